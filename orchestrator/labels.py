@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
-from .names import Target
 from .plan import Override, Plan
 
 
@@ -43,17 +40,6 @@ def with_changes(title: str, changes: Iterable[Override]) -> str:
     """Return a title in one line, followed by the overrides."""
     words = changed(changes)
     return f"{title} (changed: {words})" if words and title else f"changed: {words}" if words else title
-
-
-def changes_in(run: Mapping[str, Any]) -> tuple[Override, ...]:
-    """Return the overrides in a run record."""
-    items, found = run.get("changes"), []
-    for item in items if isinstance(items, list) else ():
-        if isinstance(item, dict) and "place" in item:
-            with contextlib.suppress(ValueError):  # the record was edited
-                target = Target.parse(str(item["place"]))
-                found.append(Override(target, item.get("value", ""), str(item.get("origin", ""))))
-    return tuple(found)
 
 
 def changes_of_all(every: Sequence[Sequence[Override]]) -> tuple[Override, ...]:

@@ -67,12 +67,12 @@ class Run:
     @property
     def title(self) -> str:
         """The scenario's title."""
-        return str(self.results.run.get("title") or "")
+        return self.results.record.title or ""
 
     @property
     def record(self) -> dict[str, Any]:
         """Everything needed to repeat the run: run.json."""
-        return self.results.run
+        return self.results.record.content()
 
     @property
     def remarks(self) -> list[str]:
@@ -81,12 +81,12 @@ class Run:
         >>> base.set({"speed": 300}).run().remarks[0]
         "driver.target_speed: 300 m/s is 1080 km/h; did you mean '300 km/h'?"
         """
-        return remarks_of(findings_in(self.record))
+        return remarks_of(findings_in(self.results.record))
 
     @property
     def changes(self) -> list[dict[str, Any]]:
         """What was other than in the scenario file, each with place, value and origin."""
-        return list(self.record.get("changes", ()))
+        return [one.model_dump() for one in self.results.record.changes]
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Return a column, shape (rows,): `unit.variable`, or the only variable of that name."""

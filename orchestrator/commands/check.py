@@ -261,7 +261,7 @@ def _fault_rows(plan: Plan) -> Iterable[Sequence[str]]:
     from ..results.run_record import faults_of
 
     for fault in faults_of(plan):
-        yield fault["on"], fault["fault"], ", ".join(fold(fault["at"]))
+        yield fault.on, fault.fault, ", ".join(fold(fault.at))
 
 
 def _scaled(wire: Wire) -> str:

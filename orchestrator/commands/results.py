@@ -151,7 +151,7 @@ def animate(sources: RunSources, wishes: RunOptions, label: Labels = None, out: 
     """
     from ..errors import ResultsError, ScenarioError
     from ..files import write_whole
-    from ..labels import changed_each, changes_in
+    from ..labels import changed_each
     from ..pages.animation import MOST, page
     from ..results.read import load_results
     from .progress import say
@@ -163,7 +163,7 @@ def animate(sources: RunSources, wishes: RunOptions, label: Labels = None, out: 
     folders = recorded(sources, wishes)
     runs = list(zip(labels_of(folders, label), map(load_results, folders), strict=True))
     titles = [results.record.title or name for name, results in runs]
-    changed = changed_each([(name, changes_in(results.run)) for name, results in runs])
+    changed = changed_each([(name, results.record.overrides) for name, results in runs])
     if len(runs) == 1:
         text = page(runs, title=titles[0], changed=changed)
     else:
@@ -194,7 +194,7 @@ def diff(one: One, other: Other) -> None:
     pass
 
     first, second = load_results(one), load_results(other)
-    found, parted = differences(first.run, second.run), divergence(first, second)
+    found, parted = differences(first.record, second.record), divergence(first, second)
     if found:
         print_tables([differences_table(found, *distinct([one, other]))])
     if parted.partings or parted.notes:

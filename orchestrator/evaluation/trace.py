@@ -39,7 +39,7 @@ from vocabulary.signals import SIGNALS
 
 from ..errors import ResultsError, ScenarioError
 from ..files import reads
-from ..labels import changes_in, with_changes
+from ..labels import with_changes
 from ..messages import hint, listed
 from ..metrics.measures import si_of
 from ..metrics.run_metrics import columns_of
@@ -231,7 +231,7 @@ def trace_of(results: Results, label: str = "") -> Trace:
         _friction(results, fmus, told),
         facts,
         results.folder,
-        with_changes(results.record.title or "", changes_in(results.run)),
+        with_changes(results.record.title or "", results.record.overrides),
     )
 
 

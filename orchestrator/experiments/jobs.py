@@ -271,7 +271,7 @@ def measured(results: Results, metrics: MetricRequests, test: TestRequest | None
         values[key] = None if value is None or short else (value.number, value.unit)
     if test:
         values |= _judged(results, *test)
-    kinds = dict.fromkeys(one.kind for one in findings_in(results.run) if one.time is not None)
+    kinds = dict.fromkeys(one.kind for one in findings_in(results.record) if one.time is not None)
     return MeasuredRun(values, findings=tuple(kinds), ended=results.ended)
 
 

@@ -66,10 +66,8 @@ class ExperimentResult:
         """Name and SHA-256 of the FMUs of all runs, from the plans or else from the run records; sorted."""
         if self.planned:
             return sorted((fmu.name, digest) for digest, fmu in self.planned.fmus.items())
-        recorded = (fmu for one in self.results.values() for fmu in one.run.get("fmus", {}).values())
-        return sorted(
-            {(str(fmu["name"]), str(fmu["sha256"])) for fmu in recorded if {"name", "sha256"} <= set(fmu)}
-        )
+        recorded = (fmu for one in self.results.values() for fmu in one.record.fmus.values())
+        return sorted({(fmu.name, fmu.sha256) for fmu in recorded if fmu.name and fmu.sha256})
 
     def words(self, case: Case) -> str:
         """Return the name of a case in messages."""

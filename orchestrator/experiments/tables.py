@@ -18,7 +18,7 @@ from ..errors import ModelDescriptionError, ScenarioError
 from ..figures.style import shown
 from ..fmu.archive import open_fmu
 from ..fmu.native import runs_as
-from ..labels import changed, changes_in, with_changes
+from ..labels import changed, with_changes
 from ..messages import printable, star
 from ..metrics.measures import catalogue as measures
 from ..metrics.measures import symbol
@@ -26,6 +26,7 @@ from ..metrics.plausibility import findings_in, first_of_each
 from ..metrics.run_metrics import STANDARD, MetricValue, columns_of, evaluate_all, metric
 from ..plan import Fmu, Plan
 from ..results.read import FoundRun, Results
+from ..results.run_record import RunRecord
 from ..scenario import catalogue, yaml_lines
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ def remarks(runs: Iterable[tuple[str, Results]]) -> list[str]:
 
 
 def _remarkable(results: Results) -> str:
-    found = [one for one in findings_in(results.run) if one.time is not None]
+    found = [one for one in findings_in(results.record) if one.time is not None]
     return "; ".join(one.says for one in first_of_each(found))
 
 
@@ -111,7 +112,7 @@ def metrics_of_run(results: Results, names: Sequence[str]) -> Table:
     rows: list[Sequence[Cell]] = [
         [metric(name).title, metric(name).formula, value] for name, value in values.items()
     ]
-    title = with_changes(str(results.run.get("title") or results.folder), changes_in(results.run))
+    title = with_changes(results.record.title or str(results.folder), results.record.overrides)
     missing = [name for name in names if name not in values]
     notes = [f"No number for {', '.join(missing)}."] if missing else []
     return Table(title, ["metric", "", "value"], rows, notes)
@@ -127,11 +128,11 @@ def runs_table(runs: Sequence[FoundRun]) -> Table:
     headings = ["run", "begun", "scenario", "changed", "status", *(one.formula for one in peaks)]
     table = Table("", headings)
     for run in runs:
-        file = Path(str((run.record.get("scenario") or {}).get("file") or ""))
+        file = Path(run.record.scenario_file)
         scenario = "/".join([*file.parts[-2:-1], file.stem])
         cells: list[Cell] = [
-            str(run.folder), _local(run.record.get("started")), scenario or None,
-            changed(changes_in(run.record)) or None, run.status, *(_peak(run.record, s) for s in PEAKS),
+            str(run.folder), _local(run.record.started), scenario or None,
+            changed(run.record.overrides) or None, run.status, *(_peak(run.record, s) for s in PEAKS),
         ]  # fmt: skip
         table.rows.append(cells)
     table.notes = [f"{run.folder}: {_one_line(run.problem)}" for run in runs if run.problem]
@@ -146,13 +147,13 @@ def _local(started: Any) -> str | None:
         return None
 
 
-def _peak(record: dict[str, Any], signal: str) -> MetricValue | None:
+def _peak(record: RunRecord, signal: str) -> MetricValue | None:
     """Return the peak of a signal from the run record, without reading the results."""
-    units = {name: unit or "" for name, unit in (record.get("units") or {}).items()}
+    units = {name: unit or "" for name, unit in record.units.items()}
     columns = {name: np.empty(0) for name in units if name != "time"}
     found = columns_of(Results(Path(), np.empty(0), columns, units, record), signal)
-    ends = [record.get(end, {}).get(name) for name in found for end in ("smallest", "largest")]
-    numbers = [float(end) for end in ends if isinstance(end, (int, float, str))]
+    ends = [of_column.get(name) for name in found for of_column in (record.smallest, record.largest)]
+    numbers = [float(end) for end in ends if end is not None]
     if not numbers or any(map(math.isnan, numbers)):
         return None
     return MetricValue(max(map(abs, numbers)), units[found[0]] or "1")

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ResultsError
-from ..labels import changed_each, changes_in
+from ..labels import changed_each
 from .panels import SPAN, Panel, in_legend, shown_by, spans_of
 from .style import REFERENCE, ROW, LabelledRun, digits_of, frame, line_style, new_figure, reference_words
 
@@ -125,7 +125,7 @@ def title_of(runs: Sequence[LabelledRun]) -> str:
 
 def changes_of(runs: Sequence[LabelledRun]) -> str:
     """Return the overrides of the runs' scenarios, in words."""
-    return changed_each([(run.label, changes_in(run.results.run)) for run in runs])
+    return changed_each([(run.label, run.results.record.overrides) for run in runs])
 
 
 def provenance(runs: Sequence[LabelledRun]) -> str:

@@ -18,8 +18,6 @@ from typing import Any
 OK, WARNING, DISCARD, ERROR, FATAL, PENDING, UNKNOWN = range(7)
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending", "a status that FMI does not have")
 
-WRITTEN = 100
-"""Warnings written into run.json; further ones are only counted."""
 KEPT = 1000
 """Messages kept per instance; further ones are only counted."""
 LONGEST = 10_000
@@ -114,17 +112,6 @@ class Log:
             if m.status == WARNING or (m.instance != ended_by and m.category != "traceback")
         )
         return sorted(chosen, key=lambda m: m.category != MASTER)
-
-    def record(self, ended_by: str | None = None) -> dict[str, Any]:
-        """Return the warnings as they appear in run.json (see `warnings`)."""
-        warnings = list(self.warnings(ended_by))
-        return {
-            "warnings": [
-                {"unit": m.instance, "time": m.time, "status": STATUS[m.status], "text": m.text}
-                for m in warnings[:WRITTEN]
-            ],
-            "more_warnings": max(0, len(warnings) - WRITTEN) + self.dropped,
-        }
 
 
 def describe(unit: str, what: str, time: float, status: int, log: Log) -> str:

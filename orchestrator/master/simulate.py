@@ -10,7 +10,6 @@ import uuid
 from dataclasses import asdict, dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import Any
 
 from ..errors import (
     KEPT,
@@ -30,13 +29,15 @@ from ..results.formats import recorder_of
 from ..results.freshness import key_of
 from ..results.read import Results
 from ..results.recorder import Recorder
-from ..results.run_record import run_record
+from ..results.run_record import EndRecord, ErrorRecord, FindingRecord, WarningRecord, run_record
 from .child_run import ChildRun, can_be_apart
 from .fmi import open_unit
-from .log import Log, Message
+from .log import STATUS, Log, Message
 from .process_state import StopFlag, interrupts
 from .run_loop import OpenInstance, RunLoop, RunProgress
 
+WRITTEN = 100
+"""Warnings written into run.json; further ones are only counted."""
 IN_MEMORY = 16 * 10**9
 """Largest size of results kept in memory [B]; chosen: the memory of a desktop computer."""
 
@@ -48,7 +49,7 @@ class RunInfo:
     folder: Path
     rows: int
     columns: int
-    id: str  # unique, also in run.json, to identify the run that a folder's results belong to
+    id: str | None  # unique, also in run.json, to identify the run that a folder's results belong to
     wall_time: float  # of initialization and stepping [s]
     passes: int  # of initialization
     warnings: list[Message] = field(default_factory=list)
@@ -96,7 +97,7 @@ def simulate(
         Path(out),
         recorder.written,
         len(plan.record),
-        run.id,
+        run.record.id,
         run.wall_time,
         run.course.passes,
         list(run.log.warnings()),
@@ -150,15 +151,14 @@ class Simulation:
         self.watch = PlausibilityWatch(plan)
         recorder.looks.append(self.watch.look)
         self.log = Log()
-        self.id = uuid.uuid4().hex[:12]
-        self._key = key_of(plan)
+        self.record = run_record(plan, status=RUNNING, started=datetime.now(timezone.utc))
+        self.record.id, self.record.key = uuid.uuid4().hex[:12], key_of(plan)
         self._apart = apart
         self._stop = StopFlag()
         course = ChildRun if apart else RunLoop
         self.course: RunLoop = course(plan, recorder, self.log, self._stop, progress)
         self._saved = False
         self._ended_by: str | None = None  # instance
-        self._started = datetime.now(timezone.utc)
         self._began = time.perf_counter()
         self._saving = False
 
@@ -170,7 +170,7 @@ class Simulation:
         """Make the run; write results and record however it ends, before the instances are freed."""
         with interrupts(self._stop, self._abandon):
             try:
-                self.recorder.announce(self._recorded(RUNNING))
+                self.recorder.announce(self.record)
                 try:
                     self.course.go(opener)
                 except BaseException as error:
@@ -218,20 +218,17 @@ class Simulation:
         """Write the record of the run and put the results in place."""
         self._saving = True
         self._ended_by = getattr(error, "instance", None)
-        ended: dict[str, Any] = {
-            "wall_time": self.wall_time,
-            "loop": self.course.loop,
-            "error": self._explained(error),
-            "units_freed": False,
-            "findings": [asdict(one) for one in (*self.plan.findings, *self.watch.findings())],
-        }
-        if self.course.ended is not None:
-            ended["ended"] = {
-                "unit": self.course.ended.instance,
-                "time": self.course.ended.time,
-                "message": str(self.course.ended),
-            }
-        record = self._recorded(status) | self.log.record(self._ended_by) | ended
+        record, ended = self.record, self.course.ended
+        record.status = status
+        record.wall_time, record.loop = self.wall_time, self.course.loop
+        record.error = self._explained(error)
+        record.units_freed = False
+        record.findings = [
+            FindingRecord(**asdict(one)) for one in (*self.plan.findings, *self.watch.findings())
+        ]
+        if ended is not None:
+            record.ended = EndRecord(unit=ended.instance, time=ended.time, message=str(ended))
+        self._note_warnings()
         self.recorder.finish(record)
         self._saved, self._saving = True, False
 
@@ -240,24 +237,28 @@ class Simulation:
         try:
             self.course.end()
         finally:
-            freed = {**self.log.record(self._ended_by), "units_freed": True}
-            self.recorder.close(freed if self._saved else None)
+            if self._saved:
+                self._note_warnings()
+                self.record.units_freed = True
+            self.recorder.close(self.record if self._saved else None)
 
-    def _recorded(self, status: str) -> dict[str, Any]:
-        return {
-            "id": self.id,
-            "key": self._key,
-            **run_record(self.plan, status=status, started=self._started),
-        }
+    def _note_warnings(self) -> None:
+        """Set the warnings of the record to those logged so far."""
+        warnings = list(self.log.warnings(self._ended_by))
+        self.record.warnings = [
+            WarningRecord(unit=m.instance, time=m.time, status=STATUS[m.status], text=m.text)
+            for m in warnings[:WRITTEN]
+        ]
+        self.record.more_warnings = max(0, len(warnings) - WRITTEN) + self.log.dropped
 
-    def _explained(self, error: BaseException | None) -> dict[str, Any] | None:
+    def _explained(self, error: BaseException | None) -> ErrorRecord | None:
         if error is None:
             return None
         unit = getattr(error, "instance", None)
-        return {
-            "message": str(error) or type(error).__name__,
-            "unit": unit,
-            "time": getattr(error, "time", None),
-            "inputs": self.course.inputs_of(unit) if unit else {},
-            "traceback": self.log.tracebacks(unit) if unit else [],
-        }
+        return ErrorRecord(
+            message=str(error) or type(error).__name__,
+            unit=unit,
+            time=getattr(error, "time", None),
+            inputs=self.course.inputs_of(unit) if unit else {},
+            traceback=self.log.tracebacks(unit) if unit else [],
+        )

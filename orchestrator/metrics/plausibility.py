@@ -7,10 +7,9 @@ the run. None is an error: a car without control does spin.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
-from typing import Any
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from vocabulary.gravity import G
 from vocabulary.wheels import WHEEL_NAMES, wheels
 
 from ..plan import Finding, Plan
+from ..results.run_record import RunRecord
 from .run_metrics import columns_of, results_to_be
 
 SignalArrays = Sequence[np.ndarray]
@@ -187,15 +187,11 @@ def _highest_friction(plan: Plan) -> float | None:
     return max(known, default=0.0) or None if not varies else None
 
 
-def findings_in(run: Mapping[str, Any]) -> tuple[Finding, ...]:
+def findings_in(record: RunRecord) -> tuple[Finding, ...]:
     """Return the findings in a run record."""
-    given = run.get("findings")
     return tuple(
-        Finding(
-            str(one["kind"]), one.get("place"), one.get("value"), one.get("time"), str(one.get("says", ""))
-        )
-        for one in (given if isinstance(given, list) else ())
-        if isinstance(one, dict) and "kind" in one
+        Finding(one.kind, one.place, None if one.value is None else float(one.value), one.time, one.says)
+        for one in record.findings
     )
 
 

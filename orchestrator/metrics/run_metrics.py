@@ -270,13 +270,13 @@ def evaluate(results: Results, chosen: Metric, window: TimeWindow | None = None)
 def results_to_be(plan: Plan) -> Results:
     """Return results without rows that have the columns which a plan will record."""
     from ..results.read import Results
-    from ..results.run_record import connections_of
+    from ..results.run_record import FmuRecord, RunRecord, connections_of
 
     units = {unit.name: unit for unit in plan.instances}
     variables = {f"{u}.{name}": units[u].fmu.variables[name] for u, name in plan.record}
     columns = {name: np.empty(0, float if v.type != "String" else str) for name, v in variables.items()}
-    names = {name: {"name": unit.fmu.name} for name, unit in units.items()}
-    run = {"fmus": names, "connections": connections_of(plan)}
+    fmus = {name: FmuRecord(name=unit.fmu.name, role=unit.role) for name, unit in units.items()}
+    run = RunRecord(fmus=fmus, connections=connections_of(plan))
     return Results(Path(), np.empty(0), columns, {n: v.unit or "" for n, v in variables.items()}, run)
 
 

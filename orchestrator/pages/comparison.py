@@ -7,7 +7,7 @@ records, `comparison_facts` what a page on several runs shows.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -18,12 +18,13 @@ from vocabulary.wheels import WHEELS
 from ..experiments.outcome import ExperimentResult
 from ..experiments.tables import Table, marked, remarks
 from ..figures.style import LabelledRun, digits_of, shown, shown_unit
-from ..labels import changed, changes_in
+from ..labels import changed
 from ..messages import counted, star
 from ..metrics.measures import variable_of
 from ..metrics.run_metrics import MetricValue, metric
 from ..names import SignalName
 from ..results.read import Results
+from ..results.run_record import RunRecord
 from .page_parts import PageFigure, figure_of
 
 SAME = 1e-9
@@ -80,7 +81,7 @@ def divergence(one: Results, other: Results) -> RunComparison:
         if parting is not None:
             known = found.get(parting.signal)
             found[parting.signal] = parting if known is None else _together(known, parting)
-    order = {unit: i for i, unit in enumerate(one.run.get("evaluation_order", []))}
+    order = {unit: i for i, unit in enumerate(one.record.evaluation_order)}
     ranked = sorted(
         found.values(), key=lambda p: (p.first, order.get(SignalName.parse(p.signal).instance, len(order)))
     )
@@ -103,7 +104,9 @@ def _parting(
         if not unlike.size:
             return None
         first = float(time[unlike[0]])
-        return SignalDifference(star(name), targets_of(run.run, name), first, first, float("nan"), first, "")
+        return SignalDifference(
+            star(name), targets_of(run.record, name), first, first, float("nan"), first, ""
+        )
     with np.errstate(invalid="ignore"):
         apart = np.abs(a - b)
     apart = np.where(np.isnan(a) & np.isnan(b), 0.0, np.where(np.isnan(apart), np.inf, apart))
@@ -117,7 +120,7 @@ def _parting(
     largest = int(np.argmax(apart))
     return SignalDifference(
         signal=star(name) if name[-2:] in WHEELS else name,
-        targets=targets_of(run.run, name),
+        targets=targets_of(run.record, name),
         first=float(time[unlike[0]]),
         seen=float(time[visible[0]]) if visible.size else None,
         largest=float(apart[largest]),
@@ -137,9 +140,9 @@ def _together(one: SignalDifference, other: SignalDifference) -> SignalDifferenc
     )  # fmt: skip
 
 
-def targets_of(run: Mapping[str, Any], signal: str) -> tuple[str, ...]:
+def targets_of(record: RunRecord, signal: str) -> tuple[str, ...]:
     """Return the instances that a recorded signal is connected to, taken from the run record."""
-    fed = (SignalName.parse(wire["to"]) for wire in run.get("connections", []) if wire["from"] == signal)
+    fed = (SignalName.parse(wire.target) for wire in record.connections if wire.source == signal)
     return tuple(dict.fromkeys(name.instance for name in fed))
 
 
@@ -155,7 +158,7 @@ class RecordDifference(NamedTuple):
     other: Any
 
 
-def differences(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[RecordDifference]:
+def differences(one: RunRecord, other: RunRecord) -> list[RecordDifference]:
     """Return what differs between the records of two runs: scenario, instances, wires, versions."""
     first, second = dict(_facts(one)), dict(_facts(other))
     exchanged = tuple(f"{unit}." for unit in _names(one) if _names(one)[unit] != _names(other).get(unit))
@@ -168,30 +171,28 @@ def differences(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[Record
     ]
 
 
-def _names(run: Mapping[str, Any]) -> dict[str, Any]:
-    return {unit: fmu.get("name") for unit, fmu in run.get("fmus", {}).items()}
+def _names(record: RunRecord) -> dict[str, str]:
+    return {unit: fmu.name for unit, fmu in record.fmus.items()}
 
 
-def _facts(run: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+def _facts(record: RunRecord) -> Iterator[tuple[str, Any]]:
     """Yield location and value of all entries of a record that are compared."""
-    scenario = run.get("scenario", {})
-    yield "scenario", scenario.get("file")
-    yield "vehicle file", scenario.get("vehicle")
-    yield "changed", changed(changes_in(run)) or None
+    yield "scenario", record.scenario.get("file")
+    yield "vehicle file", record.scenario.get("vehicle")
+    yield "changed", changed(record.overrides) or None
     for key in OF_RUN:
-        yield key, run.get(key)
-    for unit, fmu in run.get("fmus", {}).items():
-        yield unit, f"{fmu.get('name')} ({str(fmu.get('sha256', ''))[:8]})"
-        yield f"{unit}.step_size", fmu.get("step_size")
-        for kind in ("defaults", "parameters", "constants"):
-            for name, value in fmu.get(kind, {}).items():
+        yield key, getattr(record, key) if key in record.model_fields_set else None
+    for unit, fmu in record.fmus.items():
+        yield unit, f"{fmu.name} ({fmu.sha256[:8]})"
+        yield f"{unit}.step_size", fmu.step_size
+        for values in (fmu.defaults, fmu.parameters, fmu.constants):
+            for name, value in values.items():
                 yield f"{unit}.{name}", value
-    for wire in run.get("connections", []):
-        text = wire if isinstance(wire, str) else f"{wire.get('from')} -> {wire.get('to')}"
-        yield text, "connected"
-    for fault in run.get("faults", []):
-        yield f"fault of {fault.get('on')}", fault.get("fault")
-    yield from run.get("versions", {}).items()
+    for wire in record.connections:
+        yield f"{wire.source} -> {wire.target}", "connected"
+    for fault in record.faults:
+        yield f"fault of {fault.on}", fault.fault
+    yield from record.versions.items()
 
 
 def differences_table(found: list[RecordDifference], one: str, other: str) -> Table:

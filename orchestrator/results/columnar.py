@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from ..plan import Value
 from .formats import plain, recorder_of
 from .read import Results
 from .recorder import BLOCK, Recorder, RowBlock
+from .run_record import RunRecord
 
 
 class Columns:
@@ -70,20 +70,19 @@ class MemoryRecorder(RowBlock):
     def _take(self, block: np.ndarray, others: list[list[Value]]) -> None:
         self._columns.add(block, others)
 
-    def finish(self, run: dict[str, Any]) -> None:
+    def finish(self, record: RunRecord) -> None:
         """Make `results` from the rows written so far."""
         time, *values = (plain(array) for array in self._columns.arrays())
         units = {name: self.units.get(name) or "" for name in ("time", *self.columns)}
-        record = {**run, "rows": self.written, **self.extremes()}
+        record.rows = self.written
+        record.smallest, record.largest = self.extremes()
         self.results = Results(Path(), time, dict(zip(self.columns, values, strict=True)), units, record)
 
-    def announce(self, run: dict[str, Any]) -> None:
+    def announce(self, record: RunRecord) -> None:
         """Do nothing: there are no files."""
 
-    def close(self, run: dict[str, Any] | None = None) -> None:
-        """Update the run record with what has changed since `finish`."""
-        if self.results is not None:
-            self.results.run.update(run or {})
+    def close(self, record: RunRecord | None = None) -> None:
+        """Do nothing: there are no files."""
 
 
 class ColumnRecorder(Recorder):
@@ -126,6 +125,6 @@ def write_results(results: Results, folder: Path, *, format: str = "csv") -> Non
             recorder.lay(block)
             recorder.others += [list(row) for row in others[first : first + len(block)]]
             recorder.write(len(block))
-        recorder.finish(results.run)
+        recorder.finish(results.record.model_copy())
     finally:
         recorder.close()

@@ -8,21 +8,27 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
 from dataclasses import astuple
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from .. import checksums
 from ..cache import OF_RESULTS, sources_hash
 from ..checksums import checksum
 from ..errors import ResultsError
 from ..plan import Plan
 from .folder import COMPLETED, RUN_FILE, is_dead
-from .formats import RESULTS_FILE
 from .read import load_results
-from .run_record import PROGRAMS, connections_of, load_record, run_record, units_of, version_of
+from .run_record import (
+    PROGRAMS,
+    FmuRecord,
+    RunRecord,
+    connections_of,
+    load_record,
+    run_record,
+    units_of,
+    version_of,
+)
 
 
 def key_of(plan: Plan, also: Any = None) -> str:
@@ -44,7 +50,7 @@ def key_of(plan: Plan, also: Any = None) -> str:
         "series": [
             [u.name, name, s.sha256, s.column, s.held] for u in plan.instances for name, s in u.series.items()
         ],
-        "wires": connections_of(plan),
+        "wires": [wire.model_dump(by_alias=True, exclude_unset=True) for wire in connections_of(plan)],
         "faults": [list(astuple(signal)) for signal in plan.faults],
         "record": plan.record,
         "time": [str(plan.start), str(plan.step), plan.n_steps],
@@ -86,18 +92,18 @@ def staleness(plan: Plan, folder: Path) -> str | None:
         recorded = load_record(folder)
     except ResultsError as error:
         return "the last run has died" if is_dead(folder) else str(error)
-    if recorded.get("status") != COMPLETED:
+    if recorded.status != COMPLETED:
         return "the run did not reach its end"
-    results = folder / str(recorded.get("results", RESULTS_FILE))
+    results = folder / recorded.results
     if not results.is_file():
         return "the results are missing"
     if not _whole(results, recorded):
         return "the results were changed or cut off"
-    if recorded.get("key") != key_of(plan):
+    if recorded.key != key_of(plan):
         return _reason(plan, recorded)
-    if recorded.get("units") != units_of(plan):
+    if recorded.units != units_of(plan):
         return "the units of its record are not those of the FMUs"
-    return None if checksums.has_checksums(recorded) else "the record has no checksums"
+    return None if recorded.has_checksums else "the record has no checksums"
 
 
 def altered(folder: Path) -> str:
@@ -106,40 +112,39 @@ def altered(folder: Path) -> str:
         return ""
     try:
         recorded = load_record(folder)
-        results = folder / str(recorded.get("results", RESULTS_FILE))
+        results = folder / recorded.results
         if results.is_file() and not _whole(results, recorded):
             return f"{results}: was changed or cut off"
     except ResultsError as error:
         return str(error)
-    return "" if checksums.has_checksums(recorded) else f"{folder / RUN_FILE}: has no checksums"
+    return "" if recorded.has_checksums else f"{folder / RUN_FILE}: has no checksums"
 
 
-def _reason(plan: Plan, recorded: Mapping[str, Any]) -> str:
+def _reason(plan: Plan, recorded: RunRecord) -> str:
     """Return in words why the key of a record differs from that of a plan."""
-    planned = run_record(plan, status="completed", started=datetime.now(timezone.utc))
-    wanted = json.loads(json.dumps(planned, default=str))
+    planned = run_record(plan, status=COMPLETED, started=datetime.now(timezone.utc))
     for key, sentence in COMPARED.items():
-        if recorded.get(key) != wanted.get(key):
+        if getattr(recorded, key) != getattr(planned, key):
             return sentence
-    for unit, fmu in wanted["fmus"].items():
-        known = recorded.get("fmus", {}).get(unit, {})
-        if known.get("sha256") != fmu["sha256"]:
-            return f"{unit}: another {fmu['name']}.fmu"
+    for unit, fmu in planned.fmus.items():
+        known = recorded.fmus.get(unit, FmuRecord())
+        if known.sha256 != fmu.sha256:
+            return f"{unit}: another {fmu.name}.fmu"
         for key, words in _OF_UNIT.items():
-            if known.get(key) != fmu.get(key):
+            if getattr(known, key) != getattr(fmu, key):
                 return f"{unit}: other {words}"
-    earlier = recorded.get("versions", {})
     for program in (*PROGRAMS, "orchestrator"):
-        if earlier.get(program) != (version := wanted["versions"][program]):
-            return f"{program} {version} in place of {earlier.get(program, 'an unknown one')}"
+        version, earlier = planned.versions[program], recorded.versions.get(program, "an unknown one")
+        if version != earlier:
+            return f"{program} {version} in place of {earlier}"
     return "its record is of an earlier kind"
 
 
-def _whole(results: Path, recorded: Mapping[str, Any]) -> bool:
+def _whole(results: Path, recorded: RunRecord) -> bool:
     """Return whether a results file is unchanged since its run wrote it."""
     try:
-        if known := recorded.get("checksum"):
-            return known == checksum(results)
-        return load_results(results.parent).time.size >= recorded.get("rows", 0)
+        if recorded.checksum:
+            return recorded.checksum == checksum(results)
+        return load_results(results.parent).time.size >= recorded.rows
     except (OSError, ResultsError):
         return False

@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import ResultsError
-from ..labels import changes_in, with_changes
+from ..labels import with_changes
 from .columnar import ColumnRecorder
 from .csv_file import column_of, values_of
 from .formats import FILES, asammdf, plain
+from .run_record import RunRecord
 
 UNIT = b"unit"
 """Key of the measurement unit in a field's metadata."""
@@ -56,7 +57,7 @@ class ParquetRecorder(ColumnRecorder):
             self._lost = error
             raise
 
-    def _complete(self, run: dict[str, Any]) -> None:
+    def _complete(self, record: RunRecord) -> None:
         if self._lost is not None:  # a file with a gap is useless
             raise ResultsError(self._lost.problems)
         if self._columns.rows or self._writer is None:
@@ -103,7 +104,7 @@ class MdfRecorder(ColumnRecorder):
 
     file = FILES["mf4"]
 
-    def _complete(self, run: dict[str, Any]) -> None:
+    def _complete(self, record: RunRecord) -> None:
         package = asammdf()
         time, *columns = self._columns.arrays()
         signals = [
@@ -113,11 +114,11 @@ class MdfRecorder(ColumnRecorder):
             for name, array in zip(self.columns, columns, strict=True)
         ]
         with package.MDF(version="4.10") as mdf:
-            if run.get("started"):
-                mdf.header.start_time = datetime.fromisoformat(run["started"])
+            if record.started:
+                mdf.header.start_time = datetime.fromisoformat(record.started)
             mdf.append(
                 signals,
-                comment=with_changes(str(run.get("title") or ""), changes_in(run)),
+                comment=with_changes(record.title or "", record.overrides),
                 common_timebase=True,
             )
             data = io.BytesIO()

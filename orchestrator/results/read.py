@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -25,7 +24,7 @@ from ..messages import fold, listed, short
 from ..names import SignalName
 from ..scenario.quantities import conversion, measure_of
 from .folder import COMPLETED, DIED, PART, RUN_FILE, RUNNING, is_dead, unfinished
-from .formats import FILES, RESULTS_FILE, source_of
+from .formats import FILES, source_of
 from .run_record import ConnectionRecord, RunRecord, check_record, load_record, warn_if_unchecked
 
 UNREADABLE = "unreadable"
@@ -38,7 +37,7 @@ class FoundRun:
 
     folder: Path
     status: str  # "completed", "failed", "interrupted", "running", "died", or UNREADABLE
-    record: dict[str, Any]
+    record: RunRecord
     problem: str = ""  # why its results are missing or incomplete
 
 
@@ -53,7 +52,7 @@ def found_runs(folder: Path) -> list[FoundRun]:
     found = [run for place in _folders(folder) for run in _runs_in(place)]
     if not found:
         raise ResultsError(f"{folder}: holds no results; make some with 'yawbench run SCENARIO'")
-    return sorted(found, key=lambda run: (str(run.record.get("started") or ""), run.folder))
+    return sorted(found, key=lambda run: (run.record.started or "", run.folder))
 
 
 def _folders(folder: Path) -> Iterator[Path]:
@@ -71,7 +70,7 @@ def _runs_in(folder: Path) -> Iterator[FoundRun]:
         try:
             record = check_record(going, folder / f"{RUN_FILE}{PART}")
         except ResultsError:  # the run may have died before it had written its record
-            record = {}
+            record = RunRecord()
         yield FoundRun(folder, DIED if dead else RUNNING, record, "it ended without a word" if dead else "")
     if going is not None and not os.path.lexists(folder / RUN_FILE):
         return
@@ -79,10 +78,9 @@ def _runs_in(folder: Path) -> Iterator[FoundRun]:
         record = load_record(folder, settled=going is not None)
         warn_if_unchecked(record, folder)
     except ResultsError as error:
-        yield FoundRun(folder, UNREADABLE, {}, str(error))
+        yield FoundRun(folder, UNREADABLE, RunRecord(), str(error))
         return
-    problem = str((record.get("error") or {}).get("message") or "")
-    yield FoundRun(folder, str(record.get("status") or ""), record, problem)
+    yield FoundRun(folder, record.status, record, record.error.message if record.error else "")
 
 
 LONG = 200_000
@@ -141,12 +139,7 @@ class Results:
     time: np.ndarray  # shape (rows,) [s]
     columns: dict[str, np.ndarray]  # "<instance>.<variable>" -> shape (rows,)
     units: dict[str, str]  # "time" and "<instance>.<variable>" -> unit; "" if it has none
-    run: dict[str, Any]  # run.json
-
-    @cached_property
-    def record(self) -> RunRecord:
-        """The run record `run` as a typed object, created at the first access."""
-        return RunRecord.model_validate(self.run)
+    record: RunRecord  # run.json
 
     @cached_property
     def names(self) -> dict[str, SignalName]:
@@ -268,31 +261,31 @@ def load_results(
             or the last run in the folder has died.
     """
     folder = Path(folder)
-    run = load_record(folder)
-    warn_if_unchecked(run, folder)
-    name = str(run.get("results", RESULTS_FILE))
+    record = load_record(folder)
+    warn_if_unchecked(record, folder)
+    name = record.results
     if name not in FILES.values():
         known = listed(FILES.values(), last="or")
         raise ResultsError(f"{folder / RUN_FILE}: names {name!r} as the file of results; it must be {known}.")
     path = folder / name
     try:
         check_regular(path)
-        file = source_of(path, run.get("texts"))
+        file = source_of(path, record.texts)
         _check_names(file.names)
-        _check_checksum(path, run)
-        empty = _empty(folder, file.names, run)
+        _check_checksum(path, record)
+        empty = _empty(folder, file.names, record)
         columns = list(dict.fromkeys(only(empty))) if only else file.names[1:]
         blocks = _in_order(file.blocks(["time", *columns]))
         if thin:
-            blocks = thinned(blocks, ["time", *columns], run.get("rows", 0))
+            blocks = thinned(blocks, ["time", *columns], record.rows)
         time, *values = _joined(blocks, 1 + len(columns))
     except FileNotFoundError:
         raise ResultsError(f"{path}: is missing, though {RUN_FILE} is there.") from None
     except (OSError, ValueError) as error:
         raise ResultsError(f"{path}: cannot be read: {reason(error)}") from None
-    if run.get("status") == COMPLETED and not thin and time.size < run.get("rows", 0):
-        raise ResultsError(f"{path}: holds {time.size} of the {run['rows']} rows of its run; run it again.")
-    return Results(folder, time, dict(zip(columns, values, strict=True)), empty.units, run)
+    if record.status == COMPLETED and not thin and time.size < record.rows:
+        raise ResultsError(f"{path}: holds {time.size} of the {record.rows} rows of its run; run it again.")
+    return Results(folder, time, dict(zip(columns, values, strict=True)), empty.units, record)
 
 
 def _check_names(names: Sequence[str]) -> None:
@@ -303,22 +296,19 @@ def _check_names(names: Sequence[str]) -> None:
         raise ValueError(f"more than one column is called {short(twice[0])}")
 
 
-def _empty(folder: Path, names: Sequence[str], run: dict[str, Any]) -> Results:
+def _empty(folder: Path, names: Sequence[str], record: RunRecord) -> Results:
     """Return results with these columns and no rows."""
-    units = {name: str(run.get("units", {}).get(name) or "") for name in names}
-    return Results(folder, np.empty(0), {name: np.empty(0) for name in names[1:]}, units, run)
+    units = {name: record.units.get(name) or "" for name in names}
+    return Results(folder, np.empty(0), {name: np.empty(0) for name in names[1:]}, units, record)
 
 
-def _check_checksum(path: Path, run: dict[str, Any]) -> None:
+def _check_checksum(path: Path, record: RunRecord) -> None:
     """Check a results file against the checksum in its record, if there is one.
 
     Raises:
         ValueError: it is a different file, or truncated.
     """
-    known = run.get("checksum")
-    if not known:
-        return
-    if known != checksum(path):
+    if record.checksum and record.checksum != checksum(path):
         raise ValueError(
             f"it is not what its run has written (its checksum in {RUN_FILE} is another); run it again, or "
             f"remove the checksum if you have changed the file yourself"

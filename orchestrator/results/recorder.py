@@ -13,8 +13,6 @@ import csv
 import errno
 import hashlib
 import io
-import json
-import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -22,14 +20,15 @@ from typing import Any
 
 import numpy as np
 
-from ..checksums import checksum, shown, with_checksums
+from ..checksums import checksum, shown
 from ..errors import ResultsError
 from ..files import reason, write_whole
 from ..plan import Value
 from .csv_file import rows_text
-from .folder import PART, RUN_FILE, RUNNING, put_in_place, tidy
+from .folder import PART, RUN_FILE, put_in_place, tidy
 from .formats import RESULTS_FILE
 from .lock import FolderLock
+from .run_record import RunRecord
 
 BLOCK = 512
 """Rows buffered in memory before they are written."""
@@ -74,10 +73,10 @@ class RowBlock:
         """Store rows; the arrays will be overwritten after the call."""
         raise NotImplementedError
 
-    def extremes(self) -> dict[str, dict[str, float]]:
-        """Return the smallest and largest value so far of every Real column."""
+    def extremes(self) -> tuple[dict[str, float], dict[str, float]]:
+        """Return the smallest and the largest value so far of every Real column."""
         smallest, largest = (dict(zip(self._real, row.tolist(), strict=True)) for row in self._extremes)
-        return {"smallest": smallest, "largest": largest}
+        return smallest, largest
 
     def _look_at(self, rows: np.ndarray) -> None:
         """Update the extremes with a block, ignoring NaN, and pass the block to the observers."""
@@ -136,10 +135,10 @@ class Recorder(RowBlock):
             self.discard()
             raise
 
-    def announce(self, run: dict[str, Any]) -> None:
+    def announce(self, record: RunRecord) -> None:
         """Write the record of a run that is starting, so that it is there if the run dies."""
         try:
-            self._write_record({**run, "status": RUNNING})
+            write_whole(self._run_path, record.to_json())
         except OSError as error:
             self.discard()
             raise self._unwritable(error) from None
@@ -183,21 +182,21 @@ class Recorder(RowBlock):
         with contextlib.suppress(OSError):
             self._file.truncate(self._size)
 
-    def finish(self, run: dict[str, Any]) -> None:
-        """Write the run record, flush everything to disk, and give both files their final names.
+    def finish(self, record: RunRecord) -> None:
+        """Complete and write the run record, flush everything to disk, and give both files their final names.
 
         On a full disk the last rows are dropped to make room for the record, without which the others are
         useless. The folder stays locked until `close`.
         """
         try:
-            self._complete(run)
+            self._complete(record)
             os.fsync(self._file.fileno())
             try:
-                self._write_record(self._whole(run))
+                self._write_record(record)
             except OSError as error:
-                if error.errno != errno.ENOSPC or not self._make_room(len(record_text(run).encode())):
+                if error.errno != errno.ENOSPC or not self._make_room(len(record.to_json().encode())):
                     raise
-                self._write_record(self._whole(run))
+                self._write_record(record)
             self._file.close()
             self.place = self.folder / put_in_place(self._home).relative_to(self._home)
         except ResultsError:
@@ -207,33 +206,31 @@ class Recorder(RowBlock):
             self.discard()
             raise self._unwritable(error) from None
 
-    def close(self, run: dict[str, Any] | None = None) -> None:
+    def close(self, record: RunRecord | None = None) -> None:
         """Release the folder.
 
         Args:
-            run: what has changed in the record since `finish`.
+            record: the run record if it has changed since `finish`.
         """
-        if run is not None:
-            record = self._home / self.place.relative_to(self.folder) / RUN_FILE
+        if record is not None:
+            path = self._home / self.place.relative_to(self.folder) / RUN_FILE
             with contextlib.suppress(OSError):  # results and record are in place already
-                self._write_record({**self._record, **run}, record)
+                write_whole(path, record.to_json())
         self._lock.release()
 
-    def _complete(self, run: dict[str, Any]) -> None:
+    def _complete(self, record: RunRecord) -> None:
         """Write what follows the rows, if the format needs it."""
-
-    def _whole(self, run: dict[str, Any]) -> dict[str, Any]:
-        """Return a run's record completed with what only the recorder knows."""
-        file = {} if self.file == RESULTS_FILE else {"results": self.file}
-        known = {"rows": self.written, **file, "checksum": self._checksum(), **self.extremes()}
-        self._record = {**run, **known}
-        return self._record
 
     def _checksum(self) -> str:
         return checksum(self._path) if self._digest is None else shown(self._digest)
 
-    def _write_record(self, run: dict[str, Any], path: Path | None = None) -> None:
-        write_whole(path or self._run_path, record_text(run))
+    def _write_record(self, record: RunRecord) -> None:
+        """Complete a run record with what only the recorder knows, and write it."""
+        record.rows, record.checksum = self.written, self._checksum()
+        if record.results != self.file:
+            record.results = self.file
+        record.smallest, record.largest = self.extremes()
+        write_whole(self._run_path, record.to_json())
 
     def _unwritable(self, error: OSError) -> ResultsError:
         return ResultsError(f"{self.folder}: results cannot be written: {reason(error)}.")
@@ -270,21 +267,3 @@ def _order(real: Sequence[bool]) -> list[int]:
         order.append(reals if is_real else others)
         reals, others = reals + is_real, others + (not is_real)
     return order
-
-
-def record_text(run: Mapping[str, Any]) -> str:
-    """Return the JSON text of a run record, with its checksums."""
-    return json.dumps(with_checksums(_plain(run)), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def _plain(value: Any) -> Any:
-    """Return `value` as JSON can represent it: non-finite numbers become text."""
-    if isinstance(value, dict):
-        return {str(k): _plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if isinstance(value, bool) or value is None or isinstance(value, (int, str)):
-        return value
-    if isinstance(value, float):
-        return value if math.isfinite(value) else repr(value)
-    return str(value)

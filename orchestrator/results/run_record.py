@@ -1,11 +1,11 @@
 """The run record, run.json: everything needed to repeat a run and to judge it.
 
-`RunRecord` is its only definition: what a run writes has these fields, and what is read back is validated
-against them.
+`RunRecord` is its only definition: a run fills and writes it, and what is read back is validated against it.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import platform
@@ -27,18 +27,21 @@ from ..errors import ResultsError
 from ..files import read_bytes, reading, reason
 from ..fmu.native import runs_as
 from ..messages import short
-from ..plan import DEFAULT, InputSeries, Instance, Plan, Wire
+from ..plan import DEFAULT, InputSeries, Instance, Override, Plan, Wire
 from .folder import FAILED, LARGEST, RUN_FILE, refuse_dead
-from .formats import FILES
+from .formats import FILES, RESULTS_FILE
 
 PROGRAMS = ("yawbench", "fmpy", "pythonfmu", "numpy")
 """Packages that influence the numbers."""
 
 
 class _Part(BaseModel):
-    """Base of the parts of a record. Any field may be missing, and earlier versions may have written more."""
+    """Base of the parts of a record. Any field may be missing, and earlier versions may have written more.
 
-    model_config = ConfigDict(strict=True, extra="allow")
+    Only fields that are set are written, in the order of their definition.
+    """
+
+    model_config = ConfigDict(strict=True, extra="allow", populate_by_name=True)
 
 
 class SeriesRecord(_Part):
@@ -96,8 +99,8 @@ class EndRecord(_Part):
 class ConnectionRecord(_Part):
     """A wire; `gain`, `offset` and the resulting unit only if it converts."""
 
-    source: str = Field("", alias="from")
-    target: str = Field("", alias="to")
+    source: str = Field("", validation_alias="from", serialization_alias="from")
+    target: str = Field("", validation_alias="to", serialization_alias="to")
     gain: float | None = None
     offset: float = 0.0
     unit: str | None = None
@@ -113,12 +116,21 @@ class FindingRecord(_Part):
     says: str = ""
 
 
+class WarningRecord(_Part):
+    """A message of an instance that did not end the run, with its time [s] and FMI status."""
+
+    unit: str = ""
+    time: float | str = 0.0
+    status: str = ""
+    text: str = ""
+
+
 class FaultRecord(_Part):
     """A fault and the time span [s] in which it acts."""
 
     on: str
     fault: str
-    begin: float | None = Field(None, alias="from")
+    begin: float | None = Field(None, validation_alias="from", serialization_alias="from")
     until: float | None = None
     at: list[str] = []
 
@@ -128,11 +140,12 @@ class FaultRecord(_Part):
         return f"{self.on}: {self.fault}"
 
 
-class ChangeRecord(_Part):
+class OverrideRecord(_Part):
     """An override of a value of the scenario file."""
 
     place: str
     value: Any
+    origin: str = ""
 
 
 NotFinite = Literal["nan", "inf", "-inf"]
@@ -149,10 +162,7 @@ class RunRecord(_Part):
     title: str | None = None
     started: str | None = None  # ISO 8601
     wall_time: float = 0.0  # [s]
-    loop: str = ""  # that made the steps: "compiled", or "Python: " and why
     rows: NonNegativeInt = 0
-    results: str = "results.csv"  # name of the file
-    checksum: str = ""  # of that file
     algorithm: str = ""
     step_size: float = 0.0  # [s]
     start_time: float = 0.0  # [s]
@@ -162,22 +172,64 @@ class RunRecord(_Part):
     units: dict[str, str | None] = {}  # units of time and of the columns
     texts: list[str] | None = None  # columns that hold text
     fmus: dict[str, FmuRecord] = {}
-    changes: list[ChangeRecord] = []
+    changes: list[OverrideRecord] = []
     connections: list[ConnectionRecord] = []
     faults: list[FaultRecord] = []
-    findings: list[FindingRecord] = []
     scenario: dict[str, Any] = {}
     notes: list[str] = []
     versions: dict[str, str] = {}
-    warnings: list[dict[str, Any]] = []
+    warnings: list[WarningRecord] = []
     more_warnings: NonNegativeInt = 0
     units_freed: bool = False
-    smallest: dict[str, float | NotFinite] = {}
-    largest: dict[str, float | NotFinite] = {}
+    loop: str = ""  # that made the steps: "compiled", or "Python: " and why
+    findings: list[FindingRecord] = []
+    results: str = RESULTS_FILE  # name of the file
+    checksum: str = ""  # of that file
+    smallest: Mapping[str, float | NotFinite] = {}
+    largest: Mapping[str, float | NotFinite] = {}
     checksums: dict[str, str] = {}  # of the keys of the record itself; see `orchestrator.checksums`
 
+    @property
+    def overrides(self) -> tuple[Override, ...]:
+        """The overrides of the scenario file."""
+        found = []
+        for one in self.changes:
+            with contextlib.suppress(ValueError):  # the record was edited
+                found.append(Override.of(one.place, one.value, one.origin))
+        return tuple(found)
 
-def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
+    @property
+    def scenario_file(self) -> str:
+        """The path of the scenario file."""
+        return str(self.scenario.get("file") or "")
+
+    @property
+    def has_checksums(self) -> bool:
+        """Whether the record carries checksums; those of earlier versions do not."""
+        return "checksums" in self.model_fields_set
+
+    def content(self) -> dict[str, Any]:
+        """Return the content of run.json, as JSON represents it: non-finite numbers become text."""
+        return checksums.with_checksums(_plain(self.model_dump(by_alias=True, exclude_unset=True)))
+
+    def to_json(self) -> str:
+        """Return the text of run.json, with its checksums."""
+        return json.dumps(self.content(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, bool) or value is None or isinstance(value, (int, str)):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else repr(value)
+    return str(value)
+
+
+def run_record(plan: Plan, *, status: str, started: datetime) -> RunRecord:
     """Return the record of a run as known at its start: no wall time, error, rows or warnings yet.
 
     Args:
@@ -185,29 +237,31 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
         started: when the run began, with a time zone.
     """
     units = {unit.name: unit for unit in plan.instances}
-    return {
-        "status": status,
-        "error": None,
-        "title": plan.title,
-        "started": started.isoformat(timespec="seconds"),
-        "wall_time": 0.0,
-        "rows": 0,
-        "algorithm": plan.algorithm,
-        "step_size": float(plan.step),
-        "start_time": plan.time(0),
-        "stop_time": plan.time(plan.n_steps),
-        "ended": None,
-        "evaluation_order": list(units),
-        "units": units_of(plan),
-        "texts": [f"{u}.{name}" for u, name in plan.record if units[u].fmu.variables[name].type == "String"],
-        "fmus": {name: _fmu(unit, plan) for name, unit in units.items()},
-        "changes": [change.record for change in plan.changes],
-        "connections": connections_of(plan),
-        **({"faults": faults_of(plan)} if plan.faults else {}),
-        "scenario": plan.scenario,
-        "notes": list(plan.notes),
-        "versions": versions(),
-    }
+    record = RunRecord(
+        status=status,
+        error=None,
+        title=plan.title,
+        started=started.isoformat(timespec="seconds"),
+        wall_time=0.0,
+        rows=0,
+        algorithm=plan.algorithm,
+        step_size=float(plan.step),
+        start_time=plan.time(0),
+        stop_time=plan.time(plan.n_steps),
+        ended=None,
+        evaluation_order=list(units),
+        units=units_of(plan),
+        texts=[f"{u}.{name}" for u, name in plan.record if units[u].fmu.variables[name].type == "String"],
+        fmus={name: _fmu(unit, plan) for name, unit in units.items()},
+        changes=[OverrideRecord.model_validate(change.record) for change in plan.changes],
+        connections=connections_of(plan),
+        scenario=plan.scenario,
+        notes=list(plan.notes),
+        versions=versions(),
+    )
+    if plan.faults:
+        record.faults = faults_of(plan)
+    return record
 
 
 def units_of(plan: Plan) -> dict[str, str | None]:
@@ -217,56 +271,59 @@ def units_of(plan: Plan) -> dict[str, str | None]:
     return {"time": "s", **columns}
 
 
-def connections_of(plan: Plan) -> list[dict[str, Any]]:
+def connections_of(plan: Plan) -> list[ConnectionRecord]:
     """Return the wires of a plan: source, target, and the conversion if there is one."""
     units = {unit.name: unit for unit in plan.instances}
     return [_connection(wire, units) for wire in plan.wires]
 
 
-def faults_of(plan: Plan) -> list[dict[str, Any]]:
+def faults_of(plan: Plan) -> list[FaultRecord]:
     """Return the faults of a plan as the scenario states them, with their times [s] and variables."""
-    found: dict[tuple[str, str], dict[str, Any]] = {}
+    found: dict[tuple[str, str], FaultRecord] = {}
     for signal in plan.faults:
         place, says = str(signal.fault.on), str(signal.fault)
         begin, end = (t if math.isfinite(t) else None for t in (signal.fault.begin, signal.fault.end))
-        new: dict[str, Any] = {"on": place, "fault": says, "from": begin, "until": end, "at": []}
-        found.setdefault((place, says), new)["at"].append(f"{signal.instance}.{signal.variable}")
+        new = FaultRecord(on=place, fault=says, begin=begin, until=end, at=[])
+        found.setdefault((place, says), new).at.append(f"{signal.instance}.{signal.variable}")
     return list(found.values())
 
 
-def _connection(wire: Wire, units: Mapping[str, Instance]) -> dict[str, Any]:
-    ends = {"from": f"{wire.source}.{wire.output}", "to": f"{wire.target}.{wire.input}"}
-    if not wire.converts:
-        return ends
-    unit = units[wire.target].fmu.variables[wire.input].unit
-    return ends | {"gain": wire.gain, "offset": wire.offset} | ({"unit": unit} if unit else {})
+def _connection(wire: Wire, units: Mapping[str, Instance]) -> ConnectionRecord:
+    ends = ConnectionRecord(source=f"{wire.source}.{wire.output}", target=f"{wire.target}.{wire.input}")
+    if wire.converts:
+        ends.gain, ends.offset = wire.gain, wire.offset
+        if unit := units[wire.target].fmu.variables[wire.input].unit:
+            ends.unit = unit
+    return ends
 
 
-def _fmu(unit: Instance, plan: Plan) -> dict[str, Any]:
+def _fmu(unit: Instance, plan: Plan) -> FmuRecord:
     fmu = unit.fmu
-    return {
-        "name": fmu.name,
-        "role": unit.role,
-        "file": fmu.path.name,
-        "sha256": fmu.sha256,
-        "guid": fmu.guid,
-        "generation_tool": fmu.generation_tool,
-        "fmi_version": f"{fmu.fmi}.0",
-        "built": None if fmu.built is None else asdict(fmu.built),
-        "runs_as": runs_as(fmu.path),
-        "step_size": float(unit.period * plan.step),
-        "tolerance": unit.tolerance or fmu.tolerance,
-        "parameters": dict(unit.parameters),
-        "origins": {name: str(origin) for name, origin in unit.origins.items() if origin != DEFAULT},
-        # the FMU's values of the parameters that the run does not set
-        "defaults": {v.name: v.start for v in fmu.of("parameter") if v.name not in unit.parameters},
-        "constants": {name: value for name, value in unit.constants.items() if name not in unit.series},
-    } | ({"series": {name: _series(one) for name, one in unit.series.items()}} if unit.series else {})
+    record = FmuRecord(
+        name=fmu.name,
+        role=unit.role,
+        file=fmu.path.name,
+        sha256=fmu.sha256,
+        guid=fmu.guid,
+        generation_tool=fmu.generation_tool,
+        fmi_version=f"{fmu.fmi}.0",
+        built=None if fmu.built is None else asdict(fmu.built),
+        runs_as=runs_as(fmu.path),
+        step_size=float(unit.period * plan.step),
+        tolerance=unit.tolerance or fmu.tolerance,
+        parameters=dict(unit.parameters),
+        origins={name: str(origin) for name, origin in unit.origins.items() if origin != DEFAULT},
+        defaults={v.name: v.start for v in fmu.of("parameter") if v.name not in unit.parameters},
+        constants={name: value for name, value in unit.constants.items() if name not in unit.series},
+    )
+    if unit.series:
+        record.series = {name: _series(series) for name, series in unit.series.items()}
+    return record
 
 
-def _series(series: InputSeries) -> dict[str, Any]:
+def _series(series: InputSeries) -> SeriesRecord:
     how = "held" if series.held else "linear"
-    return {"file": series.file, "column": series.column, "interpolation": how, "sha256": series.sha256}
+    return SeriesRecord(file=series.file, column=series.column, interpolation=how, sha256=series.sha256)
 
 
 def versions() -> dict[str, str]:
@@ -288,7 +345,7 @@ def version_of(package: str) -> str:
         return "unknown"
 
 
-def load_record(folder: Path, *, settled: bool = False) -> dict[str, Any]:
+def load_record(folder: Path, *, settled: bool = False) -> RunRecord:
     """Read the record of the run whose results are in a folder.
 
     Args:
@@ -320,17 +377,17 @@ def load_record(folder: Path, *, settled: bool = False) -> dict[str, Any]:
         return check_record(run, file)
 
 
-def warn_if_unchecked(run: Mapping[str, Any], folder: Path) -> None:
+def warn_if_unchecked(record: RunRecord, folder: Path) -> None:
     """Warn the user of a record without checksums."""
-    if not checksums.has_checksums(run):
+    if not record.has_checksums:
         checksums.warn(
             f"{folder / RUN_FILE}: has no checksums, it is of an earlier version or was changed; "
             "its units and names are taken as they are"
         )
 
 
-def check_record(run: Any, file: Path) -> dict[str, Any]:
-    """Validate a record and return it.
+def check_record(run: Any, file: Path) -> RunRecord:
+    """Return the record with this content, after validating it.
 
     Raises:
         ResultsError: it was changed, or something in it is not what a run writes.
@@ -343,11 +400,10 @@ def check_record(run: Any, file: Path) -> dict[str, Any]:
             f"{checksums.KEY!r} if you have changed the file yourself."
         )
     try:
-        RunRecord.model_validate(run)
+        return RunRecord.model_validate(run)
     except ValidationError as errors:
         first, *others = errors.errors(include_url=False)
         place = ".".join(map(str, first["loc"]))
         more = f" ({len(others)} more like it)" if others else ""
         wrong = f"{place}: {first['msg'].lower().partition(' or instance')[0]} (got {short(first['input'])})"
         raise ResultsError(f"{file}: is not the record of a run: {wrong}{more}.") from None
-    return run

@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ..checksums import checksum
+from ..checksums import KEY, checksum
 from ..errors import ResultsError
 from ..files import open_own, reason, write_whole
 from .csv_file import CsvFile
 from .folder import DIED, PART, RUN_FILE, is_dead, is_final, is_regular, put_in_place, tidy, unfinished
 from .formats import FILES, RESULTS_FILE
 from .lock import FolderLock
-from .recorder import record_text
+from .run_record import check_record
 
 WHY = "the process of this run ended without a word"
 
@@ -42,8 +42,9 @@ def salvage(folder: Path) -> tuple[Path, int]:
         rows = _keep_whole_rows(path) if is_regular(path) else 0
         if rows:
             ended = {"status": DIED, "rows": rows, "checksum": checksum(path), "error": {"message": WHY}}
-            known = {name: value for name, value in record.items() if name != "results"}
-            write_whole(folder / f"{RUN_FILE}{PART}", record_text({**known, **ended}))
+            known = {name: value for name, value in record.items() if name not in ("results", KEY)}
+            part = folder / f"{RUN_FILE}{PART}"
+            write_whole(part, check_record(known | ended, part).to_json())
             return put_in_place(folder), rows
         tidy(folder)
         return folder, 0

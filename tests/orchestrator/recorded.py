@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from orchestrator.checksums import with_checksums
 from orchestrator.results.read import Results
-from orchestrator.results.recorder import record_text
+from orchestrator.results.run_record import RunRecord
 
 UNITS = {
     "driver.steer_angle": "rad",
@@ -35,9 +37,21 @@ def results(
     """Return results that hold the columns; units are those of a car's usual columns or as given."""
     time = np.linspace(0.0, 1.0, len(next(iter(columns.values())))) if time is None else np.asarray(time)
     known = {"time": "s", **{name: (units or UNITS).get(name, "1") for name in columns}}
-    return Results(
-        folder, time, {k: np.asarray(v, float) for k, v in columns.items()}, known, run_record(known)
-    )
+    record = RunRecord.model_validate(run_record(known))
+    return Results(folder, time, {k: np.asarray(v, float) for k, v in columns.items()}, known, record)
+
+
+def noted(made: Results, **fields: Any) -> Results:
+    """Set fields of the record as run.json has them, FMUs beside those that are there; return the results."""
+    new = RunRecord.model_validate(fields)
+    for name in fields:
+        setattr(made.record, name, made.record.fmus | new.fmus if name == "fmus" else getattr(new, name))
+    return made
+
+
+def record_text(content: dict[str, Any]) -> str:
+    """Return the text of a run.json with any content, and with its checksums."""
+    return json.dumps(with_checksums(content))
 
 
 def run_record(units: dict[str, str], title: str = "Sine at 25 m/s") -> dict[str, Any]:
@@ -85,5 +99,5 @@ def write(recorded: Results, folder: Path, **changes: Any) -> Path:
     table = np.column_stack([recorded.time, *recorded.columns.values()])
     header = ",".join(["time", *recorded.columns])
     np.savetxt(folder / "results.csv", table, fmt="%.17g", delimiter=",", header=header, comments="")
-    (folder / "run.json").write_text(record_text({**recorded.run, **changes}))
+    (folder / "run.json").write_text(record_text({**recorded.record.content(), **changes}))
     return folder

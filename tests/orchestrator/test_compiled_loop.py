@@ -210,8 +210,8 @@ def test_ctrl_c_reaches_a_walk_within_a_moment(fmus, tmp_path):
     with pytest.raises(Interrupted):
         simulate(plan, tmp_path / "out")
     assert time.monotonic() - begin < 5.0
-    record = load_results(tmp_path / "out").run
-    assert (record["status"], record["loop"]) == ("interrupted", COMPILED)
+    record = load_results(tmp_path / "out").record
+    assert (record.status, record.loop) == ("interrupted", COMPILED)
 
 
 def test_without_a_compiler_the_loop_is_in_python(tmp_path, monkeypatch):

@@ -54,10 +54,10 @@ def test_a_failed_step_is_one_sentence_with_unit_time_and_reason(tmp_path):
     units = ramp_into(raise_at(0.5, ValueError("velocity_x must exceed 1 m/s (got 0.2)")))
     sentence, results, _ = fail(tmp_path, units, ["source.x -> target.x"])
     assert sentence == "target: step failed at t = 0.5 s: ValueError: velocity_x must exceed 1 m/s (got 0.2)"
-    assert results.run["status"] == "failed"
-    assert results.run["error"]["message"] == sentence
-    assert results.run["error"]["unit"] == "target"
-    assert results.run["error"]["time"] == 0.5
+    assert results.record.status == "failed"
+    assert results.record.error.message == sentence
+    assert results.record.error.unit == "target"
+    assert results.record.error.time == 0.5
 
 
 def test_a_failed_run_keeps_the_rows_before_and_the_inputs_of_the_failed_step(tmp_path):
@@ -65,8 +65,8 @@ def test_a_failed_run_keeps_the_rows_before_and_the_inputs_of_the_failed_step(tm
     _, results, _ = fail(tmp_path, units, ["source.x -> target.x"])
     assert results.time.tolist() == [0.0, 0.1, 0.2, 0.3, 0.4, 0.5]
     assert results["target.y"].tolist() == results["source.x"].tolist()
-    assert results.run["rows"] == 6
-    assert results.run["error"]["inputs"] == {"x": pytest.approx(6.0)}
+    assert results.record.rows == 6
+    assert results.record.error.inputs == {"x": pytest.approx(6.0)}
 
 
 def test_every_instance_is_freed_exactly_once_after_a_failure(tmp_path):
@@ -150,12 +150,12 @@ def test_an_error_after_which_a_unit_went_on_is_reported_and_not_taken_for_the_r
     opener = Opener(units, "target", answering(OK, (ERROR, "a glitch, never mind")))
     info = simulate(make_plan(units, ["source.x -> target.x"]), tmp_path, opener=opener)
     assert [(m.instance, m.time, m.text) for m in info.warnings] == [("target", 0.2, "a glitch, never mind")]
-    assert [w["status"] for w in load_results(tmp_path).run["warnings"]] == ["Error"]
+    assert [w.status for w in load_results(tmp_path).record.warnings] == ["Error"]
 
 
 def test_an_error_that_ended_the_run_is_no_warning_of_it(tmp_path):
     _, results, _ = answer(tmp_path, answering(ERROR, (WARNING, "getting warm"), (ERROR, "too hot")))
-    assert [w["text"] for w in results.run["warnings"]] == ["getting warm"]
+    assert [w.text for w in results.record.warnings] == ["getting warm"]
 
 
 def test_a_component_s_own_sentence_is_not_wrapped_in_another(tmp_path):
@@ -186,7 +186,7 @@ def test_a_warning_is_reported_and_the_run_goes_on(tmp_path):
     assert [(m.instance, m.time, m.text) for m in info.warnings] == [("target", 0.2, "getting warm")]
     results = load_results(tmp_path)
     assert len(results.time) == 11
-    assert results.run["warnings"] == [
+    assert results.record.content()["warnings"] == [
         {"unit": "target", "time": 0.2, "status": "Warning", "text": "getting warm"}
     ]
 
@@ -287,8 +287,8 @@ def test_a_value_on_no_wire_that_is_not_finite_is_a_warning_with_its_first_time(
     said = [(m.instance, m.time, m.text) for m in info.warnings]
     assert said == [("source", time, "spare is not a number; it is on no wire")]
     results = load_results(tmp_path)
-    assert results.run["status"] == "completed"
-    assert [(w["unit"], w["time"]) for w in results.run["warnings"]] == [("source", time)]
+    assert results.record.status == "completed"
+    assert [(w.unit, w.time) for w in results.record.warnings] == [("source", time)]
     assert len(results.time) == 11
     assert math.isnan(results["source.spare"][-1])
 
@@ -304,8 +304,8 @@ def test_after_a_warning_of_one_value_all_others_are_still_looked_at(tmp_path):
     }
     sentence, results, _ = fail(tmp_path, units, ["source.x -> target.x"])
     assert sentence == "source: x is infinite at t = 0.8 s, on the wire source.x -> target.x"
-    assert [w["text"].split()[0] for w in results.run["warnings"]] == ["spare", "more"]
-    assert [w["time"] for w in results.run["warnings"]] == [0.3, 0.5]
+    assert [w.text.split()[0] for w in results.record.warnings] == ["spare", "more"]
+    assert [w.time for w in results.record.warnings] == [0.3, 0.5]
 
 
 def test_a_value_on_no_wire_is_named_also_of_a_unit_that_floods_the_log(tmp_path):
@@ -352,7 +352,7 @@ def test_an_interrupted_run_ends_between_two_steps_and_keeps_its_results(number,
     status = 128 + number
     sentence, results, slaves = fail(tmp_path, units, ["source.x -> target.x"], status=status)
     assert sentence == "the run was interrupted at t = 0.6 s"
-    assert results.run["status"] == "interrupted"
+    assert results.record.status == "interrupted"
     assert results.time.tolist()[-1] == 0.6
     assert [slave.freed for slave in slaves.values()] == [1, 1]
     assert signal.getsignal(number) is before
@@ -366,7 +366,7 @@ def test_a_run_interrupted_during_initialization_has_no_rows(tmp_path):
 
     sentence, results, slaves = answer(tmp_path, Slave, status=130)
     assert sentence == "the run was interrupted during initialization"
-    assert results.run["status"] == "interrupted"
+    assert results.record.status == "interrupted"
     assert len(results.time) == 0
     assert [slave.freed for slave in slaves.values()] == [1, 1]
 
@@ -381,7 +381,7 @@ def test_a_failure_before_all_inputs_are_known_records_those_that_are(tmp_path):
     _, results, _ = fail(
         tmp_path, units, wires, opener=Opener(units, "b", Slave), constants={"b": {"flag_in": True}}
     )
-    assert results.run["error"]["inputs"] == {"x_in": "nan", "flag_in": True}
+    assert results.record.error.inputs == {"x_in": "nan", "flag_in": True}
 
 
 def test_handlers_are_restored_after_a_run(tmp_path):
@@ -400,10 +400,10 @@ def test_a_failed_run_stands_beside_the_results_of_one_that_reached_its_end(tmp_
     assert caught.value.problems[-1] == f"What was recorded until then: {tmp_path / 'failed'}"
     results = load_results(tmp_path)
     assert list(results) == ["a.x"]
-    assert results.run["status"] == "completed"
+    assert results.record.status == "completed"
     beside = load_results(tmp_path / "failed")
     assert list(beside) == ["source.x", "target.y"]
-    assert beside.run["status"] == "failed"
+    assert beside.record.status == "failed"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["failed", "results.csv", "run.json"]
 
 
@@ -418,7 +418,7 @@ def test_a_run_that_reaches_its_end_replaces_good_and_failed_results(tmp_path):
 def test_a_failed_run_replaces_the_results_of_another_that_failed(tmp_path):
     for connected in (["source.x -> target.x"], []):
         _, results, _ = fail(tmp_path, ramp_into(raise_at(0.5, ValueError("no"))), connected)
-    assert results.run["connections"] == []
+    assert results.record.connections == []
     assert sorted(p.name for p in tmp_path.iterdir()) == ["results.csv", "run.json"]
 
 
@@ -436,8 +436,8 @@ def test_results_are_whole_on_the_disk_before_a_unit_is_freed(tmp_path):
     simulate(make_plan(units, n_steps=50), tmp_path, opener=Dying(units))
     ((before, _),) = found
     assert len(before.time) == 51
-    assert before.run["status"] == "completed"
-    assert not before.run["units_freed"]
-    after = load_results(tmp_path).run
-    assert after["units_freed"]
-    assert [w["text"] for w in after["warnings"]] == ["fmi2Terminate returned Error"]
+    assert before.record.status == "completed"
+    assert not before.record.units_freed
+    after = load_results(tmp_path).record
+    assert after.units_freed
+    assert [w.text for w in after.warnings] == ["fmi2Terminate returned Error"]

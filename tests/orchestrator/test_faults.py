@@ -32,7 +32,7 @@ from orchestrator.wiring.make_plan import make_plan as plan_of_scenario
 
 from .fake_fmus import Var, make_fmu, out
 from .fakes import Clock, Function, Integrator, Stage, Witness, make_plan
-from .recorded import car
+from .recorded import car, noted
 
 ALGORITHMS = ("jacobi", "gauss_seidel", "extrapolated")
 BEGIN, END, STEP = 1.0, 2.0, 1 / 8
@@ -416,7 +416,7 @@ def test_the_record_says_what_was_faulty_and_results_are_known_to_be_of_another_
     frozen = faulty("freeze", of_output=True)
     made = make_plan(units, WIRES, faults=[frozen])
     simulate(made, tmp_path, opener=Stage(units))
-    assert load_results(tmp_path).run["faults"] == [
+    assert load_results(tmp_path).record.content()["faults"] == [
         {
             "on": "source.x",
             "fault": "freeze from 1 s until 2 s",
@@ -428,7 +428,7 @@ def test_the_record_says_what_was_faulty_and_results_are_known_to_be_of_another_
     assert staleness(made, tmp_path) is None
     assert staleness(replace(made, faults=()), tmp_path) == "the faults have changed"
     simulate(replace(made, faults=()), tmp_path / "healthy", opener=Stage(units))
-    assert "faults" not in load_results(tmp_path / "healthy").run
+    assert "faults" not in load_results(tmp_path / "healthy").record.content()
 
 
 CAMPAIGN = """\
@@ -511,7 +511,7 @@ def test_check_shows_faults_and_an_archive_says_that_it_has_none(folder, capsys)
 def test_figures_mark_when_runs_were_faulty_and_the_legend_says_how():
     healthy, broken = car(), car(1.2)
     fault = {"on": "gyro.yaw_rate", "fault": "freeze from 2 s", "from": 2.0, "until": None, "at": []}
-    broken.run["faults"] = [fault]
+    noted(broken, faults=[fault])
     figure = draw([LabelledRun("healthy", healthy), LabelledRun("broken", broken)], ["sideslip", "path"])
     legend = [text.get_text() for box in figure.legends for text in box.get_texts()]
     assert legend[-1] == "broken: gyro.yaw_rate: freeze from 2 s"

@@ -68,7 +68,7 @@ def test_models_agree_with_fmpys_own_simulation(run, tmp_path, model, parameters
     status, said, results = run({"a": (model, {"parameters": parameters})}, *isolate, stop_time=5)
     assert status == 0, said
     theirs = by_fmpy(tmp_path, model, stop_time=5, start_values=parameters)
-    assert results.run["fmus"]["a"]["fmi_version"] == "3.0"
+    assert results.record.fmus["a"].fmi_version == "3.0"
     for column in results:
         difference = np.abs(results[column] - theirs[column.removeprefix("a.")])
         assert difference.max() < 1e-12, column
@@ -153,7 +153,7 @@ def test_units_of_both_versions_share_a_scenario(run, tmp_path, library, isolate
     status, said, results = run(units, *isolate, inputs={"m.u[2]": 1.0}, connections=wires)
     assert status == 0, said
     assert results["m.y[1]"].tolist() == (2 * results["d.x"]).tolist()
-    assert [results.run["fmus"][u]["fmi_version"] for u in units] == ["3.0", "2.0", "3.0"]
+    assert [results.record.fmus[u].fmi_version for u in units] == ["3.0", "2.0", "3.0"]
 
 
 @together_and_apart
@@ -162,7 +162,7 @@ def test_an_fmu_that_wants_to_end_ends_the_run_after_its_last_step(run, isolate)
     assert status == 0, said
     assert "ended: a ended the run at t = 9 s" in said
     assert (results.time[-1], results["a.counter"][-1]) == (9.0, 10)
-    assert results.run["ended"]["time"] == 9.0
+    assert results.record.ended.time == 9.0
 
 
 @together_and_apart

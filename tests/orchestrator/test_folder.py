@@ -55,7 +55,7 @@ def names(folder):
 def test_the_record_names_the_run_that_the_results_are_of(tmp_path):
     first, second = run(tmp_path), run(tmp_path)
     assert first.id != second.id
-    assert load_results(tmp_path).run["id"] == second.id
+    assert load_results(tmp_path).record.id == second.id
 
 
 @needs_locks
@@ -78,11 +78,11 @@ def test_what_a_dead_run_recorded_can_be_salvaged(before, tmp_path):
     place, rows = salvage(tmp_path)
     assert place == (tmp_path / "failed" if before else tmp_path)
     results = load_results(place)
-    assert rows == len(results.time) == results.run["rows"] == 1024  # two whole blocks
-    assert results.run["status"] == "died"
-    assert "ended without a word" in results.run["error"]["message"]
+    assert rows == len(results.time) == results.record.rows == 1024  # two whole blocks
+    assert results.record.status == "died"
+    assert "ended without a word" in results.record.error.message
     if before:
-        assert load_results(tmp_path).run["status"] == "completed"
+        assert load_results(tmp_path).record.status == "completed"
     with pytest.raises(ResultsError, match="no run has died here; there is nothing to salvage"):
         salvage(tmp_path)
     assert not [path for path in tmp_path.rglob("*") if path.name.endswith((".part", LOCK_FILE))]
@@ -128,7 +128,7 @@ def test_the_next_run_removes_what_a_dead_one_has_left(tmp_path):
 def test_earlier_results_are_read_while_a_run_goes_on(tmp_path):
     info = run(tmp_path)
     seen = []
-    run(tmp_path, x=lambda t: seen.append(load_results(tmp_path).run["id"]) or t)
+    run(tmp_path, x=lambda t: seen.append(load_results(tmp_path).record.id) or t)
     assert set(seen) == {info.id}
 
 
@@ -170,13 +170,13 @@ def test_a_run_that_dies_while_its_files_get_their_names_is_said_and_put_in_plac
             load_results(tmp_path)
         assert "died" in [one.status for one in found_runs(tmp_path)]
         assert snapshot(tmp_path) == left
-        assert salvage(tmp_path) == (place, load_results(place).run["rows"])
+        assert salvage(tmp_path) == (place, load_results(place).record.rows)
     results = load_results(tmp_path)
     if place != tmp_path:
-        assert results.run["status"] == "completed"
+        assert results.record.status == "completed"
         assert results["a.x"][0] == 0.0
         results = load_results(place)
-    assert results.run["status"] == status
+    assert results.record.status == status
     assert results["a.x"][0] == 1.0
     assert died == (died_after < 2)
     assert not [path for path in tmp_path.rglob("*") if path.name.endswith((".part", LOCK_FILE))]
@@ -192,8 +192,8 @@ def test_the_next_run_puts_in_place_what_one_had_ended_with_before(tmp_path, mon
     assert names(tmp_path) == ["results.csv.part", "run.json.part"]
     with pytest.raises(SimulationError):
         run(tmp_path, x=lambda t: math.nan if t > 0.05 else t, wire=True)
-    assert load_results(tmp_path).run["status"] == "completed"
-    assert load_results(tmp_path / "failed").run["status"] == "failed"
+    assert load_results(tmp_path).record.status == "completed"
+    assert load_results(tmp_path / "failed").record.status == "failed"
 
 
 @needs_locks

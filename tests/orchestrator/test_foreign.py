@@ -144,9 +144,9 @@ def test_a_step_that_fails_is_a_sentence_and_the_results_so_far(run, isolate, an
     status, said, results = run(*isolate, answer=answer)
     assert status == 1
     assert "b: step failed at t = 0.25 s: valve 3 of b is 99.5% open, größer als gedacht\n" in said
-    assert results.run["status"] == "failed"
+    assert results.record.status == "failed"
     assert results.time[-1] == 0.25
-    assert results.run["error"]["inputs"] == {
+    assert results.record.error.inputs == {
         "Real_in": 1.5, "Integer_in": -42, "Boolean_in": False, "String_in": "<größer>",
     }  # fmt: skip
 
@@ -174,7 +174,7 @@ def test_a_parameter_reaches_an_fmu_that_resets_when_the_experiment_is_set_up(ru
     status, said, results = run(*isolate, answer=1, guid="{reset}")
     assert status == 0
     assert "valve 3 of b" in said
-    assert results.run["fmus"]["b"]["parameters"] == {"answer": 1}
+    assert results.record.fmus["b"].parameters == {"answer": 1}
 
 
 @together_and_apart
@@ -182,8 +182,8 @@ def test_a_parameter_that_does_not_take_ends_the_run(run, isolate):
     status, said, results = run(*isolate, answer=2, guid="{deaf}")
     assert status == 1
     assert "b: a parameter did not take the value that was set: answer is 0, not 2" in said
-    assert results.run["status"] == "failed"
-    assert results.run["error"]["unit"] == "b"
+    assert results.record.status == "failed"
+    assert results.record.error.unit == "b"
 
 
 @together_and_apart
@@ -209,7 +209,7 @@ def test_gain_and_offset_reach_units_that_declare_no_units_of_measurement(run, i
     assert status == 0, said
     assert set(results["b.Real_out"]) == {2 * (10 * 1.5 - 3)}
     assert set(results["b.Integer_out"]) == {2 * (10 * 10 - 3)}
-    assert results.run["connections"][0] == {
+    assert results.record.content()["connections"][0] == {
         "from": "a.Real_out", "to": "b.Real_in", "gain": 10.0, "offset": -3.0
     }  # fmt: skip
 
@@ -237,7 +237,7 @@ def test_text_parameters_and_inputs_are_recorded_by_name(run, isolate, form):
     assert set(results["b.answer"]) == {0}
     assert set(results["b.Integer_in"]) == {-42}
     assert set(results["b.Real_in"]) == {1.5}
-    assert results.run["rows"] == 11
+    assert results.record.rows == 11
 
 
 @together_and_apart
@@ -247,9 +247,9 @@ def test_an_fmu_that_wants_to_end_ends_the_run_in_good_order(run, isolate, guid,
     assert status == 0, said
     assert f"ended: a ended the run at t = {reached} s" in said
     assert results.time.size == rows
-    assert (results.run["status"], results.run["error"]) == ("completed", None)
-    assert results.run["ended"]["unit"] == "a"
-    assert results.run["ended"]["time"] == pytest.approx(reached)
+    assert (results.record.status, results.record.error) == ("completed", None)
+    assert results.record.ended.unit == "a"
+    assert results.record.ended.time == pytest.approx(reached)
     assert results["b.Real_out"].tolist() == [3.0] * rows
 
 
@@ -273,7 +273,7 @@ def test_start_time_and_tolerance_reach_the_fmu(run, isolate):
     assert run(*isolate, guid="{solver}", change=with_default)[2]["b.Real_out"][-1] == 1e-4
     results = run(*isolate, guid="{solver}", change=with_default, more=", tolerance: 1e-6")[2]
     assert (results["a.Real_out"][-1], results["b.Real_out"][-1]) == (1e-4, 1e-6)
-    assert results.run["fmus"]["b"]["tolerance"] == 1e-6
+    assert results.record.fmus["b"].tolerance == 1e-6
 
 
 @pytest.mark.parametrize(
@@ -304,7 +304,7 @@ def test_a_description_that_is_formally_wrong_runs_with_a_warning_if_asked_to(ru
     status, said, results = run("--no-validate", **WRONG)
     assert status == 0, said
     assert 'warning: a at t = 0 s: the model description is not valid FMI 2.0: The unit "bar"' in said
-    assert [w["unit"] for w in results.run["warnings"]] == ["a", "b"]
+    assert [w.unit for w in results.record.warnings] == ["a", "b"]
     assert results["b.Real_out"][-1] == 3.0
 
 
@@ -368,4 +368,4 @@ def test_a_foreign_unit_takes_time_series_of_every_type(run, isolate, tmp_path):
     assert results["a.Integer_out"].tolist() == [2] * 5 + [4] * 5 + [6]
     assert results["a.Boolean_out"].tolist() == [1] * 5 + [0] * 5 + [1]
     assert results["a.String_out"].tolist() == ["<x>"] * 5 + ["<y>"] * 5 + ["<z>"]
-    assert set(results.run["fmus"]["a"]["series"]) == {f"{kind}_in" for kind in given}
+    assert set(results.record.fmus["a"].series) == {f"{kind}_in" for kind in given}

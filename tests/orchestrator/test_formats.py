@@ -18,11 +18,12 @@ from orchestrator.results import parquet_and_mdf
 from orchestrator.results.columnar import MemoryRecorder
 from orchestrator.results.formats import FILES, recorder_of
 from orchestrator.results.read import load_results
-from orchestrator.results.recorder import BLOCK, record_text
+from orchestrator.results.recorder import BLOCK
+from orchestrator.results.run_record import RunRecord
 from tests.fmu_copies import put_fmus
 
 from .fakes import Clock, Function, Stage, make_plan
-from .recorded import car, write
+from .recorded import car, record_text, write
 
 COLUMNS = ["a.n", "a.x", "a.s", "a.y", "a.b"]
 REAL = [False, True, False, True, False]
@@ -47,7 +48,7 @@ def record(folder, rows, name):
     fill(writer, rows)
     units = {k: UNITS.get(k) for k in ("time", *COLUMNS)}
     started = "2024-01-02T03:04:05+00:00"
-    writer.finish({"status": "completed", "title": "Sine", "started": started, "units": units})
+    writer.finish(RunRecord(status="completed", title="Sine", started=started, units=units))
     writer.close()
     return load_results(folder)
 
@@ -76,13 +77,16 @@ def test_results_in_memory_are_those_on_disk(tmp_path):
     seen = []
     memory.looks.append(lambda rows: seen.append(len(rows)))
     fill(memory, 700)
-    memory.finish({"status": "completed", "units_freed": False})
-    memory.close({"units_freed": True})
+    run = RunRecord(status="completed")
+    memory.finish(run)
+    run.units_freed = True
+    memory.close(run)
     alike(memory.results, expected)
-    said = memory.results.run
-    assert (said["status"], said["rows"], said["units_freed"]) == ("completed", 700, True)
+    said = memory.results.record
+    assert (said.status, said.rows, said.units_freed) == ("completed", 700, True)
     for end in ("smallest", "largest"):
-        assert said[end] == {name: float(value) for name, value in expected.run[end].items()}
+        expected_of = getattr(expected.record, end)
+        assert getattr(said, end) == {name: float(value) for name, value in expected_of.items()}
     assert seen == [BLOCK, 700 - BLOCK]
 
 
@@ -146,7 +150,7 @@ def test_a_run_that_fails_keeps_what_it_has_recorded(name, tmp_path):
         simulate(plan(), tmp_path, opener=Stage(units(fail_at=0.9)), format=name)
     assert error.value.problems[1] == f"What was recorded until then: {tmp_path}"
     found = load_results(tmp_path)
-    assert found.run["status"] == "failed"
+    assert found.record.status == "failed"
     assert found.time[-1] == 0.899
 
 
@@ -229,7 +233,7 @@ def test_plot_draws_results_of_every_format(tmp_path):
             for row, values in zip(writer.rows, block, strict=False):
                 row[:] = values
             writer.write(len(block))
-        writer.finish({**recorded.run, "units": recorded.units})
+        writer.finish(recorded.record)
         writer.close()
     for name in FILES:
         main_ok(["plot", str(tmp_path / name)])

@@ -167,5 +167,5 @@ def test_a_unit_that_copies_the_process_of_its_run_ends_it_before_there_are_many
     assert "a unit (good, bad or after) had copied the process of the run (fork)" in done.stderr
     assert "Traceback" not in done.stderr
     results = load_results(tmp_path / "out")
-    assert results.run["status"] == "failed"
+    assert results.record.status == "failed"
     assert np.array_equal(results["good.y"], np.full(len(results.time), VALUES_OF["good.y"]))

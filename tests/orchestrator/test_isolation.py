@@ -125,8 +125,8 @@ def test_an_fmu_that_crashes_costs_the_run_and_not_its_results(foreign, run):
     status, said, results = run(foreign("raise(SIGSEGV);"))
     assert status == 1
     assert "controller: step failed at t = 0.05 s: its process died of SIGSEGV in fmi2DoStep\n" in said
-    assert results.run["status"] == "failed"
-    assert results.run["error"]["unit"] == "controller"
+    assert results.record.status == "failed"
+    assert results.record.error.unit == "controller"
     assert 0.049 <= results.time[-1] <= 0.052
     assert np.all(np.isfinite(results["plant.velocity_x"]))
 
@@ -164,8 +164,8 @@ def test_without_isolation_too_an_end_without_a_word_is_a_sentence_and_the_resul
     status, said, results = run(foreign(act), "--format", format_, isolate=False)
     assert status == 1
     assert f"controller: step failed at t = 0.05 s: the process of the run {did}\n" in said
-    assert results.run["status"] == "failed"
-    assert results.run["error"]["unit"] == "controller"
+    assert results.record.status == "failed"
+    assert results.record.error.unit == "controller"
     assert results.time[-1] == 0.051  # the controller takes two steps at once
     assert np.all(np.isfinite(results["plant.velocity_x"]))
 
@@ -175,7 +175,7 @@ def test_a_foreign_controller_in_c_runs_isolated_as_it_runs_together(foreign, ru
     fmu = foreign(";")
     _, _, apart = run(fmu)
     _, _, together = run(fmu, isolate=False)
-    assert apart.run["status"] == "completed"
+    assert apart.record.status == "completed"
     for name in together.columns:
         assert np.array_equal(apart[name], together[name]), name
 

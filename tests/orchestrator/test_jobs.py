@@ -88,7 +88,7 @@ def test_results_of_an_earlier_run_cannot_pass_for_new(tmp_path):
     write(car(n=5), tmp_path / "fails")
     (failed,) = execute(jobs(tmp_path, "fails"), run=obey)
     assert not failed.ok
-    assert load_results(tmp_path / "fails").run["status"] == "completed"  # nothing is lost
+    assert load_results(tmp_path / "fails").record.status == "completed"  # nothing is lost
     assert read_back(tmp_path / "fails", "of the new run") == (
         f"{tmp_path / 'fails'}: holds the results of another run than the one just made"
     )

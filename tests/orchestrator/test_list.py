@@ -7,6 +7,7 @@ from orchestrator.experiments.tables import runs_table
 from orchestrator.metrics.run_metrics import columns_for, evaluate_all
 from orchestrator.pages.comparison import differences
 from orchestrator.results.read import UNREADABLE, found_runs, load_results
+from orchestrator.results.run_record import FmuRecord, RunRecord
 from tests.fmu_copies import put_fmus
 
 from .recorded import car, write
@@ -60,7 +61,8 @@ def test_what_differs_between_two_runs_stands_in_two_tables(yawbench, tmp_path):
 
 def test_of_two_units_of_another_kind_only_shared_parameters_are_compared():
     def run(name, **parameters):
-        return {"fmus": {"controller": {"name": name, "sha256": name, "parameters": parameters}}}
+        fmu = FmuRecord(name=name, sha256=name, parameters=parameters)
+        return RunRecord(fmus={"controller": fmu})
 
     found = differences(run("pid", gain=1, limit=2), run("fuzzy", width=1, limit=3))
     assert [one.place for one in found] == ["controller", "controller.limit"]

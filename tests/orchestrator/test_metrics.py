@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,9 +12,10 @@ from orchestrator.figures.panels import LabelledRun, shown_by
 from orchestrator.figures.style import digits_of, shown, shown_unit
 from orchestrator.metrics import catalogue, measures
 from orchestrator.metrics.run_metrics import AT_A_TIME, STANDARD, MetricValue, evaluate, evaluate_all, metric
+from orchestrator.results.run_record import ConnectionRecord
 from vocabulary.wheels import WHEELS
 
-from .recorded import UNITS, car, results
+from .recorded import UNITS, car, noted, results
 
 T = np.linspace(0.0, 2.0, 20001)
 SINE = np.sin(2 * np.pi * T)
@@ -257,7 +257,7 @@ def test_the_output_that_feeds_an_input_is_the_signal_of_that_name():
         {"from": "mine.beta", "to": "driver.sideslip", "gain": np.pi / 180, "offset": 0.0, "unit": "rad"},
         {"from": "plant.yaw_rate", "to": "driver.turn", "gain": -1.0, "offset": 0.0, "unit": "rad/s"},
     ]
-    run = replace(run, run={**run.run, "connections": wires})
+    noted(run, connections=wires)
     assert evaluate(run, metric("peak(yaw_moment)")) == MetricValue(2 * T[-1], "N.m")
     assert evaluate(run, metric("peak(sideslip)")) == MetricValue(pytest.approx(np.radians(T[-1])), "rad")
     assert evaluate(run, metric("peak(turn)")) is None  # another sign is another signal
@@ -303,9 +303,9 @@ def watched():
     """Return the recorded run of such a car."""
     units = {name: "rad/s" if "rate" in name else "rad" for name in WATCHED}
     run = results(WATCHED, T, units)
-    run.run["fmus"]["gyro"] = {"name": "sensor_cluster"}
-    run.run["connections"].append({"from": "reference.sideslip_ref", "to": "controller.sideslip_ref"})
-    return run
+    wire = ConnectionRecord(source="reference.sideslip_ref", target="controller.sideslip_ref")
+    run.record.connections.append(wire)
+    return noted(run, fmus={"gyro": {"name": "sensor_cluster"}})
 
 
 @pytest.mark.parametrize(
@@ -328,7 +328,7 @@ def test_a_metric_compares_two_named_columns(name, number):
 def test_a_bare_name_never_means_what_is_only_measured_or_estimated():
     seen = results({"gyro.yaw_rate": SINE, "estimator.sideslip": SINE, "estimator.sideslip_rate": 9 * SINE,
                     "plant.sideslip": SINE}, T)  # fmt: skip
-    seen.run["fmus"] |= {"gyro": {"name": "sensor_cluster"}, "estimator": {"name": "estimator_a"}}
+    noted(seen, fmus={"gyro": {"name": "sensor_cluster"}, "estimator": {"name": "estimator_a"}})
     assert evaluate(seen, metric("peak(yaw_rate)")) is None
     assert evaluate(seen, metric("peak(gyro.yaw_rate)")).number == pytest.approx(1.0, rel=1e-4)
     of_truth = evaluate(seen, metric("phase_area(sideslip)")).number  # by the slope of the car's own

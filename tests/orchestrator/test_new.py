@@ -90,7 +90,7 @@ def beginnings(project):
 def test_a_unit_of_any_role_is_built_tested_and_run(beginnings, role, other):
     folder, made = beginnings
     run = load_results(folder / "results" / f"my_{role}" / "25mps")
-    assert run.run["fmus"][role]["name"] == f"{role}_my_{role}"
+    assert run.record.fmus[role].name == f"{role}_my_{role}"
     assert np.abs(run.find("yaw_rate")).max() > 0.01
     _, last = made[role]
     assert last[1:2] + last[-1:] == ["compare", f"{role}={other},{role}_my_{role}"]
@@ -108,8 +108,8 @@ def test_a_new_plant_moves_much_as_the_shipped_one_whose_loads_change(beginnings
 def test_a_new_vehicle_is_the_one_that_its_scenario_drives(beginnings):
     folder, _ = beginnings
     run = load_results(folder / "results" / "my_vehicle" / "25mps")
-    assert run.run["scenario"]["vehicle"] == "../vehicles/my_vehicle.yaml"
-    assert run.run["fmus"]["plant"]["parameters"]["mass"] == 1100
+    assert run.record.scenario["vehicle"] == "../vehicles/my_vehicle.yaml"
+    assert run.record.fmus["plant"].parameters["mass"] == 1100
 
 
 @pytest.mark.exhaustive

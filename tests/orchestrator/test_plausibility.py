@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -12,9 +13,10 @@ import pytest
 from orchestrator.experiments.tables import MARK, marked, remarks
 from orchestrator.metrics.plausibility import CHECKS, PlausibilityWatch, findings_in, first_of_each
 from orchestrator.plan import Finding, Fmu, Instance, Plan, Variable, Wire
+from orchestrator.results.run_record import FindingRecord, RunRecord
 from vocabulary.wheels import WHEELS
 
-from .recorded import car
+from .recorded import car, noted
 
 
 def variable(name, causality="output", unit="1", kind="Real", lowest=None, highest=None):
@@ -108,10 +110,13 @@ def test_every_check_says_where_its_limit_comes_from():
 def test_a_run_with_findings_is_marked_in_tables():
     results = car()
     assert marked("a", results) == "a"
-    results.run["findings"] = [vars(Finding("spin", "plant.sideslip", 90.0, 1.0, "the car spins"))]
+    noted(results, findings=[vars(Finding("spin", "plant.sideslip", 90.0, 1.0, "the car spins"))])
     assert marked("a", results) == f"a {MARK}"
     assert remarks([("a", results)]) == [f"{MARK} a: the car spins"]
 
 
-def test_a_record_of_another_shape_has_no_findings():
-    assert findings_in({}) == findings_in({"findings": "x"}) == findings_in({"findings": [3]}) == ()
+def test_findings_are_read_back_from_a_record_even_if_not_finite():
+    found = Finding("spin", "plant.sideslip", math.inf, 1.0, "the car spins")
+    assert findings_in(RunRecord(findings=[FindingRecord(**vars(found))])) == (found,)
+    assert findings_in(RunRecord.model_validate({"findings": [vars(found) | {"value": "inf"}]})) == (found,)
+    assert findings_in(RunRecord()) == ()

@@ -15,7 +15,7 @@ from orchestrator.figures.plots import draw, provenance, title_of
 from orchestrator.figures.style import LINES, NOTE_WIDTH, REFERENCE, save
 from orchestrator.messages import printable
 
-from .recorded import car, results
+from .recorded import car, noted, results
 
 
 def panel(figure, name):
@@ -209,7 +209,7 @@ def test_title_and_provenance_come_from_the_runs_records():
 
 def test_a_run_that_ended_early_is_named():
     failed = car()
-    failed.run["status"] = "failed"
+    failed.record.status = "failed"
     assert provenance([LabelledRun("third try", failed)]).endswith("ended early: third try")
 
 
@@ -308,7 +308,7 @@ def test_a_panel_that_no_run_has_is_refused_with_the_likely_one() -> None:
 @pytest.mark.parametrize("rows", [0, 1])
 def test_a_run_that_ended_at_its_start_is_one_sentence(rows):
     ended = results({name: np.zeros(rows) for name in ("plant.yaw_rate", "plant.sideslip")}, np.zeros(rows))
-    ended.run.update(status="failed", error={"message": "plant: initialization failed"})
+    noted(ended, status="failed", error={"message": "plant: initialization failed"})
     with pytest.raises(ResultsError) as caught:
         draw([LabelledRun("good", car()), LabelledRun("ended", ended)])
     assert caught.value.problems == [

@@ -16,7 +16,7 @@ from orchestrator.master.simulate import simulate
 from orchestrator.results import csv_file
 from orchestrator.results import recorder as module
 from orchestrator.results.read import load_results
-from orchestrator.results.recorder import BLOCK, Recorder, record_text
+from orchestrator.results.recorder import BLOCK, Recorder
 from orchestrator.results.run_record import RunRecord
 
 from .fakes import Clock, Function, Stage, make_plan
@@ -32,7 +32,7 @@ def record(folder, table, *, real=None, others=None, run=None):
             row[:] = values
         writer.others.extend(others[begin : begin + BLOCK] if others else [])
         writer.write(len(block))
-    writer.finish({"status": "completed", "units": {}, **(run or {})})
+    writer.finish(RunRecord.model_validate({"status": "completed", "units": {}, **(run or {})}))
     writer.close()
 
 
@@ -93,7 +93,7 @@ def test_names_with_commas_and_quotes_are_quoted(tmp_path):
     writer = Recorder(tmp_path, names, [True] * 3)
     writer.rows[0][:] = [0.0, 1.0, 2.0, 3.0]
     writer.write(1)
-    writer.finish({"status": "completed", "units": {}})
+    writer.finish(RunRecord(status="completed", units={}))
     writer.close()
     with (tmp_path / "results.csv").open(encoding="utf-8", newline="") as stream:
         assert next(csv.reader(stream)) == ["time", *names]
@@ -105,7 +105,7 @@ def test_columns_keep_their_order_when_some_are_no_reals(tmp_path):
     writer.rows[0][:] = [0.0, 1.0, 2.0]
     writer.others.append([7, 'say "ä",\nthen stop', True])
     writer.write(1)
-    writer.finish({"status": "completed", "units": {}})
+    writer.finish(RunRecord(status="completed", units={}))
     writer.close()
     results = load_results(tmp_path)
     assert {name: column[0] for name, column in results.columns.items()} == {
@@ -128,11 +128,11 @@ def test_earlier_results_stay_until_the_new_ones_are_whole(tmp_path):
     writer = Recorder(tmp_path, ["a.x"], [True])
     writer.rows[0][:] = 1.0
     writer.write(1)
-    assert load_results(tmp_path).run["title"] == "first"
+    assert load_results(tmp_path).record.title == "first"
     assert len(load_results(tmp_path).time) == 3
-    writer.finish({"status": "completed", "title": "second", "units": {}})
+    writer.finish(RunRecord(status="completed", title="second", units={}))
     writer.close()
-    assert load_results(tmp_path).run["title"] == "second"
+    assert load_results(tmp_path).record.title == "second"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["results.csv", "run.json"]
 
 
@@ -166,7 +166,7 @@ def test_a_second_run_into_the_same_folder_is_refused_until_the_first_has_ended(
         Recorder(tmp_path, ["a.x"], [True])
     first.rows[0][:] = 0.0, 1.0
     first.write(1)
-    first.finish({"status": "completed", "units": {}})
+    first.finish(RunRecord(status="completed", units={}))
     first.close()
     assert load_results(tmp_path)["a.x"].tolist() == [1.0]
     for _ in range(2):
@@ -175,7 +175,7 @@ def test_a_second_run_into_the_same_folder_is_refused_until_the_first_has_ended(
 
 def test_a_path_that_is_no_utf_8_does_not_cost_the_results(tmp_path):
     record(tmp_path, table(3), run={"scenario": {"file": os.fsdecode(b"sin\xe9.yaml")}})
-    assert load_results(tmp_path).run["scenario"]["file"] == "sin\udce9.yaml"
+    assert load_results(tmp_path).record.scenario["file"] == "sin\udce9.yaml"
 
 
 def no_space(*args, **kwargs):
@@ -210,8 +210,8 @@ def test_a_disk_that_fills_up_keeps_whole_rows_and_says_so(tmp_path):
         "the rows that fit are kept."
     )
     assert 49_900 < (tmp_path / "results.csv").stat().st_size <= 50_000
-    assert results.run["status"] == "failed"
-    assert results.run["rows"] == len(results.time) > 500
+    assert results.record.status == "failed"
+    assert results.record.rows == len(results.time) > 500
     np.testing.assert_allclose(results["a.y"], np.cos(results.time), atol=1e-15)
     assert stage.slaves["a"].freed == 1
 
@@ -225,7 +225,7 @@ def test_rows_at_the_end_make_room_for_the_record_on_a_full_disk(tmp_path, monke
     record(tmp_path, values, run={"title": "x" * 5000})
     results = load_results(tmp_path)
     assert 0 < len(results.time) < len(values)
-    assert results.run["rows"] == len(results.time)
+    assert results.record.rows == len(results.time)
     assert results.time.tolist() == values[: len(results.time), 0].tolist()
 
 
@@ -234,7 +234,7 @@ def test_earlier_results_stay_if_the_record_cannot_be_written_at_all(tmp_path, m
     monkeypatch.setattr(module, "write_whole", no_space)
     with pytest.raises(ResultsError, match="results cannot be written: the disk is full"):
         record(tmp_path, table(5), run={"title": "second"})
-    assert load_results(tmp_path).run["title"] == "first"
+    assert load_results(tmp_path).record.title == "first"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["results.csv", "run.json"]
 
 
@@ -267,4 +267,4 @@ def test_every_key_that_a_run_writes_is_a_field_of_its_record(tmp_path):
     assert foreign(record) == set()
     assert written.keys() <= RunRecord.model_fields.keys()
     assert record.fmus["a"].name
-    assert json.loads(record_text(written)) == written  # its checksums are those of what stands there
+    assert json.loads(record.to_json()) == written  # its checksums are those of what stands there

@@ -173,11 +173,11 @@ def test_runs_of_other_settings_and_one_that_fails_leave_all_results_readable(
     assert status == 1
     (results,) = Path("results").iterdir()
     assert f"What was recorded until then: {results / 'good' / 'failed'}" in said
-    assert {folder.name: load_results(folder).run["status"] for folder in results.iterdir()} == {
+    assert {folder.name: load_results(folder).record.status for folder in results.iterdir()} == {
         "good": "completed",
         f"{scenario.stem},controller=controller_off,driver.amplitude=0.03": "completed",
     }
-    assert load_results(results / "good" / "failed").run["status"] == "failed"
+    assert load_results(results / "good" / "failed").record.status == "failed"
     assert len(load_results(results / "good").time) > len(load_results(results / "good" / "failed").time)
     assert yawbench(scenario, "--name", "good", "--out", "x")[0] == 2
 
@@ -238,13 +238,13 @@ def test_an_exception_in_a_component_is_one_sentence_with_file_and_line(yawbench
     ]
     results = load_results(tmp_path / "out")
     assert results.time.tolist() == [0.0, 0.01, 0.02, 0.03, 0.04, 0.05]
-    error = results.run["error"]
-    assert results.run["status"] == "failed"
-    assert error["message"] == said.splitlines()[0]
-    assert (error["unit"], error["time"]) == ("controller", 0.05)
-    assert error["inputs"]["steer_angle"] == pytest.approx(results["driver.steer_angle"][5], rel=0.5)
-    assert "in advance\n" in error["traceback"][0]
-    assert error["traceback"][0].rstrip().endswith("100 % größer 1")
+    error = results.record.error
+    assert results.record.status == "failed"
+    assert error.message == said.splitlines()[0]
+    assert (error.unit, error.time) == ("controller", 0.05)
+    assert error.inputs["steer_angle"] == pytest.approx(results["driver.steer_angle"][5], rel=0.5)
+    assert "in advance\n" in error.traceback[0]
+    assert error.traceback[0].rstrip().endswith("100 % größer 1")
 
 
 def test_an_exception_at_the_start_is_one_sentence(yawbench, faulty, tmp_path):
@@ -291,8 +291,8 @@ def test_a_warning_of_a_component_is_shown_and_recorded(yawbench, faulty, tmp_pa
     status, said = yawbench(faulty('self.warn("tyres are 90 % warm")'), "--out", tmp_path / "out")
     assert status == 0
     assert said.splitlines()[0] == "warning: controller at t = 0.05 s: tyres are 90 % warm"
-    run = load_results(tmp_path / "out").run
-    assert [w["text"] for w in run["warnings"]] == ["tyres are 90 % warm"] * 5
+    run = load_results(tmp_path / "out").record
+    assert [w.text for w in run.warnings] == ["tyres are 90 % warm"] * 5
 
 
 def test_ctrl_c_inside_a_component_ends_the_run_after_the_step(yawbench, faulty, tmp_path):
@@ -303,7 +303,7 @@ def test_ctrl_c_inside_a_component_ends_the_run_after_the_step(yawbench, faulty,
         f"What was recorded until then: {tmp_path / 'out'}",
     ]
     results = load_results(tmp_path / "out")
-    assert results.run["status"] == "interrupted"
+    assert results.record.status == "interrupted"
     assert results.time[-1] == 0.06
 
 
@@ -323,7 +323,7 @@ def test_ctrl_c_ends_a_component_that_never_comes_back(faulty, fmus, tmp_path):
         f"back\nWhat was recorded until then: {tmp_path / 'out'}\n"
     )
     results = load_results(tmp_path / "out")
-    assert results.run["status"] == "interrupted"
+    assert results.record.status == "interrupted"
     assert results.time[-1] == 0.05
 
 

@@ -18,6 +18,7 @@ from orchestrator.evaluation.lane_change import evaluate_lane_change, highest_cl
 from orchestrator.evaluation.steering_tests import evaluate_step, evaluate_sweep, evaluate_understeer
 from orchestrator.evaluation.trace import Trace, trace_of
 from orchestrator.results.read import Results
+from orchestrator.results.run_record import RunRecord
 from orchestrator.scenario.catalogue import SHIPPED
 from orchestrator.scenario.load import load_scenario
 from orchestrator.tyres.stand import cornering_stiffness
@@ -270,6 +271,10 @@ def test_a_sweep_gives_the_frequency_response_of_an_oscillator(sampling):
     assert judged["yaw_rate_peak"] == pytest.approx(1 / (2 * damping * sqrt(1 - damping**2)), rel=0.02)
 
 
+def recorded(fmus) -> RunRecord:
+    return RunRecord.model_validate({"fmus": fmus})
+
+
 def test_a_trace_takes_the_car_from_the_plant_and_the_test_from_the_driver():
     fmus = {
         "driver": {"name": "driver_ramp", "parameters": {"steering_ratio": 17.0, "mass": 1.0}},
@@ -277,7 +282,7 @@ def test_a_trace_takes_the_car_from_the_plant_and_the_test_from_the_driver():
         "observer": {"name": "estimator_observer", "parameters": {"mass": 1300.0, "cg_height": 0.6}},
         "other": {"name": "monitor_redundancy", "parameters": {"steering_ratio": 1.0}},
     }
-    trace = trace_of(Results(Path(), np.arange(2.0), {}, {"time": "s"}, {"fmus": fmus}))
+    trace = trace_of(Results(Path(), np.arange(2.0), {}, {"time": "s"}, recorded(fmus)))
     assert trace.facts == {"steering_ratio": 17.0, "mass": 1800.0, "cg_height": 0.5}
     assert trace.mass == 1800.0
 
@@ -290,7 +295,7 @@ def test_the_friction_of_a_run_is_the_lowest_that_a_wheel_met():
 
     def friction(columns, fmus):
         units = none | dict.fromkeys(columns, "1")
-        return trace_of(Results(Path(), np.arange(2.0), columns, units, {"fmus": fmus})).friction
+        return trace_of(Results(Path(), np.arange(2.0), columns, units, recorded(fmus))).friction
 
     assert friction(met, constants | road) == 0.3
     assert friction({}, constants | road) == 0.7

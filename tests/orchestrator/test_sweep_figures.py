@@ -18,7 +18,7 @@ from orchestrator.experiments.planning import PlannedExperiment
 from orchestrator.experiments.record import columns_of, to_pandas, write_table
 
 from .fakes import Clock, make_plan
-from .recorded import car
+from .recorded import car, noted
 
 SWEEP = """
 title: Made up
@@ -102,7 +102,7 @@ def test_a_limit_is_the_largest_value_that_holds_with_all_below_it(swept):
 def test_the_table_says_of_every_run_how_it_ended_and_why(swept):
     made = swept()
     run = car()
-    run.run["ended"] = {"unit": "plant", "time": 0.5, "message": "plant: ended the run at t = 0.5 s"}
+    noted(run, ended={"unit": "plant", "time": 0.5, "message": "plant: ended the run at t = 0.5 s"})
     made.records[0] = measured(run, (("sideslip", "peak(sideslip)", None),))
     table = to_pandas(columns_of(made))
     ends = dict(zip(table["status"], table["reason"].fillna(""), strict=True))

@@ -95,7 +95,7 @@ def test_a_failed_instance_is_ended_as_the_standard_allows(fmu, held, answer, en
     assert counters(fmu) == ended
     results = load_results(tmp_path / "out")
     assert results.time[-1] == 0.25
-    assert results.run["error"]["inputs"] == {
+    assert results.record.error.inputs == {
         "Real_in": 1.5, "Integer_in": -42, "Boolean_in": False, "String_in": "<größer>",
     }  # fmt: skip
 
@@ -125,7 +125,7 @@ def test_an_instance_that_cannot_be_ended_is_reported(fmu, held, answer, word, e
     info = simulate(chain(fmu, AT_THE_END + answer), tmp_path / "out")
     assert [(m.instance, m.text) for m in info.warnings] == [("b", f"fmi2Terminate returned {word}")]
     assert counters(fmu) == ended  # after Fatal no function of any instance may be called
-    assert load_results(tmp_path / "out").run["status"] == "completed"
+    assert load_results(tmp_path / "out").record.status == "completed"
 
 
 def test_an_fmu_that_refuses_to_be_instantiated_says_why(fmu, held, tmp_path):
@@ -153,4 +153,4 @@ def test_a_library_that_is_none_is_refused(fmu, tmp_path, monkeypatch):
     with pytest.raises(ModelDescriptionError, match=r"^a: .*its library cannot be loaded: "):
         simulate(chain(fmu), "out")
     assert Path.cwd() == tmp_path
-    assert load_results("out").run["status"] == "failed"
+    assert load_results("out").record.status == "failed"

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.results.read import Results
-from tests.orchestrator.recorded import car, results
+from tests.orchestrator.recorded import car, noted, results
 from vocabulary.wheels import WHEELS
 
 SIZES = {"cg_to_front_axle": 1.2, "cg_to_rear_axle": 1.5, "track_width": 1.6}
@@ -34,7 +34,7 @@ def whole_car(gain: float = 1.0, *, mirrored: bool = False, n: int = 801) -> Res
         "plant": {"name": "plant_made_up", "parameters": SIZES, "constants": {}},
         "tyre": {"name": "tyre_made_up", "constants": {f"friction_{w}": MU for w in WHEELS}},
     }
-    return replace(recorded, run={**recorded.run, "fmus": {**recorded.run["fmus"], **fmus}})
+    return noted(recorded, fmus=fmus)
 
 
 def odd(column: str) -> bool:

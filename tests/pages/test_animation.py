@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ import pytest
 from components.driving.track import LaneChangeParameters
 from orchestrator.cli import main
 from orchestrator.pages.animation import FRAMES, assets, fragment, page
-from tests.orchestrator.recorded import write
+from tests.orchestrator.recorded import noted, write
 
 from .browser import DESK, PHONE, Browser
 from .made_up import data_in, whole_car, without
@@ -76,9 +75,9 @@ def two(tmp_path_factory) -> Path:
     """A page of two runs with lanes."""
     one = whole_car()
     driver = {"name": "driver_double_lane_change", "parameters": vars(LaneChangeParameters())}
-    run = {**one.run, "fmus": {**one.run["fmus"], "driver": driver}}
+    noted(one, fmus={"driver": driver})
     file = tmp_path_factory.mktemp("page") / "two.html"
-    file.write_text(page([("fuzzy neural network", replace(one, run=run)), ("off", whole_car(2.0))]), "utf-8")
+    file.write_text(page([("fuzzy neural network", one), ("off", whole_car(2.0))]), "utf-8")
     return file
 
 

@@ -21,7 +21,7 @@ from orchestrator.pages.animation import (
     still_of,
     thinned,
 )
-from tests.orchestrator.recorded import car
+from tests.orchestrator.recorded import car, noted
 from vocabulary.lane_change import lanes_of
 from vocabulary.wheels import WHEELS
 
@@ -94,12 +94,9 @@ def test_the_radius_of_a_friction_circle_is_friction_times_load():
 
 def test_the_friction_that_a_controller_believes_in_makes_no_circle():
     recorded = whole_car()
-    fmus = {
-        **recorded.run["fmus"],
-        "reference": {"name": "reference_made_up", "constants": {"friction": 0.4}},
-    }
+    fmus = {"reference": {"name": "reference_made_up", "constants": {"friction": 0.4}}}
     fmus["tyre"] = {"name": "tyre_made_up", "constants": {}}
-    frames = frames_of(replace(recorded, run={**recorded.run, "fmus": fmus}))
+    frames = frames_of(noted(recorded, fmus=fmus))
     assert "grip_fl" not in frames.channels
     assert frames.notes == ("friction or vertical loads were not recorded: no friction circles",)
 
@@ -135,8 +132,7 @@ def test_the_still_picture_shows_the_largest_sideslip_of_all_runs():
 def test_sizes_that_only_the_fmu_had_are_taken_from_its_defaults():
     recorded = whole_car()
     plant = {"name": "plant_made_up", "parameters": {"track_width": 1.7}, "defaults": SIZES}
-    changed = replace(recorded, run={**recorded.run, "fmus": {**recorded.run["fmus"], "plant": plant}})
-    frames = frames_of(changed)
+    frames = frames_of(noted(recorded, fmus={"plant": plant}))
     assert (frames.car.front_axle, frames.car.rear_axle, frames.car.track) == (1.2, 1.5, 1.7)
     assert not frames.notes
 
@@ -165,7 +161,7 @@ def test_a_run_without_positions_cannot_be_animated_and_is_told_what_is_missing(
 def test_a_failed_run_is_shown_as_far_as_it_goes():
     recorded = whole_car()
     recorded.columns["plant.position_y"][500:] = np.nan
-    frames = frames_of(replace(recorded, run={**recorded.run, "status": "failed"}))
+    frames = frames_of(noted(recorded, status="failed"))
     assert frames.channels["time"][-1] == recorded.time[499]
     assert frames.notes == ("the run did not end as planned; shown until 4.99 s",)
 
@@ -199,8 +195,7 @@ def test_lanes_path_and_outline_come_from_the_recorded_driver():
     driver = {"name": "driver_double_lane_change", "parameters": {"track_start": 30.0}}
     driver["defaults"] = vars(LaneChangeParameters())
     columns = {**recorded.columns, "driver.path_offset": np.full(recorded.time.size, 0.25)}
-    run = {**recorded.run, "fmus": {**recorded.run["fmus"], "driver": driver}}
-    frames = frames_of(replace(recorded, columns=columns, run=run))
+    frames = frames_of(replace(noted(recorded, fmus={"driver": driver}), columns=columns))
     assert [lane.start for lane in frames.lanes] == [30.0, 75.0, 125.0]
     assert (frames.car.front_end, frames.car.rear_end, frames.car.width) == (2.25, 2.65, 1.85)
     np.testing.assert_allclose(frames.channels["path_y"], frames.channels["y"] - 0.25)

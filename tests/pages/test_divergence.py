@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from orchestrator.metrics.run_metrics import MetricValue
 from orchestrator.pages.comparison import SAME, difference, divergence, parting_summary, targets_of
-from tests.orchestrator.recorded import car, results
+from tests.orchestrator.recorded import car, noted, results
 
 T = np.linspace(0.0, 1.0, 101)
 
@@ -24,7 +22,7 @@ def two(**changed):
     order = {"evaluation_order": ["controller", "plant"]}
     wires = {"connections": [{"from": "controller.yaw_moment", "to": "plant.yaw_moment"}]}
     made = [results(one, T) for one in (columns, other)]
-    return [replace(one, run={**one.run, **order, **wires}) for one in made]
+    return [noted(one, **order, **wires) for one in made]
 
 
 def test_a_run_does_not_part_from_itself():
@@ -64,7 +62,7 @@ def test_what_parts_first_stands_first_and_in_one_instant_the_cause():
 def test_a_signal_is_shown_with_the_units_that_take_it():
     one, other = two(yaw_moment=(0.5, 10.0))
     assert divergence(one, other).partings[0].targets == ("plant",)
-    assert targets_of(one.run, "plant.yaw_rate") == ()
+    assert targets_of(one.record, "plant.yaw_rate") == ()
 
 
 def test_four_wheels_are_one_signal_with_the_earliest_moment():

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from orchestrator.pages.animation import data_of, frames_of, page
 from orchestrator.pages.friction_map import MOST, clipped, ground_of
+from tests.orchestrator.recorded import noted
 from vocabulary.friction_table import table_of
 from vocabulary.patches import friction_at, inside_polygon, patches_of
 
@@ -67,10 +66,9 @@ def test_an_animation_carries_the_ground_once_and_says_what_its_colours_mean():
     run = whole_car()
     road = {"name": "road_a", "parameters": {"patches": "y > 0", "base_friction": 0.8}, "constants": {},
             "defaults": {"patch_friction": 0.2}}  # fmt: skip
-    on_road = replace(run, run={**run.run, "fmus": {**run.run["fmus"], "road": road}})
-    frames = frames_of(on_road)
+    frames = frames_of(noted(run, fmus={"road": road}))
     first, second = data_of([("a", frames), ("b", frames)])["runs"]
     assert [friction for friction, _ in first["ground"]] == [0.8, 0.2]
     assert second["ground"] == []
-    assert "slipperier" not in page([("a", run)])
-    assert "ground: the bluer the slipperier, friction 0.2 and 0.8" in page([("a", on_road)])
+    assert "slipperier" not in page([("a", whole_car())])
+    assert "ground: the bluer the slipperier, friction 0.2 and 0.8" in page([("a", run)])

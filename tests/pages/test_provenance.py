@@ -21,12 +21,12 @@ from orchestrator.pages.provenance import (
     said_in,
 )
 from orchestrator.results.freshness import key_of, staleness
-from orchestrator.results.recorder import record_text
 from orchestrator.results.run_record import run_record
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.fmu_copies import put_fmus
+from tests.orchestrator.recorded import record_text
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_fnn")
 SCENARIO = """
@@ -183,8 +183,8 @@ def recorded(plan, folder: Path, **changes) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "results.csv").write_text("time,x\n0.0,1.0\n0.1,2.0\n")
     record = run_record(plan, status="completed", started=datetime.now(timezone.utc))
-    record |= {"key": key_of(plan), "rows": 2, "checksum": checksum(folder / "results.csv")} | changes
-    (folder / "run.json").write_text(record_text(record))
+    record = record.content() | {"key": key_of(plan), "rows": 2, "checksum": checksum(folder / "results.csv")}
+    (folder / "run.json").write_text(record_text(record | changes))
     return folder
 
 

@@ -17,7 +17,7 @@ from orchestrator.errors import ScenarioError
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.verdict_tables import share
 from orchestrator.pages.report import found_studies
-from orchestrator.results.recorder import record_text
+from tests.orchestrator.recorded import record_text
 
 from .browser import DESK, PHONE
 from .flaws import flaws, open_all

@@ -50,7 +50,7 @@ def test_every_controller_runs_on_every_car_and_tyre(fmus, tmp_path, plant, tyre
     )
     simulate(plan, tmp_path)
     results = load_results(tmp_path)
-    assert results.run["status"] == "completed", results.run["error"]
+    assert results.record.status == "completed", results.record.error
     assert results.time[-1] == 2.0
     for name, column in results.columns.items():
         assert np.all(np.isfinite(column)), name

@@ -146,7 +146,7 @@ class Trial:
             except ResultsError:
                 continue
             name = results.file.relative_to(out).as_posix()
-            if results.run["status"] == "completed" and whole.get(name) != (out / name).read_bytes():
+            if results.record.status == "completed" and whole.get(name) != (out / name).read_bytes():
                 yield f"half a result passes for whole: {name}"
 
 

@@ -119,7 +119,7 @@ def whole_record() -> dict[str, Any]:
         "changes": [{"place": "plant.mass", "value": 1500.0, "origin": "--set", "plain": 1500.0}],
         "faults": [{"on": "plant.yaw_rate", "fault": "freeze", "from": 1.0, "until": None}],
         "findings": [{"kind": "spin", "place": "plant", "value": 1.0, "time": 2.0, "says": "the car spins"}],
-        "warnings": [{"unit": "plant", "time": 0.0, "text": "slow", "status": 1}], "more_warnings": 0,
+        "warnings": [{"unit": "plant", "time": 0.0, "text": "slow", "status": "Warning"}], "more_warnings": 0,
         "notes": ["a note"], "units_freed": True,
         "scenario": {
             "title": "Sine", "source": "paper", "file": "scenarios/a/b.yaml", "vehicle": {"file": "car.yaml"},
@@ -134,7 +134,7 @@ def make_good(folder: Path) -> None:
     car = recorded.car(n=81)
     car.columns["driver.steering_wheel_angle"] = 16.0 * car["driver.steer_angle"]
     car.units["driver.steering_wheel_angle"] = "rad"
-    car.run.update(whole_record())
+    recorded.noted(car, **whole_record())
     write_results(car, folder)
 
 
