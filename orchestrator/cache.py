@@ -193,7 +193,10 @@ def _hash(content: bytes) -> bytes:
     return hashlib.sha256(content).hexdigest()[:_DIGITS].encode()
 
 
-OF_RESULTS = ("plan.py", "scenario", "fmu", "wiring", "master", "results", "tyres")
+OF_RESULTS = (
+    *("names.py", "plan.py", "coupling.py", "fault_kinds.py"),
+    *("scenario", "fmu", "wiring", "master", "results", "tyres"),
+)
 """Modules and packages that determine what a run records; FMUs are hashed separately."""
 OF_METRICS = (*OF_RESULTS, "metrics")
 """Those that determine the metrics of a run."""

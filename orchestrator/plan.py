@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     import numpy as np
@@ -19,7 +19,6 @@ from .names import SignalName, Target
 Value = float | int | bool | str
 SENSING = {"sensor": "measurement", "estimator": "estimate"}
 """Role of an instance -> kind of values that its outputs are, as opposed to the truth."""
-Algorithm = Literal["jacobi", "gauss_seidel", "extrapolated"]
 
 
 class ValueRef(NamedTuple):
@@ -290,7 +289,7 @@ class Plan:
     record: tuple[SignalName, ...]  # in column order
     step: Fraction  # communication step size [s]
     n_steps: int
-    algorithm: Algorithm
+    algorithm: str  # of `coupling.ALGORITHMS`
     start: Fraction = Fraction(0)  # time of communication point 0 [s]
     title: str = ""
     scenario: dict = field(default_factory=dict)  # as run, for run.json

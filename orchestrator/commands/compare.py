@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from ..plan import Algorithm
+from ..coupling import ALGORITHMS
+from ..messages import hint, listed
 from .experiments import chapter_of, command_of, conduct, write_page
 from .options import CHANGES, MAKING, RunOptions, ScenarioFile, takes
 from .progress import hold, pooled, print_tables
@@ -57,7 +58,7 @@ Algorithms = Annotated[
     typer.Option(
         "--algorithm",
         metavar="NAME",
-        help="jacobi, gauss_seidel or extrapolated; repeatable, all are compared with the first. "
+        help=f"{listed(ALGORITHMS, last='or')}; repeatable, all are compared with the first. "
         "Default: the scenario's.",
     ),
 ]
@@ -79,7 +80,6 @@ def converge(
     results/<folder of the scenario>/<its name>-converge.
     """
     from dataclasses import replace
-    from typing import get_args
 
     from ..errors import ScenarioError
     from ..experiments.comparison import (
@@ -92,13 +92,12 @@ def converge(
     from ..experiments.record import to_csv
     from ..figures.style import save
     from ..files import write_whole
-    from ..messages import hint
     from ..pages.page_parts import image_of
     from ..results.folder import default_folder
 
     for name in algorithm or ():
-        if name not in get_args(Algorithm):
-            guess = hint(name, get_args(Algorithm), lead="there are")
+        if name not in ALGORITHMS:
+            guess = hint(name, ALGORITHMS, lead="there are")
             raise ScenarioError(f"--algorithm {name}: no such algorithm{guess}")
     folder = wishes.out or default_folder(scenario, wishes.changes, suffix="-converge")
     hold(context, folder)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..fault_kinds import KINDS, NO_FAULTS
+from ..results.formats import FORMATS
 
 if TYPE_CHECKING:
     from ..plan import Override, Plan
@@ -112,7 +113,7 @@ class RunOptions:
         typer.Option(
             "--format",
             metavar="FORMAT",
-            help="Format of the results: csv; parquet or mf4 (ASAM MDF 4), which are smaller and hold units.",
+            help=f"Format of the results: {', '.join(f'{k} ({x.says})' for k, x in FORMATS.items())}.",
         ),
     ] = "csv"
     quick: Annotated[

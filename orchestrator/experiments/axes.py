@@ -19,11 +19,11 @@ from pydantic import Field, PlainSerializer, PlainValidator, model_validator
 
 from ..messages import short
 from ..names import INPUTS, OF_RUN, VEHICLE, Target
-from ..plan import Algorithm, Override, Value
+from ..plan import Override, Value
 from ..scenario import overrides, yaml_lines
 from ..scenario.fault_schema import FaultSpec, by_location
 from ..scenario.quantities import parse_unit
-from ..scenario.scenario_schema import Scalar
+from ..scenario.scenario_schema import AlgorithmName, Scalar
 from ..scenario.validation import StrictModel, Time
 from .judged_schema import Number, Patterns, is_finite, text_of
 
@@ -89,7 +89,7 @@ class OverrideSpec(StrictModel):
     faults: list[FaultSpec] = Field([], description="In place of the scenario's at these places")
     stop_time: Time | None = Field(None, description="In place of the scenario's")
     step_size: Time | None = Field(None, description="In place of the scenario's")
-    algorithm: Algorithm | None = Field(None, description="In place of the scenario's")
+    algorithm: AlgorithmName | None = Field(None, description="In place of the scenario's")
 
     @property
     def targets(self) -> list[Target]:

@@ -28,7 +28,7 @@ from ..labels import changed, with_changes
 from ..metrics.measures import variable_of, words
 from ..metrics.run_metrics import MetricValue, metric
 from ..names import SignalName
-from ..plan import Algorithm, Override
+from ..plan import Override
 from ..plan import Value as Plain
 from ..results.read import Results
 from ..scenario.load import load_scenario
@@ -172,7 +172,7 @@ def refinements(
     *,
     halvings: int,
     signal: str,
-    algorithms: Sequence[Algorithm],
+    algorithms: Sequence[str],
     changes: Sequence[Override] = (),
 ) -> LoadedExperiment:
     """Return the runs of a convergence study: all steps of the first algorithm, then the next.

@@ -50,8 +50,9 @@ def found_at(plan: Plan, target: Target) -> tuple[Given, str] | None:
         files = {axle: str(file["file"]) for axle, file in plan.scenario.get("tyre_files", {}).items()}
         return (files[target.variable or "front"], "") if files else None
     if target.kind == "run":
-        values = (float(plan.start), plan.time(plan.n_steps), float(plan.step), plan.algorithm)
-        return dict(zip(OF_RUN, values, strict=True))[target.variable], "s"
+        times = float(plan.start), plan.time(plan.n_steps), float(plan.step)
+        values: dict[str, Given] = dict(zip(OF_RUN, (*times, plan.algorithm), strict=True))
+        return values[target.variable], "s"
     if target.kind == "setting" and target.is_time and instance:
         return float(instance.period * plan.step), "s"
     for instance, variable in reached(plan, target):

@@ -1,7 +1,7 @@
 """Fault injection: disturb an instance's outputs after they are read, or its inputs before they are set.
 
 An output is disturbed as of the time of its sample, so all receivers and the results get the same faulty
-value. An input is disturbed as of the time that it is taken for (see `coupling.halves_ahead`), after the
+value. An input is disturbed as of the time that it is taken for (see `coupling`), after the
 coupling has combined several samples into one value. At initialization both are disturbed as of the start,
 however many passes it takes: calling a fault twice for the same time discards its first observation.
 
@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..coupling import ALGORITHMS
 from ..fault_kinds import KINDS, Disturbance
 from ..plan import Plan
-from .coupling import halves_ahead
 from .instance import Status
 from .log import OK
 
@@ -78,7 +78,7 @@ def faulting(memory: SignalPool, s: InstanceSlot, *, of_output: bool) -> FaultIn
         if not of_output:
             wire = s.wires[i]
             assert wire is not None
-            ahead = halves_ahead(plan.algorithm, period, direct=s.direct(variable))
+            ahead = ALGORITHMS[plan.algorithm].halves_ahead(period, s.direct(variable))
             held = memory.of[wire.source].instance.fmu.variables[wire.output].discrete
         disturbances.append((i, ahead, KINDS[signal.fault.kind].disturbance(signal, held)))
     return FaultInjector(plan, period, disturbances) if disturbances else None

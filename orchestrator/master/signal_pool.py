@@ -16,9 +16,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..coupling import WireTiming
 from ..errors import SimulationError
 from ..plan import Instance, Plan, Value, Variable, Wire
-from .coupling import WireTiming
 from .fault_injection import FaultInjector, faulting
 from .instance import FmuInstance, StepCalls
 

@@ -20,9 +20,9 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from ..coupling import ALGORITHMS, CouplingWeights
 from ..plan import InputSeries, Plan, ValueRef, Variable
 from .compiled_loop import Kind, OperationData
-from .coupling import CouplingWeights, halves_ahead, weights
 from .fault_injection import FaultInjector
 from .instance import PlainCall, Status
 from .log import OK
@@ -75,7 +75,7 @@ class SeriesFeed:
 def _column(plan: Plan, s: InstanceSlot, variable: Variable, series: InputSeries) -> Iterator[np.ndarray]:
     """Yield the values of a series input, step by step, in blocks."""
     period, first = s.instance.period, 0
-    ahead = halves_ahead(plan.algorithm, period, direct=s.direct(variable))
+    ahead = ALGORITHMS[plan.algorithm].halves_ahead(period, s.direct(variable))
     halves, start = plan.step / 2, float(plan.start)
     while True:
         k = np.arange(first, first + period * BLOCK, period)
@@ -113,6 +113,7 @@ class StepProgram:
 
     def __init__(self, memory: SignalPool) -> None:
         self._memory = memory
+        self._algorithm = ALGORITHMS[memory.plan.algorithm]
         self.cycle = math.lcm(*(s.instance.period for s in memory.stations))
         self._made: dict[int, list[Operation]] = {}
         self._gathers: dict[tuple, list[Operation]] = {}
@@ -126,11 +127,11 @@ class StepProgram:
         phase = k % self.cycle
         if phase not in self._made:
             _make_room(self._made)
-            jacobi = self._memory.plan.algorithm == "jacobi"
-            self._made[phase] = self._jacobi(phase) if jacobi else self._in_sequence(phase)
+            made = self._at_once if self._algorithm.at_once else self._in_sequence
+            self._made[phase] = made(phase)
         return self._made[phase]
 
-    def _jacobi(self, k: int) -> list[Operation]:
+    def _at_once(self, k: int) -> list[Operation]:
         """Gather all inputs before any instance steps, a slow instance's at the start of its period."""
         m = self._memory
         beginning = [s for s in m.placed if (k - 1) % s.instance.period == 0]
@@ -159,7 +160,7 @@ class StepProgram:
                 operations += [*self._gathering(s, k), *self._of_inputs[s.name]]
                 operations += _setting(self._memory, s)
                 operations.append(_of_fmu(s, "step", s.calls.step))
-                if self._memory.plan.algorithm == "extrapolated" and s.outputs:
+                if self._algorithm.needs_before and s.outputs:
                     operations.append(_keeping_outputs(self._memory, s))
                 operations += [*getting(self._memory, s), *self._of_outputs[s.name]]
         return operations
@@ -175,7 +176,7 @@ class StepProgram:
             else:
                 relation = m.relation(s, variable, wire)
                 # `k` is a phase; shifted so that no sample lies before the start
-                per_input.append(weights(m.plan.algorithm, relation, k + 2 * self.cycle))
+                per_input.append(self._algorithm.weights(relation, k + 2 * self.cycle))
         key = (s.name, *per_input)
         if key not in self._gathers:
             _make_room(self._gathers)

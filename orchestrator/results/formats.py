@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import math
+import pkgutil
 import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -11,15 +12,14 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Protocol
 
-import numpy as np
-
 from ..errors import ResultsError, ScenarioError
 from ..messages import hint
-from ..plan import Plan
 
 if TYPE_CHECKING:
-    from .recorder import Recorder
+    import numpy as np
 
+    from ..plan import Plan
+    from .recorder import Recorder
 
 RESULTS_FILE = "results.csv"
 
@@ -29,16 +29,39 @@ class Format:
     """A file format of results."""
 
     file: str
-    recorder: str  # "module:class" in this package that writes it
+    says: str
+    recorder: str  # "module:class" in this package that writes it, a subclass of `Recorder`
     source: str  # "module:class" that reads it, called with its path and the columns that hold text
     bytes: int  # per value; measured on one run of each of the papers A to D, rounded
+    package: str = ""  # Python package that it needs besides those of yawbench
+    extra: str = ""  # of yawbench, with which that package is installed
+
+    def require(self) -> ModuleType | None:
+        """Import and return the package that it needs.
+
+        Raises:
+            ResultsError: it is not installed.
+        """
+        try:
+            return importlib.import_module(self.package) if self.package else None
+        except ImportError:
+            how = f"pip install 'yawbench[{self.extra}]'"
+            raise ResultsError(f"results as {self.says} need the package {self.package}: {how}") from None
 
 
 FORMATS = {
-    "csv": Format(RESULTS_FILE, "recorder.Recorder", "csv_file.CsvFile", 17),
-    "parquet": Format("results.parquet", "parquet_and_mdf.ParquetRecorder", "parquet_and_mdf.ParquetFile", 7),
-    "mf4": Format("results.mf4", "parquet_and_mdf.MdfRecorder", "parquet_and_mdf.MdfFile", 5),
-}
+    "csv": Format(
+        RESULTS_FILE, "text that every program reads", "recorder:Recorder", "csv_file:CsvFile", bytes=17
+    ),
+    "parquet": Format(
+        "results.parquet", "Apache Parquet",
+        "parquet_and_mdf:ParquetRecorder", "parquet_and_mdf:ParquetFile", bytes=7,
+    ),
+    "mf4": Format(
+        "results.mf4", "ASAM MDF", "parquet_and_mdf:MdfRecorder", "parquet_and_mdf:MdfFile", bytes=5,
+        package="asammdf", extra="mdf",
+    ),
+}  # fmt: skip
 """Format name -> format. CSV is the default: every program reads it, and killed runs can be salvaged."""
 FILES = {name: one.file for name, one in FORMATS.items()}
 """Format name -> file name."""
@@ -52,24 +75,8 @@ def check_format(name: str) -> str:
     """
     if name not in FORMATS:
         raise ScenarioError(f"--format {name}: no such format{hint(name, FORMATS, lead='there are')}")
-    if name == "mf4":
-        asammdf()
+    FORMATS[name].require()
     return name
-
-
-def asammdf() -> ModuleType:
-    """Import and return the package that reads and writes MDF.
-
-    Raises:
-        ResultsError: asammdf is not installed.
-    """
-    try:
-        import asammdf
-    except ImportError:
-        raise ResultsError(
-            "results as ASAM MDF need the package asammdf: pip install 'yawbench[mdf]'"
-        ) from None
-    return asammdf
 
 
 def recorder_of(name: str) -> type[Recorder]:
@@ -93,8 +100,7 @@ def source_of(path: Path, texts: Sequence[str] | None = None) -> ResultsSource:
 
 
 def _class(place: str) -> Any:
-    module, _, name = place.partition(".")
-    return getattr(importlib.import_module(f".{module}", __package__), name)
+    return pkgutil.resolve_name(f"{__package__}.{place}")
 
 
 class ResultsSource(Protocol):

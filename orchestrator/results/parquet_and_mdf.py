@@ -19,7 +19,7 @@ from ..errors import ResultsError
 from ..labels import with_changes
 from .columnar import ColumnRecorder
 from .csv_file import column_of, values_of
-from .formats import FILES, asammdf, plain
+from .formats import FILES, FORMATS, plain
 from .run_record import RunRecord
 
 UNIT = b"unit"
@@ -105,7 +105,7 @@ class MdfRecorder(ColumnRecorder):
     file = FILES["mf4"]
 
     def _complete(self, record: RunRecord) -> None:
-        package = asammdf()
+        package: Any = FORMATS["mf4"].require()
         time, *columns = self._columns.arrays()
         signals = [
             package.Signal(
@@ -154,7 +154,8 @@ class MdfFile:
     @contextlib.contextmanager
     def _open(self) -> Iterator[Any]:
         try:
-            with asammdf().MDF(self._path) as mdf:
+            package: Any = FORMATS["mf4"].require()
+            with package.MDF(self._path) as mdf:
                 yield mdf
         except (OSError, ValueError, ResultsError):
             raise

@@ -19,14 +19,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import AfterValidator, Field, PlainSerializer, PlainValidator, model_validator
+from pydantic import Field, PlainSerializer, PlainValidator, model_validator
 
 from ..errors import Problem, ScenarioError
 from ..fault_kinds import KINDS, NO_FAULTS, WORDS, Fault, FaultList, FaultLocation
 from ..messages import listed, short
 from ..plan import Value
 from . import quantities, yaml_lines
-from .validation import Instant, StrictModel, Time, validate
+from .validation import Instant, StrictModel, Time, one_of, validate
 
 _PLACE = re.compile(r"\s*(\w+)\.([^\s>]+?)\s*(?:->\s*(\w+)(?:\.(\S+))?\s*)?")
 
@@ -82,12 +82,6 @@ def parse_faults(location: FaultLocation, items: Sequence[Mapping[str, Value]], 
     return FaultList(spec.fault for spec in specs if spec is not None)
 
 
-def _kind(name: str) -> str:
-    if name not in KINDS:
-        raise ValueError(f"must be {listed(map(repr, KINDS), last='or')} (got {short(name)})")
-    return name
-
-
 def _value(value: object) -> float | str | None:
     if isinstance(value, bool) or not (isinstance(value, (int, float, str)) and value != ""):
         raise ValueError(f"must be a number, or a number with its unit (got {short(value)})")
@@ -103,7 +97,7 @@ def _share(value: object) -> float:
 
 
 FaultLocationText = Annotated[FaultLocation, PlainValidator(location_of), PlainSerializer(str)]
-KindName = Annotated[str, AfterValidator(_kind)]
+KindName = Annotated[str, one_of(KINDS)]
 FaultValue = Annotated[float | str, PlainValidator(_value)]
 Share = Annotated[float, PlainValidator(_share)]
 

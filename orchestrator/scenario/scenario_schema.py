@@ -24,15 +24,19 @@ from pydantic import (
     model_validator,
 )
 
-from ..messages import short
+from ..coupling import ALGORITHMS
+from ..messages import listed, short
 from ..names import RESERVED, SignalName
-from ..plan import Algorithm, Override, Value
+from ..plan import Override, Value
 from .fault_schema import FaultSpec
 from .tir import TyreFile
-from .validation import Instant, StrictModel, Time
+from .validation import Instant, StrictModel, Time, one_of
 from .yaml_lines import Document, KeyPath
 
 AXLES = ("front", "rear")
+
+
+AlgorithmName = Annotated[str, one_of(ALGORITHMS)]
 
 
 def endpoint(value: object) -> SignalName:
@@ -230,7 +234,9 @@ class ScenarioSpec(StrictModel):
     start_time: Instant = Field(Fraction(0), description="s")
     stop_time: Time = Field(description="s, an integer multiple of the communication step")
     step_size: Time = Field(description="s, communication step")
-    algorithm: Algorithm = Field("extrapolated", description="How units are coupled")
+    algorithm: AlgorithmName = Field(
+        "extrapolated", description=f"How units are coupled: {listed(ALGORITHMS, last='or')}"
+    )
     friction: Scalar | None = Field(None, description="Of the road, for all units that have to know it")
     speed: Scalar | None = Field(None, description="m/s, at the start and to be held")
     inputs: dict[str, InputValue] = Field({}, description="[unit.]pattern -> constant or time series")

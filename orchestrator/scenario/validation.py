@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import types
 import typing
+from collections.abc import Collection
 from fractions import Fraction
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, PlainSerializer, PlainValidator, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, PlainSerializer, PlainValidator, ValidationError
 
 from ..messages import closest, listed, short
 from .quantities import instant, seconds
@@ -17,6 +18,17 @@ Model = TypeVar("Model", bound=BaseModel)
 Instant = Annotated[Fraction, PlainValidator(instant), PlainSerializer(float)]
 Time = Annotated[Fraction, PlainValidator(seconds), PlainSerializer(float)]
 """Above zero."""
+
+
+def one_of(names: Collection[str]) -> AfterValidator:
+    """Return the validator of a text that must be one of some names, which may become more."""
+
+    def known(name: str) -> str:
+        if name not in names:
+            raise ValueError(f"must be {listed(map(repr, names), last='or')} (got {short(name)})")
+        return name
+
+    return AfterValidator(known)
 
 
 class StrictModel(BaseModel):

@@ -10,7 +10,7 @@ from typing import Any
 from orchestrator.fault_kinds import FaultySignal
 from orchestrator.master.instance import ExperimentSetup, FmuInstance, StepCalls
 from orchestrator.master.log import ERROR, OK, Log
-from orchestrator.plan import Algorithm, Fmu, Instance, Plan, ValueRef, Variable, Wire
+from orchestrator.plan import Fmu, Instance, Plan, ValueRef, Variable, Wire
 
 
 class Behaviour:
@@ -149,7 +149,7 @@ def make_plan(
     *,
     step: Fraction | str = "1/10",
     n_steps: int = 10,
-    algorithm: Algorithm = "extrapolated",
+    algorithm: str = "extrapolated",
     periods: Mapping[str, int] | None = None,
     constants: Mapping[str, Mapping[str, Any]] | None = None,
     parameters: Mapping[str, Mapping[str, Any]] | None = None,

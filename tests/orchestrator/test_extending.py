@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import io
+import sys
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
 
 import yawbench as yb
+from orchestrator.coupling import ALGORITHMS, CouplingAlgorithm, CouplingWeights
 from orchestrator.errors import ScenarioError
 from orchestrator.fault_kinds import KINDS, FaultKind
+from orchestrator.master.simulate import simulate_in_memory
+from orchestrator.results import formats
+from orchestrator.results.columnar import ColumnRecorder
 from orchestrator.scenario.overrides import read_changes
+from tests.commands import status_of
+
+from .fakes import Clock, Stage, Witness, make_plan
 
 UNITS = ("driver_sine",)
 STEERED = """\
@@ -40,3 +50,56 @@ def test_a_kind_of_fault_is_one_entry(steered, monkeypatch):
     assert str(read_changes(faults=[f"{at}: floor 1 deg"])[0]) == f"--fault {at}: floor 1 deg"
     with pytest.raises(ScenarioError, match="floor takes no seed"):
         read_changes(faults=[f"{at}: floor 1 deg seed 3"])
+
+
+class NpzRecorder(ColumnRecorder):
+    """Records a run as NumPy's archive."""
+
+    file = "results.npz"
+
+    def _complete(self, record):
+        names = ["time", *self.columns]
+        data = io.BytesIO()
+        np.savez(data, **dict(zip(names, self._columns.arrays(), strict=True)))
+        self._append(data.getvalue())
+
+
+class NpzFile:
+    """NumPy's archive of results."""
+
+    def __init__(self, path, texts=None):
+        self._columns = np.load(path)
+        self.names = list(self._columns)
+
+    def blocks(self, columns):
+        yield [formats.plain(self._columns[name]) for name in columns]
+
+
+def test_a_format_is_a_module_and_an_entry(steered, monkeypatch):
+    module = ModuleType("orchestrator.results.npz")
+    module.NpzRecorder, module.NpzFile = NpzRecorder, NpzFile
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    entry = formats.Format("results.npz", "NumPy's archive", "npz:NpzRecorder", "npz:NpzFile", 8)
+    monkeypatch.setitem(formats.FORMATS, "npz", entry)
+    monkeypatch.setitem(formats.FILES, "npz", entry.file)
+    for name in ("npz", "csv"):
+        assert status_of("run", "steered.yaml", "--format", name, "--out", name) == 0
+    assert sorted(path.name for path in Path("npz").iterdir()) == ["results.npz", "run.json"]
+    binary, text = yb.open("npz"), yb.open("csv")
+    assert list(binary.results) == list(text.results)
+    assert all((binary[name] == text[name]).all() for name in text.results)
+    assert status_of("diff", "npz", "csv") == 0
+
+
+def test_a_coupling_algorithm_is_one_entry(steered, monkeypatch):
+    averaged = CouplingAlgorithm(
+        lambda timing, k: CouplingWeights(0.5, 0.5), lambda period, direct: period, needs_before=True
+    )
+    monkeypatch.setitem(ALGORITHMS, "averaged", averaged)
+    units = {"source": Clock(x=lambda t: t), "target": Witness()}
+    plan = make_plan(units, ["source.x -> target.end"], step="1/8", n_steps=8, algorithm="averaged")
+    results = simulate_in_memory(plan, opener=Stage(units))
+    assert results["target.y"][1:] == pytest.approx(results.time[1:] - 1 / 16)
+    assert steered.set({"algorithm": "averaged"}).plan().algorithm == "averaged"
+    with pytest.raises(ScenarioError, match="'extrapolated' or 'averaged'"):
+        steered.set({"algorithm": "average"})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
 import json
 import math
 import sys
@@ -189,14 +188,7 @@ def test_an_unknown_format_names_those_there_are():
 
 
 def test_mdf_without_its_package_says_how_to_get_it(tmp_path, monkeypatch):
-    found = builtins.__import__
-
-    def without(name, *args, **kwargs):
-        if name.startswith("asammdf"):
-            raise ImportError(name)
-        return found(name, *args, **kwargs)
-
-    monkeypatch.setattr(builtins, "__import__", without)
+    monkeypatch.setitem(sys.modules, "asammdf", None)  # importing it is an ImportError
     with pytest.raises(ResultsError, match=r"need the package asammdf: pip install 'yawbench\[mdf\]'$"):
         recorder_of("mf4")
 

@@ -18,7 +18,8 @@ PRODUCT = ("components", "vocabulary", "fmus", "orchestrator", "yawbench")
 ROOT = Path(__file__).parents[2]
 ORCHESTRATOR = Path(__file__).parents[2] / "orchestrator"
 STAGES = (
-    {"errors", "messages", "names", "fault_kinds", "plan", "labels", "cache", "checksums", "files"},
+    {"errors", "messages", "names", "plan", "labels", "cache", "checksums", "files"}
+    | {"coupling", "fault_kinds"},
     {"processes", "supervisor", "workers"},
     {"scenario"},
     {"fmu"},

@@ -8,6 +8,8 @@ import pytest
 
 from orchestrator import cache
 
+from .test_imports import ORCHESTRATOR, SOURCES, imported_by, stage_of
+
 
 @pytest.fixture
 def copy(tmp_path, monkeypatch):
@@ -35,3 +37,13 @@ def test_code_that_has_a_say_in_the_numbers_changes_the_hash_and_no_other(copy):
     assert hashes()[1] != metrics
     (copy / "master" / "log.py").rename(copy / "master" / "logs.py")
     assert hashes()[0] != results
+
+
+def test_all_that_these_parts_import_has_a_say_or_cannot_change_a_number():
+    harmless = {"cache", "checksums", "errors", "files", "labels", "messages"}
+    harmless |= {"processes", "supervisor", "workers"}
+    own = {part.removesuffix(".py") for part in cache.OF_RESULTS}
+    for path in SOURCES:
+        if path.relative_to(ORCHESTRATOR).parts[0].removesuffix(".py") in own:
+            used = {stage_of(dotted) for _, dotted in imported_by(path)} - {None, "metrics", "figures"}
+            assert used <= own | harmless, path

@@ -23,9 +23,8 @@ there are two samples, both are the initial value: held, for one step.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-
-from ..plan import Algorithm
 
 
 @dataclass(frozen=True)
@@ -48,34 +47,49 @@ class CouplingWeights:
     kept: float = 0.0
 
 
-def weights(algorithm: Algorithm, relation: WireTiming, k: int) -> CouplingWeights:
-    """Return the weights of a wire for the step of its target that ends at `k`.
+def _held(timing: WireTiming, k: int) -> CouplingWeights:
+    return CouplingWeights()
 
-    `k` is a communication point at which the target ends a step. The weights repeat after the least
-    common multiple of both periods.
-    """
-    if algorithm != "extrapolated":
-        return CouplingWeights()
-    n, m = relation.source_period, relation.target_period
-    last = _last_sample(relation, k)
-    ahead = (k if relation.direct else k - m / 2) - last
-    if relation.discrete:
+
+def _extrapolated(timing: WireTiming, k: int) -> CouplingWeights:
+    n, m = timing.source_period, timing.target_period
+    last = _last_sample(timing, k)
+    ahead = (k if timing.direct else k - m / 2) - last
+    if timing.discrete:
         return CouplingWeights() if ahead >= 0 else CouplingWeights(0.0, 1.0)
     if ahead == 0:
         return CouplingWeights()
-    if m > n and not relation.direct:
-        apart = last - _last_sample(relation, k - m)
+    if m > n and not timing.direct:
+        apart = last - _last_sample(timing, k - m)
         return CouplingWeights(1.0 + ahead / apart, 0.0, -ahead / apart)
     return CouplingWeights(1.0 + ahead / n, -ahead / n)
 
 
-def halves_ahead(algorithm: Algorithm, period: int, *, direct: bool) -> int:
-    """Return the time that an input is taken for, in half communication steps from the step's beginning."""
-    held = {"jacobi": 0, "gauss_seidel": 2 * period}
-    return held.get(algorithm, 2 * period if direct else period)
-
-
-def _last_sample(relation: WireTiming, k: int) -> int:
+def _last_sample(timing: WireTiming, k: int) -> int:
     """Return the communication point of the source's last sample when the target steps to `k`."""
-    n = relation.source_period
-    return k - k % n if relation.earlier else k - 1 - (k - 1) % n
+    n = timing.source_period
+    return k - k % n if timing.earlier else k - 1 - (k - 1) % n
+
+
+@dataclass(frozen=True)
+class CouplingAlgorithm:
+    """A coupling algorithm: the weights of samples, and the time that an input is taken for."""
+
+    weights: Callable[[WireTiming, int], CouplingWeights]
+    """Called with the properties of a wire and a communication point `k` at which the target ends a step.
+    The weights must repeat after the least common multiple of both periods."""
+    halves_ahead: Callable[[int, bool], int]
+    """Called with the period of an instance and whether an input has direct feedthrough; returns the time
+    that the input is taken for, in half communication steps from the beginning of the instance's step."""
+    at_once: bool = False  # all instances take their inputs before any of them steps
+    needs_before: bool = False  # weights of the sample before the last may differ from 0
+
+
+ALGORITHMS = {
+    "jacobi": CouplingAlgorithm(_held, lambda period, direct: 0, at_once=True),
+    "gauss_seidel": CouplingAlgorithm(_held, lambda period, direct: 2 * period),
+    "extrapolated": CouplingAlgorithm(
+        _extrapolated, lambda period, direct: 2 * period if direct else period, needs_before=True
+    ),
+}
+"""Name -> algorithm. To add an algorithm, add it here."""
