@@ -36,6 +36,7 @@ LARGEST = 1_000_000_000
 """Bytes of a file. Chosen: it fits into memory."""
 BESIDE = "run.json"
 _HEADER = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*")
+_INDEXED = re.compile(r".*\w\[[\d, ]+\]\s*")
 
 
 class FileColumn(NamedTuple):
@@ -75,10 +76,11 @@ class SeriesFile:
         self._units: list[str | None] = []
         beside = _units_beside(path)
         for header, unit in zip(self._table.headers, self._table.units, strict=True):
-            found = _HEADER.fullmatch(header)
+            known = unit or beside.get(header)
+            found = None if known and _INDEXED.fullmatch(header) else _HEADER.fullmatch(header)
             name = found["name"] if found else header.strip()
             self._names.append(name)
-            self._units.append((found and found["unit"].strip()) or unit or beside.get(name))
+            self._units.append((found and found["unit"].strip()) or known or beside.get(name))
 
     def column(self, name: str, time: str) -> FileColumn:
         """Return a column with its times: those of the column `time`, in MDF those of the channel."""

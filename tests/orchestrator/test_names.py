@@ -1,0 +1,287 @@
+"""Names of signals and targets, and variables called as tools for Modelica and FMI 3 call theirs."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.planning import plan_experiment
+from orchestrator.experiments.region import RegionRuns
+from orchestrator.figures.panels import panels_of
+from orchestrator.figures.style import LabelledRun
+from orchestrator.metrics.run_metrics import evaluate, metric
+from orchestrator.names import SignalName, Target, match, matching
+from orchestrator.pages.comparison import divergence
+from orchestrator.results.read import load_results
+from orchestrator.scenario.load import load_scenario
+from orchestrator.wiring.make_plan import make_plan
+from tests.changed import changed
+from tests.commands import status_of
+
+UNITS = ("driver_sine", "plant_two_dof", "tyre_linear")
+
+NAMES = {
+    "plant_two_dof": {
+        "yaw_rate": "body.w",
+        "sideslip": "x[1]",
+        "position_y": "frame[1].y",
+        "steer_angle": "u[1]",
+    },
+    "driver_sine": {"amplitude": "a[1]", "frequency": "wave.f"},
+}
+"""FMU -> variable -> its other name."""
+SCENARIO = """\
+title: Other names
+stop_time: 3
+step_size: 10 ms
+inputs: {yaw_moment: 0}
+friction: 0.9
+units:
+  driver: {fmu: driver_sine, parameters: {"a[1]": 2 deg, wave.f: 0.5}}
+  plant: {fmu: plant_two_dof, parameters: {initial_speed: 20}}
+  tyre: {fmu: tyre_linear}
+connections:
+  - {from: driver.steer_angle, to: "plant.u[1]"}
+"""
+
+
+def test_the_first_dot_of_a_name_separates_the_instance():
+    assert SignalName.parse("plant.body.w") == ("plant", "body.w")
+    assert SignalName.parse("plant.frame[1.5].x") == ("plant", "frame[1.5].x")
+    assert SignalName.parse("yaw_rate") == ("", "yaw_rate")
+    assert [str(SignalName.parse(text)) for text in ("plant.x[1]", "time")] == ["plant.x[1]", "time"]
+
+
+def test_a_key_of_inputs_names_an_instance_only_if_there_is_one():
+    assert SignalName.parse_input("tyre.friction_*", ["tyre"]) == ("tyre", "friction_*")
+    assert SignalName.parse_input("body.u", ["tyre"]) == ("*", "body.u")
+
+
+@pytest.mark.parametrize(
+    "text, target",
+    [
+        ("stop_time", Target("run", variable="stop_time")),
+        ("friction", Target("fact", variable="friction")),
+        ("vehicle", Target("vehicle_file")),
+        ("vehicle.mass", Target("vehicle_parameter", variable="mass")),
+        ("tyres", Target("tyres")),
+        ("tyres.rear", Target("tyres", variable="rear")),
+        ("inputs.tyre.friction_*", Target("input", variable="tyre.friction_*")),
+        ("faults.plant.x[1] -> sensor", Target("faults", variable="plant.x[1] -> sensor")),
+        ("controller", Target("fmu", "controller")),
+        ("plant.step_size", Target("setting", "plant", "step_size")),
+        ("plant.body.m", Target("parameter", "plant", "body.m")),
+    ],
+)
+def test_a_target_is_parsed_and_written_back(text, target):
+    assert Target.parse(text) == target
+    assert str(target) == text
+
+
+@pytest.mark.parametrize("text", ["", ".", ".mass", "plant.", "inputs."])
+def test_a_target_without_one_of_its_parts_is_refused(text):
+    with pytest.raises(ValueError, match=re.escape(repr(text))):
+        Target.parse(text)
+
+
+def test_only_the_star_of_a_pattern_is_special():
+    names = ["x[1]", "x[2]", "x1", "body.w", "bodyxw"]
+    assert list(matching("x[1]", names).values()) == ["x[1]"]
+    assert matching("x[*]", names) == {"1": "x[1]", "2": "x[2]"}
+    assert list(matching("*.w", names).values()) == ["body.w"]
+    assert [match("a*b", name) for name in ("ab", "a.b", "aXbc", "a\nb")] == ["", ".", None, "\n"]
+    assert [match("a?", name) for name in ("a?", "ab")] == ["", None]
+
+
+@pytest.fixture
+def folder(fmus, tmp_path, monkeypatch) -> Path:
+    """A folder with the scenario and FMUs whose variables have the other names."""
+    for name in UNITS:
+        _rename(fmus / f"{name}.fmu", tmp_path / "fmus" / f"{name}.fmu", NAMES.get(name, {}))
+    (tmp_path / "other.yaml").write_text(SCENARIO)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("YAWBENCH_NO_BUILD", "1")
+    return tmp_path
+
+
+def _rename(fmu: Path, target: Path, names: dict[str, str]) -> None:
+    target.parent.mkdir(exist_ok=True)
+    with zipfile.ZipFile(fmu) as given, zipfile.ZipFile(target, "w") as made:
+        for item in given.infolist():
+            content = given.read(item)
+            if item.filename == "modelDescription.xml":
+                for old, new in names.items():
+                    assert f'name="{old}"'.encode() in content
+                    content = content.replace(f'name="{old}"'.encode(), f'name="{new}"'.encode())
+            made.writestr(item, content)
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a table by column, without the units in its header."""
+    with path.open(newline="", encoding="utf-8") as file:
+        header, *cells = csv.reader(file)
+    return [dict(zip((name.partition(" [")[0] for name in header), row, strict=True)) for row in cells]
+
+
+def test_parameters_columns_and_wires_have_such_names(folder):
+    given = ["--set", "driver.a[1]=3 deg", "--set", "driver.wave.f=1"]
+    assert status_of("run", "other.yaml", *given, "--out", "out") == 0
+    results = load_results(Path("out"))
+    assert {"plant.body.w", "plant.x[1]", "plant.frame[1].y"} <= set(results)
+    assert results.find("body.w") is results["plant.body.w"]
+    assert abs(results["plant.body.w"]).max() > 0
+    assert [change["place"] for change in results.run["changes"]] == ["driver.a[1]", "driver.wave.f"]
+
+
+def test_a_scenario_records_them_by_name_and_by_pattern(folder):
+    with (folder / "other.yaml").open("a") as file:
+        file.write('record: ["plant.x[1]", "plant.frame[*].y", "*.w"]\n')
+    assert (
+        status_of("run", "other.yaml", "--out", "out") == 2
+    )  # only the first dot separates: `w` of any instance
+    text = (folder / "other.yaml").read_text().replace('"*.w"', '"*.body.w"')
+    (folder / "other.yaml").write_text(text)
+    assert status_of("run", "other.yaml", "--out", "out") == 0
+    assert list(load_results(Path("out"))) == ["plant.x[1]", "plant.frame[1].y", "plant.body.w"]
+
+
+def test_metrics_take_them(folder, yawbench):
+    names = ("peak(plant.x[1])", "peak(body.w)", "final(plant.frame[1].y)", "rms(plant.x[1] - plant.x[1])")
+    status, _, said = yawbench(
+        "run", "other.yaml", "--out", "out", *(word for name in names for word in ("--metric", name))
+    )
+    assert status == 0, said
+    results = load_results(Path("out"))
+    found = {name: evaluate(results, metric(name)) for name in names}
+    assert found["peak(plant.x[1])"].number == abs(results["plant.x[1]"]).max()
+    assert found["peak(body.w)"].number == abs(results["plant.body.w"]).max()
+    assert found["final(plant.frame[1].y)"].number == results["plant.frame[1].y"][-1]
+    assert found["rms(plant.x[1] - plant.x[1])"].number == 0
+    assert [metric(name).name for name in names] == list(names)
+
+
+SWEEP = """\
+title: Levels
+scenario: other.yaml
+axes:
+  a: {vary: "driver.a[1]", values: [1, 2], unit: deg}
+  f: {vary: driver.wave.f, values: [500, 1000], unit: mHz}
+metrics:
+  most: {metric: "peak(plant.x[1])"}
+"""
+
+
+def test_levels_of_axes_are_converted_to_the_unit_of_the_parameter(folder, yawbench):
+    (folder / "sweep.yaml").write_text(SWEEP)
+    status, _, said = yawbench("sweep", "sweep.yaml", "--out", "out", "--jobs", 1)
+    assert status == 0, said
+    table = rows(folder / "out/table.csv")
+    assert [float(row["a"]) for row in table] == pytest.approx([math.radians(x) for x in (1, 1, 2, 2)])
+    assert [float(row["f"]) for row in table] == [0.5, 1.0, 0.5, 1.0]
+    assert float(table[2]["most"]) > 1.9 * float(table[0]["most"])
+
+
+def test_constants_of_inputs_are_set_by_name_and_by_instance(folder, yawbench):
+    (folder / "other.yaml").write_text(SCENARIO.split("connections:")[0])
+    (folder / "sweep.yaml").write_text(
+        "title: Held\nscenario: other.yaml\naxes:\n"
+        '  held: {vary: "inputs.u[1]", values: [1, 2], unit: deg}\n'
+        "metrics:\n  most: {metric: final(plant.body.w)}\n"
+    )
+    status, _, said = yawbench("sweep", "sweep.yaml", "--out", "out", "--jobs", 1)
+    assert status == 0, said
+    assert [float(row["held"]) for row in rows(folder / "out/table.csv")] == pytest.approx(
+        [math.radians(1), math.radians(2)]
+    )
+    plan = planned("other.yaml", changed(settings=["inputs.plant.u[1]=0.1"]))
+    assert plant_of(plan).constants["u[1]"] == 0.1
+
+
+def test_figures_draw_them_alone_and_over_one_another(folder, yawbench):
+    yawbench("run", "other.yaml", "--out", "out")
+    panels = ("plant.x[1]", "frame[1].y", "plant.body.w(plant.x[1])")
+    status, _, said = yawbench("plot", "out", *(word for one in panels for word in ("--panel", one)))
+    assert status == 0, said
+    results = LabelledRun("", load_results(folder / "out"))
+    assert [len(panels_of([results], one)) for one in panels] == [1, 1, 1]
+    assert (folder / "out/overview.svg").is_file()
+
+
+def test_runs_that_differ_in_them_are_told_apart(folder, yawbench):
+    yawbench("run", "other.yaml", "--out", "one")
+    yawbench("run", "other.yaml", "--set", "driver.a[1]=3 deg", "--out", "other")
+    status, out, said = yawbench("diff", "one", "other")
+    assert status == 0, said
+    assert {"driver.a[1]", "plant.x[1]", "plant.body.w", "plant.frame[1].y"} <= set(out.split())
+    parted = divergence(load_results(folder / "one"), load_results(folder / "other"))
+    assert {one.signal: one.targets for one in parted.partings}["driver.steer_angle"] == ("plant",)
+
+
+def test_convergence_is_measured_of_them(folder, yawbench):
+    options = ("--halvings", 2, "--out", "out")
+    status, _, said = yawbench("converge", "other.yaml", "--signal", "plant.body.w", *options)
+    assert status == 0, said
+    status, _, said = yawbench("converge", "other.yaml", "--signal", "body", *options)
+    assert status == 2, said
+
+
+def test_faults_disturb_them(folder, yawbench):
+    bias = ("--fault", "plant.frame[1].y: bias 2 from 1 s", "--fault", "plant.body.*: gain 0")
+    status, _, said = yawbench("run", "other.yaml", "--out", "out", *bias)
+    assert status == 0, said
+    results = load_results(folder / "out")
+    assert not results["plant.body.w"].any()
+    at = np.searchsorted(results.time, 1.0)
+    jump = results["plant.frame[1].y"][at] - results["plant.frame[1].y"][at - 1]
+    assert jump == pytest.approx(2, abs=0.1)
+    assert [one.on for one in results.record.faults] == ["plant.frame[1].y", "plant.body.*"]
+
+
+STUDY = """\
+title: Open
+runs:
+  - {name: own, scenario: other.yaml}
+metrics:
+  most: {metric: "peak(plant.x[1])"}
+claims:
+  - {says: Small, holds_if: [{run: own, metric: most, at_most: 90 deg}]}
+region:
+  points: 10
+  open_values:
+    turned: {vary: "driver.a[1]", from: 1, to: 3, unit: deg, because: "chosen: around it"}
+"""
+
+
+def test_they_are_open_values_of_a_study(folder):
+    (folder / "study.yaml").write_text(STUDY)
+    experiment = load_experiment(folder / "study.yaml")
+    runs = RegionRuns(plan_experiment(experiment, folder / "out"))
+    assert runs.touched == {"turned": ["own"]}
+    assert runs.unit("turned") == "rad"
+    assert runs.chosen_number("turned", ["own"]) == pytest.approx(math.radians(2))
+
+
+def test_recorded_results_are_series_of_inputs(folder, yawbench):
+    assert yawbench("run", "other.yaml", "--out", "out")[0] == 0
+    (folder / "again.yaml").write_text(
+        SCENARIO.split("connections:")[0].replace(
+            "inputs: {", 'inputs: {"u[1]": {file: out/results.csv, column: "plant.x[1]"}, '
+        )
+    )
+    (series,) = plant_of(planned("again.yaml")).series.values()
+    assert series.values.tolist() == load_results(folder / "out")["plant.x[1]"].tolist()
+
+
+def planned(name: str, changes=()):
+    return make_plan(load_scenario(Path(name), changes=changes), fmus=Path("fmus"))
+
+
+def plant_of(plan):
+    return next(one for one in plan.instances if one.name == "plant")
