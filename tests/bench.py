@@ -1,17 +1,21 @@
-"""What a run costs: `make bench`, or `python -m tests.bench [SCENARIO ...]`.
+"""What a run costs: `make bench`, or `python -m tests.bench [--long] [SCENARIO ...]`.
 
-Prints, and asserts nothing: times depend on the machine and on who else uses it. Every figure is
-the best of several runs, which is the one least disturbed, if nothing else is said.
+Prints, and asserts nothing: times depend on the machine and on who else uses it. Every figure is the best of
+several runs, which is the one least disturbed, if nothing else is said. First comes a table of ratios, each
+of two things measured in turn, beside what they are to be at most; `--long` adds what takes minutes. Then,
+for every scenario, what the instances cost in the loop in Python, and what other masters take.
 """
 
 from __future__ import annotations
 
+import json
 import os
+import resource
 import subprocess
 import sys
 import tempfile
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import nan
 from pathlib import Path
@@ -19,7 +23,10 @@ from time import perf_counter, perf_counter_ns
 
 import numpy as np
 
+from fmus.build import HERE as FMUS
+from orchestrator.fmu.native import NATIVE, runs_as
 from orchestrator.interop.second_opinion import MASTERS, installed, second_opinion
+from orchestrator.master.compiled_loop import WANTED as LOOP
 from orchestrator.master.fmi import open_unit
 from orchestrator.master.log import Log
 from orchestrator.master.master import Master
@@ -31,6 +38,9 @@ from orchestrator.wiring.make_plan import make_plan
 
 DEFAULT = Path(__file__).parents[1] / "scenarios" / "fnn_sideslip" / "25mps.yaml"
 REPEATS = 3
+BARE_LOOP = "x = 0\nfor i in range(10**7): x += i"
+RUNS = 20, 220
+"""Numbers of runs of the two sweeps of which the difference is taken: what a run costs, without the start."""
 STEPS = 4000
 """Communication steps measured at most; a scenario's start is representative of its cost."""
 
@@ -49,7 +59,7 @@ class Meter:
         return perf_counter_ns() - begin
 
     def around(self, operation: Operation) -> list[Operation]:
-        call, spent, own, key = operation.call, self.spent, self._own, (operation.unit, operation.kind)
+        call, spent, own, key = operation.call, self.spent, self._own, (operation.instance, operation.kind)
 
         def timed():
             begin = perf_counter_ns()
@@ -57,7 +67,7 @@ class Meter:
             spent[key] += perf_counter_ns() - begin - own
             return status
 
-        return [operation._replace(call=timed)]
+        return [operation._replace(call=timed, data=None)]
 
 
 Change = Callable[[Operation], list[Operation]]
@@ -200,22 +210,130 @@ def imports() -> float:
     return min(float(subprocess.run(command, capture_output=True, check=True).stdout) for _ in range(REPEATS))
 
 
+def spent(*arguments: object, **environment: str) -> float:
+    """Return the processor time [s] of a Python process and its children."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    command = [sys.executable, *map(str, arguments)]
+    subprocess.run(command, capture_output=True, check=True, env=os.environ | environment)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def took(*arguments: object, **environment: str) -> float:
+    """Return the time [s] of a Python process from start to end."""
+    begin = perf_counter()
+    spent(*arguments, **environment)
+    return perf_counter() - begin
+
+
+def ratio(one: Callable[[], float], other: Callable[[], float]) -> float:
+    """Return the ratio of two costs, the best of several measured in turn."""
+    pairs = [(one(), other()) for _ in range(REPEATS)]
+    return min(first for first, _ in pairs) / min(second for _, second in pairs)
+
+
+def stepping(path: Path, **environment: str) -> float:
+    """Return the time of a communication step [s], in a process with this environment."""
+    command = [sys.executable, "-m", "tests.bench", "--step", str(path)]
+    done = subprocess.run(command, capture_output=True, check=True, env=os.environ | environment)
+    return float(done.stdout)
+
+
+def beyond_stepping(path: Path) -> float:
+    """Return the processor time [s] of a short run in a sweep, less that of its steps."""
+    with tempfile.TemporaryDirectory() as folder:
+        sweep = Path(folder, "sweep.yaml")
+
+        def cost(runs: int) -> float:
+            axis = {"vary": "inputs.friction*", "from": 0.3, "to": 0.9, "count": runs}
+            keys = {"title": "Short runs", "scenario": str(path), "set": {"stop_time": 0.05}}
+            metrics = {"yaw_rate": {"metric": "peak(yaw_rate)"}}
+            sweep.write_text(json.dumps({**keys, "axes": {"friction": axis}, "metrics": metrics}))
+            out = Path(folder, str(runs))
+            return spent("-m", "orchestrator.cli", "sweep", sweep, "--fresh", "--out", out, "--jobs", 1)
+
+        few, many = (min(cost(runs) for _ in range(REPEATS)) for runs in RUNS)
+    plan = make_plan(load_scenario(path))
+    return (many - few) / (RUNS[1] - RUNS[0]) - stepping(path) * round(0.05 / float(plan.step))
+
+
+def against(path: Path) -> dict[str, float]:
+    """Return the time of our step over that of other masters, with the same FMUs on one core."""
+    plan = make_plan(load_scenario(path))
+    plan = replace(plan, n_steps=min(STEPS, plan.n_steps))
+    there = [one for one in MASTERS if installed(one) and one.title != "fmpy"]
+    with tempfile.TemporaryDirectory() as folder:
+        runs = [second_opinion(plan, Path(folder), masters=there) for _ in range(REPEATS)]
+    best = {}
+    for k, master in enumerate(there):
+        if all("ours on one core" in run[k].seconds for run in runs):
+            ours, theirs = (
+                min(run[k].seconds[f"{whose} on one core"] for run in runs) for whose in ("ours", "theirs")
+            )
+            best[master.title] = ours / theirs
+    return best
+
+
+def ratios(path: Path, *, long: bool) -> None:
+    """Print the table of what this program is to come to."""
+
+    def line(what: str, value: float, limit: str) -> None:
+        print(f"  {what:78s}{value:9.3g}   {limit}", flush=True)
+
+    print(f"{path}: {processors()} cores; what it is to be at most stands behind each figure\n")
+    native = [runs_as(archive) for archive in sorted(FMUS.glob("*.fmu"))]
+    line(f"FMUs of {len(native)} that do not run natively", sum(one != NATIVE for one in native), "3")
+    reference = {LOOP: "python", "YAWBENCH_UNITS": "python"}
+
+    def bare() -> float:
+        return spent("-c", BARE_LOOP)
+
+    def importing() -> float:
+        return spent("-c", "import yawbench")
+
+    step = ratio(lambda: stepping(path), lambda: stepping(path, **reference))
+    line("a step of the compiled loop and native units, over Python loop and units", step, "1/20 = 0.05")
+    loop = ratio(lambda: stepping(path), lambda: stepping(path, **{LOOP: "python"}))
+    line("a step of the compiled loop over one of the Python loop, native units", loop, "")
+    for title, share in against(path).items():
+        line(f"a step over one of {title}, native units, one core", share, "0.5 of the better")
+    line("`import yawbench` over a bare loop of 1e7 additions", ratio(importing, bare), "0.3")
+    with tempfile.TemporaryDirectory() as folder:
+        run = ratio(lambda: spent("-m", "orchestrator.cli", "run", path, "--out", folder), bare)
+    line("`yawbench run` over a bare loop of 1e7 additions", run, "1.2")
+    line("processor time of a run in a sweep beyond stepping [s]", beyond_stepping(path), "0.03")
+    if long:
+        command = "-m", "orchestrator.cli"
+        with tempfile.TemporaryDirectory() as folder:
+            built = took(*command, "build", "--out", folder, YAWBENCH_CACHE=f"{folder}/cache")
+            line("first build of all FMUs [s]", built, "180")
+            again = took(*command, "build", "--force", "--out", folder, YAWBENCH_CACHE=f"{folder}/cache")
+            line("build of all FMUs, translations cached [s]", again, "")
+            line("`yawbench report` [s]", took(*command, "report", "--out", f"{folder}/report"), "240")
+            line("`yawbench rank` [s]", took(*command, "rank", "--fresh", "--out", f"{folder}/rank"), "180")
+    print()
+
+
 def process(path: Path) -> float:
     """Return the time [s] of a whole `yawbench run`."""
-    times = []
     with tempfile.TemporaryDirectory() as folder:
-        for _ in range(REPEATS):
-            begin = perf_counter()
-            subprocess.run(
-                [sys.executable, "-m", "orchestrator.cli", "run", str(path), "--out", folder],
-                capture_output=True,
-                check=True,
-            )
-            times.append(perf_counter() - begin)
-    return min(times)
+        return min(took("-m", "orchestrator.cli", "run", path, "--out", folder) for _ in range(REPEATS))
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Print a single step's time for `--step SCENARIO`, else everything."""
+    files = [Path(argument) for argument in arguments if not argument.startswith("--")]
+    if "--step" in arguments:
+        print(measure(make_plan(load_scenario(files[0])))["step"])
+        return
+    ratios(DEFAULT, long="--long" in arguments)
+    os.environ[LOOP] = "python"  # its calls are timed one by one
+    for path in files or [DEFAULT]:
+        bench(path)
+    del os.environ[LOOP]
+    for path in files or [DEFAULT]:
+        masters(path)
 
 
 if __name__ == "__main__":
-    for scenario_file in [Path(argument) for argument in sys.argv[1:]] or [DEFAULT]:
-        bench(scenario_file)
-        masters(scenario_file)
+    main(sys.argv[1:])
