@@ -18,7 +18,7 @@ import typer
 from typer.core import TyperGroup
 
 from .errors import Interrupted, RecordWarning, YawbenchError
-from .master.process_state import terminable
+from .interrupts import terminable
 from .messages import cut, printable
 
 COMMANDS = {
@@ -26,10 +26,10 @@ COMMANDS = {
     "build": "build",
     "check": "check",
     "run": "run",
-    "compare": "compare",
+    "compare": "compare_and_diff",
     "plot": "results",
     "animate": "results",
-    "converge": "compare",
+    "converge": "compare_and_diff",
     "study": "experiments",
     "report": "experiments",
     "sweep": "experiments",
@@ -38,7 +38,7 @@ COMMANDS = {
     "tune": "experiments",
     "rank": "rank",
     "list": "list",
-    "diff": "results",
+    "diff": "compare_and_diff",
     "salvage": "results",
     "export-ssp": "interop",
     "second-opinion": "interop",

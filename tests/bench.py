@@ -26,11 +26,11 @@ import numpy as np
 from fmus.build import HERE as FMUS
 from orchestrator.fmu.native import NATIVE, runs_as
 from orchestrator.interop.second_opinion import MASTERS, installed, second_opinion
+from orchestrator.interrupts import StopFlag
 from orchestrator.master.compiled_loop import WANTED as LOOP
 from orchestrator.master.fmi import open_unit
 from orchestrator.master.log import Log
 from orchestrator.master.master import Master
-from orchestrator.master.process_state import StopFlag
 from orchestrator.master.step_program import Operation
 from orchestrator.plan import Plan
 from orchestrator.scenario.load import load_scenario

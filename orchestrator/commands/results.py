@@ -1,4 +1,4 @@
-"""`yawbench plot`, `animate`, `diff` and `salvage`: commands on recorded runs.
+"""`yawbench plot`, `animate` and `salvage`: commands on recorded runs.
 
 A run is given by its results folder, or by a scenario, which is run first if its results are missing or out
 of date.
@@ -174,33 +174,6 @@ def animate(sources: RunSources, wishes: RunOptions, label: Labels = None, out: 
     except OSError as error:
         raise ResultsError(f"{file}: the page cannot be written: {error.strerror or error}.") from None
     say(f"{file}: {len(text.encode()) / 1000:.0f} kB")
-
-
-One = Annotated[Path, typer.Argument(help="Folder of results.", metavar="RUN")]
-Other = Annotated[Path, typer.Argument(help="Folder of the results to compare it with.", metavar="RUN")]
-
-
-def diff(one: One, other: Other) -> None:
-    """Show what differs between two runs.
-
-    First what they were made of: scenario, parameters, FMUs, connections, versions of programs. Then
-    their results, signal by signal: from when on they differ, from when on a curve shows it (1 % of the
-    signal's largest value), and by how much at most.
-    """
-    from ..pages.comparison import differences, differences_table, divergence, partings_table
-    from ..results.read import load_results
-    from .progress import print_tables, say
-
-    pass
-
-    first, second = load_results(one), load_results(other)
-    found, parted = differences(first.record, second.record), divergence(first, second)
-    if found:
-        print_tables([differences_table(found, *distinct([one, other]))])
-    if parted.partings or parted.notes:
-        print_tables([partings_table(parted, first, second)])
-    if not (found or parted.partings or parted.notes):
-        say("The runs are the same, in what they were made of and in every number.")
 
 
 Folders = Annotated[list[Path], typer.Argument(help="Folders of runs that died.", metavar="FOLDER...")]

@@ -11,7 +11,7 @@ from .options import RunOptions, takes
 
 if TYPE_CHECKING:
     from ..experiments.tables import Table
-    from ..vehicles.handling import Handling
+    from ..vehicles.handling_and_braking import Handling
 
 
 VehicleAction = Annotated[
@@ -64,7 +64,7 @@ def vehicle(
     from ..scenario import catalogue, yaml_lines
     from ..scenario.scenario_schema import Vehicle
     from ..scenario.validation import validate
-    from ..vehicles.handling import TestTrack, draw_cars, fitting_plant, handling_of
+    from ..vehicles.handling_and_braking import TestTrack, draw_cars, fitting_plant, handling_of
     from ..wiring.warnings import remarks_on_values
     from .progress import print_tables, save_figure, say
 
@@ -95,7 +95,7 @@ def _tables(cars: list[Handling]) -> list[Table]:
 
     from ..evaluation.steering_tests import LEVELS, G
     from ..experiments.tables import Table
-    from ..vehicles.handling import SPEEDS
+    from ..vehicles.handling_and_braking import SPEEDS
 
     names = [without_role(car.plant) for car in cars]
     numbers = set(range(1, len(names) + 1))

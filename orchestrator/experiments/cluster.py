@@ -25,7 +25,7 @@ import distributed
 from ..cache import OF_METRICS, sources_hash
 from ..errors import ResultsError, ScenarioError
 from ..fmu.archive import open_fmu, read_archive
-from ..master.process_state import terminable
+from ..interrupts import terminable
 from ..messages import listed
 from ..plan import Plan
 from .jobs import Job, OnOutcome, Outcome, execute

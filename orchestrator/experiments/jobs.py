@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..cache import OF_METRICS, OF_TESTS, sources_hash
 from ..errors import KEPT, BuildError, Interrupted, ResultsError, ScenarioError, YawbenchError
-from ..master.process_state import StopFlag, interrupts
+from ..interrupts import StopFlag, interrupts
 from ..messages import hint, printable
 from ..metrics.plausibility import findings_in
 from ..metrics.run_metrics import evaluate, metric

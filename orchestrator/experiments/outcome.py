@@ -16,11 +16,12 @@ from ..metrics.run_metrics import MetricValue
 from ..results.folder import RUN_FILE
 from ..results.read import Results
 from .axes import RUN, DesignPoint, Level
+from .confidence import interval
 from .experiment import Case, LoadedExperiment, NamedRun
 from .grids import correlation
 from .jobs import NOT_MADE, MeasuredRun, Outcome, measured, read_back
 from .judged_schema import Claim, LimitSpec, calculate
-from .judging import ClaimResult, MetricTable, interval, judge
+from .judging import ClaimResult, MetricTable, judge
 from .margins import Region
 from .planning import PlannedExperiment, metrics_of
 from .schema import ExperimentSpec

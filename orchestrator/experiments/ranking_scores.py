@@ -23,9 +23,9 @@ from ..errors import ResultsError
 from ..evaluation.sine_with_dwell import FROM, RATIOS, SLIGHT, SPUN
 from ..figures.style import digits_apart
 from ..plan import Value
+from .confidence import ConfidenceInterval, interval
 from .execution import Executor
 from .jobs import STEP_TIME, Job, MeasuredRun
-from .judging import ConfidenceInterval, interval
 from .outcome import ExperimentResult
 from .ranking import (
     RECORDED,

@@ -24,7 +24,7 @@ from .tables import Table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from .judging import ConfidenceInterval
+    from .confidence import ConfidenceInterval
     from .ranking_scores import RankingResult
 
 

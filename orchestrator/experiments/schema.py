@@ -106,7 +106,7 @@ take values, as do `stop_time`, `step_size` and `algorithm`; an instance alone t
         with slip control: {swap: {wheel_control: wheel_control_slip}, set: {driver.amplitude: 0.04}}
 
 An axis of seeds with `repeats` gives every number as the mean over it, with a confidence interval
-(`judging.interval`); a verdict whose bound lies inside is undecided. `runs` names the runs it applies to.
+(`confidence.interval`); a verdict whose bound lies inside is undecided. `runs` names the runs it applies to.
 
     axes:
       seed: {vary: sensor.seed, values: [1, 2, 3, 4, 5], runs: ["*/noisy"], repeats: true}

@@ -39,11 +39,11 @@ from typing import Any
 
 import numpy as np
 
+from ..interrupts import StopFlag
 from ..master.fmi import open_unit
 from ..master.instance import FmuInstance
 from ..master.log import Log
 from ..master.master import Master
-from ..master.process_state import StopFlag
 from ..names import SignalName
 from ..plan import Override
 from ..scenario import ssp_read

@@ -33,6 +33,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import Interrupted, SimulationError, YawbenchError
+from ..interrupts import StopFlag, stop_requested_at
 from ..messages import listed
 from ..plan import Plan, Value
 from ..processes import ForkedChild, die_with_parent
@@ -44,7 +45,7 @@ from .ipc import FmuProcess, LogRelay, rebuilt, told
 from .isolation import Isolation
 from .log import MASTER, WARNING, Log
 from .master import WORDS, EndRequested, Master
-from .process_state import StopFlag, flush_output, stop_requested_at
+from .process_state import flush_output
 from .run_loop import OpenInstance, RunLoop, RunProgress
 
 ROWS, PROGRESS, ENDED, WHERE = 0x90, 0x91, 0x92, 0x93

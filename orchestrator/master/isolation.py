@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import SimulationError, YawbenchError
+from ..interrupts import stop_requested_at
 from ..plan import Instance, Plan, Value, ValueRef
 from ..processes import start
 from ..supervisor import ANSWER, FAILED, REPLY, REQUEST, PipeChannel, ProcessLost
@@ -29,7 +30,7 @@ from .guardian import stand_guard
 from .instance import Buffers, CtypesInstance, ExperimentSetup, FmuInstance, Status, StepCalls
 from .ipc import GET, LOG, SET, STEP, FmuProcess, LogRelay, SharedBuffer, rebuilt, shared_memory, told
 from .log import FATAL, OK, PROCESS, WARNING, Log, known
-from .process_state import ProcessState, flush_output, stop_requested_at
+from .process_state import ProcessState, flush_output
 from .step_program import copying
 
 CALL_LIMIT = 10.0

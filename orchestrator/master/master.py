@@ -22,13 +22,14 @@ from typing import cast
 import numpy as np
 
 from ..errors import Interrupted, SimulationError
+from ..interrupts import StopFlag
 from ..messages import listed
 from ..plan import Plan, Value
 from .compiled_loop import Answer, CompiledLoop, missing_loop
 from .initialization import initialize
 from .instance import Buffers, FmuInstance, PlainCall, Status
 from .log import DISCARD, MASTER, OK, WARNING, Log, describe
-from .process_state import Copies, ProcessState, StopFlag, suspects
+from .process_state import Copies, ProcessState, suspects
 from .signal_pool import SignalPool
 from .step_program import Operation, StepProgram
 

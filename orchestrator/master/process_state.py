@@ -1,4 +1,4 @@
-"""Process-wide state that an FMU may corrupt for others, and signals that stop a run.
+"""Process-wide state that an FMU may corrupt for others.
 
 Libraries compiled for speed flush small numbers to zero for the whole process from the moment they are
 loaded; others set a rounding mode or a locale (after which `strtod` reads "0,5") and leave it. Loading,
@@ -6,9 +6,6 @@ instantiation and initialization are few calls: what they have changed is restor
 step that would cost more than the work of many instances, so between steps only the floating-point
 environment is checked, now and then: if it has changed, the run ends, because it is unknown since when.
 Isolated instances share nothing.
-
-Ctrl-C and SIGTERM set a flag that is checked between steps. Python's default for Ctrl-C is an exception at an
-arbitrary point, which inside an FMU would end in half a step or a dead process.
 """
 
 from __future__ import annotations
@@ -23,11 +20,8 @@ import signal
 import struct
 import sys
 import threading
-import time
-from collections.abc import Callable, Iterator, Sequence
-from types import FrameType
+from collections.abc import Iterator, Sequence
 
-from ..errors import Interrupted
 from ..plan import Instance
 from .log import MASTER, WARNING, Log
 
@@ -142,88 +136,3 @@ def _umask() -> int:
     mask = os.umask(0o077)
     os.umask(mask)
     return mask
-
-
-_requested_at: float | None = None
-
-
-class StopFlag:
-    """Whether the run should stop, and the signal that requested it."""
-
-    def __init__(self) -> None:
-        self.flag = ctypes.c_int32(0)  # read by the compiled loop, too
-        self.number: int = signal.SIGINT
-
-    @property
-    def requested(self) -> bool:
-        return bool(self.flag.value)
-
-    def request(self, number: int = signal.SIGINT) -> None:
-        """Ask the run to stop."""
-        global _requested_at
-        self.flag.value, self.number = 1, number
-        _requested_at = _requested_at or time.monotonic()
-
-    def interrupted(self, how: str, *, unit: str | None = None, time: float | None = None) -> Interrupted:
-        """Return the exception to raise; `how` continues the message "the run was interrupted"."""
-        space = "" if how.startswith(":") else " "
-        problem = f"the run was interrupted{space}{how}"
-        return Interrupted(problem, instance=unit, time=time, number=self.number)
-
-
-def stop_requested_at() -> float | None:
-    """Return when this process was asked to stop, by `time.monotonic` [s]; None if it was not."""
-    return _requested_at
-
-
-@contextlib.contextmanager
-def terminable() -> Iterator[None]:
-    """Make SIGTERM end the block with an exception, as Ctrl-C does.
-
-    Raises:
-        Interrupted: SIGTERM was received.
-    """
-
-    def handle(number: int, frame: FrameType | None) -> None:
-        raise Interrupted(number=number)
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    earlier = signal.signal(signal.SIGTERM, handle)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL if earlier is None else earlier)
-
-
-@contextlib.contextmanager
-def interrupts(flag: StopFlag, again: Callable[[], None]) -> Iterator[None]:
-    """Make SIGINT and SIGTERM set `flag` while the block runs; `again` is called if they repeat.
-
-    Outside the main thread, where Python allows no handlers, the block just runs.
-
-    Raises:
-        Interrupted: a signal came too late to stop the block.
-    """
-
-    def handle(number: int, frame: FrameType | None) -> None:
-        if flag.requested:
-            again()
-        flag.request(number)
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    global _requested_at
-    _requested_at = None
-    numbers = (signal.SIGINT, signal.SIGTERM)
-    earlier = [signal.signal(number, handle) for number in numbers]
-    try:
-        yield
-    finally:
-        _requested_at = None
-        for number, handler in zip(numbers, earlier, strict=True):
-            signal.signal(number, signal.SIG_DFL if handler is None else handler)
-    if flag.requested:
-        raise flag.interrupted("when it had ended")

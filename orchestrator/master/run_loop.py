@@ -16,13 +16,14 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import ResultsError, SimulationError
+from ..interrupts import StopFlag
 from ..messages import listed
 from ..plan import Instance, Plan, Value
 from ..results.recorder import BLOCK
 from .instance import FmuInstance, Status, StepCalls
 from .log import MASTER, WARNING, Log
 from .master import EndRequested, Master
-from .process_state import Copies, StopFlag, suspects
+from .process_state import Copies, suspects
 
 RunProgress = Callable[[int, int], None]
 """Called a few times a second with the number of communication points completed and their total."""

@@ -20,6 +20,7 @@ from ..errors import (
     SimulationError,
     YawbenchError,
 )
+from ..interrupts import StopFlag, interrupts
 from ..messages import printable
 from ..metrics.plausibility import PlausibilityWatch
 from ..plan import Finding, Plan
@@ -33,7 +34,6 @@ from ..results.run_record import EndRecord, ErrorRecord, FindingRecord, WarningR
 from .child_run import ChildRun, can_be_apart
 from .fmi import open_unit
 from .log import STATUS, Log, Message
-from .process_state import StopFlag, interrupts
 from .run_loop import OpenInstance, RunLoop, RunProgress
 
 WRITTEN = 100

@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ScenarioError
+from ..experiments.confidence import LEVEL
 from ..experiments.experiment import FIGURES
 from ..experiments.figures import runs_of, title_of
 from ..experiments.jobs import Job, PlanningCache
-from ..experiments.judging import LEVEL, ClaimResult
+from ..experiments.judging import ClaimResult
 from ..experiments.outcome import Each, ExperimentResult
 from ..experiments.tables import Cell, Table
 from ..experiments.verdict_tables import (

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from orchestrator.experiments.judging import interval
+from orchestrator.experiments.confidence import interval
 
 
 def test_the_interval_is_that_of_students_t_test():

@@ -19,9 +19,9 @@ from orchestrator.experiments.experiment import load_experiment
 from orchestrator.fault_kinds import KINDS, CountedNoise, Fault, FaultLocation, FaultySignal
 from orchestrator.figures.panels import FAULTY, LabelledRun
 from orchestrator.figures.plots import draw
+from orchestrator.interrupts import StopFlag
 from orchestrator.master.log import Log
 from orchestrator.master.master import Master
-from orchestrator.master.process_state import StopFlag
 from orchestrator.master.simulate import simulate, simulate_in_memory
 from orchestrator.plan import Override
 from orchestrator.results.freshness import key_of, staleness

@@ -20,7 +20,7 @@ ORCHESTRATOR = Path(__file__).parents[2] / "orchestrator"
 STAGES = (
     {"errors", "messages", "names", "plan", "labels", "cache", "checksums", "files"}
     | {"coupling", "fault_kinds"},
-    {"processes", "supervisor", "workers"},
+    {"processes", "supervisor", "workers", "interrupts"},
     {"scenario"},
     {"fmu"},
     {"wiring"},

@@ -8,10 +8,10 @@ import pytest
 
 from components.sensing.noise import key, normal
 from orchestrator.errors import ScenarioError
+from orchestrator.experiments.confidence import interval
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.figures import draw_over_axes
 from orchestrator.experiments.jobs import run_job
-from orchestrator.experiments.judging import interval
 from orchestrator.experiments.outcome import judge_records
 from orchestrator.experiments.planning import plan_experiment
 from orchestrator.experiments.verdict_tables import HOLDS, UNDECIDED, limit_tables, run_tables, verdict

@@ -17,8 +17,8 @@ from orchestrator.fmu.opener import Opener
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.scenario.load import load_scenario
 from orchestrator.tyres.stand import cornering_stiffness
-from orchestrator.vehicles import handling
-from orchestrator.vehicles.handling import (
+from orchestrator.vehicles import handling_and_braking as handling
+from orchestrator.vehicles.handling_and_braking import (
     PLANTS,
     SAMPLE,
     STEP,

@@ -1,7 +1,8 @@
-"""`yawbench compare` and `yawbench converge`: a scenario with different FMUs, or with smaller steps."""
+"""`yawbench compare`, `converge` and `diff`: other FMUs, smaller steps, two recorded runs."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -10,7 +11,7 @@ from ..coupling import ALGORITHMS
 from ..messages import hint, listed
 from .experiments import chapter_of, command_of, conduct, write_page
 from .options import CHANGES, MAKING, RunOptions, ScenarioFile, takes
-from .progress import hold, pooled, print_tables
+from .progress import hold, pooled, print_tables, say
 
 Swaps = Annotated[
     list[str],
@@ -133,3 +134,28 @@ def converge(
     write_page([chapter_of(findings, folder, command, each, shown_in=folder, **facts)], folder)
     if any(row.failed for row in rows):
         raise typer.Exit(1)
+
+
+One = Annotated[Path, typer.Argument(help="Folder of results.", metavar="RUN")]
+Other = Annotated[Path, typer.Argument(help="Folder of the results to compare it with.", metavar="RUN")]
+
+
+def diff(one: One, other: Other) -> None:
+    """Show what differs between two runs.
+
+    First what they were made of: scenario, parameters, FMUs, connections, versions of programs. Then
+    their results, signal by signal: from when on they differ, from when on a curve shows it (1 % of the
+    signal's largest value), and by how much at most.
+    """
+    from ..pages.comparison import differences, differences_table, divergence, partings_table
+    from ..results.read import load_results
+    from .results import distinct
+
+    first, second = load_results(one), load_results(other)
+    found, parted = differences(first.record, second.record), divergence(first, second)
+    if found:
+        print_tables([differences_table(found, *distinct([one, other]))])
+    if parted.partings or parted.notes:
+        print_tables([partings_table(parted, first, second)])
+    if not (found or parted.partings or parted.notes):
+        say("The runs are the same, in what they were made of and in every number.")
