@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import gc
 import importlib
 import io
 import os
@@ -124,6 +125,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     used, and the process exits without shutting the interpreter down.
     """
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # searching for plugins takes time
+    if arguments is None:
+        gc.set_threshold(100_000, 20, 20)  # imports and plans stay: searching for garbage finds little
     _make_printable()
     if not os.environ.get(TRACEBACK):  # ignore errors raised in destructors of libraries
         sys.unraisablehook = lambda _: None
