@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from orchestrator.errors import BuildError
+from orchestrator.errors import BuildError, Diagnostic
 from orchestrator.files import draft_of, remove_draft
 from orchestrator.fmu.native import NATIVE, runs_as
 from orchestrator.workers import Pool
@@ -92,8 +92,9 @@ def build_all(
     chosen = list(known) if components is None else list(dict.fromkeys(components))
     unknown = [name for name in chosen if name not in known]
     if unknown:
-        raise BuildError(f"there is no component {name!r}; there are: {', '.join(known)}" for name in unknown)
-    problems: list[str] = []
+        sentences = [f"there is no component {name!r}; there are: {', '.join(known)}" for name in unknown]
+        raise BuildError(sentences, code="component-unknown")
+    errors: list[Diagnostic] = []
     report = Report()
     tell = progress or (lambda name, what: None)
     stale = []
@@ -105,12 +106,12 @@ def build_all(
         else:
             stale.append(name)
     for name, found in _built(stale, known, out, root):
-        problems += found
+        errors += found
         if not found:
             report.built.append(name)
         tell(name, "failed" if found else "built")
-    if problems:
-        raise BuildError(problems)
+    if errors:
+        raise BuildError(errors)
     report.built.sort(key=chosen.index)
     for name in report.built:
         how = runs_as(out / f"{name}.fmu")
@@ -137,37 +138,38 @@ def _is_current(recipe: Recipe, target: Path, root: Path) -> bool:
 
 def _built(
     names: list[str], known: Mapping[str, Recipe], out: Path, root: Path
-) -> Iterator[tuple[str, list[str]]]:
+) -> Iterator[tuple[str, list[Diagnostic]]]:
     """Build components, as many at a time as there are processors; yield each with what is wrong with it."""
     if len(names) < 2 or sys.platform == "win32":
         for name in names:
-            yield name, problems_of(known[name], out, root)
+            yield name, errors_of(known[name], out, root)
         return
     with Pool(preload=[__name__]) as pool:
         for finished in pool.each(_build_one, [(name, out, root) for name in names]):
             name = names[finished.number]
-            died = [f"{name}: the process that built it {finished.died}"] if finished.died else []
+            lost = f"{name}: the process that built it {finished.died}"
+            died = [Diagnostic("build-process-died", lost)] if finished.died else []
             if finished.error is not None:
                 raise finished.error
             yield name, died or finished.value
 
 
-def _build_one(name: str, out: Path, root: Path) -> list[str]:
+def _build_one(name: str, out: Path, root: Path) -> list[Diagnostic]:
     """Build a component in a worker and return what is wrong with it."""
     with contextlib.redirect_stdout(sys.stderr):  # components may print while they are imported
-        return problems_of(_recipes(root)[name], out, root)
+        return errors_of(_recipes(root)[name], out, root)
 
 
 _recipes = functools.cache(find_recipes)
 """`find_recipes`, once for each worker process."""
 
 
-def problems_of(recipe: Recipe, out: Path, root: Path) -> list[str]:
+def errors_of(recipe: Recipe, out: Path, root: Path) -> list[Diagnostic]:
     """Build a component and return what is wrong with it."""
     try:
         bring_up_to_date(recipe, out / f"{recipe.name}.fmu", component_mark(recipe, root), force=True)
     except BuildError as error:
-        return list(error.problems)
+        return error.diagnostics
     return []
 
 
@@ -229,7 +231,7 @@ def recipe_of(
     if source.is_dir():
         return CRecipe(source)
     if not source.is_file():
-        raise BuildError(f"{source}: there is no such file")
+        raise BuildError(f"{source}: there is no such file", code="component-unreadable")
     stem = source.stem
     if role is None and source.parent.name in ROLES:
         role = source.parent.name
@@ -238,7 +240,10 @@ def recipe_of(
             role, stem = folder, stem[len(other.name) + 1 :]
             break
     if role not in ROLES:
-        raise BuildError(f"{source}: which role? Put it into a folder called one of: {', '.join(ROLES)}")
+        raise BuildError(
+            f"{source}: which role? Put it into a folder called one of: {', '.join(ROLES)}",
+            code="component-without-role",
+        )
     elsewhere = {} if source.is_relative_to(root) else {role: source.parent}
     sources = Sources(root, elsewhere=elsewhere)
     recipe = PythonRecipe(
@@ -270,9 +275,13 @@ def bring_up_to_date(recipe: Recipe, target: Path, mark: BuildStamp, force: bool
         files = presented(files, recipe.listing(), role=recipe.role, credits=credits)
         put(target, to_bytes(files, mark), *modules)
     except BuildError as error:
-        raise BuildError([f"{recipe.name}: {problem}" for problem in error.problems]) from None
+        raise BuildError([
+            replace(one, message=f"{recipe.name}: {one.message}") for one in error.diagnostics
+        ]) from None  # fmt: skip
     except OSError as error:
-        raise BuildError(f"{recipe.name}: cannot be read or written: {error}") from None
+        raise BuildError(
+            f"{recipe.name}: cannot be read or written: {error}", code="component-unreadable"
+        ) from None
     return True
 
 

@@ -84,7 +84,8 @@ class Sources:
             found = self._module(parts)
             if found is None:
                 raise BuildError(
-                    f"{where}there is no module {'.'.join(parts)} in {self.root}{self._namesake(parts)}"
+                    f"{where}there is no module {'.'.join(parts)} in {self.root}{self._namesake(parts)}",
+                    code="component-import-forbidden",
                 )
             waiting += [(parts[:i], where) for i in range(len(parts))]  # the packages above it
             is_package = self.file(parts).name == "__init__.py"
@@ -92,7 +93,10 @@ class Sources:
             waiting += found.imports
             for package, line in found.outside:
                 if package not in allowed:
-                    raise BuildError(f"{line}: imports {package}, {_WAYS_OUT.format(package=package)}")
+                    raise BuildError(
+                        f"{line}: imports {package}, {_WAYS_OUT.format(package=package)}",
+                        code="component-import-forbidden",
+                    )
             if found.file is not None:
                 evidence[str(found.file)] = found.digest
                 folders.add(found.file.parent)  # a new file in it can come before one that is known
@@ -135,9 +139,11 @@ class Sources:
             text = content.decode("utf-8").replace("\r\n", "\n")
             tree = ast.parse(text)
         except SyntaxError as error:
-            raise BuildError(f"{name}:{error.lineno}: {type(error).__name__}: {error.msg}") from None
+            raise BuildError(
+                f"{name}:{error.lineno}: {type(error).__name__}: {error.msg}", code="component-unreadable"
+            ) from None
         except (OSError, ValueError) as error:
-            raise BuildError(f"{name}: cannot be read: {error}") from None
+            raise BuildError(f"{name}: cannot be read: {error}", code="component-unreadable") from None
         package = parts if file.name == "__init__.py" else parts[:-1]
         lines = text.split("\n")
         imports: list[tuple[Parts, str]] = []
@@ -175,7 +181,10 @@ class Sources:
                 return names
             return None
         if node.level > len(package) + 1:
-            raise BuildError(f"{where}: the relative import goes beyond the package of the components")
+            raise BuildError(
+                f"{where}: the relative import goes beyond the package of the components",
+                code="component-import-forbidden",
+            )
         return package[: len(package) + 1 - node.level] + names
 
 
@@ -210,7 +219,10 @@ def _outside(name: str, where: str) -> str | None:
     """Return the package that an absolute import needs beyond the standard library, if it does."""
     top = name.partition(".")[0]
     if top in ("components", *BESIDE):
-        raise BuildError(f"{where}: write 'from {name}{'.<module>' if name == top else ''} import ...'")
+        raise BuildError(
+            f"{where}: write 'from {name}{'.<module>' if name == top else ''} import ...'",
+            code="component-import-forbidden",
+        )
     return None if top in sys.stdlib_module_names else top
 
 

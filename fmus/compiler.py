@@ -46,7 +46,7 @@ def compiler_version(command: Sequence[str]) -> str:
         BuildError: there is none.
     """
     if shutil.which(command[0]) is None:
-        raise BuildError(f"there is no C compiler ({command[0]}); CC can name one")
+        raise BuildError(f"there is no C compiler ({command[0]}); CC can name one", code="compiler-missing")
     return subprocess.run([*command, "--version"], capture_output=True, text=True, check=False).stdout
 
 
@@ -73,7 +73,9 @@ def compile_library(command: Sequence[str], sources: Mapping[str, bytes], *argum
         )
         if done.returncode != 0:
             lines = [line for line in done.stderr.splitlines() if "error" in line or "undefined" in line]
-            raise BuildError(lines or [f"the C compiler failed: exit status {done.returncode}"])
+            raise BuildError(
+                lines or [f"the C compiler failed: exit status {done.returncode}"], code="compiler-failed"
+            )
         if done.stderr:
             print(printable(done.stderr.rstrip()), file=sys.stderr)
         return Path(temporary, "made.so").read_bytes()
@@ -117,7 +119,7 @@ def load_compiled(source: Path) -> tuple[ctypes.CDLL | None, str]:
             copy.flush()
             return ctypes.CDLL(copy.name), ""
     except YawbenchError as error:
-        return None, error.problems[0]
+        return None, str(error.diagnostics[0])
     except OSError as error:
         return None, f"{source.name} cannot be loaded: {error}"
 
@@ -139,6 +141,6 @@ def _launcher(command: tuple[str, ...]) -> tuple[bytes | None, str]:
         arguments = [*FLAGS, SOURCES[0], *LIBRARIES]
         binary = recalled_library(STORE, sources, arguments, compiler_version(command))
     except BuildError as error:
-        why = error.problems[0]
+        why = str(error.diagnostics[0])
         return None, why if "C compiler" in why else f"the C compiler failed: {why}"
     return binary, ""

@@ -24,7 +24,7 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-from .errors import ModelDescriptionError
+from .errors import Diagnostic, ModelDescriptionError
 from .files import fcntl, write_whole
 
 _PLAIN_PATH = re.compile(r"[A-Za-z0-9_.~/\\: -]+")
@@ -41,7 +41,7 @@ def cache_folders() -> Iterator[Path]:
         ModelDescriptionError: there is no usable folder.
     """
     folder = _user_folder()
-    problems = []
+    errors: list[str | Diagnostic] = []
     not_plain = (
         f"{folder}: FMUs cannot be unpacked here: the path holds more than ASCII letters, digits, "
         "spaces and ._~-; name another folder in YAWBENCH_CACHE"
@@ -56,11 +56,11 @@ def cache_folders() -> Iterator[Path]:
                 yield _private(Path(base) / f"yawbench-{user}")
                 usable = True
             except OSError as error:
-                problems.append(f"{base}: FMUs cannot be unpacked here: {error.strerror}")
+                errors.append(f"{base}: FMUs cannot be unpacked here: {error.strerror}")
             except ModelDescriptionError as error:
-                problems += error.problems
+                errors += error.diagnostics
     if not usable:
-        raise ModelDescriptionError([*problems, not_plain][0])
+        raise ModelDescriptionError([*errors, not_plain][0], code="cache-unwritable")
 
 
 def cache_folder() -> Path:
@@ -74,7 +74,9 @@ def cache_folder() -> Path:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             if os.access(folder, os.W_OK | os.X_OK):
                 return folder
-    raise ModelDescriptionError("no folder for the cache can be written; name one in YAWBENCH_CACHE")
+    raise ModelDescriptionError(
+        "no folder for the cache can be written; name one in YAWBENCH_CACHE", code="cache-unwritable"
+    )
 
 
 _held: dict[Path, int] = {}
@@ -143,7 +145,8 @@ def _private(folder: Path) -> Path:
     if hasattr(os, "getuid") and folder.lstat().st_uid != os.getuid():
         raise ModelDescriptionError(
             f"{folder}: FMUs cannot be unpacked here: the folder belongs to another user; "
-            "name another one in YAWBENCH_CACHE"
+            "name another one in YAWBENCH_CACHE",
+            code="cache-unwritable",
         )
     return folder
 

@@ -18,7 +18,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from .errors import Interrupted, RecordWarning, YawbenchError
+from .errors import Diagnostic, Interrupted, RecordWarning, YawbenchError
 from .interrupts import terminable
 from .messages import cut, printable
 
@@ -73,7 +73,7 @@ def _interruptible() -> Iterator[None]:
             raise
         interrupted = Interrupted.of(cause)
         _print_traceback(error)
-        _print_problems(interrupted.problems)
+        _print_errors(interrupted.diagnostics)
         raise SystemExit(interrupted.exit_status) from None
 
 
@@ -157,7 +157,7 @@ def _status(arguments: Sequence[str]) -> int:
             sys.stdout.flush()
     except YawbenchError as error:
         _print_traceback(error)
-        _print_problems(error.problems)
+        _print_errors(error.diagnostics)
         return error.exit_status
     except BrokenPipeError:  # the reader closed the pipe
         pass
@@ -196,9 +196,9 @@ TRACEBACK = "YAWBENCH_TRACEBACK"
 """Environment variable; if it is set, errors are printed with their tracebacks."""
 
 
-def _print_problems(problems: Iterable[str]) -> None:
-    for problem in problems:
-        print(cut(printable(problem), LONGEST_MESSAGE), file=sys.stderr)
+def _print_errors(diagnostics: Iterable[Diagnostic]) -> None:
+    for one in diagnostics:
+        print(cut(str(one), LONGEST_MESSAGE), file=sys.stderr)
 
 
 def _print_traceback(error: BaseException) -> bool:

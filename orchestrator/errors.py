@@ -1,4 +1,4 @@
-"""Exceptions and warnings of this package, as one hierarchy.
+"""Diagnostics, and the exceptions and warnings of this package that carry them, as one hierarchy.
 
     YawbenchError                 exit status
     ├── ScenarioError             2   the scenario file or a command-line override is wrong
@@ -11,74 +11,170 @@
 `Interrupted` (Ctrl-C, SIGTERM) is a KeyboardInterrupt instead, so that code which continues after an error
 does not continue after Ctrl-C.
 
-All problems of one file are collected and raised together. Each is a sentence that says where, what,
-and what is allowed.
+All errors of one file are collected and raised together. Each is a `Diagnostic`: a code for programs, and a
+sentence that says where, what, and what is allowed.
 """
 
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, Literal
 
 from .messages import printable
 
-if TYPE_CHECKING:
-    from .plan import Finding
-
-KEPT = "kept"
-"""Kind of the problem that names the saved results of a failed run."""
+Severity = Literal["error", "warning", "info"]
 
 
-class Problem(str):
-    """An error message that begins with its location, which its attributes give separately.
+@dataclass(frozen=True)
+class Location:
+    """Where a diagnostic points; every part may be unknown.
 
     Attributes:
-        text: the message without its location.
-        file: the file with the error, if any.
-        line: the line in the file, if any.
-        place: the key of the value, such as "units.plant.fmu", or the override that set it; "" if neither.
-        kind: KEPT, or "".
+        file: the file with the value.
+        line: its line in the file.
+        target: the key of the value, such as "units.plant.fmu", or the override that set it.
+        instance: the instance that failed.
+        signal: the signal or parameter, "instance.variable", that the message is about.
+        time: simulation time at which it began [s].
+
+    >>> from pathlib import Path
+    >>> str(yb.Location(Path("a.yaml"), 3, "units.plant.fmu"))
+    'a.yaml:3: units.plant.fmu'
     """
 
-    text: str
-    file: Path | None
-    line: int | None
-    place: str
-    kind: str
+    file: Path | None = None
+    line: int | None = None
+    target: str = ""
+    instance: str | None = None
+    signal: str | None = None
+    time: float | None = None
 
-    def __new__(
-        cls, text: str, *, file: Path | None = None, line: int | None = None, place: str = "", kind: str = ""
-    ) -> Problem:
-        where = f"{file}:{line}" if file and line else f"{file or ''}"
-        text = printable(text)  # from users, FMUs and files: must not contain control characters
-        made = super().__new__(cls, printable(": ".join(filter(None, (where, place, text)))))
-        made.text, made.file, made.line, made.place, made.kind = text, file, line, place, kind
-        return made
+    def __str__(self) -> str:
+        """File, line and target; messages name the other parts themselves."""
+        where = f"{self.file}:{self.line}" if self.file and self.line else f"{self.file or ''}"
+        return ": ".join(filter(None, (where, self.target)))
+
+
+@dataclass(frozen=True)
+class Diagnostic:
+    """Something to tell the user: an error, a warning or an information.
+
+    Attributes:
+        code: what it is about, for programs; docs/diagnostics.md lists all.
+        message: one sentence, without the location.
+        severity: "error", "warning" or "info".
+        location: where it points.
+        value: the number that it is about, such as the largest one.
+
+    >>> spinning = base.set({"plant.initial_sideslip": "60 deg"}).run().diagnostics[-1]
+    >>> spinning.code, spinning.severity, spinning.location.signal
+    ('car-spins', 'warning', 'plant.sideslip')
+    """
+
+    code: str
+    message: str
+    severity: Severity = "error"
+    location: Location = Location()
+    value: float | None = None
+
+    def __str__(self) -> str:
+        """The text for users: the location, then the message, without control characters."""
+        return printable(": ".join(filter(None, (str(self.location), self.message))))
+
+    def record(self) -> dict[str, Any]:
+        """Return the diagnostic as JSON-ready data, without the parts that are unknown."""
+        where = {
+            name: str(part) if isinstance(part, Path) else part
+            for name, part in vars(self.location).items()
+            if part not in (None, "")
+        }
+        value = {} if self.value is None else {"value": self.value}
+        own = {"code": self.code, "severity": self.severity, "message": self.message}
+        return {**own, **({"location": where} if where else {}), **value}
+
+    @classmethod
+    def of(cls, record: Mapping[str, Any]) -> Diagnostic:
+        """Return the diagnostic of which `record` is the data."""
+        where = dict(record.get("location", {}))
+        if "file" in where:
+            where["file"] = Path(where["file"])
+        return cls(**{**record, "location": Location(**where)})
+
+
+def errors_in(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+    """Return the diagnostics that are errors."""
+    return tuple(one for one in diagnostics if one.severity == "error")
+
+
+def warnings_in(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+    """Return the warnings, each once; of those about a time, the earliest of each code, as of four wheels."""
+    found: dict[tuple[str, str], Diagnostic] = {}
+    for one in diagnostics:
+        if one.severity == "warning":
+            time = one.location.time
+            key = (one.code, one.message if time is None else "")
+            if (time or 0.0) < (found.setdefault(key, one).location.time or 0.0):
+                found[key] = one
+    return tuple(found.values())
+
+
+class InvalidValueError(ValueError):
+    """A value that cannot be used, as low-level parsers refuse it; callers add where it comes from."""
+
+    def __init__(self, message: str, code: str) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+def code_of(error: Exception, default: str = "value-invalid") -> str:
+    """Return the code that an error was raised with, `default` if with none."""
+    return getattr(error, "code", default)
+
+
+Messages = str | Diagnostic | Iterable[str | Diagnostic]
+"""What an error is raised with: sentences, or diagnostics where each has its own code or location."""
+
+
+def text_of(diagnostics: Iterable[Diagnostic]) -> str:
+    """Return diagnostics as one line."""
+    return "; ".join(map(str, diagnostics))
 
 
 class YawbenchError(Exception):
-    """Base class of all errors; `problems` are its messages, each with file and line where known.
+    """Base class of all errors; `diagnostics` says what is wrong, with code and location.
 
-    `file` and `line` are those of the first problem that has them, else None.
+    `code` is that of the first one; `file` and `line` are those of the first that has them, else None.
 
     >>> try:
     ...     yb.load("fnn_sideslip/26mps")
     ... except yb.YawbenchError as error:
-    ...     print(error.problems)
-    ["there is no scenario 'fnn_sideslip/26mps'; did you mean 'fnn_sideslip/25mps'?"]
+    ...     print(error.code, error.diagnostics[0].message, sep="\\n")
+    scenario-unknown
+    there is no scenario 'fnn_sideslip/26mps'; did you mean 'fnn_sideslip/25mps'?
     """
 
     exit_status = 2
+    default_code = "internal-error"
 
-    def __init__(self, problems: str | Iterable[str]) -> None:
-        texts = [problems] if isinstance(problems, str) else problems
-        self.problems = [text if isinstance(text, Problem) else Problem(text) for text in texts]
-        located = next((problem for problem in self.problems if problem.file), None)
-        self.file = located.file if located else None
-        self.line = located.line if located else None
-        super().__init__("\n".join(self.problems))
+    def __init__(self, messages: Messages, *, code: str | None = None) -> None:
+        self.diagnostics = _diagnostics(messages, code or self.default_code)
+        located = next((one.location for one in self.diagnostics if one.location.file), Location())
+        self.file = located.file
+        self.line = located.line
+        super().__init__("\n".join(map(str, self.diagnostics)))
+
+    @property
+    def code(self) -> str:
+        """What the first error is about; docs/diagnostics.md lists all codes."""
+        return self.diagnostics[0].code
+
+
+def _diagnostics(messages: Messages, code: str) -> list[Diagnostic]:
+    given = [messages] if isinstance(messages, (str, Diagnostic)) else messages
+    return [one if isinstance(one, Diagnostic) else Diagnostic(code, one) for one in given]
 
 
 class YawbenchWarning(UserWarning):
@@ -104,6 +200,8 @@ class ScenarioError(YawbenchError):
     yawbench.ScenarioError: set stop_time=-1: must be a time above 0 s (got -1)
     """
 
+    default_code = "value-invalid"
+
 
 class ModelDescriptionError(YawbenchError):
     """An FMU is missing, corrupt or not supported.
@@ -112,6 +210,8 @@ class ModelDescriptionError(YawbenchError):
     Traceback (most recent call last):
     yawbench.ModelDescriptionError: swap tyre=tyre_pacejka: no FMU 'tyre_pacejka' in ...
     """
+
+    default_code = "fmu-invalid"
 
 
 class WiringError(YawbenchError):
@@ -122,6 +222,8 @@ class WiringError(YawbenchError):
     yawbench.WiringError: ...controller.roll_angle ...
     """
 
+    default_code = "wiring-invalid"
+
 
 class ResultsError(YawbenchError):
     """Recorded results are missing or unreadable.
@@ -130,6 +232,8 @@ class ResultsError(YawbenchError):
     Traceback (most recent call last):
     yawbench.ResultsError: results/nothing: no results here, run.json is missing; ...
     """
+
+    default_code = "results-unreadable"
 
 
 class RecordWarning(YawbenchWarning):
@@ -150,6 +254,7 @@ class BuildError(YawbenchError):
     """
 
     exit_status = 1
+    default_code = "component-invalid"
 
 
 class SimulationError(YawbenchError):
@@ -165,12 +270,19 @@ class SimulationError(YawbenchError):
     """
 
     exit_status = 1
+    default_code = "run-failed"
 
-    def __init__(self, problem: str, *, instance: str | None, time: float) -> None:
-        super().__init__(problem)
+    def __init__(
+        self, messages: Messages, *, instance: str | None, time: float, code: str | None = None
+    ) -> None:
+        where = Location(instance=instance, time=time)
+        super().__init__([
+            replace(one, location=where) if one.location == Location() else one
+            for one in _diagnostics(messages, code or self.default_code)
+        ])  # fmt: skip
         self.instance = instance
         self.time = time
-        self.findings: tuple[Finding, ...] = ()  # about the run up to that time
+        self.warnings: tuple[Diagnostic, ...] = ()  # about the run up to that time
 
 
 class Interrupted(KeyboardInterrupt):
@@ -178,17 +290,17 @@ class Interrupted(KeyboardInterrupt):
 
     def __init__(
         self,
-        problem: str | Iterable[str] = "Interrupted",
+        messages: Messages = "Interrupted",
         *,
         instance: str | None = None,
         time: float | None = None,
         number: int = signal.SIGINT,
     ) -> None:
-        self.problems = [Problem(text) for text in ([problem] if isinstance(problem, str) else problem)]
+        self.diagnostics = _diagnostics(messages, "run-interrupted")
         self.instance = instance
         self.time = time
         self.number = number
-        super().__init__("\n".join(self.problems))
+        super().__init__("\n".join(map(str, self.diagnostics)))
 
     @property
     def exit_status(self) -> int:
@@ -201,5 +313,12 @@ class Interrupted(KeyboardInterrupt):
         return error if isinstance(error, cls) else cls()
 
 
-for _public in (YawbenchError, *YawbenchError.__subclasses__(), YawbenchWarning, RecordWarning):
+for _public in (
+    Diagnostic,
+    Location,
+    YawbenchError,
+    *YawbenchError.__subclasses__(),
+    YawbenchWarning,
+    RecordWarning,
+):
     _public.__module__ = "yawbench"  # where users import them from, and what tracebacks shall say

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 from vocabulary.roles import role_of
 
+from .errors import Diagnostic
 from .fault_kinds import FaultList, FaultySignal
 from .messages import cut
 from .names import SignalName, Target
@@ -270,17 +271,6 @@ class Override:
 
 
 @dataclass(frozen=True)
-class Finding:
-    """A warning, as data, about a legal but suspicious value, or about an event during a run."""
-
-    kind: str  # "spin", "two values", ...
-    place: str | None = None  # instance.variable
-    value: float | None = None  # the most extreme value
-    time: float | None = None  # when it began [s]; None: before the run
-    says: str = ""  # the message
-
-
-@dataclass(frozen=True)
 class Plan:
     """A run to be executed: instances in evaluation order, wires, and the time grid in integers."""
 
@@ -293,9 +283,8 @@ class Plan:
     start: Fraction = Fraction(0)  # time of communication point 0 [s]
     title: str = ""
     scenario: dict = field(default_factory=dict)  # as run, for run.json
-    notes: tuple[str, ...] = ()  # messages to the user that are not errors
     changes: tuple[Override, ...] = ()  # of the scenario file
-    findings: tuple[Finding, ...] = ()  # warnings about values
+    diagnostics: tuple[Diagnostic, ...] = ()  # what was left out or assumed, and warnings about values
     faults: tuple[FaultySignal, ...] = ()  # those of one variable in the order in which they act
 
     def time(self, k: int) -> float:

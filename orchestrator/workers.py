@@ -149,7 +149,10 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
         try:
             for finished in self.each(function, zip(*arguments, strict=False)):
                 if finished.died:
-                    raise YawbenchError("a process that reads results or draws figures has been killed")
+                    raise YawbenchError(
+                        "a process that reads results or draws figures has been killed",
+                        code="run-process-died",
+                    )
                 if finished.error is not None:
                     raise finished.error
                 results[finished.number] = finished.value
@@ -198,7 +201,8 @@ def _require_files(needed: int) -> None:
     if allowed != resource.RLIM_INFINITY and allowed < needed:
         raise YawbenchError(
             f"only {allowed} files may be open at a time, and these processes need {needed} "
-            f"(`ulimit -n {needed}`)"
+            f"(`ulimit -n {needed}`)",
+            code="too-few-open-files",
         )
 
 

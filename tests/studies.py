@@ -32,7 +32,7 @@ def judge_some(file: Path, out: Path, *runs: str) -> dict[str, Any]:
     planned = plan_experiment(experiment, out, fmus=FMUS)
     named = {run.name for run in experiment.matching(runs)}
     outcomes = execute([job for job in left_to_do(planned.jobs, {}) if job.label in named])
-    assert [outcome.problems for outcome in outcomes if not outcome.ok] == []
+    assert [outcome.diagnostics for outcome in outcomes if not outcome.ok] == []
     write_findings(judge_results(planned.experiment, out, planned=planned), {}, out)
     return record_of(out)
 

@@ -16,8 +16,8 @@ proved itself:
     yb.load("fnn_sideslip/25mps").swap(controller=proportional).run().metric("peak(sideslip)")
 
 Scenarios are immutable: `swap`, `set` and `fault` return new ones. Nothing is written or printed unless
-requested. All errors derive from YawbenchError; `problems` are their messages, `file` and `line` the location
-of the first:
+requested. All errors derive from YawbenchError; `diagnostics` says what is wrong; `code`, `file` and `line`
+are those of the first:
 
     YawbenchError
     ├── ScenarioError             the scenario or an override of it is wrong
@@ -40,6 +40,8 @@ if TYPE_CHECKING:
     from components.fmi.variables import output, parameter, signal
     from orchestrator.errors import (
         BuildError,
+        Diagnostic,
+        Location,
         ModelDescriptionError,
         RecordWarning,
         ResultsError,
@@ -57,7 +59,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BuildError",
+    "Diagnostic",
     "Experiment",
+    "Location",
     "ModelDescriptionError",
     "Ranking",
     "RecordWarning",

@@ -58,4 +58,4 @@ def _made_here(job: Job, run: Callable[..., Any], programs: Mapping[Path, Python
     try:
         return Outcome(job, value=run(job, opener=opener_of(programs)))
     except YawbenchError as error:
-        return Outcome(job, tuple(error.problems), error.exit_status)
+        return Outcome(job, tuple(error.diagnostics), error.exit_status)

@@ -65,11 +65,13 @@ class PythonComponent:
             self.step_size = _step_size(given)
             xml = ElementTree.tostring(self._made(unit).to_xml())
         except ScenarioError as error:
-            raise ScenarioError(f"{unit}: {error}") from None
+            raise ScenarioError(f"{unit}: {error}", code="controller-invalid") from None
         except (TypeError, ValueError) as error:
-            raise ScenarioError(f"{unit}: {_name(given)}: {error}") from error
+            raise ScenarioError(f"{unit}: {_name(given)}: {error}", code="controller-invalid") from error
         except Exception as error:  # the user's code may raise anything while its declarations are read
-            raise ScenarioError(f"{unit}: {_name(given)}: {arguments.said(error)}") from error
+            raise ScenarioError(
+                f"{unit}: {_name(given)}: {arguments.said(error)}", code="controller-invalid"
+            ) from error
         name = self.component.fmu_name
         self.path = HOME / f"{name}.fmu"
         digest = hashlib.sha256(xml + _source(given)).hexdigest()
@@ -171,14 +173,17 @@ def _component(given: Any, role: str) -> type[Component]:
     if arguments.is_a(given, type):
         if issubclass(given, Component):
             return _reporting(given)
-        raise ScenarioError(f"{_name(given)} is a class; give an object of it, {_name(given)}()")
+        raise ScenarioError(
+            f"{_name(given)} is a class; give an object of it, {_name(given)}()", code="controller-invalid"
+        )
     if hasattr(given, "output"):
         return _of_object(given)
     if callable(given):
         return _of_function(given, role)
     raise ScenarioError(
         f"{_name(given)} is no controller: give the name or path of an FMU, a function of signals, "
-        "an object with inputs, outputs and a method output(t, u), or a component class"
+        "an object with inputs, outputs and a method output(t, u), or a component class",
+        code="controller-invalid",
     )
 
 
@@ -188,13 +193,15 @@ def _of_function(function: Callable[..., Any], role: str) -> type[Component]:
     if role not in known:
         raise ScenarioError(
             f"{_name(function)}: what it returns is not known for a unit that is none of {', '.join(known)}; "
-            "give an object with outputs"
+            "give an object with outputs",
+            code="controller-invalid",
         )
     parameters = inspect.signature(function).parameters.values()
     plain = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
     if unnamed := [str(p) for p in parameters if p.kind not in plain]:
         raise ScenarioError(
-            f"{_name(function)}: {unnamed[0]} names no signal: name each, as in (yaw_rate, t)"
+            f"{_name(function)}: {unnamed[0]} names no signal: name each, as in (yaw_rate, t)",
+            code="controller-invalid",
         )
     names = [p.name for p in parameters if p.default is p.empty]
     inputs = [name for name in names if name != "t"]
@@ -212,14 +219,19 @@ def _of_object(given: Any) -> type[Component]:
     """Return a component whose instances each work with a copy of an object."""
     for wanted in ("inputs", "outputs"):
         if not hasattr(given, wanted):
-            raise ScenarioError(f"{_name(given)} has no {wanted}: name its signals, as in ('yaw_rate',)")
+            raise ScenarioError(
+                f"{_name(given)} has no {wanted}: name its signals, as in ('yaw_rate',)",
+                code="controller-invalid",
+            )
 
     def __init__(self: Any, **kwargs: Any) -> None:
         super(component, self).__init__(**kwargs)
         try:
             self._given = copy.deepcopy(given)  # so that a run does not affect the next one
         except Exception as error:
-            raise ScenarioError(f"{_name(given)} cannot be copied for a run: {error}") from error
+            raise ScenarioError(
+                f"{_name(given)} cannot be copied for a run: {error}", code="controller-invalid"
+            ) from error
 
     members = {"__init__": __init__}
     for method in ("output", "advance", "start"):

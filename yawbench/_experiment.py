@@ -9,11 +9,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.errors import Problem, ScenarioError
+from orchestrator.errors import Diagnostic, Location, ScenarioError
 from orchestrator.experiments.experiment import LoadedExperiment as Design
 from orchestrator.experiments.experiment import NamedRun
 from orchestrator.experiments.figures import draw_over_axes
-from orchestrator.experiments.jobs import Job, MeasuredRun, Outcome, PlanningCache, measured
+from orchestrator.experiments.jobs import Job, Outcome, PlanningCache, measured
 from orchestrator.experiments.judged_schema import si_number, text_of
 from orchestrator.experiments.outcome import ExperimentResult
 from orchestrator.experiments.planning import metrics_of, plan_experiment
@@ -23,7 +23,6 @@ from orchestrator.master.fmi import open_unit
 from orchestrator.master.run_loop import OpenInstance
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.messages import hint, listed, printable, short
-from orchestrator.metrics.plausibility import remarks_of
 from orchestrator.results.read import Results
 from orchestrator.scenario.quantities import number_and_unit
 from orchestrator.scenario.validation import Model, validate
@@ -75,7 +74,7 @@ def experiment(
                 swap, *brought = swapped.changes[len(changed.changes) :]
                 words = level if isinstance(level, str) else Path(str(swap.value)).stem
                 if words in variants:
-                    raise ScenarioError(f"{name}: two levels are called {words}")
+                    raise ScenarioError(f"{name}: two levels are called {words}", code="name-duplicate")
                 settings = {str(one.target): one.value for one in brought}
                 variants[words] = {"swap": {name: str(swap.value)}, "set": settings}
                 changed = replace(changed, programs=swapped.programs)
@@ -90,11 +89,13 @@ def experiment(
 
 
 def _checked(model: type[Model], given: dict[str, Any]) -> Model:
-    """Validate data against a schema; all problems become sentences."""
+    """Validate data against a schema; all errors are raised together."""
     document = Document(Path(), given)
     made = validate(model, document)
     if made is None:
-        raise ScenarioError([Problem(one.text, place=one.place) for one in document.problems])
+        raise ScenarioError([
+            replace(one, location=Location(target=one.location.target)) for one in document.errors
+        ], code="argument-invalid")  # fmt: skip
     return made
 
 
@@ -105,11 +106,14 @@ def _values(name: str, given: Iterable[Any]) -> dict[str, Any]:
     split = [number_and_unit(level) if isinstance(level, str) else None for level in levels]
     units = {one[1] for one in split if one}
     if as_text := next((x for x in levels if isinstance(x, str) and not isinstance(scalar(x), str)), None):
-        raise ScenarioError(f"{name}: give numbers, True or False as such, not as text (got {as_text!r})")
+        raise ScenarioError(
+            f"{name}: give numbers, True or False as such, not as text (got {as_text!r})",
+            code="argument-invalid",
+        )
     if not units:
         return {"values": levels}
     if len(units) > 1 or not all(split):
-        raise ScenarioError(f"{name}: give all levels in one unit, or none")
+        raise ScenarioError(f"{name}: give all levels in one unit, or none", code="argument-invalid")
     return {"values": [float(one[0]) for one in split if one], "unit": units.pop()}
 
 
@@ -162,13 +166,13 @@ class Experiment:
         metrics = metrics_of(planned.experiment)
         with _bar(self.design.spec.title, len(self), shown=progress) as told:
             outcomes = make_all(planned.jobs, self.base.programs, workers=workers, done=told, run=_in_memory)
-        records = [
-            measured(one.value, metrics) if one.ok else MeasuredRun({}, one.problems) for one in outcomes
-        ]
+        records = [measured(one.value, metrics) if one.ok else one.record for one in outcomes]
         runs = [Run(one.value) if one.ok else None for one in outcomes] if keep else None
         findings = ExperimentResult(planned.experiment, records, {}, planned)
-        given = remarks_of(one for job in planned.jobs if job.plan for one in job.plan.findings)
-        warn(self.design.spec.title, filter(None, (*given, findings.remarkable())))
+        given = [one for job in planned.jobs if job.plan for one in job.plan.diagnostics]
+        if found := findings.remarkable():
+            given.append(Diagnostic("runs-with-warnings", found, "warning"))
+        warn(self.design.spec.title, given)
         return Runs(findings, runs)
 
 
@@ -234,13 +238,21 @@ class Runs:
         )
         for name in filter(None, (x, y, lines, panels)):
             if name not in spec.axes:
-                raise ScenarioError(f"there is no axis {name!r}{hint(name, spec.axes, lead='axes')}")
+                raise ScenarioError(
+                    f"there is no axis {name!r}{hint(name, spec.axes, lead='axes')}", code="axis-unknown"
+                )
         if metric not in spec.metrics:
-            raise ScenarioError(f"there is no metric {metric!r}{hint(metric, spec.metrics, lead='metrics')}")
+            raise ScenarioError(
+                f"there is no metric {metric!r}{hint(metric, spec.metrics, lead='metrics')}",
+                code="metric-unknown",
+            )
         if left := [
             name for name in spec.axes if name not in (x, y, lines, panels, *_axes_of(more.get("only")))
         ]:
-            raise ScenarioError(f"the axis {left[0]!r} has no place in this figure: give lines or panels")
+            raise ScenarioError(
+                f"the axis {left[0]!r} has no place in this figure: give lines or panels",
+                code="argument-invalid",
+            )
         for name, value in more.items():
             more[name] = self._checked(name, value, metric)
         places = {key: value for key, value in (("y", y), ("lines", lines), ("panels", panels)) if value}
@@ -271,13 +283,15 @@ class Runs:
         """Return levels of an axis that a figure shows alone."""
         spec, name = self.findings.spec, f"only[{axis!r}]"
         if axis not in spec.axes:
-            raise ScenarioError(f"only: there is no axis {axis!r}{hint(axis, spec.axes, lead='axes')}")
+            raise ScenarioError(
+                f"only: there is no axis {axis!r}{hint(axis, spec.axes, lead='axes')}", code="axis-unknown"
+            )
         given = _values(name, arguments.items(levels, name, "a list of levels"))["values"]
         known = [text_of(one) for one in spec.axes[axis].variants or spec.axes[axis].values or ()]
         unknown = [text_of(one) for one in given if text_of(one) not in known]
         if unknown or not given:
             wrong = f"there is no level {unknown[0]!r}" if unknown else "names no level"
-            raise ScenarioError(f"{name}: {wrong}; levels: {listed(known)}")
+            raise ScenarioError(f"{name}: {wrong}; levels: {listed(known)}", code="axis-unknown")
         return list(given)
 
     def __repr__(self) -> str:

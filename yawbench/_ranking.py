@@ -87,7 +87,8 @@ def rank(
     wanted = set(loaded.entries if others is None else others)
     if unknown := sorted(wanted - set(loaded.entries)):
         raise ScenarioError(
-            f"there is no entry {unknown[0]!r}{hint(unknown[0], loaded.entries, lead='known')}"
+            f"there is no entry {unknown[0]!r}{hint(unknown[0], loaded.entries, lead='known')}",
+            code="entry-unknown",
         )
     kept = {key: one for key, one in loaded.entries.items() if key in wanted or key in more}
     loaded = replace(loaded, entries=kept)
@@ -115,7 +116,7 @@ def _entry(given: Any, name: str) -> tuple[dict[str, EntrySpec], dict[Path, Pyth
     if arguments.names_file(given):
         fmu = fmu_of(given, "controller")
         if not (name or Path(fmu).stem):
-            raise ScenarioError(f"controller: {fmu!r} is no name of an FMU")
+            raise ScenarioError(f"controller: {fmu!r} is no name of an FMU", code="controller-invalid")
         return {name or Path(fmu).stem: _spec(name or Path(fmu).stem, fmu)}, {}
     if arguments.is_a(given, type) and not issubclass(given, Component):
         given = _object_of(given)
@@ -129,7 +130,7 @@ def _object_of(given: type) -> Any:
         return given()
     except Exception as error:
         said = f"no object can be made of it without arguments: {error!r}"
-        raise ScenarioError(f"controller: {given.__name__}: {said}") from error
+        raise ScenarioError(f"controller: {given.__name__}: {said}", code="controller-invalid") from error
 
 
 def _spec(name: str, fmu: str) -> EntrySpec:
@@ -171,7 +172,9 @@ class Ranking:
         name = arguments.text(name, "name of an entry")
         places = {one.entry: one.place for one in self.ranked.standings}
         if name not in places:
-            raise ScenarioError(f"there is no entry {name!r}{hint(name, places, lead='known')}")
+            raise ScenarioError(
+                f"there is no entry {name!r}{hint(name, places, lead='known')}", code="entry-unknown"
+            )
         return places[name]
 
     def plot(self, kind: str = "matrix") -> Figure:
@@ -183,7 +186,9 @@ class Ranking:
         drawn = {"matrix": draw_matrix, "pareto": draw_pareto}
         kind = arguments.text(kind, "kind")
         if kind not in drawn:
-            raise ScenarioError(f"there is no picture {kind!r}{hint(kind, drawn, lead='known')}")
+            raise ScenarioError(
+                f"there is no picture {kind!r}{hint(kind, drawn, lead='known')}", code="figure-unknown"
+            )
         return shown_in_notebooks(drawn[kind](self.ranked, "yawbench.rank"))
 
     def __repr__(self) -> str:

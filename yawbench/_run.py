@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from orchestrator.errors import ResultsError, ScenarioError
+from orchestrator.errors import Diagnostic, ResultsError, ScenarioError, warnings_in
 from orchestrator.evaluation.judgement import Evaluation
 from orchestrator.evaluation.standard_tests import TESTS
 from orchestrator.evaluation.trace import trace_of
 from orchestrator.messages import hint, short
-from orchestrator.metrics.plausibility import findings_in, remarks_of
 from orchestrator.metrics.run_metrics import STANDARD, MetricValue, evaluate, evaluate_all, metric, why_none
 from orchestrator.results.read import Results, load_results
 
@@ -75,13 +74,14 @@ class Run:
         return self.results.record.content()
 
     @property
-    def remarks(self) -> list[str]:
-        """What is no failure but hardly meant, in sentences: on given values, then on the run's course.
+    def diagnostics(self) -> tuple[Diagnostic, ...]:
+        """What was assumed or left out (severity "info"), and warnings on values and on the run's course.
 
-        >>> base.set({"speed": 300}).run().remarks[0]
-        "driver.target_speed: 300 m/s is 1080 km/h; did you mean '300 km/h'?"
+        >>> warned = base.set({"speed": 300}).run().diagnostics[0]
+        >>> warned.code, warned.location.signal, warned.value
+        ('unit-suspicious', 'driver.target_speed', 300.0)
         """
-        return remarks_of(findings_in(self.results.record))
+        return self.results.record.all_diagnostics
 
     @property
     def changes(self) -> list[dict[str, Any]]:
@@ -139,7 +139,7 @@ class Run:
         value = evaluate(self.results, chosen, window)
         if value is None:
             why = why_none(self.results, chosen, window or chosen.window, self.time[-1])
-            raise ResultsError(why or f"{name}: this run gives no number")
+            raise ResultsError(why or f"{name}: this run gives no number", code="signal-unknown")
         return value.number
 
     def metrics(self) -> dict[str, MetricValue]:
@@ -166,14 +166,19 @@ class Run:
         """
         test = arguments.text(test, "test")
         if test not in TESTS:
-            raise ScenarioError(f"there is no test {test!r}{hint(test, TESTS, lead='known')}")
+            raise ScenarioError(
+                f"there is no test {test!r}{hint(test, TESTS, lead='known')}", code="test-unknown"
+            )
         if angle is not None and not TESTS[test].needs_angle:
-            raise ScenarioError(f"{test} needs no angle: leave it away")
+            raise ScenarioError(f"{test} needs no angle: leave it away", code="option-invalid")
         if angle is not None:
             with arguments.as_scenario_errors():
                 given = arguments.number(angle, "angle")
             if not 0.0 < given < 2.0 * math.pi:
-                raise ScenarioError(f"angle: must be a number between 0 and 2 pi rad (got {short(angle)})")
+                raise ScenarioError(
+                    f"angle: must be a number between 0 and 2 pi rad (got {short(angle)})",
+                    code="argument-invalid",
+                )
         return TESTS[test].evaluate(trace_of(self.results, self.title), angle)
 
     def plot(self, *panels: str, title: str | None = None) -> Figure:
@@ -215,7 +220,7 @@ class Run:
         return place
 
     def __repr__(self) -> str:
-        noted = "".join(f"; {text}" for text in self.remarks)
+        noted = "".join(f"; {text}" for text in warnings_in(self.diagnostics))
         return f"<Run {self.title!r}: {len(self)} rows of {len(self.results.columns)} variables{noted}>"
 
     def _repr_html_(self) -> str:
@@ -224,7 +229,7 @@ class Run:
         changed = "".join(f"<br>{escape(str(c['place']))} = {escape(str(c['value']))}" for c in self.changes)
         cells = [(metric(name).title, shown(x.number, x.unit)) for name, x in self.metrics().items()]
         rows = "".join(f"<tr><td>{escape(title)}</td><td>{escape(value)}</td></tr>" for title, value in cells)
-        noted = "".join(f"<br>⚠ {escape(text)}" for text in self.remarks)
+        noted = "".join(f"<br>⚠ {escape(str(one))}" for one in warnings_in(self.diagnostics))
         return f"<b>{escape(self.title)}</b>{changed}{noted}<table>{rows}</table>"
 
 

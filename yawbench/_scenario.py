@@ -10,13 +10,20 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from orchestrator.errors import Problem, ScenarioError, SimulationError, YawbenchWarning
+from orchestrator.errors import (
+    Diagnostic,
+    Location,
+    ScenarioError,
+    SimulationError,
+    YawbenchWarning,
+    text_of,
+    warnings_in,
+)
 from orchestrator.fault_kinds import FaultList
 from orchestrator.fmu.opener import Opener
 from orchestrator.master.log import Log
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.messages import hint, short
-from orchestrator.metrics.plausibility import remarks_of
 from orchestrator.names import Target
 from orchestrator.plan import Instance, Override, Plan, Value
 from orchestrator.scenario import catalogue, scenario_schema
@@ -103,7 +110,7 @@ class Scenario:
         for unit, wanted in units.items():
             if unit not in given:
                 text = f"there is no unit {short(unit)}{hint(unit, given, lead='units')}"
-                raise ScenarioError([Problem(text, file=self.path)])
+                raise ScenarioError(Diagnostic("instance-unknown", text, location=Location(self.path)))
             if arguments.names_file(wanted):
                 changes.append(Override(Target.of_instance(unit), fmu_of(wanted, unit), "swap"))
                 continue
@@ -199,11 +206,15 @@ class Scenario:
         """
         plan = make_plan(self.loaded, opener=Opener(**self._opening()), measure=cornering_stiffness)
         notes = tuple(
-            f"{unit.name}: {unit.fmu.name} is plain Python of this process, no FMU"
+            Diagnostic(
+                "instance-in-python",
+                f"{unit.name}: {unit.fmu.name} is plain Python of this process, not an FMU",
+                "info",
+            )
             for unit in plan.instances
             if unit.fmu.path in self.programs
         )
-        return replace(plan, notes=plan.notes + notes)
+        return replace(plan, diagnostics=plan.diagnostics + notes)
 
     def _opening(self) -> dict[str, Any]:
         """Return the options of an `Opener`: build silently if out of date; the plain Python components."""
@@ -213,7 +224,7 @@ class Scenario:
     def run(self, *, progress: Callable[[int, int], None] | None = None) -> Run:
         """Run the scenario in this process and return its results; nothing is written.
 
-        Remarks on the run, if any, are one `YawbenchWarning`.
+        All warnings about the run are issued as one `YawbenchWarning`.
 
         Args:
             progress: called a few times a second with the steps done and those in all.
@@ -234,10 +245,10 @@ class Scenario:
         try:
             run = Run(simulate_in_memory(plan, opener=opener, progress=progress))
         except SimulationError as error:
-            warn(plan.title, remarks_of((*plan.findings, *error.findings)))
+            warn(plan.title, (*plan.diagnostics, *error.warnings))
             causes = [getattr(slave, "error", None) for slave in opened if slave.name == error.instance]
             raise error from next(iter(causes), None)
-        warn(run.title, run.remarks)
+        warn(run.title, run.diagnostics)
         return run
 
     @property
@@ -256,9 +267,9 @@ class Scenario:
         return f"<b>{escape(plan.title)}</b>{changed}<table>{rows}</table>"
 
 
-def warn(title: str, remarks: Iterable[str]) -> None:
-    """Issue all remarks as one warning, if there are any, at the line that called our caller."""
-    if said := "; ".join(remarks):
+def warn(title: str, diagnostics: Iterable[Diagnostic]) -> None:
+    """Issue all warnings among diagnostics as one, if there are any, at the line that called our caller."""
+    if said := text_of(warnings_in(diagnostics)):
         warnings.warn(f"{title}: {said}", YawbenchWarning, stacklevel=3)
 
 

@@ -20,7 +20,7 @@ from typing import Any, NoReturn, TypeVar, cast
 
 import numpy as np
 
-from orchestrator.errors import Problem, ScenarioError
+from orchestrator.errors import ScenarioError, code_of
 from orchestrator.messages import listed, short, unprintable
 
 MOST = 100_000
@@ -204,7 +204,7 @@ def as_scenario_errors(origin: str = "") -> Iterator[None]:
     try:
         yield
     except (TypeError, ValueError) as error:
-        raise ScenarioError([Problem(f"{origin} {error}".lstrip())]) from None
+        raise ScenarioError(f"{origin} {error}".lstrip(), code=code_of(error, "argument-invalid")) from None
 
 
 def plain(value: Any) -> Any:

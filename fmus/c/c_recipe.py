@@ -70,7 +70,10 @@ class CRecipe:
             raise BuildError(f"{self.source}: no unit in C: it holds no {DESCRIPTION}")
         if self.source.parent.name not in ROLES:
             folders = ", ".join(ROLES)
-            raise BuildError(f"{self.source}: which role? Put it into a folder called one of: {folders}")
+            raise BuildError(
+                f"{self.source}: which role? Put it into a folder called one of: {folders}",
+                code="component-without-role",
+            )
 
     @property
     def name(self) -> str:

@@ -34,10 +34,14 @@ def read_declaration(xml: bytes, name: str, role: Role) -> tuple[ElementTree.Ele
     try:
         root = ElementTree.fromstring(xml)
     except ElementTree.ParseError as error:
-        raise BuildError(f"{DESCRIPTION} is not well-formed XML: {error}") from None
+        raise BuildError(
+            f"{DESCRIPTION} is not well-formed XML: {error}", code="declaration-invalid"
+        ) from None
     simulation = root.find("CoSimulation")
     if simulation is None or simulation.get("modelIdentifier") != name:
-        raise BuildError(f'{DESCRIPTION}: needs <CoSimulation modelIdentifier="{name}" ...>')
+        raise BuildError(
+            f'{DESCRIPTION}: needs <CoSimulation modelIdentifier="{name}" ...>', code="declaration-invalid"
+        )
     variables, problems = [], []
     for i, element in enumerate(root.iterfind("ModelVariables/ScalarVariable")):
         own = element.get("name") or ""
@@ -54,7 +58,7 @@ def read_declaration(xml: bytes, name: str, role: Role) -> tuple[ElementTree.Ele
             variables.append(_variable(element, real))
     problems += [f"{DESCRIPTION}: {problem}" for problem in missing_signals(role, variables)]
     if problems:
-        raise BuildError(problems)
+        raise BuildError(problems, code="declaration-invalid")
     return root, variables
 
 
@@ -64,7 +68,10 @@ def _variable(element: ElementTree.Element, real: ElementTree.Element) -> CVaria
         try:
             return None if given is None else float(given)
         except ValueError:
-            raise BuildError(f"{DESCRIPTION}: {element.get('name')}: {key} is no number: {given!r}") from None
+            raise BuildError(
+                f"{DESCRIPTION}: {element.get('name')}: {key} is no number: {given!r}",
+                code="declaration-invalid",
+            ) from None
 
     return CVariable(
         name=element.get("name") or "",

@@ -95,7 +95,7 @@ def native(component: type[Any], home: Path, *, source: str, guid: str, resource
     except Refused as refused:
         return Native(why_not=str(refused))
     except BuildError as error:
-        return Native(why_not=error.problems[0])
+        return Native(why_not=str(error.diagnostics[0]))
     except Exception as error:  # whatever it is, the unit itself works
         return Native(why_not=f"not translated: {type(error).__name__}: {error}")
 

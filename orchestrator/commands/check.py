@@ -41,8 +41,8 @@ def check(scenario: ScenarioFile, wishes: RunOptions, all_: All = False) -> None
     """
     plan = plan_of_scenario(scenario, wishes)
     show(plan, scenario, defaults=all_)
-    for note in plan.notes:
-        say(f"note: {note}")
+    for one in plan.diagnostics:
+        say(f"note: {one}")
     for unit in plan.instances:
         for doubt in unit.fmu.doubts():
             say(f"warning: {unit.name}: {doubt}")
@@ -95,8 +95,9 @@ def _print(plan: Plan, scenario: Path, console: Console, defaults: bool) -> None
     _show(
         console, "Against the order", ("from", "to", "uses earlier values of"), _backward_rows(plan, direct)
     )
-    doubtful = f"No error, but {counted(len(plan.findings), 'value')} to look at: see the notes."
-    console.print(f"\n{doubtful if plan.findings else 'Nothing is wrong.'}")
+    warned = sum(one.severity == "warning" and one.location.signal is not None for one in plan.diagnostics)
+    doubtful = f"No error, but {counted(warned, 'value')} to look at: see the notes."
+    console.print(f"\n{doubtful if warned else 'Nothing is wrong.'}")
 
 
 def _show(console: Console, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

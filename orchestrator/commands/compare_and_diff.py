@@ -99,7 +99,7 @@ def converge(
     for name in algorithm or ():
         if name not in ALGORITHMS:
             guess = hint(name, ALGORITHMS, lead="there are")
-            raise ScenarioError(f"--algorithm {name}: no such algorithm{guess}")
+            raise ScenarioError(f"--algorithm {name}: no such algorithm{guess}", code="algorithm-unknown")
     folder = wishes.out or default_folder(scenario, wishes.changes, suffix="-converge")
     hold(context, folder)
     wishes = replace(wishes, jobs=1, fresh=True)

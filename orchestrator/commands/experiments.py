@@ -182,7 +182,9 @@ def of_files(context: typer.Context, files: Sequence[Path], wishes: RunOptions) 
     changes, out = wishes.changes, wishes.out
     experiments = [load_experiment(file, changes=changes) for file in files]
     if tuned := [str(one.path) for one in experiments if one.spec.tuning]:
-        raise ScenarioError([f"{file}: a tuning file; it is for `yawbench tune`" for file in tuned])
+        raise ScenarioError(
+            [f"{file}: a tuning file; it is for `yawbench tune`" for file in tuned], code="file-wrong-kind"
+        )
     if out is None:
         folders = [default_folder(file, changes) for file in files]
         page = folders[0] if len(folders) == 1 else Path(os.path.commonpath(folders))
@@ -194,7 +196,8 @@ def of_files(context: typer.Context, files: Sequence[Path], wishes: RunOptions) 
         if len(sharing := [str(f) for f, of in zip(files, folders, strict=True) if of == folder]) > 1:
             raise ScenarioError(
                 f"{listed(sharing, last='and')} would share the results folder {folder}; name them apart, or "
-                "report on them one by one, with --out"
+                "report on them one by one, with --out",
+                code="name-duplicate",
             )
     hold(context, *folders)
     each = pooled(context, wishes)

@@ -41,11 +41,17 @@ def second_opinion(
     known = {one.title.lower(): one for one in MASTERS}
     for name in master or ():
         if name.lower() not in known:
-            raise ScenarioError(f"--master {name}: there is no such master{hint(name, known, lead='known')}")
+            raise ScenarioError(
+                f"--master {name}: there is no such master{hint(name, known, lead='known')}",
+                code="master-unknown",
+            )
     chosen = [known[name.lower()] for name in master or known]
     plan = plan_of_scenario(scenario, wishes)
     if plan.faults:
-        raise ScenarioError(f"{scenario}: other masters know nothing of faults; leave out {faults_of(plan)}")
+        raise ScenarioError(
+            f"{scenario}: other masters know nothing of faults; leave out {faults_of(plan)}",
+            code="faults-unsupported",
+        )
     if plan.changes:
         say(f"changed: {changed(plan.changes)}")
     with tempfile.TemporaryDirectory(prefix="yawbench-") as folder:
@@ -63,7 +69,12 @@ def second_opinion(
     wrong = [one for one in opinions if not one.agrees and one.master.title != "fmpy"]
     if wrong:
         names = " and ".join(one.master.title for one in wrong)
-        raise SimulationError(f"{scenario}: no agreement with {names}, see above", instance=None, time=0.0)
+        raise SimulationError(
+            f"{scenario}: no agreement with {names}, see above",
+            instance=None,
+            time=0.0,
+            code="masters-disagree",
+        )
 
 
 def show(opinions: list[SecondOpinion]) -> None:
@@ -131,7 +142,7 @@ def export_ssp(
     from ..labels import faults_of
 
     plan = plan_of_scenario(scenario, wishes)
-    notes = list(plan.notes)
+    notes = list(map(str, plan.diagnostics))
     if plan.faults:
         notes.append(f"faults are not part of the archive: {faults_of(plan)}")
     if for_ == "omsimulator":

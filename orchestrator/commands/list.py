@@ -53,9 +53,9 @@ def list(wishes: RunOptions, what: Wanted = None, place: ListedFolder = None, un
     from .progress import print_tables
 
     if units:
-        found, problems = fmus_in(_folder_of_fmus(place or wishes.fmus))
+        found, errors = fmus_in(_folder_of_fmus(place or wishes.fmus))
         table = units_table(found)
-        table.notes += problems
+        table.notes += map(str, errors)
         print_tables([table])
         return
     if what is None:
@@ -75,8 +75,8 @@ def list(wishes: RunOptions, what: Wanted = None, place: ListedFolder = None, un
         scenario = catalogue.find(place, "a scenario")
         table = recorded_table(plan_of_scenario(scenario, wishes))
     else:
-        found, problems = fmus_in(_folder_of_fmus(place or wishes.fmus))
-        table = fmus_table(found, problems)
+        found, errors = fmus_in(_folder_of_fmus(place or wishes.fmus))
+        table = fmus_table(found, errors)
         if what == "signals":
             table = signals_table(found)
     print_tables([table])
@@ -98,5 +98,5 @@ def _folder_of_fmus(given: Path | None) -> Path:
             build_all(folder, progress=tell_of_build)
         return folder
     if not any(given.glob("*.fmu")):
-        raise ModelDescriptionError(f"{given}: holds no FMUs")
+        raise ModelDescriptionError(f"{given}: holds no FMUs", code="fmu-missing")
     return given

@@ -30,7 +30,8 @@ def check_name(name: str, *, role: str, taken: Iterable[str]) -> None:
     """
     if name.startswith(f"{role}_") and name != f"{role}_":
         raise ScenarioError(
-            f"{name!r}: leave out {role!r}, the FMU gets it by itself: {_plain(name, role)!r}"
+            f"{name!r}: leave out {role!r}, the FMU gets it by itself: {_plain(name, role)!r}",
+            code="name-invalid",
         )
     if not re.fullmatch(r"[a-z][a-z0-9_]{0,49}", name) or keyword.iskeyword(name):
         suggestion = _plain(name, role)
@@ -38,11 +39,13 @@ def check_name(name: str, *, role: str, taken: Iterable[str]) -> None:
         guess = f"; for example {suggestion!r}" if usable else ""
         raise ScenarioError(
             f"{name!r} cannot name a {role}: use up to 50 lower-case letters, digits and _, "
-            f"a letter first, no word of Python{guess}"
+            f"a letter first, no word of Python{guess}",
+            code="name-invalid",
         )
     if f"{role}_{name}" in taken:
         raise ScenarioError(
-            f"there is a {role} {name!r} already; nothing is overwritten, choose another name"
+            f"there is a {role} {name!r} already; nothing is overwritten, choose another name",
+            code="file-exists",
         )
 
 
@@ -177,7 +180,8 @@ def write_new(files: dict[PurePosixPath, str], folder: Path, *, also: Iterable[P
     if there:
         verb = "exists" if len(there) == 1 else "exist"
         raise ScenarioError(
-            f"{folder}: {listed(there)} {verb} already; nothing is overwritten, nothing written"
+            f"{folder}: {listed(there)} {verb} already; nothing is overwritten, nothing written",
+            code="file-exists",
         )
     for path, text in files.items():
         target = folder / path
@@ -218,7 +222,7 @@ def new(kind: NewKindArgument, name: NewName, language: Written = "python", out:
 
     check_name(name, role=kind, taken=set(find_recipes()))
     if language == "c" and kind != "controller":
-        raise ScenarioError("--language c: only a controller can be begun in C")
+        raise ScenarioError("--language c: only a controller can be begun in C", code="name-invalid")
     root = COMPONENTS.parent
     checkout = root if (root / "scenarios").is_dir() else None  # None: installed without them
     here = checkout is not None and Path.cwd().resolve().is_relative_to(checkout)

@@ -161,7 +161,7 @@ class RunOptions:
         from ..errors import ScenarioError
 
         if self.fresh and self.no_run:
-            raise ScenarioError("--fresh and --no-run contradict each other")
+            raise ScenarioError("--fresh and --no-run contradict each other", code="option-invalid")
         if self.format_ != "csv":  # importing the other formats takes time
             from ..results.formats import check_format
 
@@ -193,7 +193,10 @@ class RunOptions:
         given = self.call_limit
         if not self.isolate:
             if given is not None:
-                raise ScenarioError("--call-limit goes with --isolate: in one process no call can be ended")
+                raise ScenarioError(
+                    "--call-limit goes with --isolate: in one process no call can be ended",
+                    code="option-invalid",
+                )
             return None
         from ..master.isolation import CALL_LIMIT
         from ..scenario.quantities import seconds

@@ -70,7 +70,8 @@ def rank(
     for name in only or ():
         if name not in ranking.entries:
             raise ScenarioError(
-                f"--only {name}: there is no such entry{hint(name, ranking.entries, lead='known')}"
+                f"--only {name}: there is no such entry{hint(name, ranking.entries, lead='known')}",
+                code="entry-unknown",
             )
     folder = wishes.out or default_folder(file)
     hold(context, folder)
@@ -93,7 +94,7 @@ def _entry(given: str) -> tuple[str, EntrySpec]:
     fmu, *brought = swap_of(UNIT, given, "--controller")
     name = Path(str(fmu.value)).stem
     if is_path(str(fmu.value)) and not Path(str(fmu.value)).is_file():
-        raise ScenarioError(f"--controller {fmu.value}: there is no such file")
+        raise ScenarioError(f"--controller {fmu.value}: there is no such file", code="file-missing")
     parameters = {one.target.variable: one.value for one in brought if not isinstance(one.value, FaultList)}
     words = ", ".join([name, *(f"{key} {value}" for key, value in parameters.items())])
     path = Path(str(fmu.value)).absolute() if is_path(str(fmu.value)) else fmu.value

@@ -43,7 +43,10 @@ def recorded(sources: Sequence[Path], wishes: RunOptions) -> list[Path]:
     sources = [one if os.path.exists(one) else catalogue.named(one) or one for one in sources]
     scenarios = [one for one in sources if one.suffix in catalogue.ENDINGS and not os.path.isdir(one)]
     if wishes.changes and not scenarios:
-        raise ScenarioError("--swap, --set and --fault change a scenario; only folders of results are given")
+        raise ScenarioError(
+            "--swap, --set and --fault change a scenario; only folders of results are given",
+            code="option-invalid",
+        )
     given = [Job(one.stem, one, Path(), wishes.changes, **wishes.of_jobs) for one in scenarios]
     jobs = {}
     for job in ready(given, once=PlanningCache(build=wishes.build)):
@@ -172,7 +175,9 @@ def animate(sources: RunSources, wishes: RunOptions, label: Labels = None, out: 
     try:
         write_whole(file, text, named=out is not None)
     except OSError as error:
-        raise ResultsError(f"{file}: the page cannot be written: {error.strerror or error}.") from None
+        raise ResultsError(
+            f"{file}: the page cannot be written: {error.strerror or error}.", code="results-unwritable"
+        ) from None
     say(f"{file}: {len(text.encode()) / 1000:.0f} kB")
 
 

@@ -16,7 +16,7 @@ from .options import CHANGES, MAKING, RunOptions, ScenarioFile, plan_of_scenario
 from .progress import say
 
 if TYPE_CHECKING:
-    from ..plan import Finding
+    from ..errors import Diagnostic
 
 MetricsOption = Annotated[
     list[str] | None,
@@ -60,7 +60,9 @@ def run(
     from ..results.lock import refuse_below_others
 
     if wishes.out and name:
-        raise ScenarioError("--out names the folder and --name a part of its path: give one of them")
+        raise ScenarioError(
+            "--out names the folder and --name a part of its path: give one of them", code="option-invalid"
+        )
     metrics = _metric_names(metric or ())
     plan = plan_of_scenario(scenario, wishes)
     if named := [name for name in metric or () if name != "standard"]:
@@ -69,7 +71,7 @@ def run(
         run_metrics.check_metrics(plan, map(run_metrics.metric, named))
     folder = wishes.out or default_folder(scenario, plan.changes, name=name)
     refuse_below_others(folder)
-    for note in (*plan.notes, size_note(plan, folder, wishes.format_)):
+    for note in (*plan.diagnostics, size_note(plan, folder, wishes.format_)):
         if note:
             say(f"note: {note}")
     if plan.changes:
@@ -79,7 +81,7 @@ def run(
         with _bar(title) as progress, opener_of(plan, wishes.limit) as opener:
             info = simulate(plan, folder, progress=progress, opener=opener, format=wishes.format_, apart=True)
     except SimulationError as error:
-        _say_findings(error.findings)
+        _say_warnings(error.warnings)
         raise
     for message in info.warnings[:SHOWN]:
         grade = "" if message.status == WARNING else f"{STATUS[message.status]}: "
@@ -89,7 +91,7 @@ def run(
         say(f"warning: {len(info.warnings) - SHOWN} more, see {folder / 'run.json'}")
     if info.ended:
         say(f"ended: {info.ended}")
-    _say_findings(info.findings)
+    _say_warnings(info.diagnostics)
     say(f"{folder}: {info.rows} rows of {info.columns} variables in {info.wall_time:.2f} s")
     if metrics:
         from ..experiments.tables import metrics_of_run
@@ -101,11 +103,11 @@ def run(
         print_tables([metrics_of_run(needed, metrics)])
 
 
-def _say_findings(findings: Iterable[Finding]) -> None:
-    from ..metrics.plausibility import first_of_each
+def _say_warnings(diagnostics: Iterable[Diagnostic]) -> None:
+    from ..errors import warnings_in
 
-    for finding in first_of_each(findings):
-        say(f"note: {finding.says}")
+    for one in warnings_in(diagnostics):
+        say(f"note: {one}")
 
 
 def _metric_names(given: Sequence[str]) -> list[str]:

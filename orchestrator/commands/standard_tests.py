@@ -89,15 +89,22 @@ def drive(
     given = {str(change.target) for change in changes}
     if test == "sine-with-dwell":
         if AMPLITUDE in given:
-            raise ScenarioError(f"{AMPLITUDE}: the series itself says which amplitudes are driven")
+            raise ScenarioError(
+                f"{AMPLITUDE}: the series itself says which amplitudes are driven", code="option-invalid"
+            )
         slow = catalogue.find(slow_steer or f"{GROUND}/slowly_increasing_steer", "a scenario")
         hold(context, folder)
         status = _drive_dwell(base, slow, once, angle, wishes, figures=figures)
     else:
         if angle or slow_steer:
-            raise ScenarioError(f"{test} needs no A: leave --angle and --slow-steer away")
+            raise ScenarioError(
+                f"{test} needs no A: leave --angle and --slow-steer away", code="option-invalid"
+            )
         if given & {SPEED, "stop_time"}:
-            raise ScenarioError(f"{SPEED} and stop_time: the series itself says at what speeds is driven")
+            raise ScenarioError(
+                f"{SPEED} and stop_time: the series itself says at what speeds is driven",
+                code="option-invalid",
+            )
         hold(context, folder)
         status = _drive_lane_change(base, once, wishes, figures=figures)
     if status:
@@ -134,7 +141,7 @@ def _drive_dwell(
         try:
             known = characteristic_angle([evaluate_slow_steer(trace) for trace in traces(found)])
         except NotJudged as why:
-            raise ResultsError(str(why)) from None
+            raise ResultsError(str(why), code="test-not-applicable") from None
     say(f"A = {math.degrees(known):.1f} degrees")
     ladder = dwell_jobs(base, known, once)
     status = _make("sine with dwell", ladder, base, wishes)
@@ -332,13 +339,13 @@ def _runs(source: Path, mapping: MappingSpec | None) -> list[Path]:
 
     if not source.is_dir():
         if not source.exists():
-            raise ResultsError(f"{source}: there is no such folder or file")
+            raise ResultsError(f"{source}: there is no such folder or file", code="results-missing")
         return [source]
     runs = found_runs(source)
     found = [run.folder for run in runs if run.status == COMPLETED]
     unreadable = [run.problem for run in runs if run.status == UNREADABLE]
     if not found:
-        raise ResultsError(unreadable or f"{source}: holds no run that was completed")
+        raise ResultsError(unreadable or f"{source}: holds no run that was completed", code="runs-missing")
     for problem in unreadable:
         say(f"note: left out: {problem}")
     return found
@@ -358,9 +365,11 @@ def angle_of(given: str | None) -> float | None:
     try:
         angle = float(convert(given, "rad"))
     except ValueError as error:
-        raise ScenarioError(f"--angle: {error}") from None
+        raise ScenarioError(f"--angle: {error}", code="fmu-wrong-kind") from None
     if not 0 < angle < 2 * math.pi:
-        raise ScenarioError(f"--angle: must be between 0 and 360 degrees (got {given})")
+        raise ScenarioError(
+            f"--angle: must be between 0 and 360 degrees (got {given})", code="fmu-wrong-kind"
+        )
     return angle
 
 
@@ -375,15 +384,19 @@ def _angle(
     from .progress import say
 
     if given and slow_steer:
-        raise ScenarioError("--angle and --slow-steer both say what A is: give one of them")
+        raise ScenarioError(
+            "--angle and --slow-steer both say what A is: give one of them", code="option-invalid"
+        )
     if (given or slow_steer) and not test.needs_angle:
-        raise ScenarioError(f"{test.name} needs no A: leave --angle and --slow-steer away")
+        raise ScenarioError(
+            f"{test.name} needs no A: leave --angle and --slow-steer away", code="option-invalid"
+        )
     if not slow_steer:
         return angle_of(given)
     places = [place for source in slow_steer for place in _runs(source, mapping)]
     try:
         angle = characteristic_angle([evaluate_slow_steer(load_trace(p, mapping)) for p in places])
     except NotJudged as why:
-        raise ResultsError(str(why)) from None
+        raise ResultsError(str(why), code="test-not-applicable") from None
     say(f"A = {math.degrees(angle):.1f} degrees, from {len(places)} of slowly increasing steer")
     return angle

@@ -65,16 +65,16 @@ def vehicle(
     from ..scenario.scenario_schema import Vehicle
     from ..scenario.validation import validate
     from ..vehicles.handling_and_braking import TestTrack, draw_cars, fitting_plant, handling_of
-    from ..wiring.warnings import remarks_on_values
+    from ..wiring.warnings import suspicious_vehicle
     from .progress import print_tables, save_figure, say
 
     file = catalogue.find(file, "a vehicle file")
     document = yaml_lines.read(file, what="vehicle file")
     spec = validate(Vehicle, document)
     if spec is None:
-        raise ScenarioError(document.sentences())
-    for finding in remarks_on_values(spec.parameters):
-        say(f"note: {finding.says}")
+        raise ScenarioError(document.sorted_errors())
+    for one in suspicious_vehicle(spec.parameters):
+        say(f"note: {one}")
     opener = Opener(build=wishes.build)
     names = plant.split(",") if plant else [fitting_plant(file, tyre, wishes.fmus, opener)]
     tracks = [TestTrack(file, name.strip(), tyre, friction, wishes.fmus, opener) for name in names]

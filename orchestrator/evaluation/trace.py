@@ -174,7 +174,10 @@ class Trace:
         """
         if name not in self.signals:
             have = ", ".join(self.signals) or "nothing"
-            raise ResultsError(f"{self.label}: has no signal {name!r}, which this test needs; it has {have}")
+            raise ResultsError(
+                f"{self.label}: has no signal {name!r}, which this test needs; it has {have}",
+                code="signal-unknown",
+            )
         return self.signals[name]
 
     def told(self, name: str, meaning: str = "") -> float:
@@ -297,12 +300,12 @@ def load_mapping(path: Path | str) -> MappingSpec:
     """Read a mapping file.
 
     Raises:
-        ScenarioError: it is invalid; lists all problems.
+        ScenarioError: it is invalid; lists all errors.
     """
     document = yaml_lines.read(Path(path), what="mapping of signals")
     spec = validate(MappingSpec, document)
     if spec is None:
-        raise ScenarioError(document.sentences())
+        raise ScenarioError(document.sorted_errors())
     return spec
 
 

@@ -225,7 +225,10 @@ class MetricDrawing(ValueDrawing):
         numbers = [self.shown(self.value(run))[0] for run in self.runs]
         drawn = [x for x in numbers if not math.isnan(x) and (x > 0 or spec.scale != "log")]
         if not drawn:
-            raise ResultsError("nothing to draw: no run gives this metric a number that can be drawn.")
+            raise ResultsError(
+                "nothing to draw: no run gives this metric a number that can be drawn.",
+                code="nothing-to-draw",
+            )
         self.low, self.high = min(drawn), max(drawn)
         if spec.largest is not None:
             self.high = self.number(spec.largest)
@@ -270,7 +273,7 @@ class GridLines(ValueDrawing):
         self.cells = [(cell, values.get(cell.key)) for cell in cells(grid) if cell.column]
         units = {value.unit for _, value in self.cells if value}
         if not units:
-            raise ResultsError("nothing to draw: no cell of the grid has a number.")
+            raise ResultsError("nothing to draw: no cell of the grid has a number.", code="nothing-to-draw")
         self.what = grid.title
         self.show_in(min(units))
         self.upwards = self.measured

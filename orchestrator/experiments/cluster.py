@@ -23,7 +23,7 @@ from typing import Any
 import distributed
 
 from ..cache import OF_METRICS, sources_hash
-from ..errors import ResultsError, ScenarioError
+from ..errors import Diagnostic, ResultsError, ScenarioError
 from ..fmu.archive import open_fmu, read_archive
 from ..interrupts import terminable
 from ..messages import listed
@@ -84,13 +84,18 @@ def _submit_all(client: Any, jobs: Sequence[Job], done: OnOutcome, scheduler: st
 def _outcome(future: Any, job: Job, scheduler: str) -> Outcome:
     """Return the outcome that a worker reported, or the reason why it reported none."""
     if future.status == "cancelled" or future.status == "lost":
-        raise ResultsError(f"{scheduler}: the cluster was lost; what it had finished is kept.")
+        raise ResultsError(
+            f"{scheduler}: the cluster was lost; what it had finished is kept.", code="runs-missing"
+        )
     error = future.exception() if future.status == "error" else None
     if isinstance(error, distributed.KilledWorker):
-        return Outcome(job, ("the workers that made this run died",), 1, died=True)
+        lost = Diagnostic("run-process-died", "the workers that made this run died")
+        return Outcome(job, (lost,), 1, died=True)
     if error is not None:
         text = " ".join(str(error).split())
-        raise ResultsError(f"{scheduler}: a worker failed: {type(error).__name__}: {text}")
+        raise ResultsError(
+            f"{scheduler}: a worker failed: {type(error).__name__}: {text}", code="runs-missing"
+        )
     return replace(future.result(), job=job)
 
 
@@ -138,7 +143,8 @@ def _connected(address: str) -> Iterator[Any]:
     except (OSError, TimeoutError, asyncio.TimeoutError, ValueError, TypeError) as error:
         reason = f": {' '.join(str(error).split())}" if isinstance(error, ValueError) else ""
         raise ScenarioError(
-            f"--scheduler {address}: no Dask scheduler answers there within {TIMEOUT:g} s{reason}"
+            f"--scheduler {address}: no Dask scheduler answers there within {TIMEOUT:g} s{reason}",
+            code="cluster-unavailable",
         ) from None
     log = logging.getLogger("distributed.client")
     level = log.level
@@ -154,7 +160,9 @@ def _check_workers(client: Any, address: str) -> int:
     """Check that all workers are compatible and return their number of threads."""
     threads = sum(client.nthreads().values())
     if not threads:
-        raise ScenarioError(f"--scheduler {address}: this scheduler has no workers")
+        raise ScenarioError(
+            f"--scheduler {address}: this scheduler has no workers", code="cluster-unavailable"
+        )
     here = ours()
     for worker, theirs in client.run(versions, on_error="return").items():
         if isinstance(theirs, OSError):  # it has gone or is restarting; runs go to the others
@@ -163,11 +171,15 @@ def _check_workers(client: Any, address: str) -> int:
             text = " ".join(str(theirs).split())
             raise ScenarioError(
                 f"--scheduler {address}: its workers cannot run this program; "
-                f"is yawbench installed there? ({text})"
+                f"is yawbench installed there? ({text})",
+                code="cluster-unavailable",
             )
         differs = [f"{k} {theirs.get(k)} there, {here[k]} here" for k in here if theirs.get(k) != here[k]]
         if differs:
-            raise ScenarioError(f"--scheduler {address}: worker {worker} does not fit: {listed(differs)}")
+            raise ScenarioError(
+                f"--scheduler {address}: worker {worker} does not fit: {listed(differs)}",
+                code="cluster-unavailable",
+            )
     return threads
 
 

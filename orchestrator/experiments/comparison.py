@@ -93,7 +93,9 @@ def variants(scenario: Path, swaps: Sequence[str], changes: Sequence[Override]) 
             names[:0] = [fmu] if fmu not in names else []
     named = [unit for unit, names in choices.items() if len(names) > 1]
     if not named:
-        raise ScenarioError("nothing to compare: name several FMUs, for example --swap controller=a,b")
+        raise ScenarioError(
+            "nothing to compare: name several FMUs, for example --swap controller=a,b", code="option-invalid"
+        )
     runs: list[NamedRun] = []
     for combination in itertools.product(*choices.values()):
         chosen = dict(zip(choices, combination, strict=True))
@@ -115,7 +117,9 @@ def _choices(swaps: Sequence[str]) -> dict[str, list[str]]:
         unit, equals, fmus = text.partition("=")
         names = [fmus] if Path(fmus).is_file() else [name.strip() for name in fmus.split(",")]
         if not (unit.strip() and equals and all(names)):
-            raise ScenarioError(f"--swap {text}: write --swap UNIT=FMU or --swap UNIT=FMU,FMU,...")
+            raise ScenarioError(
+                f"--swap {text}: write --swap UNIT=FMU or --swap UNIT=FMU,FMU,...", code="option-invalid"
+            )
         known = choices.get(unit.strip(), [])
         choices[unit.strip()] = list(dict.fromkeys([*known, *names]))
     return choices
@@ -182,7 +186,9 @@ def refinements(
     """
     loaded = load_scenario(scenario, changes=changes)
     if not all(SignalName.parse(signal)):
-        raise ScenarioError(f"--signal {signal}: write UNIT.VARIABLE, for example plant.yaw_rate")
+        raise ScenarioError(
+            f"--signal {signal}: write UNIT.VARIABLE, for example plant.yaw_rate", code="option-invalid"
+        )
     runs = []
     for algorithm in algorithms or [loaded.algorithm]:
         for k in range(halvings + 1):
@@ -212,15 +218,15 @@ def measure(findings: ExperimentResult, signal: str) -> list[ConvergenceRow]:
     for run in findings.experiment.runs.values():
         by_algorithm.setdefault(str(_given(run, "algorithm")), []).append(run)
     finest = next(iter(by_algorithm.values()))[-1]
-    failed = {case.run.name: findings.record(case).problems for case in findings.experiment.cases}
+    failed = {case.run.name: findings.record(case).reason or "" for case in findings.experiment.cases}
     samples = {
-        run.name: _samples(findings.results.get(run.name), signal, "; ".join(failed[run.name]))
+        run.name: _samples(findings.results.get(run.name), signal, failed[run.name])
         for run in findings.experiment.runs.values()
     }
     reference = samples[finest.name][0]
     peak = math.nan if reference is None else float(np.max(np.abs(reference)))
     if peak == 0:
-        raise ResultsError(f"{signal} is zero throughout: choose another --signal.")
+        raise ResultsError(f"{signal} is zero throughout: choose another --signal.", code="signal-zero")
     rows = []
     for algorithm, runs in by_algorithm.items():
         coarse = [_common(samples[run.name][0], k) for k, run in enumerate(runs)]
@@ -302,7 +308,7 @@ def convergence_figure(rows: Sequence[ConvergenceRow], signal: str, title: str, 
 
     drawn = [row for row in rows if row.error and row.wall_time]
     if not drawn:
-        raise ResultsError("nothing to draw: no two runs differ.")
+        raise ResultsError("nothing to draw: no two runs differ.", code="nothing-to-draw")
     names = list(dict.fromkeys(row.algorithm for row in drawn))
     styles = {
         name: {**line_style(k), "marker": "os^"[k % 3], "markersize": 5} for k, name in enumerate(names)

@@ -154,7 +154,7 @@ def finish(
 
     runner(left, done)
     if journal and any(job.key not in journal.records for job in left):
-        raise ResultsError(f"{journal.folder}: not all runs were made; start it again.")
+        raise ResultsError(f"{journal.folder}: not all runs were made; start it again.", code="runs-missing")
     return outcomes
 
 
@@ -174,6 +174,7 @@ def runner_of(workers: int | None, scheduler: str | None) -> Runner:
         from .cluster import run_on_cluster
     except ImportError:
         raise ScenarioError(
-            "--scheduler needs the package distributed: pip install 'yawbench[cluster]'"
+            "--scheduler needs the package distributed: pip install 'yawbench[cluster]'",
+            code="package-missing",
         ) from None
     return functools.partial(run_on_cluster, scheduler=scheduler)

@@ -1,6 +1,6 @@
 """Loading of experiment files: entries with `for` and axes expanded into runs and cases.
 
-All problems of a file are reported at once.
+All errors of a file are reported at once.
 """
 
 from __future__ import annotations
@@ -72,7 +72,9 @@ class ForBinding:
         for word in re.findall(r"\{([^{}]*)\}", text):
             if word not in use:
                 guess = hint(word, use, lead="'for' has")
-                self.document.report((*self.key, *where), f"{{{word}}} stands for nothing{guess}")
+                self.document.report(
+                    (*self.key, *where), f"{{{word}}} stands for nothing{guess}", "axis-unknown"
+                )
         return re.sub(r"\{(\w+)\}", lambda match: use.get(match[1], match[0]), text)
 
     def filled(self, entry: Texts) -> Texts:
@@ -97,7 +99,9 @@ def fillings(
     """Yield every combination of a `for`; none, and a reported problem, if there are too many."""
     number = math.prod(map(len, for_each.values()))
     if number > MOST:
-        document.report((*key, "for"), f"stands for {number} {what}; at most {MOST} are taken")
+        document.report(
+            (*key, "for"), f"stands for {number} {what}; at most {MOST} are taken", "experiment-too-large"
+        )
         return
     for combination in itertools.product(*(choices.items() for choices in for_each.values())):
         words, choices = {}, []
@@ -118,7 +122,7 @@ def expanded(spec: ExperimentSpec, document: Document) -> ExperimentSpec:
         for one in fillings(document, key, number.for_each, "numbers"):
             made = one.fill(name) if number.for_each else name
             if made in derived:
-                document.report(key, f"there is already a derived number {made!r}")
+                document.report(key, f"there is already a derived number {made!r}", "name-duplicate")
             derived[made] = one.filled(number)
     said: dict[str, list[Claim]] = {"claims": [], "checks": []}
     for group, every in said.items():
@@ -132,7 +136,7 @@ def expanded(spec: ExperimentSpec, document: Document) -> ExperimentSpec:
 def named_runs(document: Document, i: int, entry: RunSpec) -> Iterator[NamedRun]:
     """Yield the runs of the i-th entry, up to the first with an error, which is reported."""
     key: KeyPath = ("runs", i)
-    folder, known = document.path.parent, len(document.problems)
+    folder, known = document.path.parent, len(document.errors)
     for one in fillings(document, key, entry.for_each, "runs"):
         name = one.fill(entry.name, "name")
         _check_folder(name, one)
@@ -148,12 +152,12 @@ def named_runs(document: Document, i: int, entry: RunSpec) -> Iterator[NamedRun]
             filled = part.model_copy(update={"swap": swaps, "set": settings})
             for change in changes_of_file(filled, folder, "study"):
                 if change.target in changes:
-                    document.report((*key, "for"), f"{change.target} is given twice")
+                    document.report((*key, "for"), f"{change.target} is given twice", "name-duplicate")
                 changes[change.target] = change
         label = one.fill(entry.label, "label", sentence=True) or name
         row = one.fill(entry.row, "row", sentence=True) or label
         scenario = folder / one.fill(entry.scenario, "scenario")
-        if len(document.problems) > known:
+        if len(document.errors) > known:
             return
         yield NamedRun(name, label, row, scenario, tuple(changes.values()))
 
@@ -166,7 +170,7 @@ def _check_folder(name: str, one: ForBinding) -> None:
     sentence = f"{short(name)} cannot name a run: use letters, digits, . _ + - and / between folders"
     if any(len(part) > LONGEST for part in parts):
         sentence = f"{short(name)} is too long: at most {LONGEST} characters between two /"
-    one.document.report((*one.key, "name"), sentence)
+    one.document.report((*one.key, "name"), sentence, "name-duplicate")
 
 
 RUNS = "runs"
@@ -320,31 +324,33 @@ def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> Lo
         changes: overrides of all runs; paths of FMUs are relative to the working directory.
 
     Raises:
-        ScenarioError: the file is invalid; lists all problems.
+        ScenarioError: the file is invalid; lists all errors.
     """
     path = Path(path)
     document = yaml_lines.read(path, what="experiment file")
     overrides.apply_to_all_runs(document, changes)
     spec = validate(ExperimentSpec, document)
-    if spec is None or document.problems:
-        raise ScenarioError(document.sentences())
+    if spec is None or document.errors:
+        raise ScenarioError(document.sorted_errors())
     spec = expanded(spec, document)
     runs = {"": NamedRun("", "", "", path.parent / spec.scenario, ())} if spec.scenario else {}
     for i, entry in enumerate(spec.runs):
         for run in named_runs(document, i, entry):
             if len(runs) == MOST:
-                document.report(("runs",), f"more than {MOST} runs; no more are taken")
-                raise ScenarioError(document.sentences())
+                document.report(
+                    ("runs",), f"more than {MOST} runs; no more are taken", "experiment-too-large"
+                )
+                raise ScenarioError(document.sorted_errors())
             if run.name in runs:
-                document.report(("runs", i, "name"), f"there is already a run {run.name!r}")
+                document.report(("runs", i, "name"), f"there is already a run {run.name!r}", "name-duplicate")
             runs[run.name] = run
     given = {change.target: change for change in changes}
     own = changes_of_file(spec, path.parent, "sweep" if spec.axes else "study")
     for_all = tuple(one for one in own if one.target not in given)
     experiment = LoadedExperiment(path, spec, runs, for_all, tuple(given.values()))
-    if not document.problems:
+    if not document.errors:
         check_axes(spec, document)
         check_names(experiment, document)
-    if document.problems:
-        raise ScenarioError(document.sentences())
+    if document.errors:
+        raise ScenarioError(document.sorted_errors())
     return experiment

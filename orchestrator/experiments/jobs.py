@@ -14,10 +14,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..cache import OF_METRICS, OF_TESTS, sources_hash
-from ..errors import KEPT, BuildError, Interrupted, ResultsError, ScenarioError, YawbenchError
+from ..errors import (
+    BuildError,
+    Diagnostic,
+    Interrupted,
+    ResultsError,
+    ScenarioError,
+    YawbenchError,
+    errors_in,
+    text_of,
+    warnings_in,
+)
 from ..interrupts import StopFlag, interrupts
 from ..messages import hint, printable
-from ..metrics.plausibility import findings_in
 from ..metrics.run_metrics import evaluate, metric
 from ..names import match
 from ..plan import Override, Plan
@@ -32,7 +41,7 @@ if TYPE_CHECKING:
     from ..scenario.scenario_schema import LoadedScenario
 
 MANY = 10
-"""Problems shown; the rest are only counted."""
+"""Errors shown; the rest are only counted."""
 
 TRIES = 2
 """Attempts at a run whose process dies; chosen: a kill from outside rarely happens twice."""
@@ -76,15 +85,14 @@ class MeasuredRun:
     """Metrics of a run, or the reason why there are none."""
 
     values: MetricValues
-    problems: tuple[str, ...] = ()
-    findings: tuple[str, ...] = ()  # kinds of plausibility warnings about the run
+    diagnostics: tuple[Diagnostic, ...] = ()  # errors, and warnings about the course of the run
     ended: str | None = None  # why an instance ended it early
     id: str | None = None  # id of its results on disk, if just written
     made: bool = True  # False: the run has not been executed yet
 
     @property
     def ok(self) -> bool:
-        return not self.problems
+        return not errors_in(self.diagnostics)
 
     @property
     def failed(self) -> bool:
@@ -99,21 +107,26 @@ class MeasuredRun:
         return ("ended early" if self.ended else "completed") if self.ok else "failed"
 
     @property
+    def warning_codes(self) -> tuple[str, ...]:
+        """Codes of the warnings about the course of the run."""
+        return tuple(one.code for one in warnings_in(self.diagnostics))
+
+    @property
     def reason(self) -> str | None:
         """Why the run failed or ended early; None if neither."""
-        return "; ".join(self.problems) or self.ended
+        return text_of(errors_in(self.diagnostics)) or self.ended
 
 
-NOT_MADE = MeasuredRun({}, ("not made",), made=False)
+NOT_MADE = MeasuredRun({}, (Diagnostic("run-not-made", "not made"),), made=False)
 """Record of a run that has not been executed yet."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Outcome of a job; `problems` is empty if it succeeded."""
+    """Outcome of a job; `diagnostics` is empty if it succeeded."""
 
     job: Job
-    problems: tuple[str, ...] = ()
+    diagnostics: tuple[Diagnostic, ...] = ()
     exit_status: int = 0
     seconds: float = 0.0  # wall time of the process
     value: Any = None  # return value; of `run_job` a `MeasuredRun`
@@ -121,18 +134,18 @@ class Outcome:
 
     @property
     def ok(self) -> bool:
-        return not self.problems
+        return not self.diagnostics
 
     @property
     def reason(self) -> str:
-        """Why the job failed, in one sentence."""
-        return "; ".join(self.problems)
+        """Why the job failed, in one line."""
+        return text_of(self.diagnostics)
 
     @property
     def record(self) -> MeasuredRun:
         """The record of the run, as its process reported it."""
-        problems = tuple(text for text in self.problems if getattr(text, "kind", "") != KEPT)
-        return MeasuredRun({}, problems) if problems else self.value
+        errors = errors_in(self.diagnostics)  # not where the results of a failed run are
+        return MeasuredRun({}, errors) if errors else self.value
 
 
 OnOutcome = Callable[[Outcome], None]
@@ -178,7 +191,7 @@ def planned(job: Job, once: PlanningCache | None = None) -> tuple[LoadedScenario
     unknown = [name for name in job.record if name not in recorded and "*" not in name]
     if unknown:
         guess = hint(unknown[0], recorded, lead="recorded are")
-        raise ScenarioError(f"{job.scenario}: {unknown[0]!r} is not recorded{guess}")
+        raise ScenarioError(f"{job.scenario}: {unknown[0]!r} is not recorded{guess}", code="signal-unknown")
     chosen = [
         name
         for text, name in recorded.items()
@@ -192,7 +205,7 @@ def ready(
     *,
     once: PlanningCache | None = None,
     progress: Callable[[int], None] = lambda done: None,
-    place: Callable[[str], tuple[Hashable, str]] = lambda problem: (problem, problem),
+    group: Callable[[Diagnostic], tuple[Hashable, Diagnostic]] = lambda error: (error, error),
 ) -> list[Job]:
     """Plan all jobs, so that each of them is known to be able to start.
 
@@ -200,28 +213,29 @@ def ready(
         jobs: the runs.
         once: cache of files and FMUs; builds stale FMUs first if its opener does.
         progress: called with the number of jobs planned so far.
-        place: returns what a problem is about, and its message; only the first problem about a thing
-            is reported.
+        group: returns what an error is about, and how it is reported; only the first error about a thing
+            is.
 
     Raises:
         BuildError: stale FMUs cannot be built.
-        ScenarioError: some jobs cannot start; lists each problem once.
+        ScenarioError: some jobs cannot start; lists each error once.
     """
     once, found = once or PlanningCache(), []
-    problems: dict[Hashable, str] = {}
+    errors: dict[Hashable, Diagnostic] = {}
     for number, job in enumerate(jobs, start=1):
         try:
             found.append(replace(job, plan=planned(job, once)[1]))
         except BuildError:
             raise
         except YawbenchError as error:
-            for problem in error.problems:
-                problems.setdefault(*place(problem))
+            for one in error.diagnostics:
+                errors.setdefault(*group(one))
         progress(number)
-    if problems:
-        messages = list(problems.values())
-        more = [f"and {len(messages) - MANY} more problems"] if len(messages) > MANY else []
-        raise ScenarioError(messages[:MANY] + more)
+    if errors:
+        shown = list(errors.values())[:MANY]
+        more = f"and {len(errors) - MANY} more problems"
+        omitted = [Diagnostic("errors-omitted", more)] if len(errors) > MANY else []
+        raise ScenarioError([*shown, *omitted])
     return found
 
 
@@ -271,8 +285,7 @@ def measured(results: Results, metrics: MetricRequests, test: TestRequest | None
         values[key] = None if value is None or short else (value.number, value.unit)
     if test:
         values |= _judged(results, *test)
-    kinds = dict.fromkeys(one.kind for one in findings_in(results.record) if one.time is not None)
-    return MeasuredRun(values, findings=tuple(kinds), ended=results.ended)
+    return MeasuredRun(values, results.record.course_warnings, results.ended)
 
 
 def _judged(results: Results, name: str, angle: float | None) -> MetricValues:
@@ -360,21 +373,21 @@ def execute(
 def _outcome(job: Job, finished: Finished) -> Outcome:
     """Return the outcome that the process of a run reported, or how it died."""
     if finished.died:
-        problem = f"the process of this run {finished.died}"
-        return Outcome(job, (problem,), 1, finished.seconds, died=True)
+        lost = Diagnostic("run-process-died", f"the process of this run {finished.died}")
+        return Outcome(job, (lost,), 1, finished.seconds, died=True)
     if finished.error is not None:
         raise finished.error
-    status, problems, value, interrupted = finished.value
-    return Outcome(job, tuple(problems), status, finished.seconds, value, interrupted)
+    status, diagnostics, value, interrupted = finished.value
+    return Outcome(job, tuple(diagnostics), status, finished.seconds, value, interrupted)
 
 
-def _report_of(job: Job, run: Callable[[Job], Any]) -> tuple[int, list[str], Any, bool]:
-    """Execute a job in a worker; return exit status, problems, value, and whether it was interrupted."""
+def _report_of(job: Job, run: Callable[[Job], Any]) -> tuple[int, list[Diagnostic], Any, bool]:
+    """Execute a job in a worker; return exit status, diagnostics, value, and whether it was interrupted."""
     try:
         return 0, [], run(job), False
     except (YawbenchError, Interrupted) as error:
         interrupted = isinstance(error, Interrupted)
-        return error.exit_status, [*error.problems] or [type(error).__name__], None, interrupted
+        return error.exit_status, error.diagnostics, None, interrupted
     except BaseException as error:
         print(printable("".join(traceback.format_exception(error))), file=sys.stderr)
-        return 1, [f"{type(error).__name__}: {error}"], None, False
+        return 1, [Diagnostic("internal-error", f"{type(error).__name__}: {error}")], None, False

@@ -15,9 +15,10 @@ from typing import Annotated, Any, NoReturn
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from .. import checksums
-from ..errors import ResultsError
+from ..errors import Diagnostic, ResultsError
 from ..files import open_own, reason, write_whole
 from ..messages import counted
+from ..results.run_record import EARLIER
 from .jobs import MeasuredRun
 
 FILE = "runs.jsonl"
@@ -68,14 +69,19 @@ class _Entry(_Line):
 
     key: str
     values: dict[str, Annotated[tuple[float, str], Field(strict=False)] | None]
-    problems: Annotated[tuple[str, ...], Field(strict=False)]
-    findings: Annotated[tuple[str, ...], Field(strict=False)] = ()
+    diagnostics: list[dict[str, Any]] = []
+    problems: list[str] = []  # until 0.2: sentences
+    findings: list[str] = []  # until 0.2: names of warnings
     ended: str | None = None
 
     @property
     def record(self) -> MeasuredRun:
         """The line as a `MeasuredRun`."""
-        return MeasuredRun(self.values, self.problems, self.findings, self.ended)
+        earlier = (
+            *(Diagnostic("run-failed", sentence) for sentence in self.problems),
+            *(Diagnostic(EARLIER.get(kind, kind), kind, "warning") for kind in self.findings),
+        )
+        return MeasuredRun(self.values, (*map(Diagnostic.of, self.diagnostics), *earlier), self.ended)
 
 
 class Journal:
@@ -98,7 +104,9 @@ class Journal:
             folder.mkdir(parents=True, exist_ok=True)
             self._file = _opened(path)
         except OSError as error:
-            raise ResultsError(f"{folder}: results cannot be written here: {reason(error)}.") from None
+            raise ResultsError(
+                f"{folder}: results cannot be written here: {reason(error)}.", code="results-unwritable"
+            ) from None
         try:
             if fresh:
                 os.ftruncate(self._file, 0)
@@ -154,7 +162,8 @@ class Journal:
     def _refuse(self, other: str) -> NoReturn:
         raise ResultsError(
             f"{self.folder}: holds the runs of {other}; give another folder with --out, "
-            "or --fresh to begin anew."
+            "or --fresh to begin anew.",
+            code="results-of-another",
         )
 
     def _replace(self, content: bytes) -> None:
@@ -178,10 +187,12 @@ class Journal:
         if last:
             self._append(
                 _Entry(
-                    key=key, values=record.values, problems=record.problems, findings=record.findings,
+                    key=key,
+                    values=record.values,
+                    diagnostics=[one.record() for one in record.diagnostics],
                     ended=record.ended,
                 )
-            )  # fmt: skip
+            )
         self.records[key] = record
 
     def _append(self, entry: _Line) -> None:
@@ -191,7 +202,9 @@ class Journal:
                 view = view[os.write(self._file, view) :]
             os.fsync(self._file)
         except OSError as error:
-            raise ResultsError(f"{self._path}: cannot be written: {reason(error)}.") from None
+            raise ResultsError(
+                f"{self._path}: cannot be written: {reason(error)}.", code="results-unwritable"
+            ) from None
 
     def close(self) -> None:
         """Close the file."""

@@ -135,4 +135,4 @@ def _number(bound: float | str, unit: str) -> float:
     try:
         return si_number(bound, unit)
     except ValueError as error:
-        raise ScenarioError(f"a condition's bound: {error}") from None
+        raise ScenarioError(f"a condition's bound: {error}", code="unit-mismatch") from None

@@ -17,7 +17,7 @@ from .schema import ExperimentSpec, FigureSpec
 if TYPE_CHECKING:
     from .experiment import LoadedExperiment
 
-COLUMNS = (RUN, "status", "reason", "findings", "key")
+COLUMNS = (RUN, "status", "reason", "warnings", "key")
 """Columns of the table besides axes and metrics."""
 
 
@@ -28,12 +28,14 @@ def check_axes(spec: ExperimentSpec, document: Document) -> None:
         for target in axis.targets:
             if target in seen:
                 also = f"axis {seen[target]!r}" if seen[target] in spec.axes else "set or swap"
-                document.report(("axes", name), f"{target} is given by {also} already")
+                document.report(("axes", name), f"{target} is given by {also} already", "name-duplicate")
             seen[target] = name
     for group, names in (("axes", spec.axes), ("metrics", spec.metrics)):
         for name in names:
             if name in COLUMNS or (group == "axes" and name in spec.metrics):
-                document.report((group, name), f"{name!r} is the name of another column of the table")
+                document.report(
+                    (group, name), f"{name!r} is the name of another column of the table", "name-duplicate"
+                )
 
 
 def check_names(experiment: LoadedExperiment, document: Document) -> None:
@@ -51,19 +53,23 @@ def check_names(experiment: LoadedExperiment, document: Document) -> None:
     for what, name, key in itertools.chain(_names(spec), _names_of_conditions(experiment, document)):
         names, lead = known[what]
         if name not in names:
-            document.report(key, f"there is no {what} {name!r}{hint(name, names, lead=lead)}")
+            document.report(key, f"there is no {what} {name!r}{hint(name, names, lead=lead)}", "name-unknown")
     for patterns, key in _patterns(spec):
         for k, pattern in enumerate(patterns):
             if not experiment.matching([pattern]):
                 sentence = f"no run is named {pattern!r}{hint(pattern, runs, lead='runs')}"
-                document.report((*key, "runs", k), sentence)
+                document.report((*key, "runs", k), sentence, "name-unknown")
     _check_correlations(spec, document)
     _check_limits(spec, document)
     for i, figure in enumerate(spec.figures):
         if figure.name in [one.name for one in spec.figures[:i]]:
-            document.report(("figures", i, "name"), f"there is already a figure {figure.name!r}")
+            document.report(
+                ("figures", i, "name"), f"there is already a figure {figure.name!r}", "name-duplicate"
+            )
         if figure.kind == "overlay" and spec.axes:
-            document.report(("figures", i, "kind"), "runs along axes are drawn as curve, map or limit")
+            document.report(
+                ("figures", i, "kind"), "runs along axes are drawn as curve, map or limit", "figure-invalid"
+            )
         _check_levels(spec, document, i, figure)
         if figure.kind not in ("overlay", "grid"):
             _check_places(spec, document, i, figure)
@@ -113,7 +119,7 @@ def _names_of_conditions(
             yield "derived number", condition.derived, (*key, "derived")
             continue
         if not condition.run and experiment.spec.runs and key[0] != "limits":
-            document.report(key, "needs run and metric, or derived in place of both")
+            document.report(key, "needs run and metric, or derived in place of both", "figure-invalid")
             continue
         if condition.run and not experiment.matching([condition.run]):
             yield "run", condition.run, (*key, "run")
@@ -147,25 +153,29 @@ def _check_correlations(spec: ExperimentSpec, document: Document) -> None:
         for axis, counted in number.only.items():
             where: KeyPath = ("derived", name, "only", axis)
             if axis not in axes:
-                document.report(where, f"there is no axis {axis!r}{hint(axis, axes, lead='the grid has')}")
+                document.report(
+                    where, f"there is no axis {axis!r}{hint(axis, axes, lead='the grid has')}", "axis-unknown"
+                )
                 continue
             for part in (part for part in counted if part not in axes[axis]):
                 guess = hint(part, axes[axis], lead=f"{axis} has")
-                document.report(where, f"there is no value {part!r}{guess}")
+                document.report(where, f"there is no value {part!r}{guess}", "name-unknown")
         if all(cell.published is None for cell in cells(grid)):
             sentence = f"grid {number.rank_correlation!r} has no published numbers to compare with"
-            document.report(("derived", name, "rank_correlation"), sentence)
+            document.report(("derived", name, "rank_correlation"), sentence, "figure-invalid")
 
 
 def _check_limits(spec: ExperimentSpec, document: Document) -> None:
     """Report limits of axes that cannot have one."""
     for name, limit in spec.limits.items():
         if limit.of in spec.axes and not spec.axes[limit.of].numeric:
-            document.report(("limits", name, "of"), f"the values of {limit.of!r} are no numbers")
+            document.report(
+                ("limits", name, "of"), f"the values of {limit.of!r} are no numbers", "figure-invalid"
+            )
         if limit.of in spec.repeats:
-            document.report(("limits", name, "of"), f"numbers are means over {limit.of!r}")
+            document.report(("limits", name, "of"), f"numbers are means over {limit.of!r}", "figure-invalid")
         if spec.design != "grid":
-            document.report(("limits", name), "limits need a grid")
+            document.report(("limits", name), "limits need a grid", "figure-invalid")
 
 
 def _check_levels(spec: ExperimentSpec, document: Document, i: int, figure: FigureSpec) -> None:
@@ -176,7 +186,7 @@ def _check_levels(spec: ExperimentSpec, document: Document, i: int, figure: Figu
         known = [text_of(level.value) for level in levels_of(spec.axes[axis])]
         for value in (value for value in chosen if text_of(value) not in known):
             sentence = f"{axis} has no value {value!r}{hint(text_of(value), known, lead='it has')}"
-            document.report(("figures", i, "only", axis), sentence)
+            document.report(("figures", i, "only", axis), sentence, "figure-invalid")
 
 
 def _check_places(spec: ExperimentSpec, document: Document, i: int, figure: FigureSpec) -> None:
@@ -184,17 +194,19 @@ def _check_places(spec: ExperimentSpec, document: Document, i: int, figure: Figu
     used = {*figure.axes.values()}
     for name, axis in figure.axes.items():
         if axis in spec.repeats:
-            document.report(("figures", i, name), f"numbers are means over {axis!r}")
+            document.report(("figures", i, name), f"numbers are means over {axis!r}", "figure-invalid")
         if name in "xy" and axis in spec.axes and figure.kind == "map" and not spec.axes[axis].numeric:
-            document.report(("figures", i), f"the values of {axis!r} are no numbers")
+            document.report(("figures", i), f"the values of {axis!r} are no numbers", "figure-invalid")
     if figure.limit in spec.limits:
         of = spec.limits[figure.limit].of
         if of in used:
-            document.report(("figures", i), f"{of!r} is what the limit {figure.limit!r} is of")
+            document.report(
+                ("figures", i), f"{of!r} is what the limit {figure.limit!r} is of", "figure-invalid"
+            )
         used.add(of)
     left = [
         name for name in (*spec.axes, *([RUN] if spec.runs else [])) if name not in used | {*spec.repeats}
     ]
-    if spec.design == "grid" and left and not document.problems:
+    if spec.design == "grid" and left and not document.errors:
         sentence = f"the axis {left[0]!r} has no place in this figure: make it lines or panels"
-        document.report(("figures", i), sentence)
+        document.report(("figures", i), sentence, "figure-invalid")

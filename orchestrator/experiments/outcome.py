@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
+from ..errors import Diagnostic
 from ..figures.style import digits_of
 from ..messages import counted
 from ..metrics.run_metrics import MetricValue
@@ -52,7 +53,7 @@ class ExperimentResult:
     def failed(self) -> dict[str, str]:
         """Label of each failed case -> reason."""
         return {
-            self.words(case): "; ".join(record.problems)
+            self.words(case): record.reason or ""
             for case, record in zip(self.experiment.cases, self.records, strict=True)
             if record.failed
         }
@@ -156,7 +157,7 @@ class ExperimentResult:
     def failure(self, run: NamedRun, setting: DesignPoint) -> str:
         """Return why a run, or the first failed repeat of it, failed at a setting; "" if none did."""
         records = (self.record(case) for case in self.cases_of(run, setting))
-        return next(("; ".join(record.problems) for record in records if record.failed), "")
+        return next((record.reason or "" for record in records if record.failed), "")
 
     def made(self, run: NamedRun, setting: DesignPoint) -> bool:
         """Return whether a run at a setting has been executed, with all its repeats."""
@@ -213,10 +214,10 @@ class ExperimentResult:
         return ExperimentResult(self.experiment, self.records, recorded, planned)
 
     def remarkable(self) -> str:
-        """Summarise the plausibility warnings of all runs, `spin in 3 of 20 runs`; "" if there are none."""
-        kinds = Counter(kind for record in self.records for kind in record.findings)
+        """Summarise the warnings of all runs, `car-spins in 3 of 20 runs`; "" if there are none."""
+        codes = Counter(code for record in self.records for code in record.warning_codes)
         total = counted(len(self.records) - self.not_made, "run")
-        return ", ".join(f"{kind} in {count} of {total}" for kind, count in kinds.items())
+        return ", ".join(f"{code} in {count} of {total}" for code, count in codes.items())
 
 
 def judge_records(planned: PlannedExperiment, records: Mapping[str, MeasuredRun]) -> ExperimentResult:
@@ -251,13 +252,14 @@ def judge_results(
     ids = [made[name].value.id if name in made and made[name].ok else None for name in experiment.runs]
     recorded = each(read_back, [out / name for name in experiment.runs], ids)
     for name, read in zip(experiment.runs, recorded, strict=True):
-        found = (made[name].reason if name in made else "") or read
-        if isinstance(found, str):
+        failed = made[name].diagnostics if name in made else ()
+        if isinstance(read, str) or failed:
             begun = name in made or any((out / name).glob(f"{RUN_FILE}*"))  # partial, if a run died
-            records.append(MeasuredRun({}, (found,)) if begun else NOT_MADE)
+            missing = (Diagnostic("run-without-results", str(read)),)
+            records.append(MeasuredRun({}, failed or missing) if begun else NOT_MADE)
         else:
-            results[name] = found
-            records.append(measured(found, metrics_of(experiment)))
+            results[name] = read
+            records.append(measured(read, metrics_of(experiment)))
     return ExperimentResult(experiment, records, results, planned)
 
 

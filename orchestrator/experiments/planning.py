@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import ScenarioError
+from ..errors import Diagnostic, Location, ScenarioError
 from ..metrics.run_metrics import STANDARD, metric, results_to_be, unit_in
 from ..names import SignalName, Target
 from ..plan import Fmu, Instance, Plan, Variable
@@ -106,15 +106,18 @@ def plan_experiment(
 
     Raises:
         BuildError: stale FMUs cannot be built.
-        ScenarioError: some runs cannot start; lists each problem once.
+        ScenarioError: some runs cannot start; lists each error once.
     """
 
-    def place(problem: str) -> tuple[Hashable, str]:
-        """Report a problem of an axis once instead of once per value, with its key in the file."""
-        axis = experiment.axis_of(getattr(problem, "place", ""))
-        return (axis, f"{experiment.path}: axes.{axis[0]}: {problem}") if axis else (problem, problem)
+    def about(error: Diagnostic) -> tuple[Hashable, Diagnostic]:
+        """Report an error of an axis once instead of once per value, with its key in the file."""
+        axis = experiment.axis_of(error.location.target)
+        if not axis:
+            return error, error
+        where = Location(experiment.path, target=f"axes.{axis[0]}")
+        return axis, Diagnostic(error.code, str(error), location=where)
 
-    jobs = ready(jobs_of(experiment, out, **of_jobs), once=once, progress=progress, place=place)
+    jobs = ready(jobs_of(experiment, out, **of_jobs), once=once, progress=progress, group=about)
     plans = [job.plan for job in jobs if job.plan]
     made_up = [*{tuple(plan.record): results_to_be(plan) for plan in plans}.values()]
     if not experiment.spec.metrics and not any(job.test for job in jobs):
@@ -142,22 +145,22 @@ def _metric_units(experiment: LoadedExperiment, made_up: list[Results]) -> dict[
         ScenarioError: no run records a metric's signals, or a bound has a unit that does not fit.
     """
     units: dict[str, str] = {}
-    problems = []
+    errors = []
     for key, spec in experiment.spec.metrics.items():
         found = (unit_in(results, metric(spec.metric)) for results in made_up)
         unit = next((unit for unit in found if unit is not None), None)
         if unit is None:
             place = f"{experiment.path}: metrics.{key}"
-            problems.append(f"{place}: no run records the signals of {spec.metric}")
+            errors.append(f"{place}: no run records the signals of {spec.metric}")
         else:
             units[key] = unit
     for place, unit, bound in _bounds(experiment, units):
         try:
             si_number(bound, unit)
-        except ValueError as error:  # noqa: PERF203 - all problems are collected
-            problems.append(f"{experiment.path}: {place}: {error}")
-    if problems:
-        raise ScenarioError(problems)
+        except ValueError as error:  # noqa: PERF203 - all errors are collected
+            errors.append(f"{experiment.path}: {place}: {error}")
+    if errors:
+        raise ScenarioError(errors, code="metric-unavailable")
     return units
 
 

@@ -241,36 +241,41 @@ def load_ranking(
         chosen: conditions to drive; empty: all.
 
     Raises:
-        ScenarioError: the file is invalid; lists all problems.
+        ScenarioError: the file is invalid; lists all errors.
     """
     path = Path(path)
     document = yaml_lines.read(path, what="ranking file")
     spec = validate(RankingSpec, document)
-    if spec is None or document.problems:
-        raise ScenarioError(document.sentences())
+    if spec is None or document.errors:
+        raise ScenarioError(document.sorted_errors())
     entries = {name: (one, path.parent) for name, one in spec.entries.items()}
     edited: list[str] = []
     for name in spec.more_entries:
         file = path.parent / name
         listed = yaml_lines.read(file, what="file of entries")
         found = validate(EntriesSpec, listed)
-        if found is None or listed.problems:
-            raise ScenarioError(listed.sentences())
+        if found is None or listed.errors:
+            raise ScenarioError(listed.sorted_errors())
         if words := found.edited:
             edited.append(f"{file}: {words}")
             checksums.warn(edited[-1])
         for key, one in found.entries.items():
             if key in entries:
-                raise ScenarioError(f"{file}: entries.{key}: there is already an entry {key!r}")
+                raise ScenarioError(
+                    f"{file}: entries.{key}: there is already an entry {key!r}", code="name-duplicate"
+                )
             entries[key] = (one, file.parent)
     for key, one in (more or {}).items():
         if key in entries:
-            raise ScenarioError(f"there is already an entry {key!r}: give the controller another name")
+            raise ScenarioError(
+                f"there is already an entry {key!r}: give the controller another name", code="name-duplicate"
+            )
         entries[key] = (one, Path())
     for name in chosen:
         if name not in spec.conditions:
             raise ScenarioError(
-                f"{path}: there is no condition {name!r}{hint(name, spec.conditions, lead='known')}"
+                f"{path}: there is no condition {name!r}{hint(name, spec.conditions, lead='known')}",
+                code="condition-unknown",
             )
     return LoadedRanking(path, spec, entries, quick, tuple(chosen), tuple(edited))
 
@@ -317,7 +322,7 @@ def angles_of(ranking: LoadedRanking, found: ExperimentResult) -> dict[str, floa
         try:
             angles[car] = characteristic_angle(judged)
         except NotJudged as why:
-            raise ResultsError(str(why)) from None
+            raise ResultsError(str(why), code="test-not-applicable") from None
     return angles
 
 

@@ -106,7 +106,9 @@ def draw_pareto(ranked: RankingResult, note: str) -> Figure:
     points = [point for point in every if point[2].mean("effort")]
     left_out = [f"{one.spec.title}: {y:.0f} points" for _, y, one in every if not one.mean("effort")]
     if not points:
-        raise ResultsError("nothing to draw: no controller that acts has all of its runs.")
+        raise ResultsError(
+            "nothing to draw: no controller that acts has all of its runs.", code="nothing-to-draw"
+        )
     front = [
         point
         for point in sorted(points, key=lambda point: point[:2])

@@ -64,11 +64,11 @@ def columns_of(findings: ExperimentResult) -> list[TableColumn]:
             columns.append(TableColumn(name, "float64", levels, about | {"unit": planned.units[name]}))
         else:
             columns.append(TableColumn(name, "string", [case.point[i].words for case in cases], about))
-    kinds = {"description": "what was remarkable in the run's course, by its kind"}
+    codes = {"description": "codes of the warnings about the run, see docs/diagnostics.md"}
     columns += [
         TableColumn("status", "string", [one.status for one in records]),
         TableColumn("reason", "string", [one.reason for one in records]),
-        TableColumn("findings", "string", [", ".join(one.findings) or None for one in records], kinds),
+        TableColumn("warnings", "string", [", ".join(one.warning_codes) or None for one in records], codes),
     ]
     for key, one in spec.metrics.items():
         chosen, unit = metric(one.metric), findings.unit(key)
@@ -129,7 +129,9 @@ def write_table(findings: ExperimentResult, out: Path) -> None:
         try:
             write_whole(out / name, content)
         except OSError as error:  # noqa: PERF203 - two files
-            raise ResultsError(f"{out / name}: cannot be written: {reason(error)}.") from None
+            raise ResultsError(
+                f"{out / name}: cannot be written: {reason(error)}.", code="results-unwritable"
+            ) from None
 
 
 def to_csv(columns: Sequence[TableColumn]) -> str:

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-from ..errors import ScenarioError
+from ..errors import Diagnostic, Location, ScenarioError
 from ..messages import hint, listed
 from ..metrics.run_metrics import MetricValue
 from ..names import OF_RUN, Target
@@ -92,7 +92,7 @@ class RegionRuns:
         }
         problems = [self._touches_none(name) for name, runs in found.items() if not runs]
         if problems:
-            raise ScenarioError(problems)
+            raise ScenarioError(problems, code="override-without-effect")
         return found
 
     def own_value(self, run: str, target: Target) -> Given | None:
@@ -198,7 +198,8 @@ class RegionRuns:
             raise ScenarioError(
                 f"{self.experiment.path}: region.open_values.{key}: the runs of one claim have "
                 f"{listed(f'{one:g}' for one in sorted(own))} there; give factors, with `times: true`, or "
-                "name the `runs` it touches"
+                "name the `runs` it touches",
+                code="region-invalid",
             )
         return own.pop()
 
@@ -269,14 +270,16 @@ def plan_region(
         job = replace(runs.jobs[name], label=label, scenario=scenario, changes=changes, plan=None)
         jobs.append(replace(job, out=folder / RUNS, keep=False))
 
-    def where(problem: str) -> tuple[str, str]:
-        """Report a problem of an open value once, with its key in the file."""
-        key = open_value_of.get(getattr(problem, "place", ""))
-        at = f"{runs.experiment.path}: region.open_values.{key}: "
-        return (key, f"{at}{problem}") if key else (problem, problem)
+    def about(error: Diagnostic) -> tuple[Hashable, Diagnostic]:
+        """Report an error of an open value once, with its key in the file."""
+        key = open_value_of.get(error.location.target)
+        if key is None:
+            return error, error
+        where = Location(runs.experiment.path, target=f"region.open_values.{key}")
+        return key, Diagnostic(error.code, str(error), location=where)
 
     metrics = metrics_of(runs.experiment)
-    made = [keyed(job, metrics) for job in ready(jobs, once=once, progress=progress, place=where)]
+    made = [keyed(job, metrics) for job in ready(jobs, once=once, progress=progress, group=about)]
     known = {
         key: one
         for key, one in asked.items()

@@ -83,7 +83,10 @@ def entry_speeds(
     scenario, plan = planned(base, once)
     first = 0.0 if scenario.speed is None else float(convert(str(scenario.speed), "m/s"))
     if first <= 0.0:
-        raise ScenarioError(f"{base.scenario}: tells no speed above 0, from which the series could begin")
+        raise ScenarioError(
+            f"{base.scenario}: tells no speed above 0, from which the series could begin",
+            code="fmu-wrong-kind",
+        )
     duration = float(plan.step * plan.n_steps)
     driven: list[Trace] = []
     judged: list[Evaluation] = []
@@ -129,4 +132,6 @@ def slow_steer_amplitude(plan: Plan, scenario: Path) -> float:
         value = one.parameter(target.variable) if one.name == target.instance else None
         if isinstance(value, (int, float)) and value != 0:
             return abs(float(value))
-    raise ScenarioError(f"{scenario}: {AMPLITUDE} is no amplitude of a hand wheel other than 0")
+    raise ScenarioError(
+        f"{scenario}: {AMPLITUDE} is no amplitude of a hand wheel other than 0", code="fmu-wrong-kind"
+    )

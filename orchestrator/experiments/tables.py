@@ -14,7 +14,7 @@ import numpy as np
 
 from vocabulary.wheels import WHEELS
 
-from ..errors import ModelDescriptionError, ScenarioError
+from ..errors import Diagnostic, ModelDescriptionError, ScenarioError, text_of
 from ..figures.style import shown
 from ..fmu.archive import open_fmu
 from ..fmu.native import runs_as
@@ -22,7 +22,6 @@ from ..labels import changed, with_changes
 from ..messages import printable, star
 from ..metrics.measures import catalogue as measures
 from ..metrics.measures import symbol
-from ..metrics.plausibility import findings_in, first_of_each
 from ..metrics.run_metrics import STANDARD, MetricValue, columns_of, evaluate_all, metric
 from ..plan import Fmu, Plan
 from ..results.read import FoundRun, Results
@@ -102,8 +101,7 @@ def remarks(runs: Iterable[tuple[str, Results]]) -> list[str]:
 
 
 def _remarkable(results: Results) -> str:
-    found = [one for one in findings_in(results.record) if one.time is not None]
-    return "; ".join(one.says for one in first_of_each(found))
+    return text_of(results.record.course_warnings)
 
 
 def metrics_of_run(results: Results, names: Sequence[str]) -> Table:
@@ -168,7 +166,7 @@ def files_table(folder: Path | None, kinds: Sequence[str]) -> Table:
         ScenarioError: the folder does not exist, or has no such files.
     """
     if folder is not None and not folder.is_dir():
-        raise ScenarioError(f"{folder}: there is no such folder")
+        raise ScenarioError(f"{folder}: there is no such folder", code="file-missing")
     table = Table("", ["name" if folder is None else "file", "kind", "title"])
     rows: dict[str, Sequence[Cell]] = {}
     for base in catalogue.folders() if folder is None else [folder]:
@@ -182,25 +180,27 @@ def files_table(folder: Path | None, kinds: Sequence[str]) -> Table:
     table.rows = [*rows.values()]
     if not table.rows:
         where = folder or " and ".join(map(str, catalogue.folders()))
-        raise ScenarioError(f"{where}: holds no file that is {' or '.join(kinds)}")
+        raise ScenarioError(f"{where}: holds no file that is {' or '.join(kinds)}", code="file-wrong-kind")
     return table
 
 
-def fmus_in(folder: Path) -> tuple[list[Fmu], list[str]]:
-    """Return the FMUs in a folder, and the problems of those that cannot be used."""
+def fmus_in(folder: Path) -> tuple[list[Fmu], list[Diagnostic]]:
+    """Return the FMUs in a folder, and the errors of those that cannot be used."""
     found: list[Fmu] = []
-    problems: list[str] = []
+    errors: list[Diagnostic] = []
     for path in sorted(folder.glob("*.fmu")):
         try:
             found.append(open_fmu(path))
         except ModelDescriptionError as error:  # noqa: PERF203 - the others are listed all the same
-            problems += error.problems
-    return found, problems
+            errors += error.diagnostics
+    return found, errors
 
 
-def fmus_table(fmus: Sequence[Fmu], problems: Sequence[str]) -> Table:
+def fmus_table(fmus: Sequence[Fmu], errors: Sequence[Diagnostic]) -> Table:
     """Return a table of FMUs."""
-    table = Table("", ["FMU", "description", "parameters", "made by"], notes=list(problems), numbers={2})
+    table = Table(
+        "", ["FMU", "description", "parameters", "made by"], notes=list(map(str, errors)), numbers={2}
+    )
     for fmu in fmus:
         count = str(len(fmu.of("parameter")))
         table.rows.append([fmu.name, _one_line(fmu.description) or None, count, fmu.generation_tool or None])

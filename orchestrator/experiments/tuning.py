@@ -80,7 +80,10 @@ def tuning_of(experiment: LoadedExperiment) -> TuningSpec:
         ScenarioError: the experiment has none.
     """
     if experiment.spec.tuning is None:
-        raise ScenarioError(f"{experiment.path}: has no 'tuning'; it is for `yawbench study` or `sweep`")
+        raise ScenarioError(
+            f"{experiment.path}: has no 'tuning'; it is for `yawbench study` or `sweep`",
+            code="file-wrong-kind",
+        )
     return experiment.spec.tuning
 
 

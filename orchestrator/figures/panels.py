@@ -185,7 +185,7 @@ def check_panels(runs: Sequence[LabelledRun], names: Sequence[str], *, option: s
         if not panels_of(runs, name)
     ]
     if problems:
-        raise ScenarioError(problems)
+        raise ScenarioError(problems, code="signal-unknown")
 
 
 def _draw_signal(axes: Axes, runs: Sequence[LabelledRun], name: str, whole: bool) -> None:

@@ -55,11 +55,13 @@ def draw(
     from matplotlib.lines import Line2D
 
     if early := [run for run in runs if run.results.time.size < 2]:
-        raise ResultsError(nothing_recorded(early[0]))
+        raise ResultsError(nothing_recorded(early[0]), code="nothing-to-draw")
     found = shown_by(runs, panels)
     if not found:
         where = ", ".join(run.results.where for run in runs)
-        raise ResultsError(f"{where}: nothing to draw, no run recorded any of {', '.join(panels)}.")
+        raise ResultsError(
+            f"{where}: nothing to draw, no run recorded any of {', '.join(panels)}.", code="nothing-to-draw"
+        )
     rows = _rows(found)
     with new_figure() as figure:
         heights = [max(panel.rows for panel in row) for row in rows]

@@ -117,7 +117,9 @@ def save(figure: Figure, stem: Path) -> list[Path]:
                 figure.savefig(content, format=path.suffix[1:], metadata=metadata)
                 write_whole(path, content.getvalue())
         except OSError as error:
-            raise ResultsError(f"{stem}: the figure cannot be written: {reason(error)}.") from None
+            raise ResultsError(
+                f"{stem}: the figure cannot be written: {reason(error)}.", code="results-unwritable"
+            ) from None
     return paths
 
 

@@ -67,7 +67,7 @@ def open_fmu(path: Path | str, *, validate: bool = True) -> Fmu:
         try:
             fmu = _load(folder / name, path) or _unpack(raw, folder / name, path)
         except OSError as error:
-            problem = problem or ModelDescriptionError(_no_room(path, folder, error))
+            problem = problem or ModelDescriptionError(_no_room(path, folder, error), code="cache-unwritable")
             continue
         if validate and fmu.flaws:
             more = f" (and {len(fmu.flaws) - 1} more)" if len(fmu.flaws) > 1 else ""
@@ -106,11 +106,13 @@ def read_archive(path: Path) -> bytes:
             more = "; ~ is a folder's name here: write the path of your home folder"
         elif "\\" in path.name:
             more = "; write paths with /, not \\"
-        raise ModelDescriptionError(f"{path}: no such FMU{more}") from None
+        raise ModelDescriptionError(f"{path}: no such FMU{more}", code="fmu-missing") from None
     except NotADirectoryError:
         return _read_member(path)
     except (OSError, ValueError) as error:
-        raise ModelDescriptionError(f"{path}: cannot read this FMU: {reason(error)}") from None
+        raise ModelDescriptionError(
+            f"{path}: cannot read this FMU: {reason(error)}", code="fmu-damaged"
+        ) from None
 
 
 def _read_member(path: Path) -> bytes:
@@ -122,9 +124,11 @@ def _read_member(path: Path) -> bytes:
             check_archive(archive)
             return archive.read(member)
     except KeyError:
-        raise ModelDescriptionError(f"{path}: no such FMU: {outer} does not hold it") from None
+        raise ModelDescriptionError(
+            f"{path}: no such FMU: {outer} does not hold it", code="fmu-missing"
+        ) from None
     except _DAMAGE as error:
-        raise ModelDescriptionError(f"{path}: cannot read this FMU: {error}") from None
+        raise ModelDescriptionError(f"{path}: cannot read this FMU: {error}", code="fmu-damaged") from None
 
 
 def _load(entry: Path, path: Path) -> Fmu | None:
@@ -172,17 +176,22 @@ def _files(raw: bytes, path: Path) -> dict[str, bytes]:
                 parts = PurePosixPath(name).parts
                 if name.startswith("/") or ".." in parts or ":" in name or "\0" in name:
                     raise ModelDescriptionError(
-                        f"{path}: the archive is unsafe: it holds the path {info.filename!r}"
+                        f"{path}: the archive is unsafe: it holds the path {info.filename!r}",
+                        code="fmu-damaged",
                     )
                 if not name.endswith("/"):
                     contents["/".join(parts)] = archive.read(info)
     except TooLargeError as error:
-        raise ModelDescriptionError(f"{path}: cannot read this FMU: {error}") from None
+        raise ModelDescriptionError(f"{path}: cannot read this FMU: {error}", code="fmu-damaged") from None
     except _DAMAGE as error:
         if raw[:2] != b"PK":
-            raise ModelDescriptionError(f"{path}: no FMU: this is not a zip archive") from None
+            raise ModelDescriptionError(
+                f"{path}: no FMU: this is not a zip archive", code="fmu-damaged"
+            ) from None
         why = reason(error).rstrip(".")
-        raise ModelDescriptionError(f"{path}: the archive is damaged or cut off ({why})") from None
+        raise ModelDescriptionError(
+            f"{path}: the archive is damaged or cut off ({why})", code="fmu-damaged"
+        ) from None
     return contents
 
 

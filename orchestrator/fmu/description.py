@@ -264,7 +264,7 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
         try:
             description = read_model_description(io.BytesIO(raw))
         except ValidationError as error:
-            flaws = [_one_line(problem) for problem in error.problems]
+            flaws = [_one_line(flaw) for flaw in error.problems]
             description = read_model_description(io.BytesIO(raw), validate=False)
         variables, refused = scalars(description, root)
     except Exception as error:  # fmpy raises whatever its parsing meets
@@ -355,11 +355,11 @@ def _parsed(xml: bytes, path: Path) -> ElementTree.Element:
     if root.tag != "fmiModelDescription" or version is None:
         raise ModelDescriptionError(f"{path}: modelDescription.xml is no FMI model description; {SUPPORTED}")
     if version != "2.0" and not version.startswith("3.0"):
-        raise ModelDescriptionError(f"{path}: an FMU of FMI {version}; {SUPPORTED}")
+        raise ModelDescriptionError(f"{path}: an FMU of FMI {version}; {SUPPORTED}", code="fmu-unsupported")
     if root.find("CoSimulation") is None:
         scheduled = root.find("ScheduledExecution") is not None and root.find("ModelExchange") is None
         kind = "scheduled execution" if scheduled else "model exchange"
-        raise ModelDescriptionError(f"{path}: an FMU for {kind} only; {SUPPORTED}")
+        raise ModelDescriptionError(f"{path}: an FMU for {kind} only; {SUPPORTED}", code="fmu-unsupported")
     return root
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import fmus
 from vocabulary.roles import role_in
 
-from ..errors import ModelDescriptionError
+from ..errors import Diagnostic, ModelDescriptionError
 from ..messages import closest, listed, printable, short
 from ..plan import BuildInfo, Fmu
 from ..scenario.overrides import is_path
@@ -84,7 +84,8 @@ class Opener:
             if lacking:
                 raise ModelDescriptionError(
                     f"{archive}: needs {listed(lacking)} in the Python that runs it, which this one lacks: "
-                    f"{sys.prefix}"
+                    f"{sys.prefix}",
+                    code="fmu-needs-packages",
                 )
             self._opened[key] = replace(fmu, built=built)
         return self._opened[key]
@@ -114,7 +115,8 @@ def find_folder(scenario: Path, *, opener: Opener) -> Path:
         return HOME
     raise ModelDescriptionError(
         f"no folder fmus/ with FMUs in {above}, in {here} or above them; "
-        "make them with 'yawbench build' or name their folder with --fmus"
+        "make them with 'yawbench build' or name their folder with --fmus",
+        code="fmu-missing",
     )
 
 
@@ -139,26 +141,38 @@ def find_fmu(fmu: str, *, scenario: Path, fmus: Path, opener: Opener, build: boo
         return archive
     names = opener.names(fmus)
     if not names:
-        raise ModelDescriptionError(f"no FMU {short(fmu)}: the folder {fmus} holds no FMUs")
+        raise ModelDescriptionError(
+            f"no FMU {short(fmu)}: the folder {fmus} holds no FMUs", code="fmu-missing"
+        )
     role = role_in(fmu)
     related = [name for name in names if role and role_in(name) == role] or names
     likely = closest(fmu, names)
     guess = f"did you mean {likely!r}? " if likely else ""
-    raise ModelDescriptionError(f"no FMU {short(fmu)} in {fmus}; {guess}there are: {listed(related)}")
+    raise ModelDescriptionError(
+        f"no FMU {short(fmu)} in {fmus}; {guess}there are: {listed(related)}", code="fmu-missing"
+    )
 
 
-def stale_fmus(fmus: Iterable[Fmu]) -> list[str]:
+def stale_fmus(fmus: Iterable[Fmu]) -> list[Diagnostic]:
     """Return a warning for every FMU that is out of date with its sources."""
     stale = {fmu.path: fmu.built.source for fmu in fmus if fmu.built is not None and not fmu.built.current}
     return [
-        f"{path.name} is not made of {source or 'its sources'} as it is now; 'yawbench build' makes it anew"
+        Diagnostic(
+            "fmu-out-of-date",
+            f"{path.name} is not made of {source or 'its sources'} as it is now; "
+            "'yawbench build' makes it anew",
+            "warning",
+        )
         for path, source in stale.items()
     ]
 
 
-def host_needs(fmus: Iterable[Fmu]) -> list[str]:
+def host_needs(fmus: Iterable[Fmu]) -> list[Diagnostic]:
     """Return a note for every FMU that needs packages beyond the standard library in its host's Python."""
     needs = {fmu.name: fmu.host_packages for fmu in fmus if fmu.host_packages}
     return [
-        f"{name} needs {listed(packages)} in the Python of every host" for name, packages in needs.items()
+        Diagnostic(
+            "fmu-needs-packages", f"{name} needs {listed(packages)} in the Python of every host", "info"
+        )
+        for name, packages in needs.items()
     ]

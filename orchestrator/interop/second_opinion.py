@@ -120,10 +120,13 @@ def second_opinion(
     """
     if not _columns(plan):
         raise WiringError(
-            f"{plan.title or 'this system'}: nothing to compare: no output of type Real is recorded"
+            f"{plan.title or 'this system'}: nothing to compare: no output of type Real is recorded",
+            code="nothing-to-compare",
         )
     if plan.start:
-        raise WiringError("a second opinion is of runs that begin at 0 s: leave start_time out")
+        raise WiringError(
+            "a second opinion is of runs that begin at 0 s: leave start_time out", code="option-invalid"
+        )
     ours: dict[bool, tuple[Request, dict[str, Recording]]] = {}
     opinions = []
     for master in masters:

@@ -70,12 +70,15 @@ def write_ssp(plan: Plan, path: Path, standard: Version = "1.0", *, named: bool 
     """
     series = [f"{unit.name}.{name}" for unit in plan.instances for name in unit.series]
     if series:
-        raise ResultsError(f"{path}: an archive has no place for the time series of {listed(fold(series))}")
+        raise ResultsError(
+            f"{path}: an archive has no place for the time series of {listed(fold(series))}",
+            code="ssp-unsupported",
+        )
     sources = _sources(plan)
     try:
         structure = system_structure(plan, standard)
     except ValueError as error:  # a control character in a text
-        raise ResultsError(f"{path}: cannot write this archive: {error}") from None
+        raise ResultsError(f"{path}: cannot write this archive: {error}", code="results-unwritable") from None
     description = etree.tostring(structure, xml_declaration=True, encoding="UTF-8", pretty_print=True)
     try:
         content = io.BytesIO()
@@ -86,7 +89,9 @@ def write_ssp(plan: Plan, path: Path, standard: Version = "1.0", *, named: bool 
                 _put(archive, source, read_archive(fmu.path))
         write_whole(path, content.getvalue(), named=named)
     except OSError as error:
-        raise ResultsError(f"{path}: cannot write this archive: {error.strerror or error}") from None
+        raise ResultsError(
+            f"{path}: cannot write this archive: {error.strerror or error}", code="results-unwritable"
+        ) from None
 
 
 def _put(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
@@ -346,7 +351,7 @@ def for_omsimulator(plan: Plan) -> tuple[Plan, list[str]]:
         if not by_units(wire)
     ]
     if problems:
-        raise WiringError(problems)
+        raise WiringError(problems, code="ssp-unsupported")
     notes = []
     slow = [unit.name for unit in plan.instances if unit.period > 1]
     if slow:

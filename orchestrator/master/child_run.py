@@ -183,7 +183,7 @@ def _go(course: RunLoop, opener: OpenInstance) -> dict[str, Any] | None:
         unit = getattr(error, "instance", None)
         return {**told(error), "inputs": course.inputs_of(unit) if unit else {}}
     except BaseException:
-        return {"kind": "", "problems": traceback.format_exc(), "inputs": {}}
+        return {"kind": "", "traceback": traceback.format_exc(), "inputs": {}}
     return None
 
 
@@ -286,7 +286,7 @@ class ChildRun(RunLoop, FmuProcess):
             self.ended = EndRequested(reason, instance=unit, time=at)
         if failed is not None:
             self._inputs = failed["inputs"]
-            raise rebuilt(failed) if failed["kind"] else RuntimeError(failed["problems"])
+            raise rebuilt(failed) if failed["kind"] else RuntimeError(failed["traceback"])
 
     def _forked(self, opener: OpenInstance, asked: int, commands: int, answers: int) -> ForkedChild:
         flush_output()
@@ -370,7 +370,7 @@ class ChildRun(RunLoop, FmuProcess):
             sentence += f"; --isolate tells in which unit (not in Python are {listed(self._suspects)})"
         if self._stop.requested:
             return self._stop.interrupted(f": {sentence}", unit=unit, time=now)
-        return SimulationError(sentence, instance=unit, time=now)
+        return SimulationError(sentence, instance=unit, time=now, code="fmu-process-died")
 
     def end(self) -> None:
         """Let the child terminate and free the instances; a crash there is only a warning."""

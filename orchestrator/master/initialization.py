@@ -79,7 +79,9 @@ def initialize(memory: SignalPool, check: StatusCheck, log: Log) -> int:
         if not moving:
             break
     if any(movement.large for movement in moving):
-        raise SimulationError(_unsettled(moving), instance=None, time=plan.time(0))
+        raise SimulationError(
+            _unsettled(moving), instance=None, time=plan.time(0), code="initialization-unsettled"
+        )
     for station in memory.stations:
         check(station.name, "initialization", station.slave.exit())
         _get(memory, station, check)
@@ -129,8 +131,7 @@ def _check_parameters(station: InstanceSlot, check: StatusCheck, log: Log) -> No
         what = "a parameter" if len(differing) == 1 else "parameters"
         raise SimulationError(
             f"{station.name}: {what} did not take the value that was set: {listed(differing[:NAMED])}{more}",
-            instance=station.name, time=log.time.value,
-        )  # fmt: skip
+            instance=station.name, time=log.time.value, code="fmu-ignores-value")  # fmt: skip
 
 
 def _check_constants(station: InstanceSlot, check: StatusCheck, log: Log) -> None:

@@ -152,7 +152,9 @@ class CtypesInstance(FmuInstance, ABC):
         if missing := [name for name in CORE[self.version] if not self._has(name)]:
             functions = listed(f"{self.prefix}{name}" for name in missing)
             fmpy.freeLibrary(self._library._handle)
-            raise ModelDescriptionError(f"{unit.name}: {unit.fmu.path}: its library lacks {functions}")
+            raise ModelDescriptionError(
+                f"{unit.name}: {unit.fmu.path}: its library lacks {functions}", code="fmu-function-missing"
+            )
         self._component = self._instantiate(unit)
         if self._component is None:
             self.free()
@@ -161,7 +163,10 @@ class CtypesInstance(FmuInstance, ABC):
             if unit.fmu.needs_tool:
                 reason += f" (it says that it needs its tool: {unit.fmu.generation_tool or 'not named'})"
             raise SimulationError(
-                f"{unit.name}: {unit.fmu.path} cannot be instantiated: {reason}", instance=unit.name, time=0.0
+                f"{unit.name}: {unit.fmu.path} cannot be instantiated: {reason}",
+                instance=unit.name,
+                time=0.0,
+                code="fmu-not-loadable",
             )
 
     def _load(self, unit: Instance) -> ctypes.CDLL:
@@ -175,7 +180,7 @@ class CtypesInstance(FmuInstance, ABC):
                 problem = f"its library cannot be loaded: {error}"
             finally:
                 os.chdir(here)
-        raise ModelDescriptionError(f"{unit.name}: {unit.fmu.path}: {problem}")
+        raise ModelDescriptionError(f"{unit.name}: {unit.fmu.path}: {problem}", code="fmu-not-loadable")
 
     @abstractmethod
     def _instantiate(self, unit: Instance) -> int | None:

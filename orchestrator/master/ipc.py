@@ -22,7 +22,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..errors import Interrupted, YawbenchError
+from ..errors import Diagnostic, Interrupted, YawbenchError
 from ..processes import Child
 from ..supervisor import LOG, PipeChannel, ProtocolError, SupervisedProcess
 from .log import KEPT, Log
@@ -66,13 +66,14 @@ def shared_memory(values: int) -> int:
 def told(error: YawbenchError | Interrupted) -> dict[str, Any]:
     """Return an error as JSON-ready data, for `rebuilt` in another process."""
     where = {name: value for name, value in vars(error).items() if name in ("instance", "time", "number")}
-    return {"kind": type(error).__name__, "problems": error.problems, "where": where}
+    told = [one.record() for one in error.diagnostics]
+    return {"kind": type(error).__name__, "diagnostics": told, "where": where}
 
 
 def rebuilt(told: dict[str, Any]) -> YawbenchError | Interrupted:
     """Return the error that `told` has described in another process."""
     kinds = {kind.__name__: kind for kind in (*YawbenchError.__subclasses__(), Interrupted)}
-    return kinds.get(told["kind"], YawbenchError)(told["problems"], **told["where"])
+    return kinds.get(told["kind"], YawbenchError)(map(Diagnostic.of, told["diagnostics"]), **told["where"])
 
 
 class LogRelay(Log):

@@ -140,7 +140,7 @@ class IsolatedInstance:
             raise rebuilt(failed)
 
     def _refused(self, sentence: str) -> SimulationError:
-        return SimulationError(sentence, instance=self.name, time=0.0)
+        return SimulationError(sentence, instance=self.name, time=0.0, code="fmu-not-loadable")
 
     def connect(self, buffers: Buffers) -> StepCalls:
         inputs, input_places, outputs, output_places, time, step = buffers
@@ -302,7 +302,9 @@ def opener_of(
         yield open_unit
         return
     if sys.platform == "win32":
-        raise SimulationError("--isolate needs Linux or macOS.", instance=None, time=0.0)
+        raise SimulationError(
+            "--isolate needs Linux or macOS.", instance=None, time=0.0, code="isolation-unavailable"
+        )
     with Isolation(plan.instances, call_limit) as isolation:
         yield isolation
 

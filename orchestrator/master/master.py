@@ -226,6 +226,7 @@ class Master:
             "flushed to zero or trapped, also for all others; with --isolate it does so for itself alone",
             instance=among[0] if len(among) == 1 else None,
             time=time,
+            code="process-state-changed",
         )
 
     def inputs_of(self, unit: str) -> dict[str, Value]:
@@ -298,7 +299,7 @@ class Master:
         """Return the exception for a failed instance: an interruption if a stop was requested."""
         if self.stop.requested:
             return self.stop.interrupted(f": {sentence}", unit=unit, time=time)
-        return SimulationError(sentence, instance=unit, time=time)
+        return SimulationError(sentence, instance=unit, time=time, code="fmu-call-failed")
 
     def _note_warning(self, unit: str, what: str) -> None:
         """Log the status Warning of an instance that has not logged a message itself."""
@@ -327,7 +328,7 @@ class Master:
                     f"{wire.source}: {wire.output} is {_spelled(value)} at t = {time:.9g} s, "
                     f"on the wire {wire.source}.{wire.output} -> {wire.target}.{wire.input}"
                 )
-            raise SimulationError(problem, instance=wire.source, time=time)
+            raise SimulationError(problem, instance=wire.source, time=time, code="value-not-finite")
         for (unit, name), at in list(self._spare.items()):
             if not math.isfinite(value := memory.pool[at]):
                 del self._spare[unit, name]

@@ -144,6 +144,7 @@ class RunLoop:
             "(fork), and the copy went on with it; with --isolate it copies its own process alone",
             instance=among[0] if len(among) == 1 else None,
             time=time,
+            code="process-copied",
         )
 
     def flush(self) -> None:
@@ -164,8 +165,8 @@ class RunLoop:
             self._rows.write(count)
         except ResultsError as error:
             kept = "; the rows that fit are kept" if getattr(self._rows, "rows_stay", False) else ""
-            problem = f"{error.problems[0].rstrip('.')} (at t = {time:.9g} s){kept}."
-            raise SimulationError(problem, instance=None, time=time) from None
+            sentence = f"{str(error.diagnostics[0]).rstrip('.')} (at t = {time:.9g} s){kept}."
+            raise SimulationError(sentence, instance=None, time=time, code=error.code) from None
         finally:
             self.writing = False
 

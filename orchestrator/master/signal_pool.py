@@ -152,7 +152,9 @@ class SignalPool:
         number = int(wire.gain * value + wire.offset)  # type: ignore[operator]
         if not -(2**31) <= number < 2**31:
             sentence = f"{wire.target}: {wire.input} would be {number}, more than an Integer holds"
-            raise SimulationError(sentence, instance=wire.target, time=self.time.value)
+            raise SimulationError(
+                sentence, instance=wire.target, time=self.time.value, code="value-too-large"
+            )
         return number
 
     def given_others(self, s: InstanceSlot) -> dict[str, Value]:

@@ -7,14 +7,13 @@ import os
 import sys
 import time
 import uuid
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
 
 from ..errors import (
-    KEPT,
+    Diagnostic,
     Interrupted,
-    Problem,
     ResultsError,
     ScenarioError,
     SimulationError,
@@ -23,14 +22,14 @@ from ..errors import (
 from ..interrupts import StopFlag, interrupts
 from ..messages import printable
 from ..metrics.plausibility import PlausibilityWatch
-from ..plan import Finding, Plan
+from ..plan import Plan
 from ..results.columnar import MemoryRecorder
 from ..results.folder import COMPLETED, RUNNING
 from ..results.formats import recorder_of
 from ..results.freshness import key_of
 from ..results.read import Results
 from ..results.recorder import Recorder
-from ..results.run_record import EndRecord, ErrorRecord, FindingRecord, WarningRecord, run_record
+from ..results.run_record import DiagnosticRecord, EndRecord, ErrorRecord, WarningRecord, run_record
 from .child_run import ChildRun, can_be_apart
 from .fmi import open_unit
 from .log import STATUS, Log, Message
@@ -54,7 +53,7 @@ class RunInfo:
     passes: int  # of initialization
     warnings: list[Message] = field(default_factory=list)
     ended: str | None = None  # why an instance ended it before its stop time
-    findings: tuple[Finding, ...] = ()  # plausibility warnings
+    diagnostics: tuple[Diagnostic, ...] = ()  # about its course, such as a car that spins
 
 
 def simulate(
@@ -102,7 +101,7 @@ def simulate(
         run.course.passes,
         list(run.log.warnings()),
         None if run.course.ended is None else str(run.course.ended),
-        run.watch.findings(),
+        run.watch.warnings(),
     )
 
 
@@ -120,7 +119,8 @@ def simulate_in_memory(
         what = f"{plan.n_steps:,} steps of {len(plan.record)} variables are {size / 1e9:.3g} GB"
         raise ScenarioError(
             f"{what}, and {IN_MEMORY / 1e9:g} GB may be kept in memory: record less, or let 'yawbench run' "
-            "write them to a file"
+            "write them to a file",
+            code="results-too-large",
         )
     recorder = MemoryRecorder(*_columns(plan))
     Simulation(plan, recorder, progress, apart=False).make(opener)
@@ -184,17 +184,17 @@ class Simulation:
         """Write the results so far, and the error that ended the run."""
         with contextlib.suppress(SimulationError):  # perhaps the disk is full; rows that fit are kept
             self.course.flush()
-        problems = error.problems if isinstance(error, (YawbenchError, Interrupted)) else []
+        told = error.diagnostics if isinstance(error, (YawbenchError, Interrupted)) else []
         if isinstance(error, SimulationError):
-            error.findings = self.watch.findings()
+            error.warnings = self.watch.warnings()
         try:
             self._save("interrupted" if isinstance(error, KeyboardInterrupt) else "failed", error)
         except ResultsError as lost:
-            problems += lost.problems
+            told += lost.diagnostics
         else:
             if self.recorder.place is not None:
                 sentence = f"What was recorded until then: {self.recorder.place}"
-                problems.append(Problem(sentence, kind=KEPT))
+                told.append(Diagnostic("results-kept", sentence, "info"))
 
     def _abandon(self) -> None:
         """Exit at once after a second signal: an FMU may be hanging."""
@@ -223,9 +223,7 @@ class Simulation:
         record.wall_time, record.loop = self.wall_time, self.course.loop
         record.error = self._explained(error)
         record.units_freed = False
-        record.findings = [
-            FindingRecord(**asdict(one)) for one in (*self.plan.findings, *self.watch.findings())
-        ]
+        record.diagnostics = [*map(DiagnosticRecord.of, (*self.plan.diagnostics, *self.watch.warnings()))]
         if ended is not None:
             record.ended = EndRecord(unit=ended.instance, time=ended.time, message=str(ended))
         self._note_warnings()

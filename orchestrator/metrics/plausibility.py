@@ -16,8 +16,8 @@ import numpy as np
 from vocabulary.gravity import G
 from vocabulary.wheels import WHEEL_NAMES, wheels
 
-from ..plan import Finding, Plan
-from ..results.run_record import RunRecord
+from ..errors import Diagnostic, Location
+from ..plan import Plan
 from .run_metrics import columns_of, results_to_be
 
 SignalArrays = Sequence[np.ndarray]
@@ -31,7 +31,7 @@ class PlausibilityCheck:
     `says` may contain `{limit}`, `{value}`, `{size}` (absolute value), `{time}`, `{column}` and `{wheel}`.
     """
 
-    kind: str
+    code: str
     signals: tuple[str, ...]  # in the vocabulary; with `*`, every wheel is checked separately
     value: Callable[[SignalArrays], np.ndarray]
     limit: float  # values above it give a warning; in the unit that `says` uses
@@ -47,38 +47,38 @@ def _degrees(x: SignalArrays) -> np.ndarray:
 
 CHECKS: tuple[PlausibilityCheck, ...] = (
     PlausibilityCheck(
-        "spin", ("sideslip",), _degrees, 45.0,
+        "car-spins", ("sideslip",), _degrees, 45.0,
         "the car spins: its sideslip angle passes {limit} degrees at {time} s and reaches {value} degrees",
         "chosen: more than front wheels can be steered against",
     ),
     PlausibilityCheck(
-        "wheel lift", ("vertical_load_*",), itemgetter(0), 1.0,
+        "wheel-lifts", ("vertical_load_*",), itemgetter(0), 1.0,
         "the {wheel} wheel lifts off at {time} s",
         "chosen: a load of less than 1 N is none", below=True,
     ),
     PlausibilityCheck(
-        "roll over", ("roll_angle",), _degrees, 15.0,
+        "car-rolls-over", ("roll_angle",), _degrees, 15.0,
         "the car leans {value} degrees, beyond what models with linear springs are valid for "
         "({limit} degrees, at {time} s)",
         "chosen: bump stops, which the models leave out, are reached before it",
     ),
     PlausibilityCheck(
-        "backwards", ("velocity_x",), itemgetter(0), -0.1,
+        "car-rolls-backwards", ("velocity_x",), itemgetter(0), -0.1,
         "the car rolls backwards from {time} s, at up to {size} m/s",
         "chosen: above the creep of a car that has stopped", below=True,
     ),
     PlausibilityCheck(
-        "speed", ("velocity_x",), lambda x: np.abs(x[0]), 70.0,
+        "speed-implausible", ("velocity_x",), lambda x: np.abs(x[0]), 70.0,
         "the car is faster than {limit} m/s (252 km/h): {value} m/s at {time} s",
         "chosen: above the top speed of the cars that the papers speak of",
     ),
     PlausibilityCheck(
-        "steer angle", ("steer_angle",), _degrees, 60.0,
+        "steer-angle-implausible", ("steer_angle",), _degrees, 60.0,
         "the front wheels are steered by {value} degrees, more than {limit} at {time} s",
         "chosen: above the steering lock of passenger cars, 35 to 50 degrees",
     ),
     PlausibilityCheck(
-        "grip", ("acceleration_x", "acceleration_y"), lambda x: np.hypot(*x) / G, 1.5,
+        "acceleration-implausible", ("acceleration_x", "acceleration_y"), lambda x: np.hypot(*x) / G, 1.5,
         "the car accelerates by {value} times what the road's friction gives, from {time} s beyond {limit}",
         "chosen: tyres of the catalogue reach 1.2 of the friction they are told", over_friction=True,
     ),
@@ -110,9 +110,9 @@ class PlausibilityWatch:
         for one in self._seen:
             one.look(rows)
 
-    def findings(self) -> tuple[Finding, ...]:
-        """Return the findings so far, in the order of the checks."""
-        return tuple(filter(None, (one.finding() for one in self._seen)))
+    def warnings(self) -> tuple[Diagnostic, ...]:
+        """Return the warnings so far, in the order of the checks."""
+        return tuple(filter(None, (one.warning() for one in self._seen)))
 
 
 class _CheckState:
@@ -138,7 +138,7 @@ class _CheckState:
             self._time = float(rows[np.argmax(x > self._sign * self.check.limit), 0])
         self._most = max(self._most, largest)
 
-    def finding(self) -> Finding | None:
+    def warning(self) -> Diagnostic | None:
         if self._time is None:
             return None
         value, column = self._sign * self._most, self.columns[0]
@@ -150,7 +150,8 @@ class _CheckState:
             wheel=WHEEL_NAMES.get(column[-2:], ""),
             column=column,
         )
-        return Finding(self.check.kind, column, value, self._time, says)
+        where = Location(signal=column, time=self._time)
+        return Diagnostic(self.check.code, says, "warning", where, value)
 
 
 def _ranges(plan: Plan) -> Iterator[PlausibilityCheck]:
@@ -170,7 +171,7 @@ def _ranges(plan: Plan) -> Iterator[PlausibilityCheck]:
                 # tolerate rounding
                 margin = 1e-9 * max(1.0, abs(limit)) * (-1 if below else 1)
                 yield PlausibilityCheck(
-                    "range", (f"{unit}.{name}",), itemgetter(0), limit + margin, says, why, below
+                    "range-left", (f"{unit}.{name}",), itemgetter(0), limit + margin, says, why, below
                 )
 
 
@@ -185,28 +186,3 @@ def _highest_friction(plan: Plan) -> float | None:
     driven = [wire.input for wire in plan.wires] + [name for unit in plan.instances for name in unit.series]
     varies = any(name.startswith("friction") for name in driven)
     return max(known, default=0.0) or None if not varies else None
-
-
-def findings_in(record: RunRecord) -> tuple[Finding, ...]:
-    """Return the findings in a run record."""
-    return tuple(
-        Finding(one.kind, one.place, None if one.value is None else float(one.value), one.time, one.says)
-        for one in record.findings
-    )
-
-
-def remarks_of(findings: Iterable[Finding]) -> list[str]:
-    """Return warnings as sentences: each suspicious value once, then the first finding of each kind."""
-    every = list(findings)
-    values = dict.fromkeys(one.says for one in every if one.time is None)
-    return [*values, *(one.says for one in first_of_each(one for one in every if one.time is not None))]
-
-
-def first_of_each(findings: Iterable[Finding]) -> list[Finding]:
-    """Return the earliest finding of each kind, so that four wheels give one warning."""
-    first: dict[str, Finding] = {}
-    for found in findings:
-        known = first.setdefault(found.kind, found)
-        if (found.time or 0.0) < (known.time or 0.0):
-            first[found.kind] = found
-    return list(first.values())

@@ -177,26 +177,28 @@ def metric(name: str) -> Metric:
         likely = max(meant, key=lambda one: one.index("("), default=closest(name, STANDARD))
         guess = f"did you mean {likely!r}? " if likely else ""
         raise ScenarioError(
-            f"{short(name)} is no metric; {guess}write measure(signal), for example {STANDARD[0]}."
+            f"{short(name)} is no metric; {guess}write measure(signal), for example {STANDARD[0]}.",
+            code="metric-unknown",
         )
     measure, signal, between, other, rest = match.groups()
     if measure not in MEASURES:
         raise ScenarioError(
-            f"{name!r}: there is no measure {measure!r}{hint(measure, MEASURES, lead='known')}"
+            f"{name!r}: there is no measure {measure!r}{hint(measure, MEASURES, lead='known')}",
+            code="metric-unknown",
         )
     try:
         window = window_of(rest) if rest else None
     except ValueError as error:
-        raise ScenarioError(f"{short(name)}: {error}") from None
+        raise ScenarioError(f"{short(name)}: {error}", code="metric-invalid") from None
     point = window is not None and window[0] == window[1]
     if point != (measure == AT_A_TIME):
         allowed = f"{AT_A_TIME}({signal}) at 2 s is of a point of time, all other measures of a stretch"
-        raise ScenarioError(f"{short(name)}: {allowed}")
+        raise ScenarioError(f"{short(name)}: {allowed}", code="metric-invalid")
     needs = MEASURES[measure].needs_reference
     if between and (between == ",") != needs:
         right = f"{measure}({signal}{', ' if needs else ' - '}{other})"
         why = "is against a reference" if needs else "needs no reference, but may be of a difference"
-        raise ScenarioError(f"{short(name)}: {measure} {why}: write {right}")
+        raise ScenarioError(f"{short(name)}: {measure} {why}: write {right}", code="metric-invalid")
     written = f"{measure}({signal})"
     if between:
         written = f"{measure}({signal}, {other})" if needs else f"{measure}({signal} - {other})"
@@ -288,7 +290,7 @@ def check_metrics(plan: Plan, chosen: Iterable[Metric]) -> None:
     """
     results, end = results_to_be(plan), plan.time(plan.n_steps)
     if problems := [why for one in chosen if (why := why_none(results, one, one.window, end))]:
-        raise ScenarioError(problems)
+        raise ScenarioError(problems, code="metric-unavailable")
 
 
 def why_none(results: Results, one: Metric, window: TimeWindow | None, end: float) -> str:

@@ -144,12 +144,16 @@ def _pose(results: Results) -> tuple[np.ndarray, list[np.ndarray]]:
         verb = "was" if len(missing) == 1 else "were"
         raise ResultsError(
             f"{results.file}: cannot be animated: {listed(missing)} {verb} not recorded; "
-            f"a car seen from above needs {listed(POSE)}."
+            f"a car seen from above needs {listed(POSE)}.",
+            code="nothing-to-draw",
         )
     sound = np.all(np.isfinite([results.time, *there]), axis=0)
     rows = sound.size if sound.all() else int(np.argmin(sound))
     if rows == 0:
-        raise ResultsError(f"{results.file}: cannot be animated: no moment with a position was recorded.")
+        raise ResultsError(
+            f"{results.file}: cannot be animated: no moment with a position was recorded.",
+            code="nothing-to-draw",
+        )
     x, y, yaw = (values[:rows] for values in there)
     return results.time[:rows], [x, y, np.unwrap(yaw)]
 
@@ -279,7 +283,7 @@ def page(runs: NamedRuns, *, title: str = "", below: str = "", changed: str = ""
 
 def _facts(runs: NamedRuns, title: str, *, alone: bool = False) -> dict[str, Any]:
     if not 1 <= len(runs) <= MOST:
-        raise ResultsError(f"an animation shows one to {MOST} runs, not {len(runs)}.")
+        raise ResultsError(f"an animation shows one to {MOST} runs, not {len(runs)}.", code="nothing-to-draw")
     shown = [(label, frames_of(results)) for label, results in runs]
     data = {"alone": alone, **data_of(shown)}
     names = " and ".join(label for label, _ in shown)

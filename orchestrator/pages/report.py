@@ -316,7 +316,9 @@ def found_studies(folder: Path = SCENARIOS) -> list[Path]:
         data = yaml_lines.read(path, what="study file").data
         titles[path] = str(data.get("title", "")) if isinstance(data, dict) else ""
     if not titles:
-        raise ScenarioError(f"no study file was named, and there is none in {folder}/*/")
+        raise ScenarioError(
+            f"no study file was named, and there is none in {folder}/*/", code="file-wrong-kind"
+        )
     first = {path.parent: min(titles[p] for p in titles if p.parent == path.parent) for path in titles}
     return sorted(titles, key=lambda path: (first[path.parent], path.stem != "study", titles[path]))
 

@@ -121,7 +121,7 @@ def refuse_dead(folder: Path) -> None:
         ResultsError: it has died.
     """
     if is_dead(folder):
-        raise ResultsError(death(folder))
+        raise ResultsError(death(folder), code="run-died")
 
 
 def death(folder: Path) -> str:
@@ -202,7 +202,10 @@ def default_folder(
     if name is None:
         return below_results(above, _with_changes(f"{stem}{suffix}", changes))
     if not _is_name(name) or re.search(r'[\x00-\x1f/\\:*?"<>|]', name) or len(name.encode()) > 200:
-        raise ScenarioError(f"--name {name}: must be the name of one folder; a path is given with --out")
+        raise ScenarioError(
+            f"--name {name}: must be the name of one folder; a path is given with --out",
+            code="option-invalid",
+        )
     return below_results(above, name)
 
 
@@ -214,7 +217,9 @@ def names_of(file: Path) -> tuple[str, str]:
     """
     above = Path(os.path.abspath(file)).parent.name
     if not _is_name(file.stem) or (above and not _is_name(above)):
-        raise ScenarioError(f"{file}: no folder of results can be named after it; name one with --out")
+        raise ScenarioError(
+            f"{file}: no folder of results can be named after it; name one with --out", code="folder-invalid"
+        )
     return above, file.stem
 
 
@@ -231,12 +236,16 @@ def below_results(*names: str) -> Path:
     place = RESULTS
     for name in filter(None, names):
         if not _is_name(name):
-            raise ScenarioError(f"no folder below {RESULTS} can be called {name!r}; name one with --out")
+            raise ScenarioError(
+                f"no folder below {RESULTS} can be called {name!r}; name one with --out",
+                code="folder-invalid",
+            )
         place /= name
         if place.is_symlink():
             raise ResultsError(
                 f"{place}: is a symbolic link, which is not followed below {RESULTS}; "
-                "name the folder that it leads to with --out"
+                "name the folder that it leads to with --out",
+                code="results-unwritable",
             )
     return place
 

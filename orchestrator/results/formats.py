@@ -46,7 +46,9 @@ class Format:
             return importlib.import_module(self.package) if self.package else None
         except ImportError:
             how = f"pip install 'yawbench[{self.extra}]'"
-            raise ResultsError(f"results as {self.says} need the package {self.package}: {how}") from None
+            raise ResultsError(
+                f"results as {self.says} need the package {self.package}: {how}", code="package-missing"
+            ) from None
 
 
 FORMATS = {
@@ -74,7 +76,9 @@ def check_format(name: str) -> str:
         ScenarioError: the format does not exist, or a package that it needs is missing.
     """
     if name not in FORMATS:
-        raise ScenarioError(f"--format {name}: no such format{hint(name, FORMATS, lead='there are')}")
+        raise ScenarioError(
+            f"--format {name}: no such format{hint(name, FORMATS, lead='there are')}", code="format-unknown"
+        )
     FORMATS[name].require()
     return name
 

@@ -68,13 +68,16 @@ class FolderLock:
             os.write(self._descriptor, json.dumps(asdict(LockHolder.here())).encode())
         except FileExistsError:
             raise ResultsError(
-                f"{folder}: results cannot be written here: it is no folder; name another with --out."
+                f"{folder}: results cannot be written here: it is no folder; name another with --out.",
+                code="results-unwritable",
             ) from None
         except BlockingIOError:
             raise _held(folder, holder_of(home) or _holder_in(b"")) from None
         except OSError as error:
             self.release()
-            raise ResultsError(f"{folder}: results cannot be written here: {reason(error)}.") from None
+            raise ResultsError(
+                f"{folder}: results cannot be written here: {reason(error)}.", code="results-unwritable"
+            ) from None
 
     def release(self) -> None:
         """Release the lock; remove the folder if it was created here and is still empty.
@@ -149,5 +152,6 @@ def _holder_in(note: bytes) -> LockHolder:
 
 def _held(folder: Path, holder: LockHolder) -> ResultsError:
     return ResultsError(
-        f"{folder}: {holder} is writing here; wait for it, or give another folder with --out."
+        f"{folder}: {holder} is writing here; wait for it, or give another folder with --out.",
+        code="results-locked",
     )

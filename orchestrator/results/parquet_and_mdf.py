@@ -59,7 +59,7 @@ class ParquetRecorder(ColumnRecorder):
 
     def _complete(self, record: RunRecord) -> None:
         if self._lost is not None:  # a file with a gap is useless
-            raise ResultsError(self._lost.problems)
+            raise ResultsError(self._lost.diagnostics)
         if self._columns.rows or self._writer is None:
             self._pass_on()
         self._writer.close()

@@ -48,10 +48,14 @@ def found_runs(folder: Path) -> list[FoundRun]:
         ResultsError: the folder does not exist, or there is no run in it.
     """
     if not folder.is_dir():
-        raise ResultsError(f"{folder}: there is no such folder; name one that holds results")
+        raise ResultsError(
+            f"{folder}: there is no such folder; name one that holds results", code="results-missing"
+        )
     found = [run for place in _folders(folder) for run in _runs_in(place)]
     if not found:
-        raise ResultsError(f"{folder}: holds no results; make some with 'yawbench run SCENARIO'")
+        raise ResultsError(
+            f"{folder}: holds no results; make some with 'yawbench run SCENARIO'", code="results-missing"
+        )
     return sorted(found, key=lambda run: (run.record.started or "", run.folder))
 
 
@@ -166,7 +170,7 @@ class Results:
         try:
             return self.columns[column]
         except KeyError:
-            raise ResultsError(self._unknown(column)) from None
+            raise ResultsError(self._unknown(column), code="signal-unknown") from None
 
     def __contains__(self, column: object) -> bool:
         return column in self.columns
@@ -196,9 +200,10 @@ class Results:
         if len(found) == 1:
             return found[0]
         if not found:
-            raise ResultsError(self._unknown(variable, role))
+            raise ResultsError(self._unknown(variable, role), code="signal-unknown")
         raise ResultsError(
-            f"{self.where}: '{variable}' was recorded of more than one unit: {', '.join(found)}."
+            f"{self.where}: '{variable}' was recorded of more than one unit: {', '.join(found)}.",
+            code="signal-ambiguous",
         )
 
     def candidates(self, variable: str, *, role: str | None = None) -> list[str]:
@@ -280,7 +285,9 @@ def load_results(
             blocks = thinned(blocks, ["time", *columns], record.rows)
         time, *values = _joined(blocks, 1 + len(columns))
     except FileNotFoundError:
-        raise ResultsError(f"{path}: is missing, though {RUN_FILE} is there.") from None
+        raise ResultsError(
+            f"{path}: is missing, though {RUN_FILE} is there.", code="results-missing"
+        ) from None
     except (OSError, ValueError) as error:
         raise ResultsError(f"{path}: cannot be read: {reason(error)}") from None
     if record.status == COMPLETED and not thin and time.size < record.rows:

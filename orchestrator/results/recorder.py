@@ -126,7 +126,9 @@ class Recorder(RowBlock):
             self._file = self._path.open("xb", buffering=0)  # "x": does not follow a link of that name
         except OSError as error:
             self._lock.release()
-            raise ResultsError(f"{folder}: results cannot be written here: {reason(error)}.") from None
+            raise ResultsError(
+                f"{folder}: results cannot be written here: {reason(error)}.", code="results-unwritable"
+            ) from None
         self._size = 0
         self._digest: Any = hashlib.sha256()  # None once rows have been cut off
         try:
@@ -168,7 +170,9 @@ class Recorder(RowBlock):
                 view = view[self._file.write(view) :]
         except OSError as error:
             self._cut_back(data[: len(data) - len(view)])
-            raise ResultsError(f"{self.folder / self.file}: cannot be written: {reason(error)}.") from None
+            raise ResultsError(
+                f"{self.folder / self.file}: cannot be written: {reason(error)}.", code="results-unwritable"
+            ) from None
         self._size += len(data)
         if self._digest is not None:
             self._digest.update(data)
@@ -233,7 +237,9 @@ class Recorder(RowBlock):
         write_whole(self._run_path, record.to_json())
 
     def _unwritable(self, error: OSError) -> ResultsError:
-        return ResultsError(f"{self.folder}: results cannot be written: {reason(error)}.")
+        return ResultsError(
+            f"{self.folder}: results cannot be written: {reason(error)}.", code="results-unwritable"
+        )
 
     def _make_room(self, needed: int) -> bool:
         """Truncate the results by at least one row; return whether that freed any space."""

@@ -23,7 +23,7 @@ from vocabulary.roles import role_of
 
 from .. import checksums
 from ..cache import OF_RESULTS, sources_hash
-from ..errors import ResultsError
+from ..errors import Diagnostic, Location, ResultsError, Severity, warnings_in
 from ..files import read_bytes, reading, reason
 from ..fmu.native import runs_as
 from ..messages import short
@@ -106,14 +106,71 @@ class ConnectionRecord(_Part):
     unit: str | None = None
 
 
-class FindingRecord(_Part):
-    """A plausibility warning about the run."""
+NotFinite = Literal["nan", "inf", "-inf"]
+"""Text for numbers that JSON cannot represent."""
 
-    kind: str
+
+class LocationRecord(_Part):
+    """Where a diagnostic points; see `errors.Location`."""
+
+    file: str | None = None
+    line: int | None = None
+    target: str = ""
+    instance: str | None = None
+    signal: str | None = None
+    time: float | None = None
+
+
+class DiagnosticRecord(_Part):
+    """What was left out or assumed, or a warning; see `errors.Diagnostic`."""
+
+    code: str = ""
+    severity: Severity = "info"
+    message: str = ""
+    location: LocationRecord = LocationRecord()
+    value: float | NotFinite | None = None
+
+    @classmethod
+    def of(cls, diagnostic: Diagnostic) -> DiagnosticRecord:
+        """Return the record of a diagnostic."""
+        return cls.model_validate(diagnostic.record())
+
+    @property
+    def diagnostic(self) -> Diagnostic:
+        """The diagnostic of which this is the record."""
+        where, value = self.location, self.value
+        file = None if where.file is None else Path(where.file)
+        place = Location(file, where.line, where.target, where.instance, where.signal, where.time)
+        number = None if value is None else float(value)
+        return Diagnostic(self.code, self.message, self.severity, place, number)
+
+
+class FindingRecord(_Part):
+    """A warning in records until 0.2."""
+
+    kind: str = ""
     place: str | None = None
-    value: float | str | None = None
+    value: float | NotFinite | None = None
     time: float | None = None
     says: str = ""
+
+    @property
+    def diagnostic(self) -> Diagnostic:
+        """The warning in today's form."""
+        where = Location(signal=self.place, time=self.time)
+        number = None if self.value is None else float(self.value)
+        return Diagnostic(EARLIER.get(self.kind, self.kind), self.says, "warning", where, number)
+
+
+EARLIER = {
+    "spin": "car-spins", "wheel lift": "wheel-lifts", "roll over": "car-rolls-over",
+    "backwards": "car-rolls-backwards", "speed": "speed-implausible", "range": "range-left",
+    "steer angle": "steer-angle-implausible", "grip": "acceleration-implausible",
+    "no car": "value-implausible", "no step": "instance-never-steps", "another tyre": "tyre-mismatch",
+    "another radius": "wheel-radius-mismatch", "two values": "values-differ",
+    "default car": "vehicle-incomplete", "slip": "unit-suspicious",
+}  # fmt: skip
+"""Kind of a warning in records and journals until 0.2 -> its code."""
 
 
 class WarningRecord(_Part):
@@ -148,10 +205,6 @@ class OverrideRecord(_Part):
     origin: str = ""
 
 
-NotFinite = Literal["nan", "inf", "-inf"]
-"""Text for numbers that JSON cannot represent."""
-
-
 class RunRecord(_Part):
     """The record of a run."""
 
@@ -175,14 +228,15 @@ class RunRecord(_Part):
     changes: list[OverrideRecord] = []
     connections: list[ConnectionRecord] = []
     faults: list[FaultRecord] = []
+    diagnostics: list[DiagnosticRecord] = []
     scenario: dict[str, Any] = {}
-    notes: list[str] = []
+    notes: list[str] = []  # until 0.2
     versions: dict[str, str] = {}
     warnings: list[WarningRecord] = []
     more_warnings: NonNegativeInt = 0
     units_freed: bool = False
     loop: str = ""  # that made the steps: "compiled", or "Python: " and why
-    findings: list[FindingRecord] = []
+    findings: list[FindingRecord] = []  # until 0.2
     results: str = RESULTS_FILE  # name of the file
     checksum: str = ""  # of that file
     smallest: Mapping[str, float | NotFinite] = {}
@@ -197,6 +251,21 @@ class RunRecord(_Part):
             with contextlib.suppress(ValueError):  # the record was edited
                 found.append(Override.of(one.place, one.value, one.origin))
         return tuple(found)
+
+    @property
+    def all_diagnostics(self) -> tuple[Diagnostic, ...]:
+        """The diagnostics, also those of a record of an earlier version."""
+        warned = {one.says for one in self.findings}
+        return (
+            *(one.diagnostic for one in self.diagnostics),
+            *(Diagnostic("earlier-note", text, "info") for text in self.notes if text not in warned),
+            *(one.diagnostic for one in self.findings),
+        )
+
+    @property
+    def course_warnings(self) -> tuple[Diagnostic, ...]:
+        """The warnings about the course of the run, such as a car that spins."""
+        return tuple(one for one in warnings_in(self.all_diagnostics) if one.location.time is not None)
 
     @property
     def scenario_file(self) -> str:
@@ -256,7 +325,7 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> RunRecord:
         changes=[OverrideRecord.model_validate(change.record) for change in plan.changes],
         connections=connections_of(plan),
         scenario=plan.scenario,
-        notes=list(plan.notes),
+        diagnostics=[*map(DiagnosticRecord.of, plan.diagnostics)],
         versions=versions(),
     )
     if plan.faults:
@@ -365,7 +434,8 @@ def load_record(folder: Path, *, settled: bool = False) -> RunRecord:
             failed = f"; those of a run that failed: {folder / FAILED}" if (folder / FAILED).exists() else ""
             raise ResultsError(
                 f"{folder}: no results here, {RUN_FILE} is missing; make them with "
-                f"'yawbench run SCENARIO --out {folder}'{failed}."
+                f"'yawbench run SCENARIO --out {folder}'{failed}.",
+                code="results-missing",
             ) from None
         except NotADirectoryError:
             holds = f", {folder.parent}" if folder.name in (RUN_FILE, *FILES.values()) else ""
@@ -397,7 +467,8 @@ def check_record(run: Any, file: Path) -> RunRecord:
     if words := checksums.changed_since(run):
         raise ResultsError(
             f"{file}: is not what its run has written: {words}; run it again, or remove "
-            f"{checksums.KEY!r} if you have changed the file yourself."
+            f"{checksums.KEY!r} if you have changed the file yourself.",
+            code="results-changed",
         )
     try:
         return RunRecord.model_validate(run)

@@ -31,7 +31,9 @@ def salvage(folder: Path) -> tuple[Path, int]:
         ResultsError: no run has died here, or its results cannot be read or written.
     """
     if not is_dead(folder):
-        raise ResultsError(f"{folder}: no run has died here; there is nothing to salvage")
+        raise ResultsError(
+            f"{folder}: no run has died here; there is nothing to salvage", code="nothing-to-salvage"
+        )
     path = folder / f"{RESULTS_FILE}{PART}"
     lock = FolderLock(folder)
     try:
@@ -49,7 +51,9 @@ def salvage(folder: Path) -> tuple[Path, int]:
         tidy(folder)
         return folder, 0
     except OSError as error:
-        raise ResultsError(f"{folder}: what is left cannot be put in place: {reason(error)}.") from None
+        raise ResultsError(
+            f"{folder}: what is left cannot be put in place: {reason(error)}.", code="results-unwritable"
+        ) from None
     except ValueError as error:
         raise ResultsError(f"{path}: cannot be read: {error}") from None
     finally:

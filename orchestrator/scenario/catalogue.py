@@ -105,7 +105,7 @@ def find(source: str | Path, kind: str) -> Path:
     """
     path = Path(source)
     if os.path.isdir(path):
-        raise ScenarioError(f"{source}: {_what_is_in(path, kind)}")
+        raise ScenarioError(f"{source}: {_what_is_in(path, kind)}", code="scenario-unknown")
     if os.path.exists(path):
         return path
     known = [name.removeprefix(f"{HOMES.get(kind)}/") for name in names(kind)]
@@ -116,10 +116,10 @@ def find(source: str | Path, kind: str) -> Path:
         return file
     for folder in (base / path for base in folders()):
         if os.path.isdir(folder):
-            raise ScenarioError(f"{source}: {_what_is_in(folder, kind)}")
+            raise ScenarioError(f"{source}: {_what_is_in(folder, kind)}", code="scenario-unknown")
     others = hint(str(source), elsewhere or known, lead="by name there are")
     what = kind.partition(" ")[2]
-    raise ScenarioError(f"there is no {what} {short(str(source))}{others}")
+    raise ScenarioError(f"there is no {what} {short(str(source))}{others}", code="scenario-unknown")
 
 
 def _what_is_in(folder: Path, kind: str) -> str:

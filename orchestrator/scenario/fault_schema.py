@@ -16,12 +16,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field, PlainSerializer, PlainValidator, model_validator
 
-from ..errors import Problem, ScenarioError
+from ..errors import Location, ScenarioError
 from ..fault_kinds import KINDS, NO_FAULTS, WORDS, Fault, FaultList, FaultLocation
 from ..messages import listed, short
 from ..plan import Value
@@ -77,8 +78,8 @@ def parse_faults(location: FaultLocation, items: Sequence[Mapping[str, Value]], 
     for item in items:
         document.data = {"on": str(location), **item}
         specs.append(validate(FaultSpec, document))
-    if document.problems:
-        raise ScenarioError([Problem(problem.text, place=where) for problem in document.problems])
+    if document.errors:
+        raise ScenarioError([replace(one, location=Location(target=where)) for one in document.errors])
     return FaultList(spec.fault for spec in specs if spec is not None)
 
 

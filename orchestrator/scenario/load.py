@@ -1,4 +1,4 @@
-"""Loads a scenario file: applies overrides, validates it, and reports all problems at once."""
+"""Loads a scenario file: applies overrides, validates it, and reports all errors at once."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def load_scenario(
         validate: False: accept FMUs with invalid model descriptions.
 
     Raises:
-        ScenarioError: with all problems of the file, its vehicle file and the overrides.
+        ScenarioError: with all errors of the file, its vehicle file and the overrides.
     """
     archive = Path(path).suffix.lower() == ".ssp"
     document = _read_archive(Path(path)) if archive else read(Path(path), what="scenario file")
@@ -58,9 +58,9 @@ def load_scenario(
         _check_time_grid(document)
         _check_unit_names(document)
     tyres = _read_tyres(file, vehicle, document, vehicle_document)
-    problems = document.sentences() + vehicle_document.sentences()
-    if problems or file is None or vehicle is None:
-        raise ScenarioError(problems)
+    errors = document.sorted_errors() + vehicle_document.sorted_errors()
+    if errors or file is None or vehicle is None:
+        raise ScenarioError(errors)
     return LoadedScenario.model_construct(
         **dict(file),
         document=document,
@@ -85,7 +85,7 @@ def _ask_for_times(document: Document) -> None:
 
     missing = ssp_read.missing_times(document)
     if missing:
-        raise ScenarioError(document.sentences() + missing)
+        raise ScenarioError(document.sorted_errors() + missing)
 
 
 def _read_vehicle(document: Document, read: Callable[..., Document]) -> Document:
@@ -94,8 +94,8 @@ def _read_vehicle(document: Document, read: Callable[..., Document]) -> Document
         return Document(document.path, data={})
     vehicle = Path(os.path.normpath(document.path.parent / name))
     if not os.path.exists(vehicle):
-        (missing,) = read(vehicle, what="vehicle file").problems
-        document.report(("vehicle",), missing)
+        (missing,) = read(vehicle, what="vehicle file").errors
+        document.report(("vehicle",), str(missing), missing.code)
         return Document(vehicle, data={})
     return read(vehicle, what="vehicle file")
 
@@ -103,7 +103,7 @@ def _read_vehicle(document: Document, read: Callable[..., Document]) -> Document
 def _read_tyres(
     scenario: ScenarioSpec | None, vehicle: Vehicle | None, document: Document, vehicle_document: Document
 ) -> dict[str, TyreFile]:
-    """Return the tyre property file of each axle; report its problems and note its warnings."""
+    """Return the tyre property file of each axle; report its errors and note its warnings."""
     if scenario is None or vehicle is None:
         return {}
     named, where = (scenario.tyres, document) if scenario.tyres else (vehicle.tyres, vehicle_document)
@@ -112,8 +112,8 @@ def _read_tyres(
         try:
             file = read_tir(os.path.normpath(where.path.parent / name))
         except ScenarioError as error:
-            for problem in error.problems:
-                where.report(("tyres",), problem)
+            for one in error.diagnostics:
+                where.report(("tyres",), str(one), one.code)
             continue
         document.notes.extend(file.warnings)
         files |= {axle: file for axle, given in (named or {}).items() if given == name}
@@ -129,11 +129,15 @@ def _check_time_grid(document: Document) -> None:
     start, stop = _read(quantities.instant, data.get("start_time", 0)), _seconds(data.get("stop_time"))
     if start is not None and stop is not None and not start < stop:
         what = f"must be after start_time, {float(start):.12g} s (got {float(stop):.12g} s)"
-        document.report(("stop_time",), what)
+        document.report(("stop_time",), what, "time-grid-invalid")
         return
     if stop is not None and (stop - (start or 0)) / step > STEPS:
         steps = float((stop - (start or 0)) / step)
-        document.report(("stop_time",), f"a run has at most {STEPS:,} steps (this would have {steps:.3g})")
+        document.report(
+            ("stop_time",),
+            f"a run has at most {STEPS:,} steps (this would have {steps:.3g})",
+            "time-grid-invalid",
+        )
         return
     times: list[tuple[KeyPath, object]] = [(("stop_time",), None if stop is None else stop - (start or 0))]
     units = data.get("units")
@@ -155,6 +159,7 @@ def _check_time_grid(document: Document) -> None:
             key,
             f"{float(time):.12g} s{after} is no integer multiple of the communication step "
             f"{float(step):.12g} s{origin}; nearest allowed: {nearest}",
+            "time-grid-invalid",
         )
 
 
@@ -184,7 +189,9 @@ def _check_unit_names(document: Document) -> None:
     for key, value in named:
         for unit in _units_in(value):
             if unit not in units and not (unit == "*" and key[0] == "record"):
-                document.report(key, f"there is no unit {unit!r}{hint(unit, units, lead='units')}")
+                document.report(
+                    key, f"there is no unit {unit!r}{hint(unit, units, lead='units')}", "instance-unknown"
+                )
 
 
 def _units_in(value: object) -> list[str]:

@@ -26,7 +26,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from ..errors import Problem, ScenarioError
+from ..errors import Diagnostic, Location, ScenarioError
 from ..fault_kinds import WORDS, FaultList
 from ..messages import hint, listed
 from ..names import FACTS, FAULTS, INPUTS, OF_RUN, TYRES, VEHICLE, Target
@@ -56,13 +56,13 @@ def read_changes(
         ScenarioError: with all malformed options.
     """
     changes: list[Override] = []
-    problems: list[str | Problem] = []
+    errors: list[str | Diagnostic] = []
     for text in swaps:
         unit, equals, fmu = (part.strip() for part in text.partition("="))
         if unit and equals and fmu:
             changes += swap_of(unit, fmu, "--swap")
         else:
-            problems.append(f"--swap {text}: write --swap UNIT=FMU")
+            errors.append(f"--swap {text}: write --swap UNIT=FMU")
     for text in settings:
         name, equals, raw = (part.strip() for part in text.partition("="))
         target = _settable(name) if equals else None
@@ -71,22 +71,22 @@ def read_changes(
             changes.append(setting(target, value, "--set"))
         else:
             sentence = f"write --set UNIT.PARAMETER=VALUE, or {listed((*OF_RUN, *FACTS), last='or')}=VALUE"
-            problems.append(f"--set {text}: {sentence}")
+            errors.append(f"--set {text}: {sentence}")
     at: dict[Target, FaultList] = {}
     for text in faults:
         location, colon, line = (part.strip() for part in text.partition(":"))
         if not (location and colon and line):
-            problems.append(f"--fault {text}: write --fault 'UNIT.OUTPUT: KIND VALUE from TIME until TIME'")
+            errors.append(f"--fault {text}: write --fault 'UNIT.OUTPUT: KIND VALUE from TIME until TIME'")
             continue
         try:
             one = faults_at(location, line, "--fault")
         except ScenarioError as error:
-            problems += error.problems
+            errors += error.diagnostics
             continue
         at[one.target] = FaultList((*at.get(one.target, ()), *one.faults))
     changes += [Override(target, given, "--fault") for target, given in at.items()]
-    if problems:
-        raise ScenarioError(problems)
+    if errors:
+        raise ScenarioError(errors, code="option-invalid")
     return tuple(changes)
 
 
@@ -125,7 +125,9 @@ def faults_at(place: str, stated: str | Mapping[str, Value], origin: str) -> Ove
         location = location_of(place)
         items = read_line(stated) if isinstance(stated, str) else [stated]
     except ValueError as error:
-        raise ScenarioError([Problem(str(error), place=where)]) from None
+        raise ScenarioError(
+            Diagnostic("fault-invalid", str(error), location=Location(target=where))
+        ) from None
     faults = parse_faults(location, items, where)
     return Override(Target("faults", variable=str(location)), faults, origin)
 
@@ -197,7 +199,7 @@ def apply_changes(
         elif not isinstance(spec, dict):
             known = (*units, VEHICLE, INPUTS) if name else units
             sentence = f"the scenario has no unit {holder!r}{hint(holder, known, lead='it has')}"
-            document.note(Problem(sentence, place=str(change)))
+            document.add(Diagnostic("instance-unknown", sentence, location=Location(target=str(change))))
             continue
         elif kind == "fmu":
             if isinstance(spec.get("fmu"), str):

@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 
+from ..errors import InvalidValueError
 from ..messages import closest, listed, short
 from ..plan import UnitDefinition
 
@@ -105,6 +106,8 @@ _TOKEN = re.compile(r"(?P<symbol>[A-Za-zµ°%]+|1)(?:\^?(?P<power>-?\d{1,2}))?|(
 
 class UnknownUnitError(ValueError):
     """A text is not a unit of measurement."""
+
+    code = "unit-unknown"
 
     def __init__(self, text: str) -> None:
         super().__init__(f"{short(text)} is not a unit")
@@ -257,17 +260,22 @@ def convert(text: str, unit: str | None, definition: UnitDefinition | None = Non
     if given == unit:
         return number
     if unit is None:
-        raise ValueError(f"{text!r} names a unit, but the FMU declares none: give a plain number")
+        raise InvalidValueError(
+            f"{text!r} names a unit, but the FMU declares none: give a plain number", code="unit-mismatch"
+        )
     target = measure_of(unit, definition)
     if target is None:
-        raise ValueError(f"{text!r} cannot be converted to {unit}: give a number in {unit}")
+        raise InvalidValueError(
+            f"{text!r} cannot be converted to {unit}: give a number in {unit}", code="unit-mismatch"
+        )
     try:
         source = _source(given, target)
     except UnknownUnitError as error:
-        raise ValueError(f"{error}{_guess(given, unit, target)}") from None
+        raise InvalidValueError(f"{error}{_guess(given, unit, target)}", code="unit-unknown") from None
     if source.powers != target.powers:
-        raise ValueError(
-            f"{text!r} is not a value in {unit}: use {listed(_spellings(unit, target), last='or')}"
+        raise InvalidValueError(
+            f"{text!r} is not a value in {unit}: use {listed(_spellings(unit, target), last='or')}",
+            code="unit-mismatch",
         )
     value = converted(number, source, target)
     if value == math.inf:

@@ -18,7 +18,7 @@ from urllib.parse import unquote, urlsplit
 from lxml import etree
 from lxml.etree import _Element
 
-from ..errors import Problem
+from ..errors import Diagnostic, Location
 from ..files import PACKED, TooLargeError, check_archive, read_bytes, reason
 from ..messages import short
 from ..plan import UnitDefinition
@@ -33,16 +33,17 @@ _DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, ValueError, RuntimeError, N
 class SspError(Exception):
     """An SSP archive cannot be read; has the XML element with the error."""
 
-    def __init__(self, sentence: str, element: _Element | None = None) -> None:
+    def __init__(self, sentence: str, element: _Element | None = None, code: str = "ssp-invalid") -> None:
         super().__init__(sentence)
+        self.code = code
         self.line = 0 if element is None else element.sourceline or 0
         self.member = "" if element is None else element.getroottree().docinfo.URL or ""
 
-    def problem(self, path: Path) -> Problem:
-        """Convert to a problem of the archive `path`, with member and line if known."""
-        if self.line and self.member:
-            return Problem(str(self), file=path / self.member, line=self.line)
-        return Problem(str(self), file=path)
+    def diagnostic(self, path: Path) -> Diagnostic:
+        """Convert to an error of the archive `path`, with member and line if known."""
+        within = self.line and self.member
+        where = Location(path / self.member, self.line) if within else Location(path)
+        return Diagnostic(self.code, str(self), location=where)
 
 
 class SspVariable(NamedTuple):
@@ -70,14 +71,14 @@ class SspArchive:
         try:
             raw = read_bytes(path, largest=PACKED)
         except FileNotFoundError:
-            raise SspError(f"no such {what}") from None
+            raise SspError(f"no such {what}", code="file-missing") from None
         except (OSError, ValueError) as error:
-            raise SspError(f"cannot read this {what}: {reason(error)}") from None
+            raise SspError(f"cannot read this {what}: {reason(error)}", code="file-unreadable") from None
         try:
             self._archive = zipfile.ZipFile(io.BytesIO(raw))
             check_archive(self._archive)
         except TooLargeError as error:
-            raise SspError(f"cannot read this {what}: {error}") from None
+            raise SspError(f"cannot read this {what}: {error}", code="file-unreadable") from None
         except _DAMAGE as error:
             raise SspError(f"no {what}, or damaged: {error}") from None
         self._variables: dict[str, dict[str, SspVariable]] = {}
@@ -98,7 +99,9 @@ class SspArchive:
             raise SspError(f"source {source!r} is not in the archive", element)
         if element.get("sourceBase", "SSD") != "SSD":
             raise SspError(
-                f"source {source!r} is in a component: only members of the archive are read", element
+                f"source {source!r} is in a component: only members of the archive are read",
+                element,
+                code="ssp-unsupported",
             )
         return member
 

@@ -25,6 +25,7 @@ from typing import Any
 
 from lxml.etree import _Element
 
+from ..errors import Diagnostic, Location
 from ..messages import fold, listed
 from ..names import RESERVED
 from .quantities import Unit, conversion
@@ -96,20 +97,24 @@ def _then(first: Scale, second: Scale) -> Scale:
 
 
 def read(path: Path, *, what: str = "SSP archive") -> Document:
-    """Read the archive `path`; errors are added to the problems of the document."""
+    """Read the archive `path`; its errors are added to the document."""
     document = Document(path)
     try:
         document.data = _scenario(SspArchive(path, what=what), document)
     except SspError as refused:
-        document.note(refused.problem(path))
+        document.add(refused.diagnostic(path))
     return document
 
 
-def missing_times(document: Document) -> list[str]:
-    """Return a message for each time that neither the archive nor an option gives."""
+def missing_times(document: Document) -> list[Diagnostic]:
+    """Return an error for each time that neither the archive nor an option gives."""
     wanted = {"stop_time": ("stop time", "10"), "step_size": ("communication step", "0.001")}
     return [
-        f"{document.path}: the archive says no {words}: give one in s, such as --set {name}={such_as}"
+        Diagnostic(
+            "key-missing",
+            f"the archive says no {words}: give one in s, such as --set {name}={such_as}",
+            location=Location(document.path),
+        )
         for name, (words, such_as) in wanted.items()
         if name not in document.data
     ]
@@ -126,9 +131,8 @@ def _scenario(archive: SspArchive, document: Document) -> dict[str, Any]:
     values = read_values(archive, structure)
     if values.unknown:
         shown = listed(fold(list(dict.fromkeys(values.unknown))))
-        document.notes.append(
-            f"the archive gives values to {shown}: passed over, there are no such variables"
-        )
+        sentence = f"the archive gives values to {shown}: passed over, there are no such variables"
+        document.notes.append(Diagnostic("variable-unknown", sentence, "info"))
     given = _values_through_connectors(structure, values.given)
     connections, driven = _connections(structure, names)
     given = {end: one for end, one in given.items() if end not in driven}
@@ -179,7 +183,8 @@ def _unit_names(structure: SspStructure, document: Document) -> dict[ElementPath
         names[path] = name
     renamed = [f"{name} ({'.'.join(path)})" for path, name in names.items() if path != (name,)]
     if renamed:
-        document.notes.append(f"units called otherwise than in the archive: {listed(renamed)}")
+        sentence = f"units called otherwise than in the archive: {listed(renamed)}"
+        document.notes.append(Diagnostic("instance-renamed", sentence, "info"))
     return names
 
 

@@ -148,9 +148,11 @@ def _add_system(
             structure.components[inner] = _component(archive, one, inner)
             structure.connectors[inner] = _connectors(one, definitions)
         elif kind == "SignalDictionaryReference":
-            raise SspError(f"a signal dictionary ({name}) is not supported", one)
+            raise SspError(f"a signal dictionary ({name}) is not supported", one, code="ssp-unsupported")
         else:
-            raise SspError(f"an element of kind {kind} ({name}) is not supported", one)
+            raise SspError(
+                f"an element of kind {kind} ({name}) is not supported", one, code="ssp-unsupported"
+            )
     for connection in system.iterfind(f"{{{SSD}}}Connections/{{{SSD}}}Connection"):
         source, sink = _directed(structure, connection, path)
         before, _ = structure.sources.setdefault(sink, (source, connection))
@@ -171,11 +173,17 @@ def _component(archive: SspArchive, element: _Element, path: ElementPath) -> Ssp
     name, kind, source = ".".join(path), element.get("type", FMU_TYPE), element.get("source", "")
     if kind != FMU_TYPE or not source.lower().endswith(".fmu"):
         raise SspError(
-            f"component {name!r} is no FMU (type {kind}, source {source!r}): only FMUs are supported", element
+            f"component {name!r} is no FMU (type {kind}, source {source!r}): only FMUs are supported",
+            element,
+            code="ssp-unsupported",
         )
     implementation = element.get("implementation", "any")
     if implementation not in ("any", "CoSimulation"):
-        raise SspError(f"component {name!r} wants {implementation}: only CoSimulation is supported", element)
+        raise SspError(
+            f"component {name!r} wants {implementation}: only CoSimulation is supported",
+            element,
+            code="ssp-unsupported",
+        )
     member = archive.member(element)
     return SspComponent(path, element, member, archive.variables(member, element))
 
@@ -194,7 +202,9 @@ def _end(structure: SspStructure, connection: _Element, which: str, path: Elemen
     element, name = connection.get(f"{which}Element"), connection.get(f"{which}Connector", "")
     inner = (*path, element) if element else path
     if inner not in structure.connectors:
-        raise SspError(f"a connection names {element!r}: there is no such component", connection)
+        raise SspError(
+            f"a connection names {element!r}: there is no such component", connection, code="file-missing"
+        )
     if inner not in structure.components and name not in structure.connectors[inner]:
         system = f"the system {'.'.join(inner)}" if inner else "the system"
         raise SspError(
@@ -322,7 +332,9 @@ def _mapping(archive: SspArchive, binding: _Element) -> dict[str, list[_Element]
 
 def _check_type(element: _Element, allowed: str) -> None:
     if element.get("type", allowed) != allowed:
-        raise SspError(f"{element.get('type')} is not supported: only {allowed} is", element)
+        raise SspError(
+            f"{element.get('type')} is not supported: only {allowed} is", element, code="ssp-unsupported"
+        )
 
 
 def _transformed(given: SspValue, entry: _Element) -> SspValue:
@@ -344,7 +356,9 @@ def linear(element: _Element) -> tuple[float, float]:
         if kind == "LinearTransformation":
             return number(one, "factor", 1.0), number(one, "offset", 0.0)
         if kind.endswith("Transformation"):
-            raise SspError(f"{kind} is not supported: only LinearTransformation is", one)
+            raise SspError(
+                f"{kind} is not supported: only LinearTransformation is", one, code="ssp-unsupported"
+            )
     return 1.0, 0.0
 
 
@@ -366,7 +380,11 @@ def _value(parameter: _Element) -> SspValue:
         if name in ("String", "Enumeration"):
             return SspValue(text, None, parameter)
         if name == "Binary":
-            raise SspError(f"parameter {parameter.get('name')!r} is Binary: not supported", parameter)
+            raise SspError(
+                f"parameter {parameter.get('name')!r} is Binary: not supported",
+                parameter,
+                code="ssp-unsupported",
+            )
     raise SspError(f"parameter {parameter.get('name')!r} has no value", parameter)
 
 

@@ -20,7 +20,7 @@ from math import atan, inf, isfinite, nan, pi, prod, sin, tan
 from pathlib import Path
 from typing import NamedTuple
 
-from ..errors import Problem, ScenarioError
+from ..errors import Diagnostic, Location, ScenarioError, Severity
 from ..files import TEXT, read_bytes, reads, reason
 from ..messages import listed, short
 
@@ -152,7 +152,7 @@ class TyreFile:
     """Parameter name without axle, such as pcx1 -> its value in SI units."""
     rolling_radius: float | None
     """Effective rolling radius at nominal load [m], None if the file does not determine it."""
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Diagnostic, ...] = ()
 
     def record(self) -> dict[str, object]:
         """Return its entry in the run record."""
@@ -161,7 +161,7 @@ class TyreFile:
             "sha256": self.sha256,
             "kind": self.kind,
             "side": self.side,
-            "warnings": list(self.warnings),
+            "warnings": list(map(str, self.warnings)),
         }
 
 
@@ -176,14 +176,16 @@ def read_tir(path: Path | str) -> TyreFile:
     try:
         raw = read_bytes(path, largest=TEXT)
     except FileNotFoundError:
-        raise ScenarioError(f"{path}: no such tyre property file") from None
+        raise ScenarioError(f"{path}: no such tyre property file", code="file-missing") from None
     except (OSError, ValueError) as error:
-        raise ScenarioError(f"{path}: cannot read this tyre property file: {reason(error)}") from None
+        raise ScenarioError(
+            f"{path}: cannot read this tyre property file: {reason(error)}", code="file-unreadable"
+        ) from None
     reading = _Reading(path)
     reading.take(read_entries(raw))
     file = reading.finish(hashlib.sha256(raw).hexdigest())
     if file is None:
-        raise ScenarioError(reading.problems)
+        raise ScenarioError(reading.errors)
     return file
 
 
@@ -196,8 +198,8 @@ class _Reading:
     units: dict[str, TirEntry] = field(default_factory=dict)
     texts: dict[str, TirEntry] = field(default_factory=dict)
     values: dict[str, float] = field(default_factory=dict)
-    problems: list[str] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
+    errors: list[Diagnostic] = field(default_factory=list)
+    warnings: list[Diagnostic] = field(default_factory=list)
 
     def take(self, entries: Iterable[TirEntry]) -> None:
         """Store the known entries; of a key that is given twice, the last."""
@@ -213,9 +215,9 @@ class _Reading:
                 self.entries[key] = entry
 
     def finish(self, sha256: str) -> TyreFile | None:
-        """Return the file, None if there are problems."""
+        """Return the file, None if there are errors."""
         if not self.entries:
-            self.problems.append(f"{self.path}: this is no tyre property file: it holds no coefficients")
+            self._say(None, "this is no tyre property file: it holds no coefficients", "error")
             return None
         kind = self._kind()
         factors = self._factors()
@@ -223,13 +225,13 @@ class _Reading:
             if key != "FITTYP" and (value := self._number(entry)) is not None:
                 self.values[key] = value * factors(DIMENSIONS.get(key, {}))
         self._check_needed()
-        if self.problems or kind is None:
+        if self.errors or kind is None:
             return None
         self._check_stiffness()
         side = self._side()
         self._remark(kind)
         values = self._complete(kind, side)
-        if self.problems:
+        if self.errors:
             return None
         warnings = tuple(self.warnings)
         return TyreFile(self.path, sha256, KINDS[kind], side, values, self._rolling_radius(), warnings)
@@ -246,7 +248,7 @@ class _Reading:
         if entry is None or entry.text is None:
             if name in FORMATS:
                 return FORMATS[name]
-            self.problems.append(f"{self.path}: FITTYP is missing, which says the kind; read are {_known()}")
+            self._say(None, f"FITTYP is missing, which says the kind; read are {_known()}", "error")
             return None
         value = self._number(entry)
         if value is None:
@@ -281,7 +283,7 @@ class _Reading:
         if side in ("LEFT", "RIGHT"):
             return side
         if entry is None:
-            self.warnings.append(f"{self.path}: TYRESIDE is missing: read as LEFT")
+            self._say(None, "TYRESIDE is missing: read as LEFT", "warning")
         else:
             self._warn(entry, f"{entry.text or 'no value'}: read as LEFT")
         return "LEFT"
@@ -298,7 +300,7 @@ class _Reading:
                 if key in self.entries:
                     self._refuse(self.entries[key], f"{must} (got {self.entries[key].text})")
                 else:
-                    self.problems.append(f"{self.path}: {key} is missing")
+                    self._say(None, f"{key} is missing", "error")
 
     def _check_stiffness(self) -> None:
         k_x = self._at("PKX1") * self._at("LKX", 1.0)
@@ -317,9 +319,8 @@ class _Reading:
             self._refuse(self.entries["PKX1"], "the slip stiffness must be positive at nominal load")
 
     def _remark(self, kind: int) -> None:
-        say = self.warnings.append
         if self._at("RBX1") == 0.0 and self._at("RBY1") == 0.0:
-            say(f"{self.path}: no combined slip: RBX1 and RBY1 are missing or zero")
+            self._say(None, "no combined slip: RBX1 and RBY1 are missing or zero", "warning")
         for low, high in (("KPUMIN", "KPUMAX"), ("ALPMIN", "ALPMAX")):
             least, most = self.values.get(low), self.values.get(high)
             if least is not None and most is not None and least * most >= 0.0 and least != most:
@@ -327,7 +328,7 @@ class _Reading:
         relaxation = ("LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS") if kind >= 60 else ("PTX1", "PTY1")
         absent = [key for key in relaxation if self._at(key) == 0.0]
         if absent:
-            say(f"{self.path}: no relaxation lengths: {listed(absent)} missing or zero")
+            self._say(None, f"no relaxation lengths: {listed(absent)} missing or zero", "warning")
         if self._at("LMUV") != 0.0:
             self._warn(self.entries["LMUV"], "friction that decays with speed is left out")
         if "UNLOADED_RADIUS" not in self.values:
@@ -335,7 +336,7 @@ class _Reading:
             how = (
                 "taken from RIM_RADIUS, WIDTH and ASPECT_RATIO" if known else "as the tyre has it by default"
             )
-            say(f"{self.path}: UNLOADED_RADIUS is missing: {how}")
+            self._say(None, f"UNLOADED_RADIUS is missing: {how}", "warning")
 
     # ---- values ---------------------------------------------------------------------------------------
 
@@ -391,7 +392,7 @@ class _Reading:
         return self.values.get(key, default)
 
     def _number(self, entry: TirEntry) -> float | None:
-        """Return the number of an entry; if it is not a number, report a problem and return None."""
+        """Return the number of an entry; if it is not a number, report an error and return None."""
         try:
             value = float((entry.text or "").upper().replace("D", "E"))
         except ValueError:
@@ -402,10 +403,16 @@ class _Reading:
         return None
 
     def _refuse(self, entry: TirEntry, sentence: str) -> None:
-        self.problems.append(Problem(sentence, file=self.path, line=entry.line, place=entry.key))
+        self._say(entry, sentence, "error")
 
     def _warn(self, entry: TirEntry, sentence: str) -> None:
-        self.warnings.append(f"{self.path}:{entry.line}: {entry.key}: {sentence}")
+        self._say(entry, sentence, "warning")
+
+    def _say(self, entry: TirEntry | None, sentence: str, severity: Severity) -> None:
+        where = Location(self.path, entry.line, entry.key) if entry else Location(self.path)
+        code = "tyre-file-invalid" if severity == "error" else "tyre-file-unusual"
+        into = self.errors if severity == "error" else self.warnings
+        into.append(Diagnostic(code, sentence, severity, where))
 
 
 def _known() -> str:

@@ -1,4 +1,4 @@
-"""Strict validation of YAML files with pydantic; problems are messages with line, key and allowed values."""
+"""Strict validation of YAML files with pydantic; errors have line, key and allowed values."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, PlainSerializer, PlainValidator, ValidationError
 
+from ..errors import code_of
 from ..messages import closest, listed, short
 from .quantities import instant, seconds
 from .yaml_lines import Document, KeyPath
@@ -50,11 +51,11 @@ KINDS: dict[str, tuple[str, type, str]] = {
 
 
 def validate(model: type[Model], document: Document) -> Model | None:
-    """Return the validated content; if it is invalid, add the problems to the document and return None."""
+    """Return the validated content; if it is invalid, add the errors to the document and return None."""
     if document.data is None:
         return None
     if another := _another_kind(model, document.data):
-        document.report((), another)
+        document.report((), another, "file-wrong-kind")
         return None
     try:
         return model.model_validate(document.data)
@@ -90,18 +91,19 @@ def _place(data: Any, location: KeyPath) -> KeyPath:
 def _report(model: type[BaseModel], document: Document, key: KeyPath, error: Any) -> None:
     kind, given = error["type"], error["input"]
     if kind == "missing":
-        document.report(key[:-1], f"{str(key[-1])!r} is missing")
+        document.report(key[:-1], f"{str(key[-1])!r} is missing", "key-missing")
     elif kind == "extra_forbidden":
         allowed = _keys(model, key[:-1])
         likely = closest(str(key[-1]), allowed)
         guess = f"did you mean {likely!r}? " if likely else ""
-        document.report(key, f"unknown key; {guess}allowed here: {listed(allowed)}")
+        document.report(key, f"unknown key; {guess}allowed here: {listed(allowed)}", "key-unknown")
     elif kind == "literal_error":
         document.report(key, f"must be {error['ctx']['expected']} (got {short(given)})")
     elif kind == "value_error":
-        document.report(key, str(error["ctx"]["error"]))
+        raised = error["ctx"]["error"]
+        document.report(key, str(raised), code_of(raised))
     elif kind in _MUST_BE:
-        document.report(key, f"must be {_MUST_BE[kind]} (got {short(given)})")
+        document.report(key, f"must be {_MUST_BE[kind]} (got {short(given)})", "value-wrong-type")
     else:
         document.report(key, f"{error['msg']} (got {short(given)})")
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..errors import Problem, ScenarioError
+from ..errors import Diagnostic, Location, ScenarioError
 from ..files import TEXT, read_bytes, reason
 from ..messages import closest, listed, short, unprintable
 from ..plan import Override
 
-PROBLEMS = 200
-"""Maximum number of reported problems of a file. Chosen: users check again before correcting more."""
+MOST_ERRORS = 200
+"""Maximum number of reported errors of a file. Chosen: users check again before correcting more."""
 DEEPEST = 40
 """Maximum nesting depth. Chosen: four times that of the schemas."""
 LARGEST_WHOLE = 2**64
@@ -28,40 +28,41 @@ KeyPath = tuple[str | int, ...]
 
 @dataclass
 class Document:
-    """The content of a YAML file as dicts, lists and scalars, with its lines, overrides and problems."""
+    """The content of a YAML file as dicts, lists and scalars, with its lines, overrides and diagnostics."""
 
     path: Path
     data: Any = None
     lines: dict[KeyPath, int] = field(default_factory=dict)
     overrides: dict[KeyPath, Override] = field(default_factory=dict)
     """Key of an overridden value -> its override."""
-    problems: dict[Problem, None] = field(default_factory=dict)
+    errors: dict[Diagnostic, None] = field(default_factory=dict)
     """An ordered set."""
-    notes: list[str] = field(default_factory=list)
-    """Messages that are not errors, for the plan."""
+    notes: list[Diagnostic] = field(default_factory=list)
+    """Diagnostics that are not errors, for the plan."""
 
-    def report(self, key: KeyPath, sentence: str) -> None:
-        """Add a problem with the value (or the missing value) at `key`."""
-        self.note(self.problem(key, sentence))
+    def report(self, key: KeyPath, sentence: str, code: str = ScenarioError.default_code) -> None:
+        """Add an error about the value (or the missing value) at `key`."""
+        self.add(Diagnostic(code, sentence, location=self.location(key)))
 
-    def note(self, problem: Problem) -> None:
-        """Add a problem.
+    def add(self, error: Diagnostic) -> None:
+        """Add an error.
 
         Raises:
-            ScenarioError: with all problems, if there are too many to continue.
+            ScenarioError: with all errors, if there are too many to continue.
         """
-        self.problems[problem] = None
-        if len(self.problems) >= PROBLEMS:
-            more = f"there may be more; these are the first {PROBLEMS} problems"
-            raise ScenarioError([*self.sentences(), Problem(more, file=self.path)])
+        self.errors[error] = None
+        if len(self.errors) >= MOST_ERRORS:
+            more = f"there may be more; these are the first {MOST_ERRORS} problems"
+            where = Location(file=self.path)
+            raise ScenarioError([*self.sorted_errors(), Diagnostic("errors-omitted", more, location=where)])
 
-    def problem(self, key: KeyPath, sentence: str) -> Problem:
-        """Return a problem with the value at `key`, located at its line or its override."""
+    def location(self, key: KeyPath) -> Location:
+        """Return where the value at `key` comes from: its line, or its override."""
         change = self.override(key)
         if change is not None:
-            return Problem(sentence, place=str(change))
+            return Location(target=str(change))
         line = next((self.lines[key[:n]] for n in range(len(key), -1, -1) if key[:n] in self.lines), 1)
-        return Problem(sentence, file=self.path, line=line, place=dotted(key))
+        return Location(file=self.path, line=line, target=dotted(key))
 
     def override(self, key: KeyPath) -> Override | None:
         """Return the override that set the value at `key`, None if it is from the file."""
@@ -85,9 +86,9 @@ class Document:
                     moved = (*key, at - 1, *place[n + 1 :])
                     kept[moved] = value
 
-    def sentences(self) -> list[Problem]:
-        """Return all problems, first those of overrides, then those of the file in the order of lines."""
-        return sorted(self.problems, key=lambda problem: problem.line or 0)
+    def sorted_errors(self) -> list[Diagnostic]:
+        """Return all errors, first those of overrides, then those of the file in the order of lines."""
+        return sorted(self.errors, key=lambda error: error.location.line or 0)
 
 
 def dotted(key: KeyPath) -> str:
@@ -99,7 +100,7 @@ def dotted(key: KeyPath) -> str:
 
 
 def read(path: Path, *, what: str) -> Document:
-    """Read the YAML file `path`; errors are added to the problems of the document.
+    """Read the YAML file `path`; its errors are added to the document.
 
     Args:
         path: the file.
@@ -107,14 +108,14 @@ def read(path: Path, *, what: str) -> Document:
     """
     document = Document(path)
 
-    def fail(line: int | None, sentence: str) -> Document:
-        document.note(Problem(sentence, file=path, line=line))
+    def fail(line: int | None, sentence: str, code: str = "file-unreadable") -> Document:
+        document.add(Diagnostic(code, sentence, location=Location(path, line)))
         return document
 
     try:
         text = read_bytes(path, largest=TEXT).decode("utf-8-sig")
     except FileNotFoundError:
-        return fail(None, f"no such {what}{_neighbours(path)}")
+        return fail(None, f"no such {what}{_neighbours(path)}", "file-missing")
     except UnicodeDecodeError:
         return fail(None, f"this {what} is not UTF-8 text")
     except (OSError, ValueError) as error:
@@ -122,18 +123,18 @@ def read(path: Path, *, what: str) -> Document:
     try:
         node, constructor = _composed(text)
     except _NotYamlError as error:
-        return fail(error.line, f"not valid YAML: {error}")
+        return fail(error.line, f"not valid YAML: {error}", "file-not-yaml")
     except RecursionError:
-        return fail(None, f"cannot read this {what}: it is nested too deeply")
+        return fail(None, f"cannot read this {what}: it is nested too deeply", "file-too-large")
     document.lines[()] = 1
     if node is not None:
         try:
             document.data = _Reader(document, constructor).value(node, (), ())
         except _TooMuchError as error:
-            document.report(error.key[:1], str(error))
+            document.report(error.key[:1], str(error), "file-too-large")
             return document
-    if document.data is None and not document.problems:
-        return fail(None, f"this {what} is empty")
+    if document.data is None and not document.errors:
+        return fail(None, f"this {what} is empty", "file-empty")
     return document
 
 
@@ -147,7 +148,7 @@ def scalar(text: str) -> Any:
         return text
     document = Document(Path())
     value = _Reader(document, constructor).value(node, (), ())  # one scalar cannot be too much
-    return text if document.problems else value
+    return text if document.errors else value
 
 
 class _NotYamlError(Exception):
@@ -216,7 +217,7 @@ _TAGS = {
 
 @dataclass
 class _Reader:
-    """Converts YAML nodes to plain values, and collects lines and problems."""
+    """Converts YAML nodes to plain values, and collects lines and errors."""
 
     document: Document
     constructor: Any
@@ -250,7 +251,7 @@ class _Reader:
         try:
             value = self.constructor.construct_object(node)
         except (ValueError, LookupError, ArithmeticError):
-            self.document.report(key, f"{short(node.value)} is not of type {kind}")
+            self.document.report(key, f"{short(node.value)} is not of type {kind}", "value-wrong-type")
             return None
         if isinstance(value, int) and abs(value) >= LARGEST_WHOLE:
             self.document.report(key, f"{short(node.value)} is too large a whole number")
@@ -270,7 +271,7 @@ class _Reader:
         return items
 
     def _mapping(self, node: Any, key: KeyPath, above: tuple[int, ...]) -> dict[str, Any]:
-        path, lines, note = self.document.path, self.document.lines, self.document.note
+        path, lines, add = self.document.path, self.document.lines, self.document.add
         mapping: dict[str, Any] = {}
         for name, item in node.value:
             if name.tag.endswith(":merge"):
@@ -280,14 +281,15 @@ class _Reader:
         for name, item in node.value:
             line = name.start_mark.line + 1
             if not isinstance(name.value, str):
-                note(Problem("a key must be text, not a collection", file=path, line=line))
+                sentence = "a key must be text, not a collection"
+                add(Diagnostic("key-invalid", sentence, location=Location(path, line)))
                 continue
             if name.tag.endswith(":merge"):
                 continue
             below = (*key, name.value)
             if name.value in own:
                 sentence = f"{dotted(below)} is given twice, first in line {own[name.value]}"
-                note(Problem(sentence, file=path, line=line))
+                add(Diagnostic("key-duplicate", sentence, location=Location(path, line)))
                 continue
             own[name.value] = lines[below] = line
             self._check_text(name.value, below)
@@ -300,7 +302,8 @@ class _Reader:
         if all(one.id == "mapping" for one in nodes):
             return list(nodes)
         sentence = "<<: write an alias of a mapping, or a list of such aliases"
-        self.document.note(Problem(sentence, file=self.document.path, line=name.start_mark.line + 1))
+        where = Location(self.document.path, name.start_mark.line + 1)
+        self.document.add(Diagnostic("value-wrong-type", sentence, location=where))
         return []
 
 

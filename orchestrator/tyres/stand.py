@@ -169,7 +169,7 @@ def open_given(
     name = os.path.abspath(fmu) if path else fmu
     found = opener.open(find_fmu(name, scenario=place, fmus=folder, opener=opener))
     if missing := [variable for variable in known_by if variable not in found.variables]:
-        raise ScenarioError(f"{fmu}: this is no {role}: it has no {listed(missing)}")
+        raise ScenarioError(f"{fmu}: this is no {role}: it has no {listed(missing)}", code="fmu-wrong-kind")
     return found
 
 

@@ -41,6 +41,14 @@ def conversion_between(source: Variable, target: Variable) -> tuple[float, float
     return conversion(measures[0], measures[1])
 
 
+DIFFERENCES = {
+    "types": "wiring-type-mismatch",
+    "units": "wiring-unit-mismatch",
+    "enumerations": "wiring-enumeration-mismatch",
+}
+"""What differs at the ends of a wire -> code."""
+
+
 def contradicts_its_name(variable: Variable) -> bool:
     usual, defined = measure_of(variable.unit), measure_of(variable.unit, variable.definition)
     return usual is not None and usual != defined
@@ -83,7 +91,6 @@ class Connector:
         self._scenario = system.scenario
         self._fmus = system.fmus
         self._outputs, self._inputs = system.outputs, system.inputs
-        self._notes = system.notes
         self._report = system.report
         self._having: dict[str, list[str]] = {}  # name of an output -> instances that have it
         for instance, outputs in self._outputs.items():
@@ -115,7 +122,7 @@ class Connector:
                     values[(instance, name)] = variable.start
                     self._system.origins[instance][name] = DEFAULT
                 else:
-                    self._report(("units", instance), self._undriven(instance, variable))
+                    self._report(("units", instance), self._undriven(instance, variable), "input-undriven")
         fitted = [self._fitted(wire, key) for wire, key in wires.values()]
         self._note_units(wire for wire, key in wires.values() if self._scale(key) is None)
         by_unit: dict[str, dict[str, Value | InputSeries]] = {instance: {} for instance in self._fmus}
@@ -132,8 +139,9 @@ class Connector:
                 overruled.setdefault((instance, source), []).append(name)
         for (instance, source), names in sorted(overruled.items()):
             for name in fold([v for v in self._inputs[instance] if v in names]):
-                self._notes.append(
-                    f"{instance}.{name} has a value of its own: {source}.{name} does not drive it"
+                self._system.note(
+                    "wire-overruled",
+                    f"{instance}.{name} has a value of its own: {source}.{name} does not drive it",
                 )
 
     def _explicit(self, instance: str) -> bool:
@@ -152,6 +160,7 @@ class Connector:
                         key,
                         f"{wire.target}.{wire.input} has a source already, {other.source}.{other.output} "
                         f"by {dotted(its_key)}",
+                        "input-ambiguous",
                     )
         return wires
 
@@ -173,7 +182,7 @@ class Connector:
         sources = [one.instance] if one else list(ends[0])
         from_pattern = one.variable if one else "*"
         if target in sources:
-            self._report(key, f"connects {target} to itself")
+            self._report(key, f"connects {target} to itself", "connection-invalid")
             return []
         self._refuse_twice(sources, (*key, "from"))
         found = [(source, matching(from_pattern, self._outputs[source])) for source in sources]
@@ -185,7 +194,11 @@ class Connector:
         if not (outputs and inputs):
             return []
         if "*" in from_pattern and "*" not in to_pattern:
-            self._report(key, f"a * in 'from' ({connection.source}) needs one in 'to' ({connection.target})")
+            self._report(
+                key,
+                f"a * in 'from' ({connection.source}) needs one in 'to' ({connection.target})",
+                "connection-invalid",
+            )
             return []
         if "*" in from_pattern:
             pairs = [(outputs[part], n) for part, n in inputs.items() if part in outputs]
@@ -193,12 +206,16 @@ class Connector:
             pairs = [(outputs[""], n) for n in inputs.values()]
         if not pairs:
             given, wanted = listed(outputs, last="or"), listed(inputs, last="or")
-            self._report(key, f"nothing matches: in 'from' the * can be {given}, in 'to' {wanted}")
+            self._report(
+                key,
+                f"nothing matches: in 'from' the * can be {given}, in 'to' {wanted}",
+                "connection-matches-nothing",
+            )
         return [Wire(source, output, target, name) for (source, output), name in pairs]
 
     def _refuse_twice(self, names: list[str], key: KeyPath) -> None:
         if twice := next((name for name in names if names.count(name) > 1), None):
-            self._report(key, f"names {twice} twice")
+            self._report(key, f"names {twice} twice", "name-duplicate")
 
     def _prefer(self, sources: list[str], targets: list[str], key: KeyPath) -> None:
         """Store which sources instances prefer; report lists without any effect."""
@@ -210,10 +227,16 @@ class Connector:
         if any(self._outputs[s].keys() & self._inputs[t].keys() for s, t in ends):
             return
         if self._scenario.replaced.keys() & {*sources, *targets}:
-            self._notes.append(f"{dotted(key)} is left out: no names are equal any more")
+            self._system.note(
+                "left-out-after-swap", f"{dotted(key)} is left out: no names are equal any more"
+            )
             return
         given, wanted = listed(sources, last="or"), listed(targets, last="or")
-        self._report(key, f"nothing matches: no output of {given} has the name of an input of {wanted}")
+        self._report(
+            key,
+            f"nothing matches: no output of {given} has the name of an input of {wanted}",
+            "connection-matches-nothing",
+        )
 
     def _put_in_order(self) -> None:
         """Sort the preferred sources of each instance into an order that agrees with all of its lists."""
@@ -230,25 +253,38 @@ class Connector:
             except CycleError as error:
                 order = list(keys)  # avoids further errors about this instance
                 circle = [f"{a} to {b} ({dotted(edges[a, b])})" for a, b in pairwise(error.args[1])]
-                self._report(lists[-1][1], f"{instance} cannot prefer {listed(circle)}")
+                self._report(
+                    lists[-1][1], f"{instance} cannot prefer {listed(circle)}", "connection-circular"
+                )
             self._preferred[instance] = [(source, keys[source]) for source in order]
 
     def _no_such(self, key: KeyPath, instance: str, pattern: str, kind: str) -> None:
         """Report a pattern without a match; only note it if the replaced FMU has a match."""
         if self._system.had([instance], pattern, kind):
-            self._notes.append(
-                f"{dotted(key[:2])} is left out: {instance} has no {kind} {pattern!r} any more"
+            self._system.note(
+                "left-out-after-swap",
+                f"{dotted(key[:2])} is left out: {instance} has no {kind} {pattern!r} any more",
             )
             return
         variable = self._fmus[instance].variables.get(pattern)
         if variable is not None:
-            self._report(key, f"{instance}.{pattern} is no {kind}: its causality is {variable.causality}")
+            self._report(
+                key,
+                f"{instance}.{pattern} is no {kind}: its causality is {variable.causality}",
+                "variable-wrong-kind",
+            )
             return
         if pattern in self._fmus[instance].refused:
-            self._report(key, f"{instance}.{pattern} {self._fmus[instance].refused[pattern]}")
+            self._report(
+                key, f"{instance}.{pattern} {self._fmus[instance].refused[pattern]}", "variable-unsupported"
+            )
             return
         names = fold([v.name for v in self._fmus[instance].of(kind)])
-        self._report(key, f"{instance} has no {kind} {pattern!r}{hint(pattern, names, lead='it has')}")
+        self._report(
+            key,
+            f"{instance} has no {kind} {pattern!r}{hint(pattern, names, lead='it has')}",
+            "variable-unknown",
+        )
 
     def _by_names(self, wires: dict[Input, tuple[Wire, KeyPath]], taken: Set[Input]) -> set[Input]:
         """Add wires between equal names, except to inputs `taken`; return inputs with several candidates."""
@@ -269,6 +305,7 @@ class Connector:
                         key,
                         f"{instance}.{name} has more than one source: {choices}; "
                         "name one under 'connections'",
+                        "input-ambiguous",
                     )
         return ambiguous
 
@@ -293,7 +330,11 @@ class Connector:
                 continue
             unless = "" if constant.of_unit else f", unless its key names {wire.target}"
             driven = f"{wire.target}.{wire.input} is driven by {wire.source}.{wire.output}"
-            self._report(constant.key, f"{driven}: a constant is for inputs that no unit drives{unless}")
+            self._report(
+                constant.key,
+                f"{driven}: a constant is for inputs that no unit drives{unless}",
+                "constant-overruled",
+            )
         return {target: constant for target, constant in given.items() if target not in wires}
 
     def _undriven(self, instance: str, variable: Variable) -> str:
@@ -336,18 +377,21 @@ class Connector:
             what, of, to = differing
             ends = f"{wire.source}.{wire.output} [{of}] to {wire.target}.{wire.input} [{to}]"
             way_out = "; a connection with a gain takes plain numbers" if what == "units" else ""
-            self._report(key, f"cannot connect {ends}: the {what} differ{way_out}")
+            self._report(key, f"cannot connect {ends}: the {what} differ{way_out}", DIFFERENCES[what])
             return wire
         assert scale is not None
         whole = source.type == "Integer" and all(x.is_integer() for x in scale)
         if given and source.type != "Real" and not whole:
             self._report(
-                key, f"gain and offset are for Real, and whole ones for Integer, not for {source.type}"
+                key,
+                f"gain and offset are for Real, and whole ones for Integer, not for {source.type}",
+                "value-wrong-type",
             )
         if given and between not in (None, (1.0, 0.0), given):
-            self._notes.append(
+            self._system.note(
+                "conversion-replaced",
                 f"{dotted(key)}: its gain and offset stand in place of the conversion "
-                f"from {source.unit} to {target.unit}"
+                f"from {source.unit} to {target.unit}",
             )
         return replace(wire, gain=scale[0], offset=scale[1])
 
@@ -368,9 +412,12 @@ class Connector:
             )
         for instance, names in missing.items():
             text = listed(fold(list(dict.fromkeys(names))))
-            self._notes.append(
-                f"{instance} ({self._fmus[instance].name}) declares no unit for {text}: not checked"
+            self._system.note(
+                "unit-missing",
+                f"{instance} ({self._fmus[instance].name}) declares no unit for {text}: not checked",
             )
         for instance, measure in odd:
             who = f"{instance} ({self._fmus[instance].name})"
-            self._notes.append(f"{who} defines {measure} otherwise than usual: taken as it defines it")
+            self._system.note(
+                "unit-unusual", f"{who} defines {measure} otherwise than usual: taken as it defines it"
+            )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from ..errors import code_of
 from ..messages import fold, hint
 from ..names import SignalName, matching
 from ..plan import InputSeries, Value, ValueOrigin
@@ -61,10 +62,15 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
             (u, name): part for u in instances for part, name in matching(name_pattern, inputs[u]).items()
         }
         if not parts and system.had(instances, name_pattern, "input"):
-            system.notes.append(f"inputs.{pattern} is left out: no unit has such an input after the swap")
+            system.note(
+                "left-out-after-swap",
+                f"inputs.{pattern} is left out: no unit has such an input after the swap",
+            )
         elif not parts:
             names = fold(list(dict.fromkeys(name for instance in instances for name in inputs[instance])))
-            system.report(key, f"no input matches{hint(name_pattern, names, lead='there are')}")
+            system.report(
+                key, f"no input matches{hint(name_pattern, names, lead='there are')}", "variable-unknown"
+            )
         for (instance, name), part in parts.items():
             variable = inputs[instance][name]
             value: Value | InputSeries = 0
@@ -75,7 +81,7 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
                 else:
                     value = value_for(variable, raw)
             except ValueError as error:
-                system.report(key, f"{error}, for {instance}.{name}")
+                system.report(key, f"{error}, for {instance}.{name}", code_of(error))
             level = CHANGED_INPUTS if fact_changed and scenario.document.override(key) else INPUTS
             given_by = origin(scenario.document, key)
             one = Constant(value, key, given_by, of_unit, "*" not in pattern, level)
@@ -86,7 +92,9 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
                 found[instance, name] = replace(other, of_unit=True)
             elif other.rank == one.rank and other is not one:
                 system.report(
-                    key, f"{instance}.{name} has another constant already, by inputs.{other.key[1]}"
+                    key,
+                    f"{instance}.{name} has another constant already, by inputs.{other.key[1]}",
+                    "input-ambiguous",
                 )
     return found
 
@@ -101,9 +109,11 @@ def _of_facts(system: WiringContext) -> Iterator[tuple[Input, Constant]]:
         ]
         if fact.inputs and not takers:
             if not changed and any(system.had(known, one, "input") for one in fact.inputs):
-                system.notes.append(f"{name} is left out: no unit has such an input after the swap")
+                system.note(
+                    "left-out-after-swap", f"{name} is left out: no unit has such an input after the swap"
+                )
             else:
-                system.report(key, f"no unit has an input {name}")
+                system.report(key, f"no unit has an input {name}", "variable-unknown")
         refused: dict[str, list[str]] = {}
         for instance, one in takers:
             value = raw

@@ -1,4 +1,4 @@
-"""State shared by all steps of wiring: the scenario, its opened FMUs, problems and notes so far.
+"""State shared by all steps of wiring: the scenario, its opened FMUs, errors and notes so far.
 
 Also *facts*, values that reach all instances which need them.
 
@@ -19,13 +19,13 @@ from functools import cached_property
 
 from vocabulary.wheels import WHEELS, wheels
 
-from ..errors import Problem, WiringError
+from ..errors import Diagnostic, Severity, WiringError
 from ..messages import fold_sentences
 from ..names import FACTS as NAMES
 from ..names import match
 from ..plan import Fmu, Instance, Value, ValueOrigin, Variable
 from ..scenario.load import LoadedScenario
-from ..scenario.yaml_lines import PROBLEMS, Document, KeyPath
+from ..scenario.yaml_lines import MOST_ERRORS, Document, KeyPath
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ ByUnit = dict[str, dict[str, Variable]]
 
 @dataclass
 class WiringContext:
-    """The scenario that is being wired, its FMUs, and the problems and notes so far.
+    """The scenario that is being wired, its FMUs, and the errors and notes so far.
 
     A value for an FMU that an override has replaced is not an error if the replaced FMU has such a variable
     (`had`): it is ignored, with a note.
@@ -75,10 +75,10 @@ class WiringContext:
     fmus: Mapping[str, Fmu]
     replaced: Callable[[str], Fmu | None]
     """Returns the replaced FMU of an instance, None if it does not exist."""
-    notes: list[str] = field(default_factory=list)
-    """Messages that are not errors, for the plan."""
-    found: list[tuple[tuple[bool, KeyPath], str]] = field(default_factory=list)
-    """Problems, each with its key and whether that key is in the vehicle file."""
+    notes: list[Diagnostic] = field(default_factory=list)
+    """Diagnostics that are not errors, for the plan."""
+    found: list[tuple[tuple[bool, KeyPath, str], str]] = field(default_factory=list)
+    """Errors: whether the key is in the vehicle file, the key, the code; the sentence."""
 
     @cached_property
     def origins(self) -> dict[str, dict[str, ValueOrigin]]:
@@ -115,21 +115,31 @@ class WiringContext:
             for variable in fmu.variables.values()
         )
 
-    def report(self, key: KeyPath, sentence: str, document: Document | None = None) -> None:
-        """Report a problem with the value at `key` of the scenario, or of the vehicle file if given.
+    def note(self, code: str, sentence: str, severity: Severity = "info") -> None:
+        """Add a diagnostic that is not an error."""
+        self.notes.append(Diagnostic(code, sentence, severity))
+
+    def report(
+        self, key: KeyPath, sentence: str, code: str = "value-invalid", document: Document | None = None
+    ) -> None:
+        """Report an error about the value at `key` of the scenario, or of the vehicle file if given.
 
         Raises:
-            WiringError: there are too many problems to continue.
+            WiringError: there are too many errors to continue.
         """
-        self.found.append(((document is self.scenario.vehicle_document, key), sentence))
-        if len(self.found) >= len(WHEELS) * PROBLEMS:
-            raise WiringError(self.problems())
+        self.found.append(((document is self.scenario.vehicle_document, key, code), sentence))
+        if len(self.found) >= len(WHEELS) * MOST_ERRORS:
+            raise WiringError(self.errors())
 
-    def problems(self) -> list[Problem]:
-        """Return all problems in the order of the files' lines, with those of the four wheels merged."""
-        problems: list[Problem] = []
+    def errors(self) -> list[Diagnostic]:
+        """Return all errors in the order of the files' lines, with those of the four wheels merged."""
+        errors: list[Diagnostic] = []
         folded = fold_sentences(self.found)
         for of_vehicle, document in enumerate((self.scenario.document, self.scenario.vehicle_document)):
-            told = [document.problem(key, text) for (which, key), text in folded if which == of_vehicle]
-            problems += sorted(dict.fromkeys(told), key=lambda problem: problem.line or 0)
-        return problems
+            told = [
+                Diagnostic(code, text, location=document.location(key))
+                for (which, key, code), text in folded
+                if which == of_vehicle
+            ]
+            errors += sorted(dict.fromkeys(told), key=lambda error: error.location.line or 0)
+        return errors

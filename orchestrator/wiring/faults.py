@@ -30,12 +30,14 @@ def faults_of(
         for unit, name, of_output in at:
             variable = system.fmus[unit].variables[name]
             if variable.type != "Real":
-                system.report((*key, "on"), f"{unit}.{name} is {variable.type}: faults are for Real")
+                system.report(
+                    (*key, "on"), f"{unit}.{name} is {variable.type}: faults are for Real", "fault-invalid"
+                )
                 continue
             try:
                 value = _value(fault, variable)
             except ValueError as error:
-                system.report((*key, "value"), f"{unit}.{name}: {error}")
+                system.report((*key, "value"), f"{unit}.{name}: {error}", "fault-invalid")
                 continue
             before = sum((f.instance, f.variable, f.of_output) == (unit, name, of_output) for f in found)
             text = f"{fault.seed or 0} {unit}.{name} {of_output} {before}"
@@ -44,7 +46,8 @@ def faults_of(
             found.append(FaultySignal(fault, unit, name, of_output, value, stream if drawn else 0))
         if at and fault.begin >= scenario.stop_time:
             ends = f"the run ends at {float(scenario.stop_time):g} s"
-            system.notes.append(f"{_said(scenario, key)} never acts: it begins at {fault.begin:g} s, {ends}")
+            sentence = f"{_said(scenario, key)} never acts: it begins at {fault.begin:g} s, {ends}"
+            system.note("fault-never-acts", sentence)
     return tuple(found)
 
 
@@ -92,7 +95,10 @@ class _Finder:
         place = fault.on
         for unit in filter(None, (place.instance, place.target)):
             if unit not in self.system.fmus:
-                self._report(f"there is no unit {unit!r}{hint(unit, self.system.fmus, lead='units')}")
+                self._report(
+                    f"there is no unit {unit!r}{hint(unit, self.system.fmus, lead='units')}",
+                    "instance-unknown",
+                )
                 return []
         if place.target:
             return self._on_wires(fault)
@@ -103,7 +109,7 @@ class _Finder:
         names = matching(pattern, self.system.outputs[unit]).values()
         used = {(w.source, w.output) for w in self.wires} | self.record
         if names and not any((unit, name) in used for name in names):
-            self._report(f"{unit}.{pattern} is neither recorded nor on a wire")
+            self._report(f"{unit}.{pattern} is neither recorded nor on a wire", "fault-without-effect")
         return [(unit, name, True) for name in names if (unit, name) in used or "*" not in pattern]
 
     def _on_inputs(self, unit: str, pattern: str) -> list[tuple[str, str, bool]]:
@@ -111,7 +117,8 @@ class _Finder:
         driven = {w.input for w in self.wires if w.target == unit}
         if names and not driven & set(names):
             self._report(
-                f"{unit}.{pattern} is on no wire: a fault of an input is one of what a unit gives it"
+                f"{unit}.{pattern} is on no wire: a fault of an input is one of what a unit gives it",
+                "fault-without-effect",
             )
         if not names and not matching(pattern, self.system.outputs[unit]):
             self._no_such(unit, pattern)
@@ -129,7 +136,8 @@ class _Finder:
                 self._left_out()
                 return []
             self._report(
-                f"no wire leads from {place.instance}.{place.variable} to {place.target}{self._way(place)}"
+                f"no wire leads from {place.instance}.{place.variable} to {place.target}{self._way(place)}",
+                "wire-unknown",
             )
         return [(w.target, w.input, False) for w in found]
 
@@ -147,11 +155,11 @@ class _Finder:
             return
         names = fold([*self.system.outputs[unit], *self.system.inputs[unit]])
         guess = hint(pattern, names, lead="it has")
-        self._report(f"{unit} has neither an output nor an input {pattern!r}{guess}")
+        self._report(f"{unit} has neither an output nor an input {pattern!r}{guess}", "variable-unknown")
 
     def _left_out(self) -> None:
         said = _said(self.system.scenario, self.key)
-        self.system.notes.append(f"{said} is left out: there is no such signal any more")
+        self.system.note("left-out-after-swap", f"{said} is left out: there is no such signal any more")
 
-    def _report(self, sentence: str) -> None:
-        self.system.report((*self.key, "on"), sentence)
+    def _report(self, sentence: str, code: str) -> None:
+        self.system.report((*self.key, "on"), sentence, code)

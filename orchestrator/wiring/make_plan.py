@@ -21,7 +21,7 @@ from pathlib import Path
 from vocabulary.roles import role_in, role_of
 from vocabulary.wheels import WHEELS
 
-from ..errors import BuildError, ModelDescriptionError, Problem, WiringError, YawbenchError
+from ..errors import BuildError, Diagnostic, Location, ModelDescriptionError, WiringError, YawbenchError
 from ..fmu.binary import CORE
 from ..fmu.description import shadowed_modules
 from ..fmu.opener import Opener, find_fmu, find_folder, host_needs, stale_fmus
@@ -35,14 +35,14 @@ from .context import WiringContext
 from .faults import faults_of
 from .order import evaluate
 from .parameters import STATIC_LOADS, STIFFNESSES, Parameters
-from .warnings import exact, remarks
+from .warnings import exact, suspicious_values
 
 
 def missing_functions(
     instances: Iterable[Instance], wires: Sequence[Wire], record: Sequence[tuple[str, str]]
-) -> list[str]:
-    """Return a message for every FMI function that the plan needs and an FMU's library does not export."""
-    problems = []
+) -> list[Diagnostic]:
+    """Return an error for every FMI function that the plan needs and an FMU's library does not export."""
+    errors = []
     for instance in instances:
         if not instance.fmu.lacking:
             continue
@@ -63,10 +63,9 @@ def missing_functions(
         for function, names in needed.items():
             if function in instance.fmu.lacking:
                 purpose = f", which {listed(names)} needs" if names else ""
-                problems.append(
-                    f"{instance.name}: the library of {instance.fmu.name} lacks {function}{purpose}"
-                )
-    return problems
+                sentence = f"{instance.name}: the library of {instance.fmu.name} lacks {function}{purpose}"
+                errors.append(Diagnostic("fmu-function-missing", sentence))
+    return errors
 
 
 def recorded(system: WiringContext) -> tuple[SignalName, ...]:
@@ -85,13 +84,14 @@ def recorded(system: WiringContext) -> tuple[SignalName, ...]:
         if found:
             continue
         if system.had(instances, pattern):
-            system.notes.append(f"record[{i}] is left out: {instance} has no variable {pattern!r} any more")
+            sentence = f"record[{i}] is left out: {instance} has no variable {pattern!r} any more"
+            system.note("left-out-after-swap", sentence)
             continue
         usual, every = ([v.name for u in instances for v in of(fmus[u])] for of in (_usual, _all))
         names = every if closest(pattern, usual) is None and closest(pattern, every) else usual
         who = "no unit has a" if instance == "*" else f"{instance} has no"
         more = hint(pattern, fold(list(dict.fromkeys(names))), lead="its outputs are")
-        system.report(("record", i), f"{who} variable {pattern!r} to record{more}")
+        system.report(("record", i), f"{who} variable {pattern!r} to record{more}", "variable-unknown")
     return tuple(chosen)
 
 
@@ -141,7 +141,7 @@ def make_plan(
     Raises:
         ModelDescriptionError: FMUs are missing, damaged or not supported.
         BuildError: FMUs are stale and cannot be built.
-        WiringError: with all problems of parameters and connections.
+        WiringError: with all errors of parameters and connections.
     """
     system = _open_all(scenario, fmus, opener or Opener())
     opened, notes = system.fmus, system.notes
@@ -154,28 +154,32 @@ def make_plan(
     if not isolated:
         _check_instances(system)
     evaluation = evaluate(opened, wires)
-    problems = system.problems()
-    of_all = shadowed_modules(opened, isolated=isolated)
+    errors = system.errors()
+    shadowed = shadowed_modules(opened, isolated=isolated)
+    of_all = [Diagnostic("fmu-modules-conflict", sentence) for sentence in shadowed]
     of_all += [
-        f"algebraic loop: {loop}; these values would define each other at one instant, so "
-        "one of these units has to give an output that does not follow its input directly"
+        Diagnostic(
+            "algebraic-loop",
+            f"algebraic loop: {loop}; these values would define each other at one instant, so "
+            "one of these units has to give an output that does not follow its input directly",
+        )
         for loop in evaluation.loops
     ]
     instances = {name: _instance(system, name, parameters[name], values[name]) for name in opened}
-    if not problems and not of_all:  # all variables are known
+    if not errors and not of_all:  # all variables are known
         of_all = missing_functions(instances.values(), wires, record)
-    if not problems and not of_all:
-        problems += _take_from_tyres(scenario, instances, distributed, measure)
-    problems += [Problem(text, file=scenario.path) for text in of_all]
-    if problems:
-        raise WiringError([*_misplaced(scenario), *problems])
-    notes += [
-        f"possible algebraic loop: {loop}; an FMU here does not say which inputs its outputs follow, "
-        "so a wire against the evaluation order uses earlier values"
-        for loop in evaluation.possible_loops[:1]
-    ]
+    if not errors and not of_all:
+        errors += _take_from_tyres(scenario, instances, distributed, measure)
+    errors += [replace(one, location=Location(file=scenario.path)) for one in of_all]
+    if errors:
+        raise WiringError([*_misplaced(scenario), *errors])
+    for loop in evaluation.possible_loops[:1]:
+        system.note(
+            "algebraic-loop-possible",
+            f"possible algebraic loop: {loop}; an FMU here does not say which inputs its outputs follow, "
+            "so a wire against the evaluation order uses earlier values",
+        )
     notes += exact(list(instances.values()), wires)
-    findings = remarks(scenario, instances)
     return Plan(
         instances=tuple(instances[name] for name in evaluation.order),
         wires=_sorted(wires, evaluation.order, opened),
@@ -186,9 +190,8 @@ def make_plan(
         algorithm=scenario.algorithm,
         title=scenario.title,
         scenario=scenario.as_run(),
-        notes=(*notes, *(found.says for found in findings)),
         changes=scenario.changes,
-        findings=tuple(findings),
+        diagnostics=(*notes, *suspicious_values(scenario, instances)),
         faults=faults,
     )
 
@@ -198,8 +201,8 @@ def _take_from_tyres(
     instances: dict[str, Instance],
     distributed: Parameters,
     measure: TyreMeasurement | None,
-) -> list[Problem]:
-    """Set missing cornering stiffnesses of axles to those of the tyres at static loads; return problems."""
+) -> list[Diagnostic]:
+    """Set missing cornering stiffnesses of axles to those of the tyres at static loads; return errors."""
     if not distributed.lacking:
         return []
     loads = [distributed.car.values[name] for name in STATIC_LOADS]
@@ -210,9 +213,10 @@ def _take_from_tyres(
         found = measure(tyres[0], dict(zip(WHEELS[::2], loads, strict=True)))
     except (ValueError, YawbenchError) as error:
         return [
-            scenario.document.problem(
-                ("units", instance),
+            Diagnostic(
+                "vehicle-incomplete",
                 f"the vehicle file does not give {listed(names)}, and the tyres do not tell: {error}",
+                location=scenario.document.location(("units", instance)),
             )
             for instance, names in distributed.lacking.items()
         ]
@@ -251,8 +255,8 @@ def _instance(
     )
 
 
-def _misplaced(scenario: LoadedScenario) -> list[str]:
-    """Return a message for every swap to an FMU whose name has the role of another instance."""
+def _misplaced(scenario: LoadedScenario) -> list[Diagnostic]:
+    """Return an error for every swap to an FMU whose name has the role of another instance."""
     before = {name: scenario.replaced.get(name, spec.fmu) for name, spec in scenario.units.items()}
     roles = {name: role_of(name, Path(fmu).stem) for name, fmu in before.items()}
     found = []
@@ -260,17 +264,18 @@ def _misplaced(scenario: LoadedScenario) -> list[str]:
         name = Path(str(change.value)).stem
         others = [instance for instance, role in roles.items() if role == role_in(name)]
         if change.swaps and others and change.target.instance not in others:
-            found.append(f"{change}: by its name {name} is for the unit {others[0]!r}")
+            sentence = f"by its name {name} is for the unit {others[0]!r}"
+            found.append(Diagnostic("swap-role-mismatch", sentence, location=Location(target=str(change))))
     return found
 
 
 def _open_all(scenario: LoadedScenario, fmus: Path | None, opener: Opener) -> WiringContext:
     """Open the FMU of each instance of a scenario."""
     document = scenario.document
-    problems: dict[Problem, None] = {}
+    errors: dict[Diagnostic, None] = {}
     folder = fmus or Path()
     if fmus is not None and not fmus.is_dir():
-        raise ModelDescriptionError(f"--fmus {fmus}: no such folder")
+        raise ModelDescriptionError(f"--fmus {fmus}: no such folder", code="folder-missing")
     if fmus is None and not all(is_path(spec.fmu) for spec in scenario.units.values()):
         folder = find_folder(scenario.path, opener=opener)
 
@@ -286,18 +291,20 @@ def _open_all(scenario: LoadedScenario, fmus: Path | None, opener: Opener) -> Wi
             return None
 
     found: dict[str, Fmu] = {}
-    not_built: dict[str, None] = {}
+    not_built: dict[Diagnostic, None] = {}
     for name, spec in scenario.units.items():
         try:
             found[name] = opened(spec.fmu, spec.validate_)
-        except BuildError as error:  # noqa: PERF203 - all problems are collected
-            not_built.update(dict.fromkeys(error.problems))
+        except BuildError as error:  # noqa: PERF203 - all errors are collected
+            not_built.update(dict.fromkeys(error.diagnostics))
         except ModelDescriptionError as error:
-            problems.update({document.problem(("units", name, "fmu"), one): None for one in error.problems})
+            where = document.location(("units", name, "fmu"))
+            told = [Diagnostic(one.code, str(one), location=where) for one in error.diagnostics]
+            errors.update(dict.fromkeys(told))
     if not_built:
         raise BuildError(not_built)
-    if problems:
-        raise ModelDescriptionError(problems)
+    if errors:
+        raise ModelDescriptionError(errors)
     return WiringContext(scenario, found, replaced)
 
 
@@ -311,6 +318,7 @@ def _check_instances(system: WiringContext) -> None:
                 ("units", name, "fmu"),
                 f"{fmu.name} can be instantiated only once per process, and {other} uses it already; "
                 "with --isolate each unit has a process of its own",
+                "fmu-once-per-process",
             )
 
 

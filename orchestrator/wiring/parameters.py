@@ -15,6 +15,7 @@ from vocabulary.friction_table import table_of
 from vocabulary.patches import patches_of
 from vocabulary.vehicle import CAR
 
+from ..errors import code_of
 from ..files import TEXT, read_bytes
 from ..fmu.binary import integer_limits
 from ..messages import closest, fold, hint, listed, short
@@ -142,7 +143,7 @@ class Parameters:
         try:
             self._given[unit][name] = value_for(self._fmus[unit].variables[name], raw)
         except ValueError as error:
-            self._system.report(key, f"{says}{error}", document)
+            self._system.report(key, f"{says}{error}", code_of(error), document)
         self._system.origins[unit][name] = came or origin(document, key)
 
     def _takers(self, name: str) -> list[str]:
@@ -153,18 +154,21 @@ class Parameters:
         fmu, place = self._fmus[unit], (self._scenario.document, key)
         if not _is_parameter(fmu, name):
             if self._is_left_out(unit, name, key):
-                self._system.notes.append(f"{unit}.{name} is left out: {fmu.name} has no such parameter")
+                sentence = f"{unit}.{name} is left out: {fmu.name} has no such parameter"
+                self._system.note("left-out-after-swap", sentence)
             else:
-                self._system.report(key, _unknown(unit, fmu, name))
+                self._system.report(key, _unknown(unit, fmu, name), "parameter-unknown")
         elif not isinstance(raw, TextSpec):
             self._give(unit, name, raw, place)
         elif fmu.variables[name].type != "String":
-            self._system.report(key, "takes a value: only parameters that are text take a file")
+            self._system.report(
+                key, "takes a value: only parameters that are text take a file", "value-wrong-type"
+            )
         else:
             try:
                 text = _text_of(self._scenario.path.parent / raw.file)
             except ValueError as error:
-                self._system.report(key, f"{raw.file}: {error}")
+                self._system.report(key, f"{raw.file}: {error}", "file-unreadable")
             else:
                 self._give(unit, name, text, place, ValueOrigin("file", raw.file), f"{raw.file}: ")
 
@@ -180,12 +184,13 @@ class Parameters:
                 continue  # for a fact with inputs, `constants` reports whether it has an effect
             before = any(self._system.had(self._fmus, name, "parameter") for name in fact.parameters)
             if before and not changed:
-                self._system.notes.append(
-                    f"{fact_name} is left out: no unit has such a parameter after the swap"
+                self._system.note(
+                    "left-out-after-swap",
+                    f"{fact_name} is left out: no unit has such a parameter after the swap",
                 )
             else:
                 sentence = f"no unit has a parameter {listed(fact.parameters, last='or')}"
-                self._system.report((fact_name,), sentence)
+                self._system.report((fact_name,), sentence, "parameter-unknown")
         return by_change
 
     def _from_tyre_files(self) -> None:
@@ -198,11 +203,13 @@ class Parameters:
                     self._give(unit, f"{name}_{axle}", value, place, came, f"{file.path}: {name.upper()}: ")
         if self._scenario.tyre_files and not any(map(_takes_tyre_files, self._fmus.values())):
             if any(map(_takes_tyre_files, self._system.before())):
-                self._system.notes.append("tyres are left out: no tyre takes such files after the swap")
+                self._system.note(
+                    "left-out-after-swap", "tyres are left out: no tyre takes such files after the swap"
+                )
             else:
                 document, key = place
                 sentence = "no unit is a tyre that takes such files; tyre_magic_formula_62 does"
-                self._system.report(key, sentence, document)
+                self._system.report(key, sentence, "tyre-file-unused", document)
 
     def _from_vehicle(self) -> None:
         document = self._scenario.vehicle_document
@@ -218,20 +225,23 @@ class Parameters:
                     numbers[name] = float(value_for(_quantity(name), raw))
                 except ValueError as error:
                     if not takers:
-                        self._system.report(key, str(error), document)
+                        self._system.report(key, str(error), code_of(error), document)
             if takers or name in CAR:
                 idle += [] if takers else [name]
             elif any(_is_parameter(fmu, name) for fmu in self._system.before()):
-                self._system.notes.append(
-                    f"vehicle.{name} is left out: no unit has such a parameter after the swap"
+                self._system.note(
+                    "left-out-after-swap",
+                    f"vehicle.{name} is left out: no unit has such a parameter after the swap",
                 )
             else:
                 known = {v.name for fmu in self._fmus.values() for v in fmu.of("parameter")}
                 likely = closest(name, sorted(known | CAR.keys()))
                 guess = f"; did you mean {likely!r}?" if likely else ""
-                self._system.report(key, f"no unit has a parameter {name!r}{guess}", document)
+                self._system.report(
+                    key, f"no unit has a parameter {name!r}{guess}", "parameter-unknown", document
+                )
         for name, sentence in contradictions(numbers):
-            self._system.report(("parameters", name), sentence, document)
+            self._system.report(("parameters", name), sentence, "vehicle-contradictory", document)
         self.car = car_of(numbers)
         for name, formula in self.car.formulas.items():
             for unit in self._takers(name):
@@ -239,8 +249,8 @@ class Parameters:
                 self._give(unit, name, self.car.values[name], (document, ("parameters",)), came, says)
         for name in idle:
             if name not in self.car.used and document.override(("parameters", name)):
-                self._system.notes.append(
-                    f"vehicle.{name} changes nothing: no unit here takes it or what follows"
+                self._system.note(
+                    "value-unused", f"vehicle.{name} changes nothing: no unit here takes it or what follows"
                 )
 
     def _refuse_half_a_car(self) -> None:
@@ -249,7 +259,7 @@ class Parameters:
         A vehicle file from which not even static loads follow does not describe a car: it only replaces some
         defaults of the FMUs.
         """
-        wrong = any(of_vehicle for (of_vehicle, _), _ in self._system.found)
+        wrong = any(of_vehicle for (of_vehicle, *_), _ in self._system.found)
         if wrong or not self.car.values.keys() >= {*STATIC_LOADS}:
             return
         for unit, fmu in self._fmus.items():
@@ -264,6 +274,7 @@ class Parameters:
                     f"{fmu.name} takes its car from the vehicle file, which gives neither "
                     f"{listed(needed, last='nor')} nor what {'they' if len(needed) > 1 else 'it'} would "
                     "follow from: give them there, or to this unit",
+                    "vehicle-incomplete",
                 )
 
     def _is_left_out(self, unit: str, name: str, key: KeyPath) -> bool:

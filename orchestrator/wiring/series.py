@@ -256,9 +256,9 @@ def reading_series(path: Path | str) -> Iterator[None]:
             try:
                 yield
             except ValueError as error:
-                raise ScenarioError(f"{path}: {error}") from None
+                raise ScenarioError(f"{path}: {error}", code="series-unreadable") from None
     except ScenarioError as error:
-        raise ValueError(error.problems[0]) from error.__cause__
+        raise ValueError(str(error.diagnostics[0])) from error.__cause__
 
 
 def numbers_in(column: np.ndarray, unit: str | None, wanted: Unit | None, says: str, what: str) -> np.ndarray:

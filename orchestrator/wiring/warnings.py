@@ -20,8 +20,9 @@ from typing import NamedTuple
 from vocabulary.roles import without_role
 from vocabulary.vehicle import CAR, DYNAMIC_INDEX
 
+from ..errors import Diagnostic, Location
 from ..messages import fold, listed
-from ..plan import DEFAULT, SENSING, Finding, Instance, Value, Variable, Wire
+from ..plan import DEFAULT, SENSING, Instance, Value, Variable, Wire
 from ..scenario.load import LoadedScenario
 from ..scenario.quantities import meant_unit, number_and_unit
 from .context import FACTS
@@ -44,7 +45,7 @@ def seen_as(wire: Wire, units: Iterable[Instance]) -> str:
     return SENSING.get(roles[wire.source], truth)
 
 
-def exact(units: Sequence[Instance], wires: Iterable[Wire]) -> list[str]:
+def exact(units: Sequence[Instance], wires: Iterable[Wire]) -> list[Diagnostic]:
     """Return a note on signals that the control side gets exactly although there is a sensor.
 
     Instances that only observe, such as a reference for comparison, may use the truth: they do not affect
@@ -59,7 +60,8 @@ def exact(units: Sequence[Instance], wires: Iterable[Wire]) -> list[str]:
         if wire.target in steering and seen_as(wire, units) == TRUTH:
             found.setdefault((wire.target, wire.source), []).append(wire.input)
     told = [f"{listed(fold(names))} of {to} (from {of})" for (to, of), names in found.items()]
-    return [f"exact, though there is a sensor: {'; '.join(told)}"] if told else []
+    sentence = f"exact, though there is a sensor: {'; '.join(told)}"
+    return [Diagnostic("sensor-bypassed", sentence, "info")] if told else []
 
 
 def _steering(units: Iterable[Instance], wires: Iterable[Wire]) -> set[str]:
@@ -71,7 +73,6 @@ def _steering(units: Iterable[Instance], wires: Iterable[Wire]) -> set[str]:
     return found
 
 
-KIND = "no car"
 INERTIA = ("yaw_inertia", "mass", "cg_to_front_axle", "cg_to_rear_axle")
 """Parameters that determine the dynamic index."""
 
@@ -85,15 +86,15 @@ class _Given(NamedTuple):
     raw: object  # as written
 
 
-def remarks_on_car(scenario: LoadedScenario, units: Mapping[str, Instance]) -> list[Finding]:
+def suspicious_car(scenario: LoadedScenario, units: Mapping[str, Instance]) -> list[Diagnostic]:
     """Return a warning for every implausible quantity of the car, and for inertias that do not fit."""
-    of_file = remarks_on_values(scenario.vehicle_file.parameters)
+    of_file = suspicious_vehicle(scenario.vehicle_file.parameters)
     told = {(one.name, one.value) for one in _of_file(scenario.vehicle_file.parameters)}
     own = [one for one in _of_units(scenario, units) if (one.name, one.value) not in told]
     return [*of_file, *filter(None, map(_beyond, own)), *_index(units)]
 
 
-def remarks_on_values(parameters: Mapping[str, Value]) -> list[Finding]:
+def suspicious_vehicle(parameters: Mapping[str, Value]) -> list[Diagnostic]:
     """Return a warning for every implausible value of a vehicle file."""
     return [*filter(None, map(_beyond, _of_file(parameters)))]
 
@@ -118,7 +119,7 @@ def _of_units(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterat
                 yield _Given(f"{unit.name}.{name}", name, value, raw)
 
 
-def _beyond(one: _Given) -> Finding | None:
+def _beyond(one: _Given) -> Diagnostic | None:
     """Return a warning about a value outside its range, None if it is inside or has no range."""
     quantity = CAR[one.name]
     if quantity.plausible is None:
@@ -133,10 +134,10 @@ def _beyond(one: _Given) -> Finding | None:
     says = f"{one.place}: {one.value:.10g}{unit} is no car's, {low:g} to {high:g}{unit} is plausible" + (
         f"; did you mean '{number} {likely}'?" if likely else ""
     )
-    return Finding(KIND, one.place, one.value, None, says)
+    return _warning("value-implausible", one.place, says, one.value)
 
 
-def _index(units: Mapping[str, Instance]) -> Iterator[Finding]:
+def _index(units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
     """Yield a warning about the first instance whose yaw inertia does not fit its mass and wheelbase.
 
     None if one of the values is implausible by itself, or all are defaults of the FMU.
@@ -158,7 +159,7 @@ def _index(units: Mapping[str, Instance]) -> Iterator[Finding]:
                 f"{unit.name}: the yaw inertia, {inertia:.6g} kg.m2, is {index:.3g} times mass times the "
                 f"distances of both axles from the centre of mass; that of cars is {low:g} to {high:g} times"
             )
-            yield Finding(KIND, f"{unit.name}.yaw_inertia", inertia, None, says)
+            yield _warning("value-implausible", f"{unit.name}.yaw_inertia", says, inertia)
             return
 
 
@@ -187,19 +188,19 @@ class GivenValue(NamedTuple):
     variable: Variable
 
 
-def remarks(scenario: LoadedScenario, units: Mapping[str, Instance]) -> list[Finding]:
+def suspicious_values(scenario: LoadedScenario, units: Mapping[str, Instance]) -> list[Diagnostic]:
     """Return warnings about the values of a scenario's instances."""
     return [
         *_two_values(units),
         *_other_cars(scenario, units),
         *_slips(scenario, units),
         *_of_tyres(scenario, units),
-        *remarks_on_car(scenario, units),
+        *suspicious_car(scenario, units),
         *_idle_units(scenario, units),
     ]
 
 
-def _idle_units(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Finding]:
+def _idle_units(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
     """Yield a warning for every instance that would take its first step after the end of the run."""
     lasts = scenario.stop_time - scenario.start_time
     for unit in units.values():
@@ -209,10 +210,10 @@ def _idle_units(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iter
                 f"{unit.name} never takes a step: its step_size, {float(step):g} s, is longer than the run, "
                 f"{float(lasts):g} s; it keeps what it gave at the start"
             )
-            yield Finding("no step", f"{unit.name}.step_size", float(step), None, says)
+            yield _warning("instance-never-steps", f"{unit.name}.step_size", says, float(step))
 
 
-def _of_tyres(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Finding]:
+def _of_tyres(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
     """Yield a warning for every value that contradicts the tyre property files."""
     tyres = [unit for unit in units.values() if "pcy1_front" in unit.parameters]
     if not tyres or not scenario.tyre_files:
@@ -221,21 +222,19 @@ def _of_tyres(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterat
     for one in _parameters(units.values()):
         if one.name == "tyre" and "pcx1_front" in units[one.instance].parameters and one.value != law:
             says = f"{one.instance}.tyre is {one.value}: it does not ask the law of {tyres[0].name}, {law}"
-            yield Finding("another tyre", place=f"{one.instance}.tyre", says=says)
+            yield _warning("tyre-mismatch", f"{one.instance}.tyre", says)
     radii = {str(f.path.name): f.rolling_radius for f in scenario.tyre_files.values() if f.rolling_radius}
     told = [one for one in _parameters(units.values()) if one.name == "wheel_radius"]
     for (file, radius), one in product(radii.items(), told):
         if isinstance(one.value, float) and radius and abs(one.value / radius - 1.0) > RADIUS:
-            yield Finding(
-                "another radius",
-                place=f"{one.instance}.wheel_radius",
-                value=one.value,
-                says=f"{one.instance}.wheel_radius is {one.value:.4g} m, but the tyres of {file} roll on "
-                f"{radius:.4g} m at nominal load",
+            says = (
+                f"{one.instance}.wheel_radius is {one.value:.4g} m, but the tyres of {file} roll on "
+                f"{radius:.4g} m at nominal load"
             )
+            yield _warning("wheel-radius-mismatch", f"{one.instance}.wheel_radius", says, one.value)
 
 
-def _two_values(units: Mapping[str, Instance]) -> Iterator[Finding]:
+def _two_values(units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
     """Yield a warning for every quantity that has different values in several instances.
 
     Exceptions are values that the scenario gives to the single instances, and defaults of FMUs for
@@ -249,13 +248,13 @@ def _two_values(units: Mapping[str, Instance]) -> Iterator[Finding]:
     for name, told in groups.items():
         if name not in in_facts and _one_matter(name, told) and _differ(told):
             vehicle = f"--set vehicle.{name}=VALUE gives it to all of them that have no value of their own"
-            yield _finding(name, told, vehicle)
+            yield _values_differ(name, told, vehicle)
     for name, fact in FACTS.items():
         told = [one for one in _parameters(units.values()) if fact.counts(units[one.instance], one.name)]
         told += [one for one in _constants(units.values()) if one.name in fact.inputs]
         meant = ({"scenario"}, {"default"}) if fact.inputs else ()  # a road may differ from wheel to wheel
         if _differ(told) and {one.origin for one in told} not in meant:
-            yield _finding(name, told, f"--set {name}=VALUE gives all of them one value")
+            yield _values_differ(name, told, f"--set {name}=VALUE gives all of them one value")
 
 
 def _one_matter(name: str, told: list[GivenValue]) -> bool:
@@ -295,7 +294,7 @@ def _constants(units: Iterable[Instance]) -> Iterator[GivenValue]:
                 yield GivenValue(unit.name, name, value, origin, unit.fmu.variables[name])
 
 
-def _finding(name: str, told: list[GivenValue], way_out: str) -> Finding:
+def _values_differ(name: str, told: list[GivenValue], way_out: str) -> Diagnostic:
     alike: dict[tuple[float, str], list[GivenValue]] = {}
     for one in told:
         alike.setdefault((float(one.value), one.origin), []).append(one)  # type: ignore[arg-type]
@@ -306,10 +305,14 @@ def _finding(name: str, told: list[GivenValue], way_out: str) -> Finding:
     by_change = (one for one in told if one.origin not in OF_FILES)
     first = next(by_change, told[0])
     says = f"{name} has two values: {', '.join(parts)}; {way_out}"
-    return Finding("two values", f"{first.instance}.{first.name}", float(first.value), None, says)  # type: ignore[arg-type]
+    return _warning("values-differ", f"{first.instance}.{first.name}", says, float(first.value))  # type: ignore[arg-type]
 
 
-def _other_cars(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Finding]:
+def _warning(code: str, signal: str, says: str, value: float | None = None) -> Diagnostic:
+    return Diagnostic(code, says, "warning", Location(signal=signal), value)
+
+
+def _other_cars(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
     """Yield a warning if there is a vehicle file, but instances use defaults for properties of the car.
 
     A ratio of 1 is exempt: it means that angles are those of the road wheels.
@@ -323,10 +326,10 @@ def _other_cars(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iter
         told = [f"{one.instance}.{one.name} {_measured(one.value, one.variable)}" for one in found]
         says = f"not in the vehicle file, so as the FMUs have it: {listed(told)}"
         first = found[0]
-        yield Finding("default car", f"{first.instance}.{first.name}", float(first.value), None, says)
+        yield _warning("vehicle-incomplete", f"{first.instance}.{first.name}", says, float(first.value))
 
 
-def _slips(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Finding]:
+def _slips(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
     """Yield a warning for every number that was probably meant in another unit."""
     for one in _parameters(units.values()):
         spec = scenario.units[one.instance].parameters.get(one.name)
@@ -341,12 +344,12 @@ def _slips(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[
                     f"{one.instance}.{one.name}: {one.value:g} {unit} is {factor * one.value:.4g} {meant}; "
                     f"did you mean '{one.value:g} {meant}'?"
                 )
-                yield Finding("slip", f"{one.instance}.{one.name}", one.value, None, says)
+                yield _warning("unit-suspicious", f"{one.instance}.{one.name}", says, one.value)
     for one in _constants(units.values()):
         if one.name in FACTS["friction"].inputs and isinstance(one.value, float) and one.value > 2.0:
             place = f"{one.instance}.{one.name}"
             says = f"{place}: a friction of {one.value:g} is no road's; did you mean '{one.value:g} %'?"
-            yield Finding("slip", place, one.value, None, says)
+            yield _warning("unit-suspicious", place, says, one.value)
             return
 
 

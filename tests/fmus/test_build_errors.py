@@ -17,6 +17,7 @@ from orchestrator.errors import BuildError, ModelDescriptionError
 from orchestrator.fmu.opener import Opener, host_needs
 from tests.fmus.bare import Fmu, Unit
 from tests.orchestrator.fake_fmus import make_fmu
+from tests.sentences import texts_of
 
 GOOD = '''"""A controller."""
 
@@ -64,7 +65,7 @@ def attempt(tmp_path):
         with pytest.raises(BuildError) as caught:
             build_component(file, tmp_path / "out", **options)
         assert list(tmp_path.glob("out/*")) == []
-        return caught.value.problems
+        return [*texts_of(caught.value)]
 
     return do
 
@@ -334,7 +335,7 @@ def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path, monkeypatch):
     monkeypatch.setattr("orchestrator.files.claim", refuse)
     with pytest.raises(BuildError) as caught:
         build_all(tmp_path, components=["tyre_linear"], force=True)
-    assert caught.value.problems == [
+    assert [*texts_of(caught.value)] == [
         f"tyre_linear: cannot be read or written: [Errno 13] Permission denied: '{tmp_path}'"
     ]
 

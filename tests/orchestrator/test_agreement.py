@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.errors import WiringError
+from orchestrator.errors import WiringError, warnings_in
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from orchestrator.wiring.warnings import seen_as
@@ -66,7 +66,7 @@ def plan(*settings, facts='inputs: {"friction*": 0.65}', driver="", reference=""
 
 
 def remarks(*settings, **values):
-    return [one.says for one in plan(*settings, **values).findings]
+    return [str(one) for one in warnings_in(plan(*settings, **values).diagnostics)]
 
 
 def values(made, unit):
@@ -75,18 +75,17 @@ def values(made, unit):
 
 
 def test_a_scenario_without_contradictions_has_no_remarks():
-    assert plan().findings == ()
+    assert warnings_in(plan().diagnostics) == ()
 
 
 def test_a_change_of_what_the_reference_is_told_alone_names_the_tyres_that_keep_theirs():
     made = plan("inputs.friction=0.3")
-    (one,) = made.findings
-    assert (one.kind, one.place, one.value) == ("two values", "reference.friction", 0.3)
-    assert one.says == (
+    (one,) = warnings_in(made.diagnostics)
+    assert (one.code, one.location.signal, one.value) == ("values-differ", "reference.friction", 0.3)
+    assert one.message == (
         "friction has two values: reference.friction 0.3 (--set), tyre.friction_* 0.65 (scenario); "
         "--set friction=VALUE gives all of them one value"
     )
-    assert one.says in made.notes
 
 
 @pytest.mark.parametrize(
@@ -96,7 +95,7 @@ def test_one_name_gives_friction_to_all_units(given):
     made = plan(**given)
     assert values(made, "reference")["friction"] == 0.3
     assert {values(made, "tyre")[f"friction_{wheel}"] for wheel in WHEELS} == {0.3}
-    assert made.findings == ()
+    assert warnings_in(made.diagnostics) == ()
 
 
 def test_a_changed_fact_goes_before_what_the_file_gives_and_behind_other_changes():
@@ -118,7 +117,7 @@ def test_one_speed_reaches_the_plant_and_the_driver():
     made = plan("speed=72 km/h", plant="initial_speed: 30", driver="target_speed: 30, speed_gain: 100")
     assert (values(made, "plant")["initial_speed"], values(made, "driver")["target_speed"]) == (20.0, 20.0)
     assert str(made.changes[0].target) == "speed"
-    assert made.findings == ()
+    assert warnings_in(made.diagnostics) == ()
 
 
 def test_friction_that_a_road_gives_is_left_to_it_and_is_that_of_the_road():
@@ -139,7 +138,7 @@ def test_a_reference_that_is_told_another_friction_than_the_roads_is_named_unles
     ]
     meant = plan(facts='friction: 0.5\ninputs: {"reference.friction": 0.3}', more=road)
     assert values(meant, "reference")["friction"] == 0.3
-    assert meant.findings == ()
+    assert warnings_in(meant.diagnostics) == ()
     late = "connections:\n  - {from: road.friction_delayed, to: reference.friction}\n"
     told = plan(facts="friction: 0.5", more=road + late)
     (wire,) = (w for w in told.wires if w.target == "reference")

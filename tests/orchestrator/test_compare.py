@@ -11,7 +11,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from orchestrator.commands.results import distinct
-from orchestrator.errors import ScenarioError
+from orchestrator.errors import Diagnostic, ScenarioError
 from orchestrator.experiments.comparison import FIGURE_SPECS, comparison_table, variants
 from orchestrator.experiments.experiment import NamedRun, experiment_of
 from orchestrator.experiments.figures import draw_all
@@ -155,7 +155,9 @@ def findings(tmp_path):
     )
     write(car(2.4), tmp_path / "off")
     write(car(1.02), tmp_path / "fnn")
-    lost = Outcome(Job("broken", Path("s.yaml"), tmp_path / "broken"), ("unit died",), 1)
+    lost = Outcome(
+        Job("broken", Path("s.yaml"), tmp_path / "broken"), (Diagnostic("run-failed", "unit died"),), 1
+    )
     return judge_results(replace(experiment, spec=spec), tmp_path, [lost])
 
 

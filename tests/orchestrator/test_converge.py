@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.errors import ResultsError, ScenarioError
+from orchestrator.errors import Diagnostic, ResultsError, ScenarioError
 from orchestrator.experiments.comparison import (
     columns_of,
     convergence_figure,
@@ -41,7 +41,7 @@ def made(folder: Path, orders: dict[str, int], halvings: int = 3, scale: float =
             given = changed(step_size=step, algorithm=name)
             runs.append(NamedRun(f"{name}/{k}", f"{name} {k}", "", Path("x.yaml"), given))
     experiment = experiment_of(Path("x.yaml"), runs, title="title")
-    failed = [Outcome(Job(name, Path(), folder), (why,), 1) for name, why in lost]
+    failed = [Outcome(Job(name, Path(), folder), (Diagnostic("run-failed", why),), 1) for name, why in lost]
     return judge_results(experiment, folder, failed)
 
 

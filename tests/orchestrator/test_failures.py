@@ -397,7 +397,7 @@ def test_a_failed_run_stands_beside_the_results_of_one_that_reached_its_end(tmp_
     failing = ramp_into(raise_at(0.5, ValueError("no")))
     with pytest.raises(SimulationError) as caught:
         simulate(make_plan(failing, ["source.x -> target.x"]), tmp_path, opener=Stage(failing))
-    assert caught.value.problems[-1] == f"What was recorded until then: {tmp_path / 'failed'}"
+    assert str(caught.value.diagnostics[-1]) == f"What was recorded until then: {tmp_path / 'failed'}"
     results = load_results(tmp_path)
     assert list(results) == ["a.x"]
     assert results.record.status == "completed"

@@ -29,6 +29,7 @@ from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.overrides import read_changes
 from orchestrator.wiring.make_plan import make_plan as plan_of_scenario
+from tests.sentences import texts_of
 
 from .fake_fmus import Var, make_fmu, out
 from .fakes import Clock, Function, Integrator, Stage, Witness, make_plan
@@ -380,7 +381,7 @@ def test_a_pattern_stands_for_several_and_each_has_random_numbers_of_its_own(fol
 def test_a_fault_that_cannot_be_is_one_sentence(fault, sentence, folder):
     with pytest.raises(YawbenchError) as caught:
         planned(fault)
-    (problem,) = caught.value.problems
+    (problem,) = texts_of(caught.value)
     assert str(problem).startswith(f"--fault {fault}: ")
     assert sentence in str(problem)
 
@@ -389,20 +390,22 @@ def test_a_fault_of_a_file_is_told_with_its_line_also_after_an_option_has_moved_
     text = SCENARIO + "faults:\n  - {on: gyro.yaw_rate, kind: freeze}\n  - {on: plant.yaw_rate, kind: gain}\n"
     with pytest.raises(ScenarioError) as caught:
         planned("gyro.yaw_rate: none", text=text)
-    assert [str(p) for p in caught.value.problems] == ["a.yaml:13: faults[0]: gain needs a value: x * value"]
+    assert [str(p) for p in texts_of(caught.value)] == ["a.yaml:13: faults[0]: gain needs a value: x * value"]
 
 
 def test_what_a_fault_never_reaches_is_noted(folder):
     assert (
         "--fault gyro.yaw_rate: freeze from 3 s never acts: it begins at 3 s, the run ends at 2 s"
-        in planned("gyro.yaw_rate: freeze from 3 s").notes
+        in texts_of(planned("gyro.yaw_rate: freeze from 3 s"))
     )
     make_fmu(Path("fmus/controller_off.fmu"), outputs=[out("yaw_moment", unit="N.m")])
     without = SCENARIO.replace("  - {from: [gyro], to: [law]}\n", "")
     gone = planned("gyro.yaw_rate -> law: freeze", text=without,
                    changes=[Override.of("law", "controller_off", "--swap")])  # fmt: skip
     assert gone.faults == ()
-    assert "--fault gyro.yaw_rate -> law: freeze is left out: there is no such signal any more" in gone.notes
+    assert "--fault gyro.yaw_rate -> law: freeze is left out: there is no such signal any more" in texts_of(
+        gone
+    )
 
 
 def test_a_run_with_a_fault_is_another_run(folder):

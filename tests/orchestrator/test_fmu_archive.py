@@ -47,7 +47,7 @@ def problem(path: Path) -> str:
     with pytest.raises(ModelDescriptionError) as caught:
         open_fmu(path)
     assert caught.value.exit_status == 2
-    assert len(caught.value.problems) == 1
+    assert len(caught.value.diagnostics) == 1
     assert "\n" not in str(caught.value)
     return str(caught.value)
 

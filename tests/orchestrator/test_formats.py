@@ -20,6 +20,7 @@ from orchestrator.results.read import load_results
 from orchestrator.results.recorder import BLOCK
 from orchestrator.results.run_record import RunRecord
 from tests.fmu_copies import put_fmus
+from tests.sentences import texts_of
 
 from .fakes import Clock, Function, Stage, make_plan
 from .recorded import car, record_text, write
@@ -147,7 +148,7 @@ def test_a_run_writes_the_format_that_it_is_told(name, tmp_path):
 def test_a_run_that_fails_keeps_what_it_has_recorded(name, tmp_path):
     with pytest.raises(SimulationError) as error:
         simulate(plan(), tmp_path, opener=Stage(units(fail_at=0.9)), format=name)
-    assert error.value.problems[1] == f"What was recorded until then: {tmp_path}"
+    assert str(error.value.diagnostics[1]) == f"What was recorded until then: {tmp_path}"
     found = load_results(tmp_path)
     assert found.record.status == "failed"
     assert found.time[-1] == 0.899
@@ -156,7 +157,7 @@ def test_a_run_that_fails_keeps_what_it_has_recorded(name, tmp_path):
 def test_a_run_in_memory_that_fails_says_nothing_of_files():
     with pytest.raises(SimulationError) as error:
         simulate_in_memory(plan(), opener=Stage(units(fail_at=0.9)))
-    assert error.value.problems == ["a: y is not a number at t = 0.9 s, on the wire a.y -> b.y"]
+    assert [*texts_of(error.value)] == ["a: y is not a number at t = 0.9 s, on the wire a.y -> b.y"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a limit on the size of files")
@@ -173,7 +174,7 @@ def test_a_disk_without_room_is_one_sentence_and_keeps_the_earlier_results(name,
             simulate(plan(), tmp_path, opener=Stage(units()), format=name)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-    assert "cannot be written: File too large" in caught.value.problems[0]
+    assert "cannot be written: File too large" in str(caught.value.diagnostics[0])
     assert "rows that fit" not in str(caught.value)
     assert "recorded until" not in str(caught.value)
     assert len(load_results(tmp_path).time) == 51

@@ -193,7 +193,7 @@ def test_a_failure_in_an_isolated_unit_is_the_sentence_of_one_that_is_not(fmus, 
             else:
                 with opened(plan.instances) as isolation:
                     simulate(plan, tmp_path / "a", opener=isolation)
-        sentences.append(error.value.problems[0])
+        sentences.append(str(error.value.diagnostics[0]))
     assert sentences[0] == sentences[1]
     assert "plant" in sentences[0]
 

@@ -14,6 +14,7 @@ from orchestrator.errors import ResultsError, ScenarioError, SimulationError, Ya
 from orchestrator.experiments.jobs import Job, execute, read_back, ready
 from orchestrator.results.read import load_results
 from orchestrator.workers import Pool
+from tests.sentences import texts_of
 
 from .recorded import car, write
 
@@ -64,7 +65,7 @@ def test_a_run_that_fails_or_dies_takes_no_other_with_it(tmp_path):
     assert outcomes["fine"].ok
     assert outcomes["fails"].reason == "plant: step failed at t = 1 s"
     assert outcomes["fails"].exit_status == 1
-    assert outcomes["wrong"].problems == ("first problem", "second problem")
+    assert texts_of(outcomes["wrong"]) == ("first problem", "second problem")
     assert outcomes["wrong"].exit_status == 2
     assert outcomes["dies"].reason == (
         "the process of this run died of SIGKILL (sent from outside or for want of memory)"
@@ -74,7 +75,7 @@ def test_a_run_that_fails_or_dies_takes_no_other_with_it(tmp_path):
 
 def test_an_error_of_the_program_itself_is_reported_too(tmp_path):
     (outcome,) = execute(jobs(tmp_path, "breaks"), run=obey)
-    assert outcome.problems == ("ZeroDivisionError: by zero",)
+    assert texts_of(outcome) == ("ZeroDivisionError: by zero",)
     assert outcome.exit_status == 1
 
 
@@ -168,7 +169,7 @@ def test_all_problems_of_all_jobs_are_found_before_any_runs(tmp_path):
     twice = [Job("a", first, tmp_path), Job("b", second, tmp_path), Job("c", first, tmp_path)]
     with pytest.raises(ScenarioError) as error:
         ready(twice)
-    assert error.value.problems == [f"{path}: no such scenario file" for path in (first, second)]
+    assert [*texts_of(error.value)] == [f"{path}: no such scenario file" for path in (first, second)]
 
 
 def test_results_can_be_read_by_several_processes(tmp_path):

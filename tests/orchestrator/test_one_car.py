@@ -14,6 +14,7 @@ from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.derivations import DERIVATIONS, car_of, contradictions
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
+from tests.sentences import texts_of
 from vocabulary.gravity import G
 
 from .fake_fmus import Var, make_fmu, out
@@ -165,11 +166,11 @@ def test_check_shows_what_is_derived_and_what_other_units_are_meant_for(plan, ca
 def test_a_change_of_what_others_follow_from_reaches_the_unit(plan):
     made = plan(settings=["vehicle.sprung_mass=1.7 t"])
     assert unit(made, "plant").parameters["mass"] == 1880.0
-    assert made.notes == ()
+    assert texts_of(made) == ()
 
 
 def test_a_change_that_reaches_no_unit_is_told(plan):
-    assert plan(settings=["vehicle.track_width=1.5"]).notes == (
+    assert texts_of(plan(settings=["vehicle.track_width=1.5"])) == (
         "vehicle.track_width changes nothing: no unit here takes it or what follows",
     )
 
@@ -195,7 +196,7 @@ def test_a_change_that_reaches_no_unit_is_told(plan):
 def test_what_is_wrong_with_a_car_is_said_in_one_sentence(plan, car, fmu, says):
     with pytest.raises(WiringError) as raised:
         plan(car, fmu)
-    assert len(raised.value.problems) == 1
+    assert len(raised.value.diagnostics) == 1
     assert says in str(raised.value)
 
 

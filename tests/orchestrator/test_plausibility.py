@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from orchestrator.errors import Diagnostic, Location, warnings_in
 from orchestrator.experiments.tables import MARK, marked, remarks
-from orchestrator.metrics.plausibility import CHECKS, PlausibilityWatch, findings_in, first_of_each
-from orchestrator.plan import Finding, Fmu, Instance, Plan, Variable, Wire
-from orchestrator.results.run_record import FindingRecord, RunRecord
+from orchestrator.metrics.plausibility import CHECKS, PlausibilityWatch
+from orchestrator.plan import Fmu, Instance, Plan, Variable, Wire
+from orchestrator.results.run_record import RunRecord
 from vocabulary.wheels import WHEELS
 
 from .recorded import car, noted
@@ -39,15 +40,17 @@ def found(made, *columns, blocks=4):
     time = np.linspace(0.0, 1.0, len(columns[0]))
     for rows in np.array_split(np.column_stack([time, *columns]), blocks):
         watch.look(rows)
-    return {one.kind: one for one in first_of_each(watch.findings())}
+    return {one.code: one for one in warnings_in(watch.warnings())}
 
 
 def test_a_car_that_spins_is_named_with_the_time_and_the_angle():
     sideslip = np.radians(np.linspace(0.0, -90.0, 101))
-    one = found(plan(sideslip={"unit": "rad"}), sideslip)["spin"]
-    assert (one.place, one.time) == ("plant.sideslip", pytest.approx(0.51))
+    one = found(plan(sideslip={"unit": "rad"}), sideslip)["car-spins"]
+    assert (one.location.signal, one.location.time) == ("plant.sideslip", pytest.approx(0.51))
     assert one.value == pytest.approx(90.0)
-    assert one.says == "the car spins: its sideslip angle passes 45 degrees at 0.51 s and reaches 90 degrees"
+    assert (
+        one.message == "the car spins: its sideslip angle passes 45 degrees at 0.51 s and reaches 90 degrees"
+    )
 
 
 def test_a_calm_run_has_no_findings():
@@ -59,27 +62,27 @@ def test_the_first_wheel_that_lifts_is_named():
     loads = {f"vertical_load_{wheel}": {"unit": "N"} for wheel in WHEELS}
     time = np.linspace(0.0, 1.0, 101)
     values = [np.where(time < at, 3000.0, 0.0) for at in (2.0, 0.9, 0.4, 2.0)]
-    one = found(plan(**loads), *values)["wheel lift"]
-    assert (one.place, one.time) == ("plant.vertical_load_rl", pytest.approx(0.4))
-    assert one.says == "the rear left wheel lifts off at 0.4 s"
+    one = found(plan(**loads), *values)["wheel-lifts"]
+    assert (one.location.signal, one.location.time) == ("plant.vertical_load_rl", pytest.approx(0.4))
+    assert one.message == "the rear left wheel lifts off at 0.4 s"
 
 
 @pytest.mark.parametrize(
-    ("signal", "value", "kind"),
+    ("signal", "value", "code"),
     [
-        ("velocity_x", 90.0, "speed"),
-        ("velocity_x", -5.0, "backwards"),
-        ("roll_angle", 0.5, "roll over"),
-        ("steer_angle", 5.0, "steer angle"),
+        ("velocity_x", 90.0, "speed-implausible"),
+        ("velocity_x", -5.0, "car-rolls-backwards"),
+        ("roll_angle", 0.5, "car-rolls-over"),
+        ("steer_angle", 5.0, "steer-angle-implausible"),
     ],
 )
-def test_each_limit_is_looked_at(signal, value, kind):
-    assert list(found(plan(**{signal: {}}), np.full(10, value))) == [kind]
+def test_each_limit_is_looked_at(signal, value, code):
+    assert list(found(plan(**{signal: {}}), np.full(10, value))) == [code]
 
 
 def test_more_acceleration_than_the_road_gives_is_named():
     made = plan(acceleration_x={}, acceleration_y={})
-    one = found(made, np.full(10, 6.0), np.full(10, 8.0))["grip"]
+    one = found(made, np.full(10, 6.0), np.full(10, 8.0))["acceleration-implausible"]
     assert one.value == pytest.approx(10.0 / 9.81 / 0.5)
     assert found(made, np.full(10, 3.0), np.full(10, 4.0)) == {}
 
@@ -93,9 +96,9 @@ def test_where_friction_is_no_constant_grip_is_not_judged():
 def test_a_value_outside_what_its_model_states_is_named():
     made = plan(pressure={"lowest": 0.0, "highest": 2.0})
     assert found(made, np.linspace(0.0, 2.0, 10)) == {}
-    one = found(made, np.linspace(0.0, 3.0, 101))["range"]
-    assert one.says == "plant.pressure is 3 at 0.67 s, beyond the 2 that its model is valid for"
-    assert found(made, np.linspace(0.0, -1.0, 101))["range"].value == pytest.approx(-1.0)
+    one = found(made, np.linspace(0.0, 3.0, 101))["range-left"]
+    assert one.message == "plant.pressure is 3 at 0.67 s, beyond the 2 that its model is valid for"
+    assert found(made, np.linspace(0.0, -1.0, 101))["range-left"].value == pytest.approx(-1.0)
 
 
 def test_values_that_are_not_finite_are_no_findings():
@@ -104,19 +107,26 @@ def test_values_that_are_not_finite_are_no_findings():
 
 def test_every_check_says_where_its_limit_comes_from():
     assert all(check.why.startswith("chosen: ") for check in CHECKS)
-    assert len({check.kind for check in CHECKS}) == len(CHECKS)
+    assert len({check.code for check in CHECKS}) == len(CHECKS)
 
 
 def test_a_run_with_findings_is_marked_in_tables():
     results = car()
     assert marked("a", results) == "a"
-    noted(results, findings=[vars(Finding("spin", "plant.sideslip", 90.0, 1.0, "the car spins"))])
+    where = Location(signal="plant.sideslip", time=1.0)
+    spin = Diagnostic("car-spins", "the car spins", "warning", where, math.inf)
+    noted(results, diagnostics=[spin.record()])
+    assert results.record.all_diagnostics == (spin,)
     assert marked("a", results) == f"a {MARK}"
     assert remarks([("a", results)]) == [f"{MARK} a: the car spins"]
 
 
-def test_findings_are_read_back_from_a_record_even_if_not_finite():
-    found = Finding("spin", "plant.sideslip", math.inf, 1.0, "the car spins")
-    assert findings_in(RunRecord(findings=[FindingRecord(**vars(found))])) == (found,)
-    assert findings_in(RunRecord.model_validate({"findings": [vars(found) | {"value": "inf"}]})) == (found,)
-    assert findings_in(RunRecord()) == ()
+def test_records_of_earlier_versions_give_diagnostics():
+    spin = {"kind": "spin", "place": "plant.sideslip", "value": "inf", "time": 1.0, "says": "the car spins"}
+    notes = ["the car spins", "stiffnesses are those of the tyres"]
+    record = RunRecord.model_validate({"findings": [spin], "notes": notes})
+    note, warning = record.all_diagnostics
+    assert (note.severity, note.message) == ("info", "stiffnesses are those of the tyres")
+    where = Location(signal="plant.sideslip", time=1.0)
+    assert warning == Diagnostic("car-spins", "the car spins", "warning", where, math.inf)
+    assert record.course_warnings == (warning,)

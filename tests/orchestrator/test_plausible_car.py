@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 import yaml
 
+from orchestrator.errors import warnings_in
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from orchestrator.wiring.parameters import known_car
-from orchestrator.wiring.warnings import remarks_on_values
+from orchestrator.wiring.warnings import suspicious_vehicle
 from tests.changed import changed
 from tests.commands import status_of
 from vocabulary.vehicle import CAR, DYNAMIC_INDEX
@@ -54,7 +55,7 @@ def remarks(*settings, **car):
     Path("car.yaml").write_text("".join(["parameters:\n", *(f"  {k}: {v}\n" for k, v in given.items())]))
     Path("a.yaml").write_text(SCENARIO)
     made = make_plan(load_scenario("a.yaml", changes=changed(settings=settings)))
-    return [one.says for one in made.findings]
+    return [str(one) for one in warnings_in(made.diagnostics)]
 
 
 def test_a_car_that_can_be_has_no_remarks():
@@ -116,7 +117,7 @@ def test_check_does_not_say_that_nothing_is_wrong(capsys):
 @pytest.mark.parametrize("file", sorted((SCENARIOS / "vehicles").glob("*.yaml")), ids=lambda file: file.stem)
 def test_every_car_of_the_library_is_plausible_with_all_that_follows(file):
     given = yaml.safe_load(file.read_text())["parameters"]
-    assert remarks_on_values(given) == []
+    assert suspicious_vehicle(given) == []
     known = known_car(given).values
     for name, value in known.items():
         low, high = CAR[name].plausible or (value, value)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.errors import RecordWarning
+from orchestrator.errors import Diagnostic, RecordWarning
 from orchestrator.experiments.jobs import MeasuredRun
 from orchestrator.experiments.ranking import EntrySpec, load_ranking
 from orchestrator.experiments.ranking_scores import (
@@ -120,7 +120,9 @@ def test_an_entry_without_a_run_is_missing_and_has_no_place():
 
 
 def test_a_run_that_broke_off_counts_as_lost():
-    lost = RankedRun("x", "c", A, A, MeasuredRun({}, ("the controller has crashed",)))
+    lost = RankedRun(
+        "x", "c", A, A, MeasuredRun({}, (Diagnostic("run-failed", "the controller has crashed"),))
+    )
     cell = RankingCell("x", "c", [driven(), lost])
     assert cell.state == "failed"
     assert cell.margin.mean == pytest.approx(100 * (0.20 - UNHELD))

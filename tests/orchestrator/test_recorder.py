@@ -18,6 +18,7 @@ from orchestrator.results import recorder as module
 from orchestrator.results.read import load_results
 from orchestrator.results.recorder import BLOCK, Recorder
 from orchestrator.results.run_record import RunRecord
+from tests.sentences import texts_of
 
 from .fakes import Clock, Function, Stage, make_plan
 
@@ -244,7 +245,7 @@ def test_a_failure_that_cannot_be_recorded_says_both(tmp_path, monkeypatch):
     units = {"a": Clock(x=lambda t: math.nan), "b": Function(lambda t, u: {"y": u["x"]}, ["x"], ["y"])}
     with pytest.raises(SimulationError) as caught:
         simulate(make_plan(units, ["a.x -> b.x"]), tmp_path / "out", opener=Stage(units))
-    assert caught.value.problems == [
+    assert [*texts_of(caught.value)] == [
         "a: x is not a number at t = 0 s, on the wire a.x -> b.x",
         f"{tmp_path / 'out'}: results cannot be written: the disk is full.",
     ]

@@ -11,7 +11,7 @@ import pytest
 from lxml import html
 
 from orchestrator.cli import main
-from orchestrator.errors import ScenarioError
+from orchestrator.errors import Diagnostic, ScenarioError
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.jobs import MeasuredRun, PlanningCache
 from orchestrator.experiments.margins import Gap, PointVerdict, Region, margin
@@ -79,7 +79,11 @@ def judged(tmp_path, fmus):
         def record(job) -> MeasuredRun:
             own = job.plan.instances[0].parameters
             peak = own["amplitude"] / own.get("steering_ratio", 1.0)
-            return MeasuredRun({}, ("it failed",)) if failing(peak) else MeasuredRun({"peak": (peak, "rad")})
+            return (
+                MeasuredRun({}, (Diagnostic("run-failed", "it failed"),))
+                if failing(peak)
+                else MeasuredRun({"peak": (peak, "rad")})
+            )
 
         findings = ExperimentResult(experiment, [record(job) for job in planned.jobs], {}, planned)
         plan = plan_region(planned, tmp_path / "o", once=once)

@@ -16,6 +16,7 @@ from orchestrator.experiments.outcome import judge_records
 from orchestrator.experiments.planning import plan_experiment
 from orchestrator.experiments.verdict_tables import HOLDS, UNDECIDED, limit_tables, run_tables, verdict
 from orchestrator.metrics.run_metrics import MetricValue
+from tests.sentences import texts_of
 
 SCENARIO = """
 title: A car that turns, and its gyro
@@ -162,7 +163,7 @@ def test_in_haste_there_are_fewer_repeats(load):
 def test_mistakes_are_told_in_a_sentence(load, change, sentence):
     with pytest.raises(ScenarioError) as refused:
         load(change)
-    assert sentence in "\n".join(refused.value.problems)
+    assert sentence in "\n".join(texts_of(refused.value))
 
 
 def test_a_design_gives_every_run_points_of_its_own(load, findings, fmus, tmp_path):

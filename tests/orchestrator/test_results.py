@@ -8,6 +8,7 @@ from orchestrator.errors import ResultsError
 from orchestrator.results import read
 from orchestrator.results.csv_file import BLOCK, CsvFile
 from orchestrator.results.read import load_results
+from tests.sentences import texts_of
 
 RUN = {
     "status": "completed",
@@ -131,7 +132,7 @@ def test_missing_and_broken_files_are_one_sentence(folder, name, text, sentence)
         (folder / name).write_text(text)
     with pytest.raises(ResultsError, match=sentence) as caught:
         load_results(folder)
-    assert len(caught.value.problems) == 1
+    assert len(caught.value.diagnostics) == 1
 
 
 @pytest.mark.parametrize(
@@ -151,7 +152,7 @@ def test_what_is_wrong_in_a_file_of_results_is_named_with_its_place(folder, text
     (folder / "results.csv").write_text(text)
     with pytest.raises(ResultsError) as caught:
         load_results(folder)
-    assert caught.value.problems == [f"{folder / 'results.csv'}: cannot be read: {sentence}"]
+    assert [*texts_of(caught.value)] == [f"{folder / 'results.csv'}: cannot be read: {sentence}"]
 
 
 @pytest.mark.parametrize(
@@ -169,7 +170,7 @@ def test_a_record_of_another_kind_is_one_sentence(folder, changes, sentence):
     (folder / "run.json").write_text(json.dumps({**RUN, **changes}))
     with pytest.raises(ResultsError) as caught:
         load_results(folder)
-    (problem,) = caught.value.problems
+    (problem,) = texts_of(caught.value)
     assert problem.startswith(f"{folder / 'run.json'}: is not the record of a run: {sentence}")
 
 

@@ -13,6 +13,7 @@ from orchestrator.errors import ScenarioError
 from orchestrator.names import SignalName
 from orchestrator.scenario.load import ScenarioSpec, load_scenario
 from tests.changed import changed
+from tests.sentences import texts_of
 
 GOOD = """\
 title: Single sine
@@ -57,7 +58,7 @@ def problems(path: Path, **options: Any) -> list[str]:
     with pytest.raises(ScenarioError) as caught:
         load_scenario(path, changes=changed(**options))
     assert caught.value.exit_status == 2
-    return caught.value.problems
+    return [*texts_of(caught.value)]
 
 
 def test_everything_in_the_file_is_read(file: Path) -> None:

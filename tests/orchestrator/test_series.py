@@ -22,6 +22,7 @@ from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from orchestrator.wiring.series import SeriesFile
+from tests.sentences import texts_of
 from vocabulary.wheels import WHEELS
 
 from .fake_fmus import Var, make_fmu, out
@@ -190,7 +191,7 @@ def problem(path: Path) -> str:
     with pytest.raises(YawbenchError) as caught:
         plan_of(path)
     assert caught.value.exit_status == 2
-    (sentence,) = caught.value.problems
+    (sentence,) = texts_of(caught.value)
     return sentence.partition(": ")[2]
 
 
@@ -212,7 +213,9 @@ def test_a_series_for_a_units_input_goes_before_equal_names(folder: Path) -> Non
     path.write_text(path.read_text().replace("units: {", "units: {driver: {fmu: driver}, "))
     made = plan_of(path)
     assert made.wires == ()
-    assert made.notes == ("plant.steer_angle has a value of its own: driver.steer_angle does not drive it",)
+    assert texts_of(made) == (
+        "plant.steer_angle has a value of its own: driver.steer_angle does not drive it",
+    )
 
 
 @pytest.mark.parametrize("form", ["parquet", "mf4", "csv"])

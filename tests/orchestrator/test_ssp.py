@@ -21,6 +21,7 @@ from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.ssp_archive import DESCRIPTION_FILE, SSC, SSD, SSM, SSV
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
+from tests.sentences import texts_of
 
 from .fake_fmus import make_fmu
 
@@ -105,7 +106,7 @@ def unit_of(plan, name):
 def problem(archive, fmus, **options):
     with pytest.raises(YawbenchError) as error:
         make_plan(load_scenario(archive, changes=changed(**options)), fmus=fmus)
-    (sentence,) = error.value.problems
+    (sentence,) = texts_of(error.value)
     return sentence
 
 
@@ -248,7 +249,7 @@ def test_a_system_in_the_system_is_laid_flat(element, feedback, fmus, tmp_path):
     etree.XMLSchema(file=str(SCHEMAS / "SystemStructureDescription.xsd")).assertValid(root)
     path = redescribed(feedback, tmp_path / "nested.ssp", root)
     plan = make_plan(load_scenario(path), fmus=fmus)
-    assert any(f"inner_{element} (inner.{element})" in note for note in plan.notes)
+    assert any(f"inner_{element} (inner.{element})" in note for note in texts_of(plan))
     inside = results_of(plan, tmp_path / "inside").replace(b"inner_", b"")
     assert inside == results_of(make_plan(load_scenario(feedback), fmus=fmus), tmp_path / "outside")
 
@@ -288,7 +289,9 @@ def test_names_that_cannot_name_a_unit_are_changed(feedback, fmus, tmp_path):
         "_vehicle",
         "Four_tyres_v2",
     }
-    assert any("_vehicle (vehicle), Four_tyres_v2" in n or "_vehicle (vehicle) and" in n for n in plan.notes)
+    assert any(
+        "_vehicle (vehicle), Four_tyres_v2" in n or "_vehicle (vehicle) and" in n for n in texts_of(plan)
+    )
 
 
 def test_a_parameter_in_another_unit_is_converted(feedback, fmus, tmp_path):
@@ -344,7 +347,7 @@ def test_a_value_for_what_nothing_has_is_passed_over_with_a_note(feedback, fmus,
     path = rewritten(feedback, tmp_path / "typo.ssp", ('name="initial_speed"', 'name="speed"'))
     plan = make_plan(load_scenario(path), fmus=fmus)
     assert "initial_speed" not in unit_of(plan, "plant").parameters
-    assert any("gives values to plant.speed" in note for note in plan.notes)
+    assert any("gives values to plant.speed" in note for note in texts_of(plan))
 
 
 def test_a_start_value_of_a_connected_input_counts_for_nothing(feedback, fmus, tmp_path):

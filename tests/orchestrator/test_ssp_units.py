@@ -15,6 +15,7 @@ from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.ssp_archive import SSC, SSD, SSV
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
+from tests.sentences import texts_of
 
 from .fake_fmus import Var, make_fmu, out
 
@@ -90,7 +91,7 @@ def scale(path: Path) -> tuple[float, float]:
 def problem(path: Path) -> str:
     with pytest.raises(YawbenchError) as caught:
         plan_of(path)
-    (sentence,) = caught.value.problems
+    (sentence,) = texts_of(caught.value)
     return sentence
 
 

@@ -14,7 +14,7 @@ import pytest
 from lxml import html
 from rich.console import Console
 
-from orchestrator.errors import ScenarioError
+from orchestrator.errors import Diagnostic, ScenarioError
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.figures import draw_all
 from orchestrator.experiments.grids import correlation
@@ -33,6 +33,7 @@ from orchestrator.pages.page_parts import animation_of
 from orchestrator.pages.report import animation, chapter, report_page
 from orchestrator.plan import Override
 from tests.pages.made_up import data_in
+from tests.sentences import texts_of
 
 from .recorded import car, write
 
@@ -99,7 +100,7 @@ def study(tmp_path):
 def problems(study, *changes):
     with pytest.raises(ScenarioError) as error:
         study(*changes)
-    return [problem.partition(": ")[2] for problem in error.value.problems]
+    return [problem.partition(": ")[2] for problem in texts_of(error.value)]
 
 
 def page(findings, out) -> str:
@@ -300,7 +301,7 @@ def test_a_condition_has_exactly_one_bound(study):
 def test_a_missing_study_file_is_one_sentence(tmp_path):
     with pytest.raises(ScenarioError) as error:
         load_experiment(tmp_path / "none.yaml")
-    assert error.value.problems == [f"{tmp_path / 'none.yaml'}: no such experiment file"]
+    assert [*texts_of(error.value)] == [f"{tmp_path / 'none.yaml'}: no such experiment file"]
 
 
 def verdicts(judgements):
@@ -322,7 +323,9 @@ def test_claims_are_judged_by_the_results_on_disk(study, out):
 
 
 def test_a_claim_about_a_run_without_results_is_not_judged(study, out):
-    lost = Outcome(Job("15mps/off", Path("x"), out / "15mps/off"), ("plant: lost",), 1)
+    lost = Outcome(
+        Job("15mps/off", Path("x"), out / "15mps/off"), (Diagnostic("run-failed", "plant: lost"),), 1
+    )
     findings = judge_results(study(), out, [lost])
     assert findings.failed == {"15mps/off": "plant: lost"}
     assert verdicts(findings.claims) == [None, False, None]
@@ -453,7 +456,9 @@ def test_a_derived_number_stands_beside_the_published_one(with_grid, out):
 
 
 def test_without_a_run_there_is_neither_correlation_nor_verdict(with_grid, out):
-    lost = Outcome(Job("15mps/off", Path("x"), out / "15mps/off"), ("plant: lost",), 1)
+    lost = Outcome(
+        Job("15mps/off", Path("x"), out / "15mps/off"), (Diagnostic("run-failed", "plant: lost"),), 1
+    )
     findings = judge_results(with_grid(), out, [lost])
     assert findings.derived == {}
     assert findings.checks[0].holds is None
@@ -522,7 +527,7 @@ def test_a_grid_without_published_numbers_is_a_plain_table(with_grid, out):
 def test_what_is_wrong_with_grids_and_derived_numbers_is_said(with_grid, old, new, said):
     with pytest.raises(ScenarioError) as error:
         with_grid((old, new))
-    assert any(said in problem for problem in error.value.problems), error.value.problems
+    assert any(said in problem for problem in texts_of(error.value)), texts_of(error.value)
 
 
 def test_a_long_heading_over_numbers_is_broken_on_the_terminal():
@@ -584,7 +589,7 @@ def test_claims_about_several_runs_and_checks_have_tables_of_their_own(study, ou
 
 
 def test_a_failed_run_is_named_in_the_table_with_its_reason(study, out):
-    lost = Outcome(Job("slow", Path("x"), out / "slow"), ("plant: lost",), 1)
+    lost = Outcome(Job("slow", Path("x"), out / "slow"), (Diagnostic("run-failed", "plant: lost"),), 1)
     (table,) = run_tables(judge_results(study(), out, [lost]))
     assert table.text()[-1] == ["slow", "failed", "-", "-", "-", "-"]
     assert table.notes[-1] == "slow: plant: lost"

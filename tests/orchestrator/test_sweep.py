@@ -16,7 +16,7 @@ from lxml import html
 
 from fmus.build import build_component
 from orchestrator.cli import main
-from orchestrator.errors import RecordWarning, ResultsError
+from orchestrator.errors import Diagnostic, Location, RecordWarning, ResultsError
 from orchestrator.experiments.jobs import MeasuredRun
 from orchestrator.experiments.journal import Journal
 from orchestrator.results.read import load_results
@@ -146,7 +146,7 @@ def test_one_row_per_run_with_units_and_figures_and_a_page(moods, yawbench, tmp_
     assert status == 0, err
     table = pq.read_table(tmp_path / "out" / "table.parquet")
     assert table.column_names == [
-        "run", "level", "amplitude", "status", "reason", "findings", "moment", "steer", "key",
+        "run", "level", "amplitude", "status", "reason", "warnings", "moment", "steer", "key",
     ]  # fmt: skip
     units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in table.schema}
     assert units["level"] == units["moment"] == "N.m"
@@ -331,8 +331,13 @@ def test_a_folder_of_another_sweep_is_refused(moods, yawbench, tmp_path):
 def test_a_line_that_a_kill_has_cut_off_is_dropped(tmp_path):
     first = Journal(tmp_path, "a/b.yaml")
     first.add("one", MeasuredRun({"x": (float("inf"), "s"), "y": None, "z": (0.1, "m")}))
-    first.add("two", MeasuredRun({}, ("plant: step failed", "and more")))
-    first.add("four", MeasuredRun({"x": None}, findings=("spin",), ended="plant: ended the run at t = 1 s"))
+    first.add(
+        "two",
+        MeasuredRun(
+            {}, (Diagnostic("run-failed", "plant: step failed"), Diagnostic("run-failed", "and more"))
+        ),
+    )
+    first.add("four", MeasuredRun({"x": None}, (SPIN,), ended="plant: ended the run at t = 1 s"))
     first.close()
     with (tmp_path / "runs.jsonl").open("ab") as stream:
         stream.write(b'{"key": "three", "val')
@@ -358,9 +363,10 @@ def test_a_journal_without_checksums_is_of_an_earlier_version(tmp_path):
         Journal(tmp_path, "a/b.yaml")
 
 
+SPIN = Diagnostic("car-spins", "the car spins", "warning", Location(signal="plant.sideslip", time=1.0), 90.0)
 RECORDS = {
-    "one": MeasuredRun({"slip": (0.0302, "rad"), "moment": (12.0, "N.m")}),
-    "two": MeasuredRun({"slip": None, "moment": (13.0, "N.m")}, findings=("spin",)),
+    "one": MeasuredRun({"slip": (0.0302, "rad"), "moment": (12.0, "N.m")}, (SPIN,), ended="early"),
+    "two": MeasuredRun({"slip": None, "moment": (13.0, "N.m")}, (SPIN,)),
 }
 
 
@@ -384,9 +390,9 @@ def journal_of(folder):
         ("0.0302", "[" * 5000 + "]" * 5000, "is no JSON"),
         ('"slip"', '"moment"', "'values' was changed"),
         ('"key": "one"', '"key": "two"', "'key' was changed"),
-        ('"problems": []', '"problems": ["no"]', "'problems' was changed"),
-        ('"problems": [], ', "", "'problems' was removed"),
-        ('"problems": []', '"problems": [], "ended": "no"', "'ended' was added"),
+        ('"car-spins"', '"car-rolls"', "'diagnostics' was changed"),
+        (', "ended": "early"', "", "'ended' was removed"),
+        ('"key": "one", ', '"key": "one", "findings": ["spin"], ', "'findings' was added"),
         ('"checksums"', '"checksum"', "it has no checksums"),
         ('"checksums": {"*"', '"checksums": {"+"', "'checksums' was changed"),
         ('"key": "one"', '"key: "one"', "is no JSON"),
@@ -419,7 +425,7 @@ def test_a_changed_head_of_a_journal_is_said_and_its_runs_are_kept(tmp_path):
 
 def test_a_path_that_is_no_utf_8_comes_back_from_the_journal(tmp_path):
     made = Journal(tmp_path, "a/b.yaml")
-    made.add("one", MeasuredRun({}, ("/home/\udcff: no such file",)))
+    made.add("one", MeasuredRun({}, (Diagnostic("file-missing", "/home/\udcff: no such file"),)))
     made.close()
     again = Journal(tmp_path, "a/b.yaml")
     again.close()

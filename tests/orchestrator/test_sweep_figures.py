@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from orchestrator.errors import ResultsError
+from orchestrator.errors import Diagnostic, ResultsError
 from orchestrator.experiments.axis_figures import boundary, edges
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.figures import draw_over_axes
@@ -66,7 +66,9 @@ def swept(tmp_path):
             jobs.append(Job("", tmp_path, tmp_path, plan=plan, key=f"{number:032}"))
             found = value(*(level.value for level in point))
             values = {} if found is None else {"sideslip": (math.radians(found), "rad")}
-            records.append(MeasuredRun(values, () if values else ("plant: it failed",)))
+            records.append(
+                MeasuredRun(values, () if values else (Diagnostic("run-failed", "plant: it failed"),))
+            )
         units = {"friction": "1", "speed": "m/s"}
         return ExperimentResult(
             sweep, records, {}, PlannedExperiment(sweep, jobs, units, {"sideslip": "rad"}, {})

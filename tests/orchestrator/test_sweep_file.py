@@ -13,6 +13,7 @@ from orchestrator.experiments.axes import AxisSpec, level_at
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.planning import plan_experiment
 from tests.changed import changed
+from tests.sentences import texts_of
 
 
 def planned_of(experiment, fmus):
@@ -234,7 +235,7 @@ REFUSED = [
 def test_a_sweep_file_that_is_wrong_is_one_sentence_with_its_place(old, new, sentence, sweep, tmp_path):
     with pytest.raises(ScenarioError) as error:
         sweep((old, new))
-    (problem,) = error.value.problems
+    (problem,) = texts_of(error.value)
     assert sentence in problem
     assert problem.startswith(f"{tmp_path / 'sweep.yaml'}:")
 
@@ -271,8 +272,8 @@ def test_figures_and_limits_must_name_what_there_is(old, new, sentence, sweep, t
     sweep(text=SWEEP + FIGURES)
     with pytest.raises(ScenarioError) as error:
         sweep((old, new), text=SWEEP + FIGURES)
-    assert any(sentence in problem for problem in error.value.problems)
-    assert len(error.value.problems) <= 2
+    assert any(sentence in problem for problem in texts_of(error.value))
+    assert len(error.value.diagnostics) <= 2
 
 
 PLANS_REFUSED = [
@@ -296,8 +297,8 @@ def test_what_no_run_could_start_with_is_said_once_and_not_once_per_run(
     loaded = sweep((old, new))
     with pytest.raises(ScenarioError) as error:
         planned_of(loaded, fmus)
-    assert sentence in error.value.problems[0]
-    assert len(error.value.problems) == 1
+    assert sentence in str(error.value.diagnostics[0])
+    assert len(error.value.diagnostics) == 1
 
 
 def test_a_bound_in_a_unit_that_its_metric_does_not_have_is_refused_before_any_run(sweep, fmus, tmp_path):

@@ -12,6 +12,7 @@ import pytest
 from components.tyre_models.pacejka_2012_set import COMMON, LONGITUDINAL, REST
 from orchestrator.errors import ScenarioError
 from orchestrator.scenario.tir import read_tir
+from tests.sentences import texts_of
 
 from .tir_files import UNITS, text_of, write
 
@@ -25,7 +26,7 @@ def read(tmp_path, *arguments, **options):
 
 
 def warnings(file):
-    return [w.removeprefix(str(file.path)).lstrip(":") for w in file.warnings]
+    return [str(w).removeprefix(str(file.path)).lstrip(":") for w in file.warnings]
 
 
 def test_a_file_gives_every_parameter_of_the_tyre_by_its_name(tmp_path):
@@ -138,7 +139,7 @@ def test_without_fzmax_loads_go_to_three_times_the_nominal_or_to_where_a_stiffne
     assert read(tmp_path, without=["FZMAX"]).values["fzmax"] == 12000.0
     assert read(tmp_path, {"FZMAX": "0", "LFZO": "0.5"}).values["fzmax"] == 6000.0
     assert read(tmp_path, {"PKY4": "3.2"}, without=["FZMAX"]).values["fzmax"] < 4000 * 3
-    assert any("has changed its sign" in w for w in read(tmp_path, {"PKX2": "-20.5"}).warnings)
+    assert any("has changed its sign" in str(w) for w in read(tmp_path, {"PKX2": "-20.5"}).warnings)
 
 
 @pytest.mark.parametrize(
@@ -166,10 +167,10 @@ def test_without_fzmax_loads_go_to_three_times_the_nominal_or_to_where_a_stiffne
 def test_what_cannot_be_used_is_refused_in_one_sentence_with_key_and_line(tmp_path, changed, options, says):
     with pytest.raises(ScenarioError) as caught:
         read(tmp_path, changed, **options)
-    assert len(caught.value.problems) == 1
-    assert says in caught.value.problems[0]
+    assert len(caught.value.diagnostics) == 1
+    assert says in str(caught.value.diagnostics[0])
     if "missing" not in says:
-        assert re.search(r"a\.tir:\d+: ", caught.value.problems[0])
+        assert re.search(r"a\.tir:\d+: ", str(caught.value.diagnostics[0]))
 
 
 @pytest.mark.parametrize(
@@ -191,7 +192,7 @@ def test_what_cannot_be_used_is_refused_in_one_sentence_with_key_and_line(tmp_pa
 def test_what_is_unusual_is_read_with_a_warning(tmp_path, changed, options, says):
     file = read(tmp_path, changed, **options)
     assert len(file.warnings) == 1
-    assert says in file.warnings[0]
+    assert says in str(file.warnings[0])
 
 
 def test_of_a_key_given_twice_the_last_counts(tmp_path):
@@ -202,7 +203,7 @@ def test_the_unloaded_radius_can_come_from_rim_and_width(tmp_path):
     given = {"RIM_RADIUS": "0.19", "WIDTH": "0.2", "ASPECT_RATIO": "0.6"}
     file = read(tmp_path, given, without=["UNLOADED_RADIUS"])
     assert file.values["unloaded_radius"] == pytest.approx(0.31)
-    assert "taken from RIM_RADIUS, WIDTH and ASPECT_RATIO" in file.warnings[0]
+    assert "taken from RIM_RADIUS, WIDTH and ASPECT_RATIO" in str(file.warnings[0])
 
 
 @pytest.mark.parametrize(
@@ -241,5 +242,5 @@ def test_files_damaged_at_random_are_read_or_refused_in_foreseen_sentences(tmp_p
             assert all(isfinite(value) for value in read_tir(path).values.values())
         except ScenarioError as error:
             refused += 1
-            assert not any("not understood" in problem for problem in error.problems), error.problems
+            assert not any("not understood" in text for text in texts_of(error)), error
     assert 50 < refused < 350

@@ -188,6 +188,5 @@ def test_a_car_at_90_m_per_s_that_spins_says_so(yawbench, tmp_path):
     _, said = yawbench("run", SCENARIO, *given, "--out", "r")
     assert "note: the car is faster than 70 m/s (252 km/h): 90 m/s at 0 s" in said
     record = json.loads((tmp_path / "r/run.json").read_text())
-    assert {"kind": "speed", "place": "plant.velocity_x", "time": 0.0}.items() <= next(
-        one for one in record["findings"] if one["kind"] == "speed"
-    ).items()
+    told = next(one for one in record["diagnostics"] if one["code"] == "speed-implausible")
+    assert told["location"] == {"signal": "plant.velocity_x", "time": 0.0}

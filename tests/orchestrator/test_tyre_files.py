@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from orchestrator.cli import main
-from orchestrator.errors import ScenarioError, WiringError
+from orchestrator.errors import ScenarioError, WiringError, warnings_in
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.planning import plan_experiment
 from orchestrator.interop.ssp_write import write_ssp
@@ -22,6 +22,7 @@ from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.overrides import changes_of, read_changes
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
+from tests.sentences import texts_of
 
 from .tir_files import write
 
@@ -88,7 +89,7 @@ def test_every_unit_takes_what_it_declares_for_both_axles(folder, fmus):
         "soft.tir",
         "stiff.tir",
     )
-    assert not any("tyre" in note or "radius" in note for note in planned.notes)
+    assert not any("tyre" in note or "radius" in note for note in texts_of(planned))
 
 
 def test_the_vehicle_file_may_name_them_and_the_scenario_has_the_last_word(folder, fmus):
@@ -156,7 +157,7 @@ def test_a_run_remembers_the_files_with_their_hash_kind_and_warnings(folder, fmu
     assert front["sha256"] == hashlib.sha256((folder / "soft.tir").read_bytes()).hexdigest()
     assert (front["kind"], front["side"]) == ("MF-Tyre 6.2", "LEFT")
     assert "UNKNOWN: read as LEFT" in front["warnings"][0]
-    assert any("UNKNOWN: read as LEFT" in note for note in record["notes"])
+    assert any("UNKNOWN: read as LEFT" in one["message"] for one in record["diagnostics"])
     assert record["fmus"]["tyre"]["origins"]["pcx1_front"] == "soft.tir"
 
 
@@ -194,8 +195,8 @@ def test_files_that_cannot_be_used_are_refused_with_their_place(folder, tyres, s
     write(folder / "bad.tir", {"PKX1": "-3"})
     with pytest.raises(ScenarioError) as caught:
         load_scenario(scenario(folder, tyres))
-    assert len(caught.value.problems) == 1
-    assert says in caught.value.problems[0]
+    assert len(caught.value.diagnostics) == 1
+    assert says in str(caught.value.diagnostics[0])
 
 
 def test_a_value_beyond_what_the_tyre_allows_is_refused_with_file_and_key(folder, fmus):
@@ -207,7 +208,7 @@ def test_a_value_beyond_what_the_tyre_allows_is_refused_with_file_and_key(folder
 def test_without_a_tyre_that_takes_them_they_are_refused_and_after_a_swap_left_out(folder, fmus):
     path = scenario(folder)
     swapped = plan(path, fmus, "tyre=tyre_linear")
-    assert "tyres are left out: no tyre takes such files after the swap" in swapped.notes
+    assert "tyres are left out: no tyre takes such files after the swap" in texts_of(swapped)
     path.write_text(path.read_text().replace("tyre_magic_formula_62", "tyre_linear"))
     with pytest.raises(WiringError, match="tyres: no unit is a tyre that takes such files"):
         plan(path, fmus)
@@ -216,11 +217,11 @@ def test_without_a_tyre_that_takes_them_they_are_refused_and_after_a_swap_left_o
 def test_a_slip_control_that_asks_another_law_and_another_radius_are_told(folder, fmus):
     (folder / "car.yaml").write_text("parameters: {wheel_radius: 0.33}\n")
     planned = plan(scenario(folder), fmus, **{"wheel_control.tyre": "dugoff"})
-    kinds = [found.kind for found in planned.findings]
-    assert kinds.count("another tyre") == 1
-    assert kinds.count("another radius") == 2  # of plant and wheel control
+    kinds = [found.code for found in warnings_in(planned.diagnostics) if found.location.signal]
+    assert kinds.count("tyre-mismatch") == 1
+    assert kinds.count("wheel-radius-mismatch") == 2  # of plant and wheel control
     assert any(
-        "wheel_radius is 0.33 m, but the tyres of soft.tir roll on 0.3042 m" in n for n in planned.notes
+        "wheel_radius is 0.33 m, but the tyres of soft.tir roll on 0.3042 m" in n for n in texts_of(planned)
     )
 
 

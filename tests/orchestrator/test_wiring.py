@@ -10,11 +10,12 @@ from typing import Any
 
 import pytest
 
-from orchestrator.errors import ModelDescriptionError, WiringError, YawbenchError
+from orchestrator.errors import Diagnostic, Location, ModelDescriptionError, WiringError, YawbenchError
 from orchestrator.plan import Instance, Override, Plan, Wire
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
+from tests.sentences import texts_of
 from vocabulary.wheels import WHEELS
 
 from .fake_fmus import Var, make_fmu, out
@@ -101,11 +102,15 @@ def plan(path: Path | None = None, *, fmus: Path | None = None, **options: Any) 
     return make_plan(load_scenario(path or scenario(), changes=changed(**options)), fmus=fmus)
 
 
-def problems(path: Path, kind: type[YawbenchError] = WiringError, **options: Any) -> list[str]:
+def errors(path: Path, kind: type[YawbenchError] = WiringError, **options: Any) -> list[Diagnostic]:
     with pytest.raises(kind) as caught:
         plan(path, **options)
     assert caught.value.exit_status == 2
-    return caught.value.problems
+    return caught.value.diagnostics
+
+
+def problems(path: Path, kind: type[YawbenchError] = WiringError, **options: Any) -> list[str]:
+    return [*map(str, errors(path, kind, **options))]
 
 
 def unit(made: Plan, name: str) -> Instance:
@@ -123,7 +128,7 @@ def test_the_plan_holds_units_wires_and_the_time_grid() -> None:
     assert len(made.wires) == 1 + 8 + 4 + 2 + 8
     assert unit(made, "tyre").constants == {f"friction_{w}": 0.65 for w in WHEELS}
     assert unit(made, "controller").constants == {"friction": 0.65}
-    assert made.notes == ()
+    assert texts_of(made) == ()
 
 
 def test_wires_are_in_the_order_of_their_targets() -> None:
@@ -365,7 +370,7 @@ def test_what_was_meant_for_the_replaced_fmu_is_left_out_with_a_note() -> None:
     made = plan(path, swaps=["controller=controller_off"])
     assert unit(made, "controller").parameters == {"gain": 2.0}
     assert unit(made, "tyre").constants == {f"friction_{w}": 0.65 for w in WHEELS}
-    assert made.notes[:2] == (
+    assert texts_of(made)[:2] == (
         "vehicle.rule_base is left out: no unit has such a parameter after the swap",
         "controller.wheel_radius is left out: controller_off has no such parameter",
     )
@@ -388,7 +393,7 @@ def test_a_constant_and_a_connection_of_the_replaced_fmu_are_left_out_with_a_not
     units = "\n".join(line for line in UNITS.splitlines() if "tyre" not in line) + "\n"
     rest = 'inputs: {friction: 1, "tyre_force*": 0}\n' + TORQUES + "record: [plant.acceleration_y]\n"
     made = plan(scenario(units, rest), swaps=["plant=plant_two_dof"])
-    assert made.notes == (
+    assert texts_of(made) == (
         "connections[0] is left out: plant has no input 'wheel_torque_*' any more",
         "inputs.tyre_force* is left out: no unit has such an input after the swap",
         "record[0] is left out: plant has no variable 'acceleration_y' any more",
@@ -415,7 +420,7 @@ def test_friction_and_speed_that_nobody_takes_after_a_swap_are_left_out_with_a_n
     make_fmu(folder / "plant_two.fmu", outputs=["x"])
     units = "  plant: {fmu: plant_one}\n"
     path = scenario(units, "", head="friction: 0.4\nspeed: 20\n")
-    assert plan(path, swaps=["plant=plant_two"]).notes[:2] == (
+    assert texts_of(plan(path, swaps=["plant=plant_two"]))[:2] == (
         "speed is left out: no unit has such a parameter after the swap",
         "friction is left out: no unit has such an input after the swap",
     )
@@ -431,7 +436,7 @@ def test_friction_and_speed_that_nobody_takes_after_a_swap_are_left_out_with_a_n
 def test_a_swap_works_though_the_replaced_fmu_is_not_there(folder: Path) -> None:
     units = UNITS.replace("controller_fnn, step_size: 2 ms", "gone, parameters: {secret: 1}")
     made = plan(scenario(units), swaps=["controller=controller_off"])
-    assert made.notes == ("controller.secret is left out: controller_off has no such parameter",)
+    assert texts_of(made) == ("controller.secret is left out: controller_off has no such parameter",)
 
 
 # Wires
@@ -569,7 +574,7 @@ def test_a_wire_converts_between_units_of_one_dimension(folder: Path) -> None:
         "driver", "steer_angle", "plant", "steer_angle", math.pi / 180
     )
     assert [w for w in made.wires if w.converts and w.source != "driver"] == []
-    assert made.notes == ()
+    assert texts_of(made) == ()
 
 
 @pytest.mark.parametrize(
@@ -602,7 +607,7 @@ def test_a_unit_that_contradicts_its_name_counts_as_defined_and_is_noted(folder:
     make_fmu(folder / "other.fmu", outputs=[out("steer_angle", unit="deg")], definitions={"deg": 'rad="1"'})
     made = plan(swaps=["driver=other"])
     assert not wire_to(made, "plant", "steer_angle").converts
-    assert made.notes == ("driver (other) defines deg otherwise than usual: taken as it defines it",)
+    assert texts_of(made) == ("driver (other) defines deg otherwise than usual: taken as it defines it",)
 
 
 def test_a_parameter_is_converted_into_a_unit_that_only_the_fmu_defines(folder: Path) -> None:
@@ -631,13 +636,13 @@ def test_gain_and_offset_take_plain_numbers_whatever_the_units_are(folder, given
     wire = wire_to(made, "plant", "steer_angle")
     assert (wire.gain, wire.offset) == scale
     make_fmu(folder / "driver_m.fmu", outputs=[out("steer_angle", unit=None)])
-    assert plan(scenario(rest=rest), swaps=["driver=driver_m"]).notes == ()
+    assert texts_of(plan(scenario(rest=rest), swaps=["driver=driver_m"])) == ()
 
 
 def test_a_gain_in_place_of_a_conversion_is_noted(folder: Path) -> None:
     make_fmu(folder / "driver_deg.fmu", outputs=[out("steer_angle", unit="deg")])
     rest = CONSTANTS + TORQUES + "  - {from: driver.steer_angle, to: plant.steer_angle, gain: 0.0625}\n"
-    assert plan(scenario(rest=rest), swaps=["driver=driver_deg"]).notes == (
+    assert texts_of(plan(scenario(rest=rest), swaps=["driver=driver_deg"])) == (
         "connections[1]: its gain and offset stand in place of the conversion from deg to rad",
     )
 
@@ -656,12 +661,12 @@ def test_text_has_no_gain_and_a_whole_number_a_whole_one(folder: Path) -> None:
 
 def test_units_that_mean_the_same_fit(folder: Path) -> None:
     make_fmu(folder / "controller_nm.fmu", outputs=[out("torque_request_*", unit="Nm")])
-    assert plan(swaps=["controller=controller_nm"]).notes == ()
+    assert texts_of(plan(swaps=["controller=controller_nm"])) == ()
 
 
 def test_an_fmu_without_units_is_connected_with_a_note(folder: Path) -> None:
     make_fmu(folder / "controller_bare.fmu", outputs=[out("torque_request_*", unit=None)])
-    assert plan(swaps=["controller=controller_bare"]).notes == (
+    assert texts_of(plan(swaps=["controller=controller_bare"])) == (
         "controller (controller_bare) declares no unit for torque_request_*: not checked",
     )
 
@@ -718,7 +723,7 @@ def test_a_loop_through_an_fmu_that_says_nothing_is_a_note(folder: Path) -> None
             out("slip_ratio_*", follows=None),
         ],
     )
-    (note,) = plan(scenario(UNITS.replace("plant_seven_dof", "plant_silent"), CONSTANTS)).notes
+    (note,) = texts_of(plan(scenario(UNITS.replace("plant_seven_dof", "plant_silent"), CONSTANTS)))
     assert note.startswith("possible algebraic loop: tyre.tyre_force_x_fl -> plant.tyre_force_x_fl -> ")
     assert note.endswith(
         "; an FMU here does not say which inputs its outputs follow, so a wire against the evaluation order "
@@ -762,7 +767,7 @@ def test_a_constant_that_names_the_unit_goes_before_equal_names_with_a_note() ->
     assert unit(made, "plant").constants == {"steer_angle": math.pi / 180}
     assert [w.target for w in made.wires if w.output == "steer_angle"] == ["controller"]
     assert not [w for w in made.wires if w.input.startswith("slip_ratio")]
-    assert made.notes == (
+    assert texts_of(made) == (
         "plant.steer_angle has a value of its own: driver.steer_angle does not drive it",
         "tyre.slip_ratio_* has a value of its own: plant.slip_ratio_* does not drive it",
     )
@@ -839,7 +844,7 @@ def test_several_lists_of_units_count_in_the_order_that_all_of_them_allow(folder
 def test_what_a_swap_leaves_without_equal_names_is_no_error_but_a_note() -> None:
     path = scenario(rest=CONSTANTS + TORQUES + "  - {from: [driver], to: [controller]}\n")
     made = plan(path, swaps=["controller=controller_off"])
-    assert "connections[1] is left out: no names are equal any more" in made.notes
+    assert "connections[1] is left out: no names are equal any more" in texts_of(made)
 
 
 def test_lists_that_prefer_in_a_circle_are_an_error_that_names_it(folder: Path) -> None:
@@ -904,7 +909,7 @@ def test_a_wrong_choice_of_sources_is_said(connection: str, expected: str) -> No
     path = scenario(rest=CONSTANTS + TORQUES + f"  - {connection}\n")
     with pytest.raises(YawbenchError) as caught:
         plan(path)
-    assert f"a.yaml:11: connections[1]{expected}" in caught.value.problems
+    assert f"a.yaml:11: connections[1]{expected}" in texts_of(caught.value)
 
 
 # Records
@@ -996,13 +1001,14 @@ def test_a_scenario_is_wired_anew_when_its_fmu_has_been_mended(folder):
     assert make_plan(loaded).wires == make_plan(load_scenario(scenario())).wires
 
 
-def test_a_problem_knows_its_sentence_its_file_and_its_line():
+def test_an_error_has_a_code_a_location_and_a_message():
     path = scenario(rest=CONSTANTS + TORQUES.replace("plant.wheel_torque", "plant.wheel_torqe"))
-    problem = problems(path)[-1]
-    assert (problem.file, problem.line, problem.place) == (path, 10, "connections[0].to")
-    assert problem == f"{path}:10: connections[0].to: {problem.text}"
-    (problem,) = problems(scenario(), settings=["plant.mass=-1"])
-    assert (problem.file, problem.line, problem.place) == (None, None, "--set plant.mass=-1")
+    error = errors(path)[-1]
+    assert (error.code, error.severity) == ("variable-unknown", "error")
+    assert error.location == Location(path, 10, "connections[0].to")
+    assert str(error) == f"{path}:10: connections[0].to: {error.message}"
+    (error,) = errors(scenario(), settings=["plant.mass=-1"])
+    assert (error.code, error.location) == ("value-invalid", Location(target="--set plant.mass=-1"))
 
 
 def test_an_input_without_a_source_is_not_sent_to_whatever_has_its_unit_of_measurement(folder):
@@ -1031,7 +1037,7 @@ def test_a_parameter_that_is_text_can_come_from_a_file(folder):
     made = unit(plan(with_road("patches: {file: sub/patches.txt}")), "road")
     assert made.parameters["patches"] == "y > 0\nx < 5 # Größe\n"
     assert made.origins["patches"] == ("file", "sub/patches.txt")
-    for given, said in (
+    for given, sentence in (
         ("patches: {file: none.txt}", "none.txt: no such file or directory"),
         ("patches: {file: sub}", "sub: is a directory"),
         ("mu: {file: sub/patches.txt}", "takes a value: only parameters that are text take a file"),
@@ -1039,5 +1045,5 @@ def test_a_parameter_that_is_text_can_come_from_a_file(folder):
         ("patches: '1e400: y > 0'", "patches: 1e400 is too large a number (in '1e400: y > 0')"),
     ):
         (problem,) = problems(with_road(given))
-        assert problem.endswith(said)
+        assert problem.endswith(sentence)
         assert "units.road.parameters." in problem

@@ -180,7 +180,7 @@ def test_the_coupling_error_of_the_sine_at_1_ms_is_small(fmus, tmp_path, control
         )
         for divisor in (1, 4)
     ]  # fmt: skip
-    assert [outcome.problems for outcome in execute(jobs)] == [()] * len(jobs)
+    assert [outcome.diagnostics for outcome in execute(jobs)] == [()] * len(jobs)
     coarse, fine = (load_results(job.out)["plant.yaw_rate"] for job in jobs)
     error = np.max(np.abs(coarse - fine[::4])) * 4 / 3  # the fine run's own, of first order, counted in
     assert 0.0 < error / np.max(np.abs(fine)) <= most

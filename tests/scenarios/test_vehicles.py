@@ -12,7 +12,7 @@ from ruamel.yaml import YAML
 from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
 from orchestrator.cli import main
 from orchestrator.commands.check import show
-from orchestrator.errors import WiringError
+from orchestrator.errors import WiringError, warnings_in
 from orchestrator.fmu.opener import Opener
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.scenario.load import load_scenario
@@ -77,7 +77,7 @@ def test_one_car_turns_alike_at_every_number_of_degrees_of_freedom(fmus):
     gains = {}
     for plant in PLANTS:
         made = steady_turn(fmus, [f"plant={plant}"], soon, step_size=0.002, stop_time=3.0)
-        assert made.findings == ()
+        assert warnings_in(made.diagnostics) == ()
         results = simulate_in_memory(made)
         assert 1.2 < results["plant.acceleration_y"][-1] < 2.0
         rate = results["plant.yaw_rate"]
@@ -240,7 +240,7 @@ def test_every_car_of_the_library_fits_every_plant(fmus, name):
         of_plant = next(unit for unit in plan.instances if unit.name == "plant")
         by_default = {v.name for v in of_plant.fmu.of("parameter")} - of_plant.parameters.keys()
         assert not {key for key in by_default if key in CAR and CAR[key].needed}
-        assert plan.findings == ()
+        assert warnings_in(plan.diagnostics) == ()
 
 
 BUILT_TO_LOSE = ("hard",)  # less understeer than cars have

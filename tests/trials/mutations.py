@@ -178,9 +178,9 @@ def outcome_of(function: Callable[[], None]) -> tuple[str, str]:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
             function()
     except YawbenchError as error:
-        if not error.problems or not all(problem.strip() for problem in error.problems):
-            return "NO SENTENCE", repr(error.problems)
-        said = "\n".join(error.problems)
+        if not all(one.message.strip() and one.code for one in error.diagnostics or [None]):
+            return "NO SENTENCE", repr(error.diagnostics)
+        said = "\n".join(map(str, error.diagnostics))
         if error.__cause__ is not None:
             return UNFORESEEN, said + "\n" + "".join(traceback.format_exception(error.__cause__)[-3:])
         return REFUSED, said

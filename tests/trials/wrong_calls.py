@@ -364,10 +364,12 @@ UNHASHABLE = {label for label, make in WRONG.items() if not _is_key(make())}
 
 
 def described() -> dict[str, list[str]]:
-    """Return every public function and method with its parameters."""
+    """Return every public function and method with its parameters, but for what users only read."""
     found = {}
     for name in yb.__all__:
         public = getattr(yb, name)
+        if public in (yb.Diagnostic, yb.Location):
+            continue
         if not isinstance(public, type):
             found[name] = list(inspect.signature(public).parameters)
         elif not issubclass(public, BaseException):

@@ -11,6 +11,8 @@ import pytest
 import yawbench as yb
 from components.controllers.fnn import Fnn
 from orchestrator.cli import main
+from orchestrator.errors import warnings_in
+from tests.sentences import texts_of
 
 SCENARIO = "fnn_sideslip/25mps"
 ROOT = Path(__file__).parents[2]
@@ -153,7 +155,8 @@ def test_a_component_class_gives_the_bits_of_its_fmu(base, run):
 def test_a_run_without_an_fmu_says_so(base):
     run = base.swap(controller=proportional).run()
     assert run.record["fmus"]["controller"]["generation_tool"] == "Python, no FMU"
-    assert any("no FMU" in note and "controller" in note for note in run.record["notes"])
+    (note,) = (one for one in run.diagnostics if one.code == "instance-in-python")
+    assert note.severity == "info" and note.message.startswith("controller: ")
 
 
 def test_every_run_begins_with_a_copy_of_the_object(base):
@@ -314,11 +317,11 @@ def test_remarks_are_in_what_a_run_shows_of_itself_and_warn_once_where_it_was_st
     spinning = base.set({"friction": 65, "plant.initial_sideslip": "60 deg"})
     with pytest.warns(yb.YawbenchWarning) as warned:
         run = spinning.run()
-    assert len(run.remarks) >= 2
+    assert len(warnings_in(run.diagnostics)) >= 2
     assert len(warned) == 1
     assert warned[0].filename == __file__
     for says in ("did you mean '65 %'?", "the car spins"):
-        assert any(says in one for one in run.remarks)
+        assert any(says in text for text in texts_of(run))
         assert says in str(warned[0].message)
         assert says in repr(run)
         assert escape(says) in run._repr_html_()
@@ -328,7 +331,7 @@ def test_a_run_without_remarks_warns_of_nothing(base):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         run = base.run()
-    assert run.remarks == []
+    assert warnings_in(run.diagnostics) == ()
 
 
 def test_an_experiment_warns_once_and_says_in_how_many_runs(base):
@@ -338,8 +341,8 @@ def test_an_experiment_warns_once_and_says_in_how_many_runs(base):
     assert len(warned) == 1
     assert warned[0].filename == __file__
     assert "did you mean '300 km/h'?" in str(warned[0].message)
-    assert "speed in 1 of 2 runs" in str(warned[0].message)
-    assert "speed in 1 of 2 runs" in repr(runs)
+    assert "speed-implausible in 1 of 2 runs" in str(warned[0].message)
+    assert "speed-implausible in 1 of 2 runs" in repr(runs)
 
 
 def test_a_run_that_fails_warns_of_what_was_remarkable_before(base):
