@@ -250,11 +250,14 @@ static bool provide_python(Python *python, char *problem, size_t size)
         }
         memcpy(functions[i].slot, &symbol, sizeof symbol);
     }
-    int major = 0, minor = 0;
-    if (sscanf(python->Py_GetVersion(), "%d.%d", &major, &minor) != 2 || major != 3 ||
-        minor < OLDEST_PYTHON) {
-        snprintf(problem, size, "Python 3.%d or newer is needed, this process has Python %d.%d",
-                 OLDEST_PYTHON, major, minor);
+    const char *version = python->Py_GetVersion();
+    int minor = 0;
+    for (const char *c = version + 2; *c >= '0' && *c <= '9'; c++) {
+        minor = 10 * minor + (*c - '0');
+    }
+    if (strncmp(version, "3.", 2) != 0 || minor < OLDEST_PYTHON) {
+        snprintf(problem, size, "Python 3.%d or newer is needed, this process has Python %.*s",
+                 OLDEST_PYTHON, (int)strcspn(version, " "), version);
         return false;
     }
     /* Two FMUs may be loaded at once by two threads; a lock that all libraries share is stderr's. */

@@ -23,6 +23,7 @@
 #include "fmi2.h"
 
 #include "find_python.h"
+#include "oldest_glibc.h"
 #include "text.h"
 
 #define EXPORT __attribute__((visibility("default")))

@@ -32,6 +32,7 @@ SHARED = (
     HERE / "unit.h",
     HERE.parent / "calling_sequence.h",
     HERE.parent / "fmi2.h",
+    HERE.parent / "oldest_glibc.h",
     HERE.parent / "compiler.py",
     HERE.parent / "packing.py",
     HERE.parent / "presentation.py",

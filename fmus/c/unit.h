@@ -20,6 +20,7 @@
 
 #include "calling_sequence.h"
 #include "fmi2.h"
+#include "oldest_glibc.h"
 
 #if defined _WIN32
 #define FMI2_EXPORT __declspec(dllexport)

@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "oldest_glibc.h"
+
 #if defined __GNUC__
 #define MAYBE_UNUSED __attribute__((unused))
 #else

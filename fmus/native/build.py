@@ -27,8 +27,8 @@ from .specialise import specialise
 from .values import Refused
 
 HERE = Path(__file__).resolve().parent
-FMI = (HERE.parent / "calling_sequence.h", HERE.parent / "fmi2.h")
-HEADERS = {file.name: file for file in (HERE / "arithmetic.h", HERE / "unit.h", *FMI)}
+SHARED = [HERE.parent / name for name in ("calling_sequence.h", "fmi2.h", "oldest_glibc.h")]
+HEADERS = {file.name: file for file in (HERE / "arithmetic.h", HERE / "unit.h", *SHARED)}
 NATIVE_LIBRARY = "native.so"
 """Name of the native library beside the launcher, which opens it by this name."""
 FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-builtin", "-fno-math-errno", "-w", "-fPIC", "-shared",

@@ -8,12 +8,21 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 
+import pytest
+
+from fmus.build import HERE as FMUS
+from fmus.c.c_recipe import TO_WINDOWS
 from tests.fmus.bare import Fmu, Unit
 from tests.fmus.plausible import plausible
 
+WINE = shutil.which("wine64") or next(map(str, Path("/usr/lib/wine").glob("wine64")), None)
+in_windows = pytest.mark.skipif(
+    WINE is None or shutil.which(TO_WINDOWS) is None, reason="needs Wine and a cross compiler"
+)
 MINORS = (10, 11, 12, 13)
 OURS_FIRST = sorted(MINORS, key=lambda minor: minor != sys.version_info.minor)
 """Which Pythons there are is asked as late as in a test: it takes a process each."""
@@ -55,6 +64,46 @@ def host_outputs(done: subprocess.CompletedProcess[str], folder: Path) -> list[f
     fmu = Fmu(folder)
     values = [float(line) for line in done.stdout.split()]
     return [values[fmu.reference[name]] for name in fmu.names("output")]
+
+
+def in_wine(units: Iterable[tuple[Fmu, dict[str, float]]], folder: Path) -> list[list[list[float]]]:
+    """Return all Reals of FMUs with these inputs after each of ten steps, as a host on Windows reads them."""
+    host = folder / "host.exe"
+    source = Path(__file__).with_name("host_windows.c")
+    subprocess.run([TO_WINDOWS, f"-I{FMUS}", source, "-o", host], check=True)
+    lines, sizes = [], []
+    for fmu, inputs in units:
+        library = next((fmu.folder / "binaries" / "win64").glob("*.dll"))
+        shutil.copy(library, folder)
+        given = [f"{fmu.reference[name]}={value!r}" for name, value in inputs.items()]
+        sizes.append(sum(kind == "Real" for kind in fmu.type.values()))
+        lines.append(" ".join([library.name, fmu.guid, str(sizes[-1]), *given]))
+    wine = {"WINEPREFIX": str(folder / "wine"), "WINEDEBUG": "-all"}
+    done = subprocess.run(
+        [str(WINE), str(host)],
+        cwd=folder,
+        env=os.environ | wine,
+        input="\n".join(lines) + "\n",
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    rows = [[float.fromhex(word) for word in line.split()] for line in done.stdout.splitlines()]
+    assert [len(row) for row in rows] == [size for size in sizes for _ in range(10)]
+    return [rows[i : i + 10] for i in range(0, len(rows), 10)]
+
+
+def ten_steps(fmu: Fmu, inputs: dict[str, float]) -> list[list[float]]:
+    """Return all Reals of an FMU in this process after each of ten steps."""
+    unit = Unit(fmu, **inputs)
+    unit.start()
+    rows = []
+    for k in range(10):
+        unit.step(0.001 * k)
+        rows.append(unit.get(*(name for name, kind in fmu.type.items() if kind == "Real")))
+    unit.free()
+    return rows
 
 
 @lru_cache

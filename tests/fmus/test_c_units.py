@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 import zipfile
 from pathlib import Path
-from xml.etree import ElementTree
 
 import pytest
 
@@ -18,7 +16,7 @@ from fmus.mark import read_mark
 from orchestrator.commands.new import begin
 from orchestrator.errors import BuildError
 from tests.fmus.bare import ERROR, OK, Fmu, Refused, Unit
-from tests.fmus.programs import run
+from tests.fmus.programs import in_windows, in_wine, run, ten_steps
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 
@@ -213,38 +211,8 @@ def test_a_unit_in_c_gets_a_library_for_windows_where_a_compiler_makes_one(folde
     assert build_component(folder, tmp_path / "a", force=True).read_bytes() == once
 
 
-WINE = shutil.which("wine64") or next(iter(Path("/usr/lib/wine").glob("wine64")), None)
-
-
-@pytest.mark.skipif(
-    WINE is None or shutil.which(TO_WINDOWS) is None, reason="needs wine and a cross compiler"
-)
-def test_the_library_for_windows_steps_as_the_one_for_linux(folder, tmp_path):
-    with zipfile.ZipFile(build_component(folder, tmp_path / "a")) as fmu:
-        (tmp_path / "unit.dll").write_bytes(fmu.read("binaries/win64/controller_idea.dll"))
-        guid = ElementTree.fromstring(fmu.read("modelDescription.xml")).get("guid")
-    source = Path(__file__).with_name("host_windows.c")
-    subprocess.run([TO_WINDOWS, f"-I{FMUS}", source, "-o", tmp_path / "host.exe"], check=True)
-    done = subprocess.run(
-        [WINE, tmp_path / "host.exe", guid],
-        cwd=tmp_path,
-        env=os.environ | {"WINEPREFIX": str(tmp_path / "wine"), "WINEDEBUG": "-all"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    unit = Unit(Fmu(unpacked(build_component(folder, tmp_path / "a"), tmp_path / "unpacked")))
-    unit.set(yaw_rate_ref=0.1)
-    unit.start()
-    expected = []
-    for i in range(10):
-        unit.step(0.001 * i, 0.001)
-        expected += unit.outputs()
-    assert [float.fromhex(line) for line in done.stdout.split()] == expected
-
-
-def unpacked(fmu, folder):
-    with zipfile.ZipFile(fmu) as archive:
-        archive.extractall(folder)
-    return folder
+@in_windows
+def test_the_library_for_windows_steps_as_the_one_for_linux(folder, tmp_path, unpack):
+    fmu = Fmu(unpack(build_component(folder, tmp_path / "a")))
+    inputs = {"yaw_rate_ref": 0.1, "yaw_rate": 0.02}
+    assert in_wine([(fmu, inputs)], tmp_path) == [ten_steps(fmu, inputs)]
