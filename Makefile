@@ -26,13 +26,13 @@ $(READY_TO_TEST): $(READY)
 fmus: setup
 	$(BIN)/yawbench build
 
-demo: fmus
+demo: setup  # builds the FMUs that it needs
 	$(BIN)/yawbench report --quick scenarios/fnn_sideslip/study.yaml
 
 report: fmus
 	$(BIN)/yawbench report
 
-run: fmus
+run: setup
 	$(BIN)/yawbench run $(SCENARIO)
 
 test: $(READY_TO_TEST) fmus  # what checks everything once; test-all adds what is exhaustive

@@ -1,7 +1,8 @@
 """The native library of a component: translated, compiled, and let through the gate; or why there is none.
 
-What was compiled and let through is kept in the cache by the C text, the compiler and the Python beside which
-it was driven, so nothing is made twice.
+What was compiled and let through is kept in the cache by the C text (which has the GUID, and so follows from
+the component's sources), the headers, the compilers, the gate and the Python beside which it was driven. A
+change of the translator that leaves a text as it was compiles nothing.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import platform
 import shutil
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -20,9 +22,10 @@ from typing import Any
 from orchestrator.cache import keep, recall
 from orchestrator.errors import BuildError
 
+from .. import usual_ranges
 from ..compiler import compile_library, compiler_command, compiler_version
+from . import gate
 from .emit import emit
-from .gate import differences
 from .specialise import specialise
 from .values import Refused
 
@@ -31,12 +34,12 @@ SHARED = [HERE.parent / name for name in ("calling_sequence.h", "fmi2.h", "oldes
 HEADERS = {file.name: file for file in (HERE / "arithmetic.h", HERE / "unit.h", *SHARED)}
 NATIVE_LIBRARY = "native.so"
 """Name of the native library beside the launcher, which opens it by this name."""
-FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-builtin", "-fno-math-errno", "-w", "-fPIC", "-shared",
+FLAGS = ("-std=c11", "-ffp-contract=off", "-fno-builtin", "-fno-math-errno", "-w", "-fPIC", "-shared",
          "-fvisibility=hidden")  # fmt: skip
 """Functions are those of libm, as in CPython: the compiler must neither know nor fuse them."""
-LINUX = ("-Wl,--build-id=none", "-Wl,-z,defs", "-s")
+LINUX = ("-O2", "-Wl,--build-id=none", "-Wl,-z,defs", "-s")
 TO_WINDOWS = "x86_64-w64-mingw32-gcc"
-WINDOWS = ("-static", "-Wl,--no-insert-timestamp", "-s")
+WINDOWS = ("-O1", "-static", "-Wl,--no-insert-timestamp", "-s")
 STORE = "native"
 """Of native libraries in the cache."""
 
@@ -61,19 +64,27 @@ def tools() -> list[str]:
 
 def toolchain() -> str:
     """Return a text that changes with whatever translates, compiles or checks."""
-    return _toolchain(tuple(compiler_command()))
+    return _compilers(tuple(compiler_command())) + _digests(*sorted(HERE.glob("*.py")))
+
+
+def _gate() -> str:
+    """Return a text that changes with whatever compiles or checks."""
+    return _compilers(tuple(compiler_command())) + _digests(Path(gate.__file__), Path(usual_ranges.__file__))
 
 
 @cache
-def _toolchain(compiler: tuple[str, ...]) -> str:
+def _compilers(compiler: tuple[str, ...]) -> str:
     said = [platform.python_version(), *FLAGS, *LINUX, *WINDOWS]
     for command in (compiler, (TO_WINDOWS,)):
         said += command
         if shutil.which(command[0]):
             said.append(compiler_version(command))
-    files = sorted([*HERE.glob("*.py"), *HEADERS.values()])
-    said += [hashlib.sha256(file.read_bytes()).hexdigest() for file in files]
-    return "\0".join(said)
+    return "\0".join(said) + _digests(*HEADERS.values())
+
+
+@cache
+def _digests(*files: Path) -> str:
+    return "\0".join(hashlib.sha256(file.read_bytes()).hexdigest() for file in files)
 
 
 def native(component: type[Any], home: Path, *, source: str, guid: str, resources: Path) -> Native:
@@ -101,7 +112,7 @@ def native(component: type[Any], home: Path, *, source: str, guid: str, resource
 
 
 def _let_through(text: str, component: type[Any], guid: str, resources: Path) -> Native:
-    key = hashlib.sha256((text + toolchain()).encode()).hexdigest()[:32]
+    key = hashlib.sha256((text + _gate()).encode()).hexdigest()[:32]
     kept = recall(STORE, key)
     if kept is not None:
         length = int.from_bytes(kept[:8], "little")
@@ -120,15 +131,19 @@ def _let_through(text: str, component: type[Any], guid: str, resources: Path) ->
 def _made(text: str, component: type[Any], guid: str, resources: Path) -> Native:
     name = component.fmu_name
     sources = {f"{name}.c": text.encode()} | {n: file.read_bytes() for n, file in HEADERS.items()}
-    compiled = compile_library(compiler_command(), sources, *LINUX, *FLAGS, f"{name}.c", "-lm")
-    files = {f"binaries/linux64/{NATIVE_LIBRARY}": compiled}
+    compilers = {f"binaries/linux64/{NATIVE_LIBRARY}": (compiler_command(), LINUX)}
+    if shutil.which(TO_WINDOWS):
+        compilers[f"binaries/win64/{name}.dll"] = ([TO_WINDOWS], WINDOWS)
+
+    def compiled(command: list[str], flags: tuple[str, ...]) -> bytes:
+        return compile_library(command, sources, *flags, *FLAGS, f"{name}.c", "-lm")
+
+    with ThreadPoolExecutor() as pool:
+        files = dict(zip(compilers, pool.map(compiled, *zip(*compilers.values(), strict=True)), strict=True))
     with tempfile.TemporaryDirectory(prefix="yawbench_") as folder:
         library = Path(folder, f"{name}.so")
-        library.write_bytes(compiled)
-        found = differences(library, guid, component, resources)
+        library.write_bytes(files[f"binaries/linux64/{NATIVE_LIBRARY}"])
+        found = gate.differences(library, guid, component, resources)
     if found:
         return Native(why_not=f"the translation is not the same as Python: {found}")
-    if shutil.which(TO_WINDOWS):
-        made = compile_library([TO_WINDOWS], sources, *WINDOWS, *FLAGS, f"{name}.c", "-lm")
-        files[f"binaries/win64/{name}.dll"] = made
     return Native(files)

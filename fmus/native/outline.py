@@ -13,7 +13,7 @@ from . import ir
 from .calls import Calling
 from .evaluate import Call, Promote
 from .lower import Facts
-from .read import Sources
+from .read import Sources, kinds_within
 from .shapes import (
     Forms,
     Growing,
@@ -53,10 +53,9 @@ class Outlining(Calling):
     def __init__(self, sources: Sources, fixed: set[ir.Var], library: Library) -> None:
         super().__init__(sources)
         self.fixed, self.library = fixed, library
-        self._sizes: dict[ast.AST, int] = {}
 
     def _run(self, call: Call, node: ast.FunctionDef | ast.Lambda) -> Any:
-        if not self.calls or self._size(node) < SMALLEST:
+        if not self.calls or kinds_within(node).total() < SMALLEST:
             return self.inside(call, node)
         for name, value in call.frame.slots.items():
             if isinstance(value, Picked):
@@ -75,11 +74,6 @@ class Outlining(Calling):
         targets = tuple(self.new(type) for type in types_of(result))
         self.out.append(ir.Invoke(targets, function, tuple(numbers)))
         return build(result, iter(targets))
-
-    def _size(self, node: ast.AST) -> int:
-        if node not in self._sizes:
-            self._sizes[node] = sum(1 for _ in ast.walk(node))
-        return self._sizes[node]
 
     def _tried(
         self,

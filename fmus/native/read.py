@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import contextlib
 import inspect
+from collections import Counter
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -43,6 +44,18 @@ def _functions(file: str, content: bytes) -> dict[tuple[int, str], list[Tree]]:
         elif isinstance(node, ast.Lambda):
             found.setdefault((node.lineno, "<lambda>"), []).append(node)
     return found
+
+
+@cache
+def kinds_within(node: ast.AST) -> Counter[type[ast.AST]]:
+    """Return how many nodes of each kind a node consists of."""
+    return Counter(map(type, ast.walk(node)))
+
+
+@cache
+def names_within(node: ast.AST) -> Counter[tuple[str, type[ast.expr_context]]]:
+    """Return how often each name is read (`ast.Load`) and set (`ast.Store`) within a node."""
+    return Counter((x.id, type(x.ctx)) for x in ast.walk(node) if isinstance(x, ast.Name))
 
 
 class Sources:

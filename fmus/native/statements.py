@@ -14,7 +14,7 @@ from typing import Any
 from . import ir
 from .evaluate import BINARY, Evaluation, Promote
 from .merge import items_of
-from .read import Sources
+from .read import Sources, kinds_within, names_within
 from .shapes import Known, Memo, Shape, Widening, build, numbers_of, shape_of, types_of
 from .values import (
     UNSET,
@@ -62,7 +62,6 @@ class Execution(Evaluation):
 
     def __init__(self, sources: Sources) -> None:
         super().__init__(sources)
-        self._closures: dict[ast.AST, bool] = {}
 
     @property
     def frame(self) -> Frame:
@@ -123,11 +122,8 @@ class Execution(Evaluation):
         return one, other
 
     def _has_closures(self) -> bool:
-        node = self.calls[-1].source.node
-        if node not in self._closures:
-            inner = (ast.Lambda, ast.FunctionDef)
-            self._closures[node] = any(isinstance(x, inner) for x in ast.walk(node) if x is not node)
-        return self._closures[node]
+        kinds = kinds_within(self.calls[-1].source.node)
+        return kinds[ast.Lambda] + kinds[ast.FunctionDef] > 1  # more than itself
 
     # ---- simple statements ------------------------------------------------------------------
 
@@ -364,8 +360,7 @@ class Execution(Evaluation):
             self.branch(over, lambda: self._otherwise(node.orelse), lambda: None)
             how = self.exit
         if isinstance(how, ir.Var):
-            returns = any(isinstance(x, ast.Return) for x in ast.walk(node))
-            if returns:
+            if kinds_within(node)[ast.Return]:
                 back = self.compare("==", how, RETURN)
                 how = self.branch(back, lambda: RETURN, lambda: ON)
             else:
@@ -377,7 +372,8 @@ class Execution(Evaluation):
         self.block(statements)
 
     def _for_bytes(self, node: ast.For, over: Bytes) -> None:
-        if node.orelse or any(isinstance(x, (ast.Break, ast.Return)) for x in ast.walk(node)):
+        kinds = kinds_within(node)
+        if node.orelse or kinds[ast.Break] or kinds[ast.Return]:
             raise Refused("leaving a loop over a text")
         for part in over.text.parts:
             if isinstance(part, str):
@@ -449,12 +445,9 @@ class Execution(Evaluation):
         self._finish_loop(node, made, carried, heads)
 
     def _is_read_outside(self, loop: ast.AST, name: str) -> bool:
-        inside = set(map(id, ast.walk(loop)))
-        function = self.calls[-1].source.node
-        return name in (EXIT, RESULT) or any(
-            isinstance(x, ast.Name) and x.id == name and isinstance(x.ctx, ast.Load) and id(x) not in inside
-            for x in ast.walk(function)
-        )
+        read = name, ast.Load
+        everywhere = names_within(self.calls[-1].source.node)
+        return name in (EXIT, RESULT) or everywhere[read] > names_within(loop)[read]
 
     def _pass(
         self,
@@ -557,7 +550,7 @@ def _has(box: Box, key: Any) -> bool:
 
 
 def _stored(loop: ast.AST) -> set[str]:
-    return {x.id for x in ast.walk(loop) if isinstance(x, ast.Name) and isinstance(x.ctx, ast.Store)}
+    return {name for name, context in names_within(loop) if context is ast.Store}
 
 
 __all__ = ["Execution", "Known"]
