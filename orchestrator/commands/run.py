@@ -52,6 +52,7 @@ def run(
     """
     from ..errors import ScenarioError, SimulationError
     from ..labels import changed, with_changes
+    from ..master.compiled_loop import slower_because
     from ..master.isolation import opener_of
     from ..master.log import STATUS, WARNING
     from ..master.simulate import simulate
@@ -74,6 +75,8 @@ def run(
     for note in (*plan.diagnostics, size_note(plan, folder, wishes.format_)):
         if note:
             say(f"note: {note}")
+    if wishes.limit is None and (why := slower_because()):
+        say(f"note: {why}; Python makes the steps, which takes longer")
     if plan.changes:
         say(f"changed: {changed(plan.changes)}")
     title = with_changes(plan.title or scenario.stem, plan.changes)

@@ -212,11 +212,20 @@ class CompiledLoop:
 def missing_loop(grid: tuple[int, int, int], n_steps: int) -> str:
     """Return why a run cannot have the compiled loop; empty if it can."""
     start, step, scale = grid
-    if os.environ.get(WANTED) == "python":
+    if _unwanted():
         return f"{WANTED} asks for it"
     if max(abs(start), abs(start + n_steps * step), scale) >= EXACT:
         return "its times are no quotients of numbers of double precision"
     return _library()[1]
+
+
+def slower_because() -> str:
+    """Return why Python makes the steps of runs although nobody asks for it; empty if it does not."""
+    return "" if _unwanted() else _library()[1]
+
+
+def _unwanted() -> bool:
+    return os.environ.get(WANTED) == "python"
 
 
 def _library() -> tuple[ctypes.CDLL | None, str]:

@@ -214,13 +214,20 @@ def test_ctrl_c_reaches_a_walk_within_a_moment(fmus, tmp_path):
     assert (record.status, record.loop) == ("interrupted", COMPILED)
 
 
-def test_without_a_compiler_the_loop_is_in_python(tmp_path, monkeypatch):
+def test_without_a_compiler_the_loop_is_in_python(fmus, tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("CC", "no-such-compiler")
     monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "cache"))
     load_compiled.cache_clear()
     try:
         why = "there is no C compiler (no-such-compiler); CC can name one"
         assert compiled_loop.missing_loop((0, 1, 1000), 10) == why
+        (tmp_path / "s.yaml").write_text("stop_time: 1\nstep_size: 0.1\nunits:\n  a: {fmu: driver_sine}\n")
+        out = tmp_path / "out"
+        with pytest.raises(SystemExit) as ended:
+            main(["run", str(tmp_path / "s.yaml"), "--fmus", str(fmus), "--out", str(out)])
+        assert not ended.value.code
+        assert f"note: {why}; Python makes the steps, which takes longer\n" in capsys.readouterr().err
+        assert load_results(out).record.loop == f"Python: {why}"
     finally:
         load_compiled.cache_clear()
 
