@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from components.fmi.component import Component
 from orchestrator.errors import ScenarioError
-from orchestrator.experiments.execution import Executor, finish, left_to_do
+from orchestrator.experiments.execution import Executor
 from orchestrator.experiments.jobs import Job, OnOutcome, PlanningCache, run_job
-from orchestrator.experiments.journal import Journal
 from orchestrator.experiments.ranking import UNIT, EntrySpec, load_ranking
 from orchestrator.experiments.ranking_scores import RankingResult, run_ranking
 from orchestrator.experiments.ranking_tables import (
@@ -97,15 +96,13 @@ def rank(
     with contextlib.ExitStack() as stack:
         folder = Path(kept_in or stack.enter_context(tempfile.TemporaryDirectory()))
         stack.enter_context(writing(folder))
-        journal = stack.enter_context(contextlib.closing(Journal(folder, loaded.identity)))
 
         def runner(jobs: Sequence[Job], told: OnOutcome) -> None:
             make_all(jobs, programs, workers=workers, done=told, run=run_job)
 
-        def make(_: str, jobs: Sequence[Job]) -> None:
-            finish(left_to_do(jobs, journal.records), journal, runner=runner)
-
-        execute = Executor(folder, journal, once, make, {"format": "parquet"})
+        execute = stack.enter_context(
+            Executor(folder, loaded.identity, runner, once, of_jobs={"format": "parquet"})
+        )
         return Ranking(run_ranking(loaded, execute, keep=out is not None))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -13,11 +12,11 @@ import typer
 
 from ..messages import counted, listed
 from .options import CHANGES, MAKING, RunOptions, named, takes
-from .progress import bar, hold, make, pooled, print_tables, say, say_failed, stoppable
+from .progress import executor_of, hold, pooled, print_tables, say, say_failed, stoppable
 
 if TYPE_CHECKING:
+    from ..experiments.execution import Executor
     from ..experiments.experiment import LoadedExperiment
-    from ..experiments.jobs import PlanningCache
     from ..experiments.outcome import Each, ExperimentResult
     from ..experiments.planning import PlannedExperiment
 
@@ -38,80 +37,64 @@ def conduct(
         YawbenchError: a run cannot start; none has been started.
         typer.Exit: Ctrl-C.
     """
+    with stoppable(folder), executor_of(folder, experiment.identity, wishes, each, **of_jobs) as execute:
+        return concluded(experiment, execute, wishes)
+
+
+def concluded(experiment: LoadedExperiment, execute: Executor, wishes: RunOptions) -> ExperimentResult:
+    """Return the result of an experiment, drawn and written; see `conduct`."""
     from ..errors import YawbenchError
     from ..experiments.figures import draw_all
-    from ..experiments.jobs import PlanningCache
-    from ..experiments.journal import Journal
-    from ..experiments.outcome import judge_records, judge_results
-    from ..experiments.planning import plan_experiment
+    from ..experiments.outcome import judge_results
     from ..experiments.record import write_findings
-    from ..fmu.opener import stale_fmus
     from ..labels import changed
 
     if wishes.quick and experiment.spec.repeats:
         experiment = experiment.short
-    planned: PlannedExperiment | None = None
-    once = PlanningCache(build=wishes.build)
-    with stoppable(folder):
-        try:
-            with bar("planning", len(experiment.cases), quiet=True) as planning:
-                planned = plan_experiment(
-                    experiment, folder, once=once, progress=planning, keep=wishes.keep,
-                    **wishes.of_jobs | of_jobs,
-                )  # fmt: skip
-        except YawbenchError:
-            if not wishes.no_run or experiment.spec.axes:
-                raise  # scenarios or FMUs are missing, but existing results can be judged without them
-        if planned:
-            experiment = planned.experiment
-            for note in stale_fmus(planned.fmus.values()):
-                say(f"note: {note}")
-        if experiment.by_options:
-            say(f"changed: {changed(experiment.by_options)}")
-        if planned and experiment.spec.axes:
-            with contextlib.closing(Journal(folder, experiment.identity, fresh=wishes.fresh)) as journal:
-                make(experiment.spec.title, planned.jobs, wishes, journal)
-                findings = judge_records(planned, journal.records)
-        else:
-            outcomes = make(experiment.spec.title, planned.jobs, wishes) if planned else []
-            findings = judge_results(experiment, folder, outcomes, planned=planned, each=each)
-        drawn, problems = draw_all(findings, folder, each=each)
-        if planned and experiment.spec.region and not wishes.quick:
-            findings = _over_region(planned, findings, folder, wishes, once)
-        write_findings(findings, drawn, folder)
+    if experiment.by_options:
+        say(f"changed: {changed(experiment.by_options)}")
+    try:
+        findings = execute(experiment, keep=wishes.keep)
+    except YawbenchError:
+        if not wishes.no_run or experiment.spec.axes:
+            raise  # scenarios or FMUs are missing, but existing results can be judged without them
+        findings = judge_results(experiment, execute.folder, each=execute.each)
+    drawn, problems = draw_all(findings, execute.folder, each=execute.each)
+    if findings.planned and experiment.spec.region and not wishes.quick:
+        findings = _over_region(findings.planned, findings, execute)
+    write_findings(findings, drawn, execute.folder)
     for problem in problems:
         say(problem)
-    if findings.not_made:
-        say(f"{findings.not_made} of {counted(len(findings.records), 'run')} not made yet")
-    if experiment.spec.axes:  # without axes, failed runs have been reported one by one
-        say_failed(findings.failed)
-        if found := findings.remarkable():
-            say(f"note: {found}")
+    say_remarks(findings)
     return findings
 
 
+def say_remarks(findings: ExperimentResult) -> None:
+    """Print which runs of an experiment are missing or failed, and what is remarkable about the others."""
+    if findings.not_made:
+        say(f"{findings.not_made} of {counted(len(findings.records), 'run')} not made yet")
+    if findings.spec.axes:  # without axes, failed runs have been reported one by one
+        say_failed(findings.failed)
+        if found := findings.remarkable():
+            say(f"note: {found}")
+
+
 def _over_region(
-    planned: PlannedExperiment,
-    findings: ExperimentResult,
-    folder: Path,
-    wishes: RunOptions,
-    once: PlanningCache,
+    planned: PlannedExperiment, findings: ExperimentResult, execute: Executor
 ) -> ExperimentResult:
     """Return the findings with the verdicts over the region added; the journal has the runs already made."""
     from ..experiments.execution import left_to_do
-    from ..experiments.journal import Journal
     from ..experiments.region import judge_region, plan_region
 
-    experiment = planned.experiment
-    with bar("planning", 0, quiet=True) as planning:
-        plan = plan_region(planned, folder, once=once, progress=planning)
+    with execute.display.planning(0) as planning:
+        plan = plan_region(planned, execute.folder, once=execute.once, progress=planning)
     jobs = {job.key: job for job in plan.jobs.values()}
-    with contextlib.closing(Journal(folder, experiment.identity, fresh=wishes.fresh)) as journal:
-        if wishes.no_run and (left := left_to_do(list(jobs.values()), journal.records)):
-            say(f"note: {counted(len(left), 'run')} of the region not made yet; it is left out")
-            return findings
-        make(f"{experiment.spec.title}, region of its verdicts", list(jobs.values()), wishes, journal)
-        records = journal.records
+    records = execute.journal.records
+    if execute.runner is None and (left := left_to_do(list(jobs.values()), records)):
+        say(f"note: {counted(len(left), 'run')} of the region not made yet; it is left out")
+        return findings
+    title = f"{planned.experiment.spec.title}, region of its verdicts"
+    execute.run(title, list(jobs.values()), journaled=True)
     failed = {jobs[key].label: str(records[key].reason) for key in jobs if not records[key].ok}
     say_failed(failed)
     if failed:
@@ -292,8 +275,6 @@ def tune(context: typer.Context, file: TuningFile, wishes: RunOptions) -> None:
     trial; the history as a figure; where the file asks for it, entries.yaml for a ranking. An interrupted
     search goes on where it was; with the same seed, and whatever the number of workers, it finds the same.
     """
-    from dataclasses import replace
-
     from ..experiments.experiment import load_experiment
     from ..experiments.record import to_csv
     from ..experiments.tuning import (
@@ -317,14 +298,15 @@ def tune(context: typer.Context, file: TuningFile, wishes: RunOptions) -> None:
     hold(context, folder)
     each = pooled(context, wishes)
 
-    def judged(trials: LoadedExperiment) -> ExperimentResult:
-        nonlocal wishes
-        findings = conduct(trials, folder, wishes, each)
-        wishes = replace(wishes, fresh=False)
-        return findings
+    with stoppable(folder), executor_of(folder, experiment.identity, wishes, each) as execute:
 
-    found = search(experiment, judged)
-    findings = judged(best_of(experiment, found))
+        def judged(trials: LoadedExperiment) -> ExperimentResult:
+            findings = execute(trials, keep=wishes.keep)
+            say_remarks(findings)
+            return findings
+
+        found = search(experiment, judged)
+        findings = concluded(best_of(experiment, found), execute, wishes)
     table = tuning_table(experiment, found)
     write_whole(folder / "trials.csv", to_csv(columns_of(found)))
     print_tables([table])

@@ -7,6 +7,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
     from ..experiments.execution import Executor
     from ..experiments.jobs import Job, Outcome
-    from ..experiments.journal import Journal
     from ..experiments.outcome import Each
     from ..experiments.planning import PlannedExperiment
     from ..experiments.tables import Table
@@ -73,66 +73,60 @@ def stoppable(folder: Path) -> Iterator[None]:
         raise Interrupted(f"Interrupted; what was recorded until then: {folder}", number=number) from None
 
 
-@contextlib.contextmanager
-def executing(identity: str, folder: Path, wishes: RunOptions, **of_jobs: Any) -> Iterator[Executor]:
-    """Provide the executor of experiments in a results folder, with its journal.
+@dataclass
+class Terminal:
+    """Shows the progress of experiments on stderr, each note once."""
+
+    making: bool = True  # whether missing runs are made
+    noted: set[str] = field(default_factory=set)
+
+    def planning(self, total: int) -> contextlib.AbstractContextManager[Callable[[int], None]]:
+        """Show a bar."""
+        return bar("planning", total, quiet=True)
+
+    def planned(self, planned: PlannedExperiment) -> None:
+        """Print which FMUs are out of date."""
+        from ..fmu.opener import stale_fmus
+
+        for note in map(str, stale_fmus(planned.fmus.values())):
+            if note not in self.noted:
+                say(f"note: {note}")
+            self.noted.add(note)
+
+    def running(
+        self, title: str, jobs: Sequence[Job], left: Sequence[Job], *, journaled: bool
+    ) -> contextlib.AbstractContextManager[Callable[[Outcome], None]]:
+        """Print how many runs are left, and show a bar; of runs with results, also a line for each."""
+        total = len({(job.key, job.out) for job in jobs})
+        done = total - len(left)
+        before = "" if not done else ", all finished before" if done == total else f", {done} finished before"
+        say(f"{title}: {counted(len(jobs), 'run')}{before}")
+        if not self.making or not left:
+            return contextlib.nullcontext(lambda outcome: None)
+        return reported("runs", total, done, each=not journaled)
+
+
+def executor_of(
+    folder: Path, identity: str, wishes: RunOptions, each: Each = map, **of_jobs: Any
+) -> Executor:
+    """Return the executor of experiments in a results folder, which shows their progress on the terminal.
 
     Args:
-        identity: of the experiments in the folder.
         folder: locked results folder.
+        identity: of the experiments in it.
         wishes: the options of the command.
+        each: `map` used to read results.
         of_jobs: fields of all jobs in place of the options'.
-
-    Raises:
-        YawbenchError: the folder holds another experiment, or cannot be written.
     """
-    from ..experiments.execution import Executor
+    from ..experiments.execution import Executor, runner_of
     from ..experiments.jobs import PlanningCache
-    from ..experiments.journal import Journal
-    from ..fmu.opener import stale_fmus
 
-    def on_planned(planned: PlannedExperiment) -> None:
-        for note in stale_fmus(planned.fmus.values()):
-            say(f"note: {note}")
-
-    with contextlib.closing(Journal(folder, identity, fresh=wishes.fresh)) as journal:
-        yield Executor(
-            folder, journal, PlanningCache(build=wishes.build),
-            lambda title, jobs: make(title, jobs, wishes, journal),
-            wishes.of_jobs | of_jobs, lambda total: bar("planning", total, quiet=True), on_planned,
-        )  # fmt: skip
-
-
-def make(
-    title: str, jobs: Sequence[Job], wishes: RunOptions, journal: Journal | None = None
-) -> list[Outcome]:
-    """Make the runs that are not finished, report their progress, and return all outcomes.
-
-    Args:
-        title: description of the runs.
-        jobs: with plans and keys.
-        wishes: the options of the command.
-        journal: has the finished runs and receives those that end; without one, finished runs are found on
-            disk, and every run is reported on a line of its own.
-
-    Raises:
-        KeyboardInterrupt: Ctrl-C.
-        YawbenchError: the journal cannot be written, or the cluster does not exist.
-    """
-    from ..experiments.execution import finish, left_to_do, runner_of
-
-    if wishes.no_run and journal is None:
-        return []
-    again = wishes.fresh and journal is None
-    left = list(jobs) if again else left_to_do(jobs, journal.records if journal else {})
-    total = len({(job.key, job.out) for job in jobs})
-    done = total - len(left)
-    before = "" if not done else ", all finished before" if done == total else f", {done} finished before"
-    say(f"{title}: {counted(len(jobs), 'run')}{before}")
-    if wishes.no_run or not left:
-        return []
-    with reported("runs", total, done, each=journal is None) as told:
-        return finish(left, journal, runner=runner_of(wishes.jobs, wishes.scheduler), told=told)
+    runner = None if wishes.no_run else runner_of(wishes.jobs, wishes.scheduler)
+    once = PlanningCache(build=wishes.build)
+    given = wishes.of_jobs | of_jobs
+    return Executor(
+        folder, identity, runner, once, wishes.fresh, given, each, Terminal(making=not wishes.no_run)
+    )
 
 
 def say_failed(failed: Mapping[str, str]) -> None:

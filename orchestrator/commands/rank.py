@@ -9,7 +9,7 @@ import typer
 
 from .experiments import command_of
 from .options import MAKING, RunOptions, named, takes
-from .progress import executing, hold, pooled, print_tables, say, stoppable
+from .progress import executor_of, hold, pooled, print_tables, say, stoppable
 
 if TYPE_CHECKING:
     from ..experiments.outcome import Each
@@ -75,7 +75,7 @@ def rank(
             )
     folder = wishes.out or default_folder(file)
     hold(context, folder)
-    with stoppable(folder), executing(ranking.identity, folder, wishes, format="parquet") as execute:
+    with stoppable(folder), executor_of(folder, ranking.identity, wishes, format="parquet") as execute:
         ranked = run_ranking(ranking, execute, only=only or ())
         command = command_of("rank", file, quick=quick, controller=controller, condition=condition)
         _write(ranked, folder, command, pooled(context, wishes))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -13,13 +13,15 @@ import typer
 
 from ..evaluation.standard_tests import TESTS
 from .options import CHANGES, MAKING, RunOptions, takes
-from .progress import hold, make, say, stoppable
+from .progress import executor_of, hold, say, stoppable
 
 if TYPE_CHECKING:
     from ..evaluation.judgement import Evaluation, TestSeries
     from ..evaluation.standard_tests import StandardTest
     from ..evaluation.trace import MappingSpec, Trace
-    from ..experiments.jobs import Job, PlanningCache
+    from ..experiments.execution import Executor
+    from ..experiments.experiment import NamedRun
+    from ..experiments.jobs import Job
     from ..plan import Override
 
 
@@ -76,7 +78,6 @@ def drive(
     kilometre per hour, from the scenario's own speed in steps and halves.
     """
     from ..errors import ScenarioError
-    from ..experiments.jobs import Job, PlanningCache
     from ..experiments.standard_test_runs import AMPLITUDE, SPEED
     from ..results.folder import default_folder
     from ..scenario import catalogue
@@ -84,8 +85,7 @@ def drive(
     changes = (*_vehicle(vehicle), *wishes.changes)
     one_run = catalogue.find(scenario or f"{GROUND}/{test.replace('-', '_')}", "a scenario")
     folder = wishes.out or default_folder(one_run, changes, suffix="_series")
-    base = Job("", one_run, folder, changes, **wishes.of_jobs | {"format": "parquet"})
-    once = PlanningCache(build=wishes.build)
+    execute = executor_of(folder, str(one_run), wishes, format="parquet")
     given = {str(change.target) for change in changes}
     if test == "sine-with-dwell":
         if AMPLITUDE in given:
@@ -94,7 +94,7 @@ def drive(
             )
         slow = catalogue.find(slow_steer or f"{GROUND}/slowly_increasing_steer", "a scenario")
         hold(context, folder)
-        status = _drive_dwell(base, slow, once, angle, wishes, figures=figures)
+        status = _drive_dwell(one_run, changes, execute, slow, angle, figures=figures)
     else:
         if angle or slow_steer:
             raise ScenarioError(
@@ -106,13 +106,19 @@ def drive(
                 code="option-invalid",
             )
         hold(context, folder)
-        status = _drive_lane_change(base, once, wishes, figures=figures)
+        status = _drive_lane_change(one_run, changes, execute, figures=figures)
     if status:
         raise typer.Exit(status)
 
 
 def _drive_dwell(
-    base: Job, slow: Path, once: PlanningCache, angle: str | None, wishes: RunOptions, *, figures: bool
+    scenario: Path,
+    changes: Sequence[Override],
+    execute: Executor,
+    slow: Path,
+    angle: str | None,
+    *,
+    figures: bool,
 ) -> int:
     """Make and evaluate the series of sine with dwell; return the exit status.
 
@@ -120,57 +126,65 @@ def _drive_dwell(
         ResultsError: A is not known.
         typer.Exit: slowly increasing steer has failed.
     """
-    import math
-
     from ..errors import ResultsError
     from ..evaluation.judgement import NotJudged
     from ..evaluation.sine_with_dwell import judge_series
     from ..evaluation.standard_tests import TESTS
     from ..evaluation.steering_tests import characteristic_angle, evaluate_slow_steer
-    from ..experiments.standard_test_runs import dwell_jobs, slow_steer_jobs, traces
-
-    pass
+    from ..experiments.standard_test_runs import dwell_runs, slow_steer_runs, traces
 
     chosen = TESTS["sine-with-dwell"]
     known = angle_of(angle)
     if known is None:
-        name = "slowly_increasing_steer"
-        found = slow_steer_jobs(replace(base, label=name, scenario=slow, out=base.out / name), once)
-        if status := _make("slowly increasing steer", found, base, wishes):
+        found, status = _made("slowly increasing steer", slow_steer_runs(slow, changes, execute), execute)
+        if status:
             raise typer.Exit(status)
         try:
             known = characteristic_angle([evaluate_slow_steer(trace) for trace in traces(found)])
         except NotJudged as why:
             raise ResultsError(str(why), code="test-not-applicable") from None
     say(f"A = {math.degrees(known):.1f} degrees")
-    ladder = dwell_jobs(base, known, once)
-    status = _make("sine with dwell", ladder, base, wishes)
+    ladder, status = _made("sine with dwell", dwell_runs(scenario, changes, known), execute)
     recorded = traces(ladder)
     judged = [chosen.evaluate(trace, known) for trace in recorded]
     series = judge_series(judged, known)
-    EvaluatedRuns(chosen, recorded, judged, series, known, base.out).conclude(each=figures)
+    EvaluatedRuns(chosen, recorded, judged, series, known, execute.folder).conclude(each=figures)
     return status
 
 
-def _drive_lane_change(base: Job, once: PlanningCache, wishes: RunOptions, *, figures: bool) -> int:
+def _drive_lane_change(
+    scenario: Path, changes: Sequence[Override], execute: Executor, *, figures: bool
+) -> int:
     """Search the highest clean entry speed and evaluate its runs; return the exit status."""
     from ..evaluation.standard_tests import TESTS
     from ..experiments.standard_test_runs import entry_speeds
 
-    pass
-
     chosen = TESTS["lane-change"]
     failed: list[int] = []
 
-    def made(job: Job) -> bool:
-        status = _make(f"{job.label} km/h", [job], base, wishes)
+    def made(run: NamedRun) -> Job | None:
+        (job,), status = _made(f"{run.name} km/h", [run], execute)
         failed.extend([status] if status else [])
-        return not status
+        return None if status else job
 
-    traces, series = entry_speeds(base, once, made)
+    traces, series = entry_speeds(scenario, changes, execute, made)
     judged = [chosen.evaluate(trace) for trace in traces]
-    EvaluatedRuns(chosen, traces, judged, series, None, base.out).conclude(each=figures)
+    EvaluatedRuns(chosen, traces, judged, series, None, execute.folder).conclude(each=figures)
     return max(failed, default=0)
+
+
+def _made(title: str, runs: Sequence[NamedRun], execute: Executor) -> tuple[list[Job], int]:
+    """Make the runs that are not finished; return their jobs and the exit status, not 0 if one failed.
+
+    Raises:
+        typer.Exit: Ctrl-C.
+    """
+    from ..experiments.experiment import experiment_of
+
+    jobs = execute.planned(experiment_of(runs[0].scenario, runs, title=title)).jobs
+    with stoppable(execute.folder):
+        outcomes = execute.run(title, jobs, journaled=False)
+    return jobs, max((one.exit_status for one in outcomes if not one.ok), default=0)
 
 
 def _vehicle(given: str | None) -> tuple[Override, ...]:
@@ -185,17 +199,6 @@ def _vehicle(given: str | None) -> tuple[Override, ...]:
     if given is None:
         return ()
     return (Override.of("vehicle", str(catalogue.find(given, "a vehicle file").resolve()), "--vehicle"),)
-
-
-def _make(title: str, jobs: Sequence[Job], base: Job, wishes: RunOptions) -> int:
-    """Make the runs that are not finished; return the exit status, not 0 if one of them failed.
-
-    Raises:
-        typer.Exit: Ctrl-C.
-    """
-    with stoppable(base.out):
-        outcomes = make(title, jobs, wishes)
-    return max((one.exit_status for one in outcomes if not one.ok), default=0)
 
 
 TestName = Literal[tuple(TESTS)]  # type: ignore[valid-type]

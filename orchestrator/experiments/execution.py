@@ -12,8 +12,9 @@ import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from .. import checksums
 from ..errors import ResultsError, ScenarioError
@@ -33,28 +34,100 @@ from .jobs import (
     ready,
 )
 from .journal import Journal
-from .outcome import ExperimentResult, judge_records
+from .outcome import Each, ExperimentResult, judge_records, judge_results
 from .planning import PlannedExperiment, plan_experiment
 
 Runner = Callable[[Sequence[Job], OnOutcome], object]
 """Executes jobs and reports each outcome; see `runner_of`."""
-MakeRuns = Callable[[str, Sequence[Job]], object]
-"""Executes those of the jobs that are not in the journal, under a title, and adds them to it."""
-ShowProgress = Callable[[int], AbstractContextManager[Callable[[int], None]]]
-"""Shows the progress of planning a number of runs."""
+
+
+class Display(Protocol):
+    """Shows the progress of experiments."""
+
+    def planning(self, total: int) -> AbstractContextManager[Callable[[int], None]]:
+        """Show the planning of a number of runs, while it is called with how many are planned."""
+        return nullcontext(lambda done: None)
+
+    def planned(self, planned: PlannedExperiment) -> None:
+        """Show what is remarkable about plans."""
+
+    def running(
+        self, title: str, jobs: Sequence[Job], left: Sequence[Job], *, journaled: bool
+    ) -> AbstractContextManager[OnOutcome]:
+        """Show the execution of jobs, of which `left` are missing, while it is called with their outcomes."""
+        return nullcontext(lambda outcome: None)
+
+
+class NoDisplay(Display):
+    """Shows nothing."""
 
 
 @dataclass(frozen=True)
-class Executor:
-    """Executes experiments in one results folder, with one journal and one cache of files and FMUs."""
+class Executor(AbstractContextManager["Executor"]):
+    """Executes experiments in one locked results folder, with one journal and one cache of files and FMUs.
+
+    The journal has the runs of experiments with axes; those of others have results in folders of their own.
+    """
 
     folder: Path
-    journal: Journal
-    once: PlanningCache
-    make: MakeRuns
+    identity: str  # of the experiments, in the journal
+    runner: Runner | None  # None: missing runs are not made
+    once: PlanningCache = field(default_factory=PlanningCache)
+    fresh: bool = False  # whether finished runs are made again
     of_jobs: Mapping[str, Any] = field(default_factory=dict)  # fields of all jobs, see `jobs_of`
-    planning: ShowProgress = lambda total: nullcontext(lambda done: None)
-    on_planned: Callable[[PlannedExperiment], object] = lambda planned: None
+    each: Each = map  # to read results with
+    display: Display = field(default_factory=NoDisplay)
+
+    @cached_property
+    def journal(self) -> Journal:
+        """The journal, opened when it is first needed.
+
+        Raises:
+            ResultsError: the folder belongs to another experiment, or cannot be written.
+        """
+        return Journal(self.folder, self.identity, fresh=self.fresh)
+
+    def __exit__(self, *_: object) -> None:
+        if "journal" in self.__dict__:
+            self.journal.close()
+
+    def __call__(
+        self,
+        experiment: LoadedExperiment,
+        *,
+        only: Callable[[Case], bool] = lambda case: True,
+        **of_jobs: Any,
+    ) -> ExperimentResult:
+        """Execute the missing runs of an experiment and return its result.
+
+        Args:
+            experiment: as loaded or computed.
+            only: whether a missing case is executed; a finished one counts in any case.
+            of_jobs: fields of all jobs in place of the executor's.
+
+        Raises:
+            YawbenchError: a run cannot start; none has been started.
+        """
+        planned = self.planned(experiment, **of_jobs)
+        experiment, journaled = planned.experiment, bool(experiment.spec.axes)
+        jobs = [job for case, job in zip(experiment.cases, planned.jobs, strict=True) if only(case)]
+        outcomes = self.run(experiment.spec.title, jobs, journaled=journaled)
+        if journaled:
+            return judge_records(planned, self.journal.records)
+        return judge_results(experiment, self.folder, outcomes, planned=planned, each=self.each)
+
+    def planned(self, experiment: LoadedExperiment, **of_jobs: Any) -> PlannedExperiment:
+        """Plan all cases of an experiment.
+
+        Raises:
+            YawbenchError: a run cannot start.
+        """
+        with self.display.planning(len(experiment.cases)) as progress:
+            planned = plan_experiment(
+                experiment, self.folder, once=self.once, progress=progress, **{**self.of_jobs, **of_jobs}
+            )
+        self.display.planned(planned)
+        return planned
 
     def plans(self, runs: Iterable[NamedRun]) -> list[Plan]:
         """Return the plans of named runs, for experiments that depend on values in their scenarios.
@@ -65,31 +138,25 @@ class Executor:
         jobs = [Job(run.label, run.scenario, self.folder, run.changes, **self.of_jobs) for run in runs]
         return [job.plan for job in ready(jobs, once=self.once) if job.plan]
 
-    def __call__(
-        self,
-        experiment: LoadedExperiment,
-        *,
-        only: Callable[[Case], bool] = lambda case: True,
-        **of_jobs: Any,
-    ) -> ExperimentResult:
-        """Execute the missing runs of an experiment with axes and return its result.
+    def run(self, title: str, jobs: Sequence[Job], *, journaled: bool) -> list[Outcome]:
+        """Execute those of the jobs that are not finished, and return their outcomes.
 
         Args:
-            experiment: with axes.
-            only: whether a missing case is executed; a finished one counts in any case.
-            of_jobs: fields of all jobs in place of the executor's.
+            title: describes the jobs.
+            jobs: with plans and keys.
+            journaled: whether the journal has the finished runs; else their results are looked for.
 
         Raises:
-            YawbenchError: a run cannot start; none has been started.
+            KeyboardInterrupt: Ctrl-C; what has finished is kept.
+            YawbenchError: the journal cannot be written, or the cluster does not exist.
         """
-        with self.planning(len(experiment.cases)) as progress:
-            planned = plan_experiment(
-                experiment, self.folder, once=self.once, progress=progress, **{**self.of_jobs, **of_jobs}
-            )
-        self.on_planned(planned)
-        cases = zip(planned.experiment.cases, planned.jobs, strict=True)
-        self.make(experiment.spec.title, [job for case, job in cases if only(case)])
-        return judge_records(planned, self.journal.records)
+        if self.runner is None and not journaled:
+            return []
+        journal = self.journal if journaled else None
+        again = self.fresh and not journaled
+        left = list(jobs) if again else left_to_do(jobs, journal.records if journal else {})
+        with self.display.running(title, jobs, left, journaled=journaled) as told:
+            return finish(left, journal, runner=self.runner, told=told) if self.runner and left else []
 
 
 def left_to_do(jobs: Sequence[Job], records: Mapping[str, MeasuredRun]) -> list[Job]:

@@ -1,8 +1,4 @@
-"""The series of runs that standard tests consist of: variations of one base job.
-
-Results stay on disk, so an interrupted series resumes: runs of the same scenario, FMUs and program are not
-executed again.
-"""
+"""The series of runs that standard tests consist of, as named runs of experiments."""
 
 from __future__ import annotations
 
@@ -20,11 +16,15 @@ from ..names import Target
 from ..plan import Override, Plan
 from ..results.read import load_results
 from ..scenario.quantities import convert
-from .jobs import Job, PlanningCache, keyed, planned, ready
+from .execution import Executor
+from .experiment import NamedRun
+from .jobs import Job, planned
 
 AMPLITUDE = "driver.amplitude"
 """Target that sine with dwell varies: amplitude of the hand-wheel angle [rad], positive to the left."""
 SIDES = (("left", 1.0), ("right", -1.0))
+SLOW_STEER = "slowly_increasing_steer"
+"""Folder of the runs of slowly increasing steer."""
 SPEED = "speed"
 """Target that lane changes vary: speed of the scenario [m/s]."""
 KMH = 1.0 / 3.6
@@ -34,31 +34,30 @@ LEAST, MOST = 10.0 * KMH, 250.0 * KMH
 """Bounds of the search for the entry speed [m/s]."""
 
 
-def slow_steer_jobs(base: Job, once: PlanningCache) -> list[Job]:
-    """Return jobs of slowly increasing steer to both sides, with the scenario's amplitude.
+def slow_steer_runs(scenario: Path, changes: Sequence[Override], execute: Executor) -> list[NamedRun]:
+    """Return runs of slowly increasing steer to both sides, with the scenario's amplitude.
 
     Raises:
-        ScenarioError: they cannot start, or the driver has no amplitude.
+        ScenarioError: the scenario is wrong, or its driver has no amplitude.
     """
-    given = slow_steer_amplitude(planned(base, once)[1], base.scenario)
-    sides = [_varied(base, name, steered(side * given, "slowly increasing steer")) for name, side in SIDES]
-    return list(map(keyed, ready(sides, once=once)))
+    (plan,) = execute.plans([NamedRun("", "", "", scenario, (*changes,))])
+    given = slow_steer_amplitude(plan, scenario)
+    return [
+        _run(f"{SLOW_STEER}/{name}", scenario, changes, steered(side * given, "slowly increasing steer"))
+        for name, side in SIDES
+    ]
 
 
-def dwell_jobs(base: Job, angle: float, once: PlanningCache) -> list[Job]:
-    """Return jobs of sine with dwell for the angle A [rad], left first and right first.
-
-    Raises:
-        ScenarioError: they cannot start.
-    """
-    jobs = [
-        _varied(
-            base, f"{name}_first/{math.degrees(amplitude):.2f}", steered(side * amplitude, "sine with dwell")
+def dwell_runs(scenario: Path, changes: Sequence[Override], angle: float) -> list[NamedRun]:
+    """Return runs of sine with dwell for the angle A [rad], left first and right first."""
+    return [
+        _run(
+            f"{name}_first/{math.degrees(amplitude):.2f}", scenario, changes,
+            steered(side * amplitude, "sine with dwell"),
         )
         for name, side in SIDES
         for amplitude in amplitudes(angle)
-    ]
-    return list(map(keyed, ready(jobs, once=once)))
+    ]  # fmt: skip
 
 
 def steered(amplitude: float, origin: str) -> Override:
@@ -67,24 +66,26 @@ def steered(amplitude: float, origin: str) -> Override:
 
 
 def entry_speeds(
-    base: Job, once: PlanningCache, make: Callable[[Job], bool]
+    scenario: Path, changes: Sequence[Override], execute: Executor, make: Callable[[NamedRun], Job | None]
 ) -> tuple[list[Trace], TestSeries]:
     """Search for the highest clean entry speed; return the runs made and the series' verdict.
 
     Args:
-        base: the job at the scenario's own speed, where the search starts.
-        once: cache of files and FMUs.
-        make: executes a run unless its results exist; returns whether there are results.
+        scenario: of one run; the search starts at its own speed.
+        changes: overrides of all runs.
+        execute: makes plans.
+        make: executes a run unless its results exist; returns its job, None if there are no results.
 
     Raises:
         ScenarioError: a run cannot start, or the scenario has no speed.
         ResultsError: a run did not record a signal that the test needs.
     """
-    scenario, plan = planned(base, once)
-    first = 0.0 if scenario.speed is None else float(convert(str(scenario.speed), "m/s"))
+    base = Job("", scenario, execute.folder, (*changes,), **execute.of_jobs)
+    loaded, plan = planned(base, execute.once)
+    first = 0.0 if loaded.speed is None else float(convert(str(loaded.speed), "m/s"))
     if first <= 0.0:
         raise ScenarioError(
-            f"{base.scenario}: tells no speed above 0, from which the series could begin",
+            f"{scenario}: tells no speed above 0, from which the series could begin",
             code="fmu-wrong-kind",
         )
     duration = float(plan.step * plan.n_steps)
@@ -93,9 +94,9 @@ def entry_speeds(
 
     def clean(speed: float) -> bool:
         seconds = math.ceil(10.0 * duration * first / speed) / 10.0  # long enough for the same distance
-        changes = Override.of(SPEED, speed, "entry speed"), Override.of("stop_time", seconds, "entry speed")
-        (job,) = map(keyed, ready([_varied(base, f"{speed / KMH:.2f}", *changes)], once=once))
-        if not make(job):
+        at = Override.of(SPEED, speed, "entry speed"), Override.of("stop_time", seconds, "entry speed")
+        job = make(_run(f"{speed / KMH:.2f}", scenario, changes, *at))
+        if job is None:
             return False
         driven.extend(traces([job]))
         driven[-1] = replace(driven[-1], label=f"{job.label} km/h")
@@ -115,10 +116,9 @@ def traces(jobs: Sequence[Job]) -> list[Trace]:
     return [replace(trace_of(load_results(job.out)), label=job.label) for job in jobs]
 
 
-def _varied(base: Job, name: str, *changes: Override) -> Job:
-    """Return a job of a series, with overrides and a subfolder."""
-    label = f"{base.label}/{name}" if base.label else name
-    return replace(base, label=label, out=base.out / name, changes=(*base.changes, *changes))
+def _run(name: str, scenario: Path, changes: Sequence[Override], *own: Override) -> NamedRun:
+    """Return a named run of a series; `own`: its overrides in addition to those of all runs."""
+    return NamedRun(name, name, name, scenario, (*changes, *own))
 
 
 def slow_steer_amplitude(plan: Plan, scenario: Path) -> float:

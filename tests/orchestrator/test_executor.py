@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from contextlib import closing
 from dataclasses import replace
 
 import pytest
 
 from orchestrator.errors import ScenarioError
 from orchestrator.experiments.axes import DesignAxisSpec, Level, axis_of_levels
-from orchestrator.experiments.execution import Executor, finish, left_to_do
+from orchestrator.experiments.execution import Executor
 from orchestrator.experiments.experiment import NamedRun, experiment_of
-from orchestrator.experiments.jobs import Outcome, PlanningCache, run_job
-from orchestrator.experiments.journal import Journal
+from orchestrator.experiments.jobs import Outcome, run_job
 from orchestrator.plan import Override
 
 from .test_repeats import SCENARIO
@@ -53,7 +51,7 @@ def bisected(folder, execute, limit, width):
 
 @pytest.fixture
 def executor(tmp_path, fmus):
-    """Return an executor with a journal in the folder, and the list of runs that it makes."""
+    """Return an executor in the folder, which resumes what is there, and the list of runs that it makes."""
     made = []
 
     def runner(jobs, done):
@@ -61,25 +59,16 @@ def executor(tmp_path, fmus):
             made.append(job)
             done(Outcome(job, value=run_job(job)))
 
-    def opened():
-        journal = Journal(tmp_path, "bisection")
-
-        def make(_, jobs):
-            finish(left_to_do(jobs, journal.records), journal, runner=runner)
-
-        return Executor(tmp_path, journal, PlanningCache(), make, {"fmus": fmus}), made
-
-    return opened
+    return lambda: (Executor(tmp_path, "bisection", runner, of_jobs={"fmus": fmus}), made)
 
 
 def test_a_bisection_of_several_runs_resumes_with_what_is_in_the_journal(executor, tmp_path):
     execute, made = executor()
-    with closing(execute.journal):
+    with execute:
         found = bisected(tmp_path, execute, 0.7, 1 / 8)
     assert found == {"slow": 0.75, "fast": 0.375}  # 0.7 and 0.35 rounded up to eighths
     assert len(made) == len(RATES) * 3
-    execute, made = executor()
-    with closing(execute.journal):
+    with executor()[0] as execute:
         assert bisected(tmp_path, execute, 0.7, 1 / 16) == {"slow": 0.75, "fast": 0.375}
     assert len(made) == len(RATES) * 4  # one more halving
 
@@ -90,7 +79,7 @@ def test_cases_left_out_count_only_if_they_are_finished(executor, tmp_path):
     metrics = {"last": {"metric": "final(sensor.yaw_rate)"}}
     runs = named_runs(tmp_path)
     experiment = experiment_of(tmp_path / "e.yaml", runs, title="t", axes={"g": axis}, metrics=metrics)
-    with closing(execute.journal):
+    with execute:
         first = execute(experiment, only=lambda case: case.run.name == "slow")
         assert [record.made for record in first.records] == [True, True, False, False]
         again = execute(experiment, only=lambda case: case.run.name == "fast")
@@ -101,7 +90,7 @@ def test_cases_left_out_count_only_if_they_are_finished(executor, tmp_path):
 
 def test_plans_of_runs_hold_what_an_experiment_may_depend_on(executor, tmp_path):
     execute, _ = executor()
-    with closing(execute.journal):
+    with execute:
         (plan, _) = execute.plans(named_runs(tmp_path))
         assert plan.time(plan.n_steps) == pytest.approx(0.1)
         wrong = replace(named_runs(tmp_path)[0], changes=(Override.of("sensor.gian", 1.0, "test"),))
@@ -112,7 +101,7 @@ def test_plans_of_runs_hold_what_an_experiment_may_depend_on(executor, tmp_path)
 def test_signals_are_recorded_by_patterns_of_their_names(executor, tmp_path):
     execute, _ = executor()
     run = named_runs(tmp_path)[0]
-    with closing(execute.journal):
+    with execute:
         every = execute.plans([run])[0].record
         some = replace(execute, of_jobs={**execute.of_jobs, "record": ("yaw_rate*", "*.steer_angle")})
         assert some.plans([run])[0].record == tuple(
