@@ -15,6 +15,8 @@ import pytest
 from tests.commands import status_of
 from tests.fmu_copies import put_fmus
 
+pytest_plugins = ["tests.sentences"]
+
 TESTS = Path(__file__).parent
 LONGEST_FIRST = (
     *("scenarios", "trials", "pages", "docs", "orchestrator", "yawbench", "fmus"),

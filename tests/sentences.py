@@ -1,10 +1,192 @@
-"""Sentences for users: what diagnostics say."""
+"""Golden sentences: what the program says to its users, in one file that is reviewed as text.
+
+    assert golden(text)                  the text is the next sentence of this test
+    assert golden_in(text)               the text holds the next sentence of this test
+    with refused(Kind, "some-code"):     an error of this kind and code, whose text is the next sentence
+
+Tests themselves ask for codes, places and numbers. `tests/sentences.json` has the sentences of each test in
+the order in which it asks for them. `pytest --rewrite-sentences PATH...` replaces those of the tests that it
+runs by what the program says now, and removes those of tests that are gone; then review the difference.
+Paths of temporary folders, of the repository and of Python are replaced by names.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import difflib
+import json
+import re
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+FILE = ROOT / "tests/sentences.json"
+COMMAND = "pytest --rewrite-sentences"
+ALIKE = 0.4
+"""Least likeness of a line that replaces a sentence; chosen: a sentence that is half reworded."""
 
 
 def texts_of(told: Any) -> tuple[str, ...]:
     """Return the texts of the diagnostics of a plan, a run or an error."""
     return tuple(map(str, told.diagnostics))
+
+
+class _Sentences:
+    """The sentences of all tests, and those that the current test has asked for."""
+
+    def __init__(self) -> None:
+        self.of: dict[str, list[Any]] = {}  # test -> its sentences
+        if FILE.exists():
+            by_file = json.loads(FILE.read_text(encoding="utf-8"))
+            self.of = {
+                f"{file}::{name}": one for file, tests in by_file.items() for name, one in tests.items()
+            }
+        self.rewriting = False
+        self.test = ""
+        self.given: list[Any] = []
+        self.volatile: list[tuple[re.Pattern[str], str]] = []
+
+    def begin(self, item: pytest.Item) -> None:
+        """Begin a test."""
+        base = item.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]
+        names = [(rf"{re.escape(str(base))}/[\w.-]+", "<tmp>"), (re.escape(str(ROOT)), "<root>")]
+        names += [(re.escape(path), "<python>") for path in (sys.executable, sys.prefix)]
+        self.volatile = [(re.compile(pattern), name) for pattern, name in names]
+        self.test, self.given = item.nodeid, []
+
+    def end(self) -> None:
+        """End a test that has passed: all of its sentences must have been asked for."""
+        if self.rewriting:
+            if self.given or self.test in self.of:
+                self.of[self.test] = self.given
+        elif more := self.of.get(self.test, [])[len(self.given) :]:
+            raise AssertionError(f"the test did not ask for its sentences {more}: {COMMAND}")
+
+    def next(self) -> Any:
+        """Return the next sentence of the test; None if there is none."""
+        known = self.of.get(self.test, [])
+        return known[len(self.given)] if len(known) > len(self.given) else None
+
+    def plain(self, value: Any) -> Any:
+        """Return a value as JSON represents it, without what differs from run to run."""
+        if isinstance(value, dict):
+            return {self.plain(str(key)): self.plain(one) for key, one in value.items()}
+        if isinstance(value, (list, tuple)):
+            return [self.plain(one) for one in value]
+        if value is None or isinstance(value, (bool, int, float)):
+            return value
+        text = str(value)
+        for pattern, name in self.volatile:
+            text = pattern.sub(name, text)
+        return text
+
+    def write(self) -> None:
+        """Write the file, sorted by file and test."""
+        by_file: dict[str, dict[str, list[Any]]] = {}
+        for test in sorted(test for test, found in self.of.items() if found):
+            file, _, name = test.partition("::")
+            by_file.setdefault(file, {})[name] = self.of[test]
+        FILE.write_text(json.dumps(by_file, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+_sentences = _Sentences()
+
+
+def golden(value: object) -> bool:
+    """Compare a value, a text or texts in lists, with the next sentence of this test."""
+    found, known = _sentences.plain(value), _sentences.next()
+    _sentences.given.append(found)
+    if not _sentences.rewriting:
+        assert known is not None, f"no sentence is known: {COMMAND}\n{found}"
+        assert found == known, f"not as in {FILE.name}"
+    return True
+
+
+def golden_in(value: object) -> bool:
+    """Look for the next sentence of this test in a text, or in one of several.
+
+    Rewriting keeps a sentence that the text still holds; else the line that is most like it replaces it.
+    """
+    several = not isinstance(value, (str, BaseException)) and isinstance(value, Iterable)
+    text = _sentences.plain("\n".join(map(str, value)) if several else value)  # type: ignore[call-overload]
+    known = _sentences.next()
+    if _sentences.rewriting and (known is None or known not in text):
+        known = _most_alike(known, text)
+    assert known is not None, f"no sentence is known: {COMMAND}, or write it into {FILE.name}\n{text}"
+    _sentences.given.append(known)
+    assert known in text, f"{known!r} of {FILE.name} is not in the text"
+    return True
+
+
+def _most_alike(sentence: str | None, text: str) -> str | None:
+    """Return the lines of a text that are most like a sentence; without one the text, if it is a line."""
+    lines = text.strip().splitlines()
+    if sentence is None:
+        return lines[0] if len(lines) == 1 else None
+    n = sentence.count("\n") + 1
+    blocks = ["\n".join(lines[k : k + n]) for k in range(len(lines) - n + 1)]
+    return next(iter(difflib.get_close_matches(sentence, blocks, n=1, cutoff=ALIKE)), None)
+
+
+@contextlib.contextmanager
+def refused(kind: type[BaseException], *codes: str) -> Iterator[pytest.ExceptionInfo[Any]]:
+    """Expect an error with one of these codes, whose text is the next sentence of this test."""
+    with pytest.raises(kind) as caught:
+        yield caught
+    if codes:
+        assert caught.value.code in codes
+    assert golden(caught.value)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--rewrite-sentences", action="store_true", help=f"write what the program says now to {FILE.name}"
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    _sentences.rewriting = bool(config.getoption("--rewrite-sentences"))
+    if _sentences.rewriting and getattr(config.option, "numprocesses", None):
+        raise pytest.UsageError("--rewrite-sentences needs a single process: leave -n out")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Refuse sentences of tests that do not exist, in all files that are collected as a whole."""
+    there = {item.nodeid for item in items}
+    chosen = {part.partition("::")[0] for part in map(str, config.args) if "::" in part}
+    whole = {test.partition("::")[0] for test in there} - {Path(file).as_posix() for file in chosen}
+    gone = [
+        test
+        for test in _sentences.of
+        if test not in there and ((file := test.partition("::")[0]) in whole or not (ROOT / file).exists())
+    ]
+    if _sentences.rewriting:
+        for test in gone:
+            del _sentences.of[test]
+    elif gone:
+        raise pytest.UsageError(
+            f"{FILE.name} has sentences of tests that do not exist: {gone[:9]}; {COMMAND}"
+        )
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    _sentences.begin(item)
+    return (yield)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call() -> Iterator[None]:
+    outcome = yield
+    _sentences.end()
+    return outcome
+
+
+def pytest_sessionfinish() -> None:
+    if _sentences.rewriting:
+        _sentences.write()

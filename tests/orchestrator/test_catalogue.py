@@ -13,6 +13,7 @@ import pytest
 import yawbench as yb
 from orchestrator.errors import ScenarioError
 from orchestrator.scenario import catalogue
+from tests.sentences import golden, refused
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 NAME = "fuzzy_feedback/single_sine"
@@ -33,7 +34,8 @@ def test_a_scenario_that_comes_along_is_run_by_its_name_from_any_folder(yawbench
 
 def test_every_command_that_takes_a_scenario_takes_a_name(yawbench):
     status, text, _ = yawbench("check", NAME)
-    assert (status, text.splitlines()[-1]) == (0, "Nothing is wrong.")
+    assert status == 0
+    assert golden(text.splitlines()[-1])
     assert yawbench("export-ssp", NAME)[0] == 0
     assert yawbench("list", "signals", NAME)[0] == 0
     assert yawbench("plot", NAME, "--set", "stop_time=0.01")[0] == 0
@@ -55,7 +57,7 @@ def test_the_nearest_folder_of_scenarios_comes_before_the_one_that_comes_along(t
 def test_the_library_knows_the_names_that_the_commands_know(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert yb.load(NAME).path == SCENARIOS / f"{NAME}.yaml"
-    with pytest.raises(ScenarioError, match="there is no scenario 'fuzy_feedback/single_sine'; did you mean"):
+    with refused(ScenarioError, "scenario-unknown"):
         yb.load("fuzy_feedback/single_sine")
 
 
@@ -85,11 +87,9 @@ def test_a_vehicle_file_goes_by_its_name_with_or_without_its_folder():
     van = catalogue.find("van", "a vehicle file")
     assert van == catalogue.find("vehicles/van", "a vehicle file")
     assert van.samefile(SCENARIOS / "vehicles" / "van.yaml")
-    with pytest.raises(
-        ScenarioError, match="there is no vehicle file 'large_salon'; did you mean 'large_sal"
-    ):
+    with refused(ScenarioError, "scenario-unknown"):
         catalogue.find("large_salon", "a vehicle file")
-    with pytest.raises(ScenarioError, match="there is no scenario '25mps'"):
+    with refused(ScenarioError, "scenario-unknown"):
         catalogue.find("25mps", "a scenario")
 
 

@@ -29,7 +29,7 @@ from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.overrides import read_changes
 from orchestrator.wiring.make_plan import make_plan as plan_of_scenario
-from tests.sentences import texts_of
+from tests.sentences import golden, golden_in, texts_of
 
 from .fake_fmus import Var, make_fmu, out
 from .fakes import Clock, Function, Integrator, Stage, Witness, make_plan
@@ -312,7 +312,8 @@ def test_an_option_and_a_file_say_the_same(folder):
     assert by_file.faults == by_option.faults
     frozen, noisy = by_file.faults
     assert frozen == on("gyro", "yaw_rate", True, "freeze", begin=0.5, end=1.5)
-    assert (str(frozen.fault.on), str(frozen.fault)) == ("gyro.yaw_rate", "freeze from 0.5 s until 1.5 s")
+    assert str(frozen.fault.on) == "gyro.yaw_rate"
+    assert golden(str(frozen.fault))
     assert (noisy.instance, noisy.variable, noisy.of_output, noisy.fault.every) == (
         "gyro",
         "yaw_rate_true",
@@ -321,7 +322,7 @@ def test_an_option_and_a_file_say_the_same(folder):
     )
     assert noisy.value == pytest.approx(math.radians(0.5))
     assert by_file.changes == ()
-    assert str(by_option.changes[0]) == "--fault gyro.yaw_rate: freeze from 0.5 s until 1.5 s"
+    assert golden(str(by_option.changes[0]))
 
 
 def test_an_option_takes_the_place_of_what_the_file_has_there(folder):
@@ -390,22 +391,18 @@ def test_a_fault_of_a_file_is_told_with_its_line_also_after_an_option_has_moved_
     text = SCENARIO + "faults:\n  - {on: gyro.yaw_rate, kind: freeze}\n  - {on: plant.yaw_rate, kind: gain}\n"
     with pytest.raises(ScenarioError) as caught:
         planned("gyro.yaw_rate: none", text=text)
-    assert [str(p) for p in texts_of(caught.value)] == ["a.yaml:13: faults[0]: gain needs a value: x * value"]
+    assert caught.value.code == "value-invalid"
+    assert golden([str(p) for p in texts_of(caught.value)])
 
 
 def test_what_a_fault_never_reaches_is_noted(folder):
-    assert (
-        "--fault gyro.yaw_rate: freeze from 3 s never acts: it begins at 3 s, the run ends at 2 s"
-        in texts_of(planned("gyro.yaw_rate: freeze from 3 s"))
-    )
+    assert golden_in(texts_of(planned("gyro.yaw_rate: freeze from 3 s")))
     make_fmu(Path("fmus/controller_off.fmu"), outputs=[out("yaw_moment", unit="N.m")])
     without = SCENARIO.replace("  - {from: [gyro], to: [law]}\n", "")
     gone = planned("gyro.yaw_rate -> law: freeze", text=without,
                    changes=[Override.of("law", "controller_off", "--swap")])  # fmt: skip
     assert gone.faults == ()
-    assert "--fault gyro.yaw_rate -> law: freeze is left out: there is no such signal any more" in texts_of(
-        gone
-    )
+    assert golden_in(texts_of(gone))
 
 
 def test_a_run_with_a_fault_is_another_run(folder):
@@ -419,17 +416,9 @@ def test_the_record_says_what_was_faulty_and_results_are_known_to_be_of_another_
     frozen = faulty("freeze", of_output=True)
     made = make_plan(units, WIRES, faults=[frozen])
     simulate(made, tmp_path, opener=Stage(units))
-    assert load_results(tmp_path).record.content()["faults"] == [
-        {
-            "on": "source.x",
-            "fault": "freeze from 1 s until 2 s",
-            "from": 1.0,
-            "until": 2.0,
-            "at": ["source.x"],
-        }
-    ]
+    assert golden(load_results(tmp_path).record.content()["faults"])
     assert staleness(made, tmp_path) is None
-    assert staleness(replace(made, faults=()), tmp_path) == "the faults have changed"
+    assert golden(staleness(replace(made, faults=()), tmp_path))
     simulate(replace(made, faults=()), tmp_path / "healthy", opener=Stage(units))
     assert "faults" not in load_results(tmp_path / "healthy").record.content()
 
@@ -480,11 +469,12 @@ def test_faults_stay_data_on_the_way_from_where_they_are_written(folder):
     (fault,) = plan_of_scenario(load_scenario("a.yaml", changes=[change])).faults
     assert (fault.value, fault.fault.begin) == (exact, exact)
     assert change.faults == (Fault(FaultLocation("plant", "yaw_rate"), "gain", exact, begin=exact),)
-    assert str(change) == "sweep plant.yaw_rate: gain 0.123456789 from 0.123456789 s"
+    assert golden(str(change))
     one, other = read_changes(faults=["a.x: bias 1 deg until 2", "a.y: none"])
     assert one.faults == (Fault(FaultLocation("a", "x"), "bias", "1 deg", end=2.0),)
     assert other.faults == ()
-    assert (str(one), str(other)) == ("--fault a.x: bias 1 deg until 2 s", "--fault a.y: none")
+    assert str(other) == "--fault a.y: none"
+    assert golden(str(one))
     both = yb.load("a.yaml").fault("gyro.yaw_rate", kind="freeze", start=exact)
     both = both.fault("gyro.yaw_rate", kind="noise", value="1 deg/s", seed=3)
     assert [(f.fault.kind, f.fault.begin, f.value) for f in both.plan().faults] == [
@@ -504,11 +494,11 @@ def yawbench_status(*arguments):
 
 def test_check_shows_faults_and_an_archive_says_that_it_has_none(folder, capsys):
     assert yawbench_status("check", "a.yaml", "--fault", "plant.slip_*: bias 0.1 from 1 s") == 0
-    assert "  plant.slip_*  bias 0.1 from 1 s  plant.slip_*\n" in capsys.readouterr().out
+    assert golden_in(capsys.readouterr().out)
     assert yawbench_status("export-ssp", "a.yaml", "--fault", "gyro.yaw_rate: freeze") == 0
-    assert "note: faults are not part of the archive: gyro.yaw_rate: freeze\n" in capsys.readouterr().err
+    assert golden_in(capsys.readouterr().err)
     assert yawbench_status("second-opinion", "a.yaml", "--fault", "gyro.yaw_rate: freeze") == 2
-    assert "other masters know nothing of faults; leave out gyro.yaw_rate: freeze" in capsys.readouterr().err
+    assert golden_in(capsys.readouterr().err)
 
 
 def test_figures_mark_when_runs_were_faulty_and_the_legend_says_how():
@@ -517,19 +507,15 @@ def test_figures_mark_when_runs_were_faulty_and_the_legend_says_how():
     noted(broken, faults=[fault])
     figure = draw([LabelledRun("healthy", healthy), LabelledRun("broken", broken)], ["sideslip", "path"])
     legend = [text.get_text() for box in figure.legends for text in box.get_texts()]
-    assert legend[-1] == "broken: gyro.yaw_rate: freeze from 2 s"
+    assert golden(legend[-1])
     over_time, path = figure.axes
     (span,) = [p for p in over_time.patches if to_hex(p.get_facecolor()) == FAULTY.lower()]
     assert (span.get_x(), span.get_x() + span.get_width()) == (2.0, 8.0)
     assert not path.patches
     alone = draw([LabelledRun("broken", broken)], ["sideslip"])
-    assert [text.get_text() for box in alone.legends for text in box.get_texts()][-1] == (
-        "gyro.yaw_rate: freeze from 2 s"
-    )
+    assert golden([text.get_text() for box in alone.legends for text in box.get_texts()][-1])
 
 
 def test_the_command_of_a_page_gives_faults_as_the_option_takes_them():
     (change,) = read_changes(faults=["a.x -> b: bias 1 deg from 2 s"])
-    assert command_of("sweep", Path("s.yaml"), fault=[f"{change.faulty}: {change.value}"]) == (
-        "yawbench sweep s.yaml --fault 'a.x -> b: bias 1 deg from 2 s'"
-    )
+    assert golden(command_of("sweep", Path("s.yaml"), fault=[f"{change.faulty}: {change.value}"]))

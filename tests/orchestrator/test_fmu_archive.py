@@ -20,6 +20,7 @@ from orchestrator.errors import ModelDescriptionError
 from orchestrator.fmu import archive as fmu_archive
 from orchestrator.fmu.archive import open_fmu
 from orchestrator.fmu.binary import platform
+from tests.sentences import golden, refused
 
 from .fake_fmus import Var, make_fmu, model_description, out
 
@@ -187,10 +188,8 @@ def test_a_temporary_cache_of_another_user_is_refused(
     monkeypatch.setattr("os.getuid", lambda: owner + 1)
     with pytest.raises(ModelDescriptionError) as caught:
         cache_folder()
-    assert str(caught.value) == (
-        f"{tmp_path}/yawbench-{owner + 1}: FMUs cannot be unpacked here: the folder belongs to another user; "
-        "name another one in YAWBENCH_CACHE"
-    )
+    assert caught.value.code == "cache-unwritable"
+    assert golden(str(caught.value))
 
 
 def test_no_plain_folder_at_all_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -199,27 +198,25 @@ def test_no_plain_folder_at_all_is_said(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr("tempfile.gettempdir", lambda: "/ü")
     with pytest.raises(ModelDescriptionError) as caught:
         cache_folder()
-    assert str(caught.value) == (
-        f"{tmp_path}/ä: FMUs cannot be unpacked here: the path holds more than ASCII letters, digits, "
-        "spaces and ._~-; name another folder in YAWBENCH_CACHE"
-    )
+    assert caught.value.code == "cache-unwritable"
+    assert golden(str(caught.value))
 
 
 def test_a_missing_fmu_is_said_with_a_guess(fmu: Path, tmp_path: Path) -> None:
     missing = tmp_path / "tyre_b.fmu"
-    assert problem(missing) == f"{missing}: no such FMU; did you mean 'tyre_a.fmu'?"
+    assert golden(problem(missing))
     missing = tmp_path / "plant.fmu"
-    assert problem(missing) == f"{missing}: no such FMU; {tmp_path} holds tyre_a.fmu"
+    assert golden(problem(missing))
 
 
 def test_a_file_that_is_no_zip_is_said(fmu: Path) -> None:
     fmu.write_text("hello")
-    assert problem(fmu) == f"{fmu}: no FMU: this is not a zip archive"
+    assert golden(problem(fmu))
 
 
 def test_an_archive_that_was_cut_off_is_said(fmu: Path) -> None:
     fmu.write_bytes(fmu.read_bytes()[:-40])
-    assert problem(fmu) == f"{fmu}: the archive is damaged or cut off (File is not a zip file)"
+    assert golden(problem(fmu))
 
 
 def test_an_archive_with_a_flipped_byte_is_said(tmp_path: Path, cache: Path) -> None:
@@ -227,9 +224,7 @@ def test_an_archive_with_a_flipped_byte_is_said(tmp_path: Path, cache: Path) -> 
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr("modelDescription.xml", model_description("a"))
     path.write_bytes(path.read_bytes().replace(b"fmiVersion", b"fmiVersiom", 1))
-    assert problem(path) == (
-        f"{path}: the archive is damaged or cut off (Bad CRC-32 for file 'modelDescription.xml')"
-    )
+    assert golden(problem(path))
 
 
 def test_every_cut_of_an_archive_gives_one_sentence(fmu: Path, cache: Path) -> None:
@@ -244,13 +239,13 @@ def test_a_zip_that_is_no_fmu_is_said(tmp_path: Path, cache: Path) -> None:
     path = tmp_path / "a.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("readme.txt", "hello")
-    assert problem(path) == f"{path}: no FMU: the archive holds no modelDescription.xml"
+    assert golden(problem(path))
 
 
 @pytest.mark.parametrize("name", ["../evil.txt", "/etc/evil.txt", "resources/../../evil.txt", "C:/evil.txt"])
 def test_an_archive_that_reaches_out_of_its_folder_is_refused(name: str, tmp_path: Path, cache: Path) -> None:
     path = make_fmu(tmp_path / "a.fmu", files={name: b"evil"})
-    assert problem(path) == f"{path}: the archive is unsafe: it holds the path {name!r}"
+    assert golden(problem(path))
     assert not list(tmp_path.rglob("evil.txt"))
 
 
@@ -260,9 +255,7 @@ def test_folders_in_each_other_are_unpacked_up_to_a_depth(nested: int, tmp_path:
     if nested <= files.DEPTH:
         assert next(open_fmu(path).directory.rglob("x")).read_bytes() == b"here"
     else:
-        assert problem(path) == (
-            f"{path}: cannot read this FMU: it holds {nested} folders in each other, more than {files.DEPTH}"
-        )
+        assert golden(problem(path))
         assert not list(cache.glob("*"))
 
 
@@ -342,19 +335,15 @@ def test_a_model_description_that_cannot_be_used_is_said(
 
 def test_a_missing_binary_is_said_with_those_there_are(tmp_path: Path, cache: Path) -> None:
     path = make_fmu(tmp_path / "a.fmu", binaries=["win64x", "darwin65"])
-    missing = f"no binary for this platform (binaries/{HERE}/a{SUFFIX})"
-    assert problem(path) == f"{path}: {missing}; it has binaries for darwin65 and win64x"
+    assert golden(problem(path))
     path = make_fmu(tmp_path / "a.fmu", binaries=[])
-    assert problem(path) == f"{path}: {missing}; it has no binaries"
+    assert golden(problem(path))
 
 
 def test_a_binary_of_another_name_is_said_with_the_name_that_is_expected(tmp_path: Path, cache: Path) -> None:
     path = tmp_path / "a.fmu"
     make_fmu(path, binaries=[], files={f"binaries/{HERE}/b{SUFFIX}": b"", f"binaries/{HERE}/c.txt": b""})
-    assert problem(path) == (
-        f"{path}: no binary of the name that the model identifier asks for (binaries/{HERE}/a{SUFFIX}); "
-        f"binaries/{HERE} holds b{SUFFIX} and c.txt"
-    )
+    assert golden(problem(path))
 
 
 def test_a_full_disk_is_said_and_leaves_nothing_half_done(
@@ -366,10 +355,7 @@ def test_a_full_disk_is_said_and_leaves_nothing_half_done(
     monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))
     with monkeypatch.context() as patch:
         patch.setattr(Path, "write_bytes", write_bytes)
-        assert problem(fmu) == (
-            f"{fmu}: cannot unpack this FMU into {cache}: no space left; free some there or name another "
-            "folder in YAWBENCH_CACHE"
-        )
+        assert golden(problem(fmu))
     assert list(cache.iterdir()) == []
     assert open_fmu(fmu).name == "tyre_a"
 
@@ -380,10 +366,7 @@ def test_a_cache_that_cannot_be_written_is_said_if_there_is_no_other(
     cache.write_text("a file in its place")
     monkeypatch.setattr("tempfile.gettempdir", lambda: "/ü")
     monkeypatch.setenv("PUBLIC", "/ö")
-    assert problem(fmu) == (
-        f"{fmu}: cannot unpack this FMU into {cache}: File exists; "
-        "another folder can be named in YAWBENCH_CACHE"
-    )
+    assert golden(problem(fmu))
 
 
 def test_a_full_cache_serves_although_it_cannot_be_written(
@@ -443,9 +426,7 @@ def test_an_archive_that_unpacks_without_limit_is_refused_before_it_is_unpacked(
     assert path.stat().st_size < 10_000
     monkeypatch.setattr(files, "UNPACKED", 2_000_000)
     monkeypatch.setattr(zipfile.ZipFile, "read", lambda *_: pytest.fail("a member was unpacked"))
-    with pytest.raises(
-        ModelDescriptionError, match=r"bomb.fmu: cannot read this FMU: unpacked it has 3 MB, "
-    ):
+    with refused(ModelDescriptionError, "fmu-damaged"):
         open_fmu(path)
 
 
@@ -453,7 +434,7 @@ def test_an_archive_that_unpacks_without_limit_is_refused_before_it_is_unpacked(
 def test_an_archive_of_very_many_files_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(files, "MEMBERS", 20)
     path = make_fmu(tmp_path / "many.fmu", files={f"resources/{i}": b"" for i in range(20)})
-    with pytest.raises(ModelDescriptionError, match=r"it holds 22 files, more than 20$"):
+    with refused(ModelDescriptionError, "fmu-damaged"):
         open_fmu(path)
 
 
@@ -461,7 +442,5 @@ def test_an_archive_of_very_many_files_is_refused(tmp_path: Path, monkeypatch: p
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
 def test_a_pipe_in_place_of_an_fmu_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.fmu")
-    with pytest.raises(
-        ModelDescriptionError, match=r"pipe.fmu: cannot read this FMU: it is a pipe, a socket"
-    ):
+    with refused(ModelDescriptionError, "fmu-damaged"):
         open_fmu(tmp_path / "pipe.fmu")

@@ -26,7 +26,7 @@ from orchestrator.scenario import yaml_lines
 from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.overrides import read_changes
 from orchestrator.wiring.make_plan import make_plan
-from tests.sentences import texts_of
+from tests.sentences import golden, golden_in, refused, texts_of
 
 from .fake_fmus import Var, make_fmu
 
@@ -113,7 +113,7 @@ def test_names_that_cannot_be_those_of_files_are_refused(name: str) -> None:
 
 def test_a_name_with_a_line_feed_can_be_swapped_in_and_is_not_found() -> None:
     (said,) = problems(f"{HEAD}units: {{a: {{fmu: plant}}}}\n", swaps=["a=pl\nant"])
-    assert "no FMU 'pl\\nant'" in said
+    assert golden_in(said)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
@@ -133,22 +133,22 @@ def test_pipes_devices_and_loops_of_links_are_not_read() -> None:
 @pytest.mark.skipif(not os.path.exists("/dev/zero"), reason="no such device here")
 def test_a_device_in_place_of_an_fmu_or_a_vehicle_file_is_not_read() -> None:
     (said,) = problems(f"{HEAD}units: {{a: {{fmu: /dev/zero}}}}\n")
-    assert said.endswith("/dev/zero: cannot read this FMU: it is a pipe, a socket or a device, not a file")
+    assert golden(said)
     (said,) = problems(f"{HEAD}vehicle: /dev/zero\nunits: {{a: {{fmu: plant}}}}\n")
-    assert said == "/dev/zero: cannot read this vehicle file: it is a pipe, a socket or a device, not a file"
+    assert golden(said)
 
 
 def test_a_file_that_is_too_large_is_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(yaml_lines, "TEXT", 1000)
     (said,) = problems("a" * 1001)
-    assert said == "a.yaml: cannot read this scenario file: it is larger than 0.001 MB"
+    assert golden(said)
 
 
 def test_of_very_many_problems_the_first_ones_are_told() -> None:
     units = "".join(f"  u{i}: {{fmi: plant}}\n" for i in range(1000))
     said = problems(f"{HEAD}units:\n{units}")
     assert len(said) == yaml_lines.MOST_ERRORS + 1
-    assert said[-1] == "a.yaml: there may be more; these are the first 200 problems"
+    assert golden(said[-1])
 
 
 def said_of(load: object, text: str) -> list[str]:
@@ -186,14 +186,12 @@ def test_a_study_of_too_many_runs_is_refused_before_they_are_listed() -> None:
     hundred = list(range(100))
     for_each = f"{{a: {hundred}, b: {hundred}, c: {hundred}}}"
     text = f'{STUDY}  - {{name: "{{a}}{{b}}{{c}}", scenario: a.yaml, for: {for_each}}}\n'
-    assert said_of(load_experiment, text) == [
-        "b.yaml:4: runs[0].for: stands for 1000000 runs; at most 10000 are taken"
-    ]
+    assert golden(said_of(load_experiment, text))
     text = STUDY + "".join(
         f'  - {{name: "{i}/{{a}}/{{b}}", scenario: a.yaml, for: {{a: {hundred}, b: {hundred}}}}}\n'
         for i in range(2)
     )
-    assert said_of(load_experiment, text) == ["b.yaml:3: runs: more than 10000 runs; no more are taken"]
+    assert golden(said_of(load_experiment, text))
 
 
 def test_a_grid_of_too_many_cells_is_refused() -> None:
@@ -203,7 +201,7 @@ def test_a_grid_of_too_many_cells_is_refused() -> None:
         f'grids: {{g: {{title: t, metric: m, run: "{{a}}{{b}}", rows: {{a: {many}}}, '
         f"columns: {{b: {many}}}}}}}\n"
     )
-    assert said_of(load_experiment, text) == ["b.yaml:5: grids.g: 40000 runs; at most 10000 are taken"]
+    assert golden(said_of(load_experiment, text))
 
 
 @pytest.mark.parametrize("text", ["a + " * 5000 + "a", "(" * 300 + "a" + ")" * 300, "-" * 390 + "a", "a\0"])
@@ -234,9 +232,7 @@ def test_an_ssp_archive_that_unpacks_without_limit_is_refused(monkeypatch: pytes
     monkeypatch.setattr(files, "UNPACKED", 1_000_000)
     with zipfile.ZipFile("a.ssp", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("SystemStructure.ssd", bytes(3_000_000))
-    with pytest.raises(
-        ScenarioError, match="cannot read this SSP archive: unpacked it has 3 MB, more than 1 MB"
-    ):
+    with refused(ScenarioError, "file-unreadable"):
         load_scenario(Path("a.ssp"))
 
 

@@ -10,6 +10,7 @@ import pytest
 from orchestrator.plan import UnitDefinition
 from orchestrator.scenario import quantities
 from orchestrator.scenario.quantities import conversion, convert, measure_of, parse_unit, seconds
+from tests.sentences import refused
 
 
 @pytest.mark.parametrize(
@@ -133,9 +134,9 @@ def test_offsets_are_converted_and_differences_have_none() -> None:
 
 def test_a_quantity_is_converted_into_a_unit_that_only_the_fmu_defines() -> None:
     assert convert("180 deg", "radian", UnitDefinition(RAD)) == math.pi
-    with pytest.raises(ValueError, match="cannot be converted to radian"):
+    with refused(ValueError, "unit-mismatch"):
         convert("180 deg", "radian")
-    with pytest.raises(ValueError, match=r"'5 m' is not a value in radian: use radian, rad, deg or mrad"):
+    with refused(ValueError, "unit-mismatch"):
         convert("5 m", "radian", UnitDefinition(RAD))
 
 

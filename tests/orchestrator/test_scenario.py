@@ -13,7 +13,7 @@ from orchestrator.errors import ScenarioError
 from orchestrator.names import SignalName
 from orchestrator.scenario.load import ScenarioSpec, load_scenario
 from tests.changed import changed
-from tests.sentences import texts_of
+from tests.sentences import golden, golden_in, texts_of
 
 GOOD = """\
 title: Single sine
@@ -232,15 +232,15 @@ def test_what_is_no_scenario_at_all_is_said(file: Path, text: str, expected: str
 
 
 def test_a_missing_file_is_said_with_a_guess(file: Path) -> None:
-    assert problems(Path("aa.yaml")) == ["aa.yaml: no such scenario file; did you mean 'a.yaml'?"]
-    assert problems(Path("25mps.yaml")) == [f"25mps.yaml: no such scenario file; {Path.cwd()} holds a.yaml"]
+    assert golden(problems(Path("aa.yaml")))
+    assert golden(problems(Path("25mps.yaml")))
 
 
 def test_a_folder_and_a_binary_file_are_no_scenarios(file: Path) -> None:
     Path("d.yaml").mkdir()
     Path("e.yaml").write_bytes(b"\xff\xfe\x00")
-    assert problems(Path("d.yaml")) == ["d.yaml: cannot read this scenario file: Is a directory"]
-    assert problems(Path("e.yaml")) == ["e.yaml: this scenario file is not UTF-8 text"]
+    assert golden(problems(Path("d.yaml")))
+    assert golden(problems(Path("e.yaml")))
 
 
 def test_a_path_with_spaces_and_umlauts_is_read(file: Path) -> None:
@@ -261,24 +261,18 @@ def test_mistakes_in_the_vehicle_file_name_that_file(file: Path) -> None:
     Path("cars").mkdir()
     Path("cars/car.yaml").write_text("mass: 1100\nparameters: {mass: .inf}\n")
     found = problems(edited(("title:", "vehicle: cars/car.yaml\ntitle:"), ("0.65", ".nan")))
-    assert found == [
-        "a.yaml:5: inputs.friction*: must be a finite number (got nan)",
-        f"{Path('cars/car.yaml')}:1: mass: unknown key; allowed here: title, source, tyres and parameters",
-        f"{Path('cars/car.yaml')}:2: parameters.mass: must be a finite number (got inf)",
-    ]
+    assert golden(found)
 
 
 def test_a_missing_vehicle_file_is_said_where_it_is_named(file: Path) -> None:
     Path("car.yaml").write_text("parameters: {}\n")
-    assert problems(edited(("title:", "vehicle: cra.yaml\ntitle:"))) == [
-        "a.yaml:1: vehicle: cra.yaml: no such vehicle file; did you mean 'car.yaml'?"
-    ]
+    assert golden(problems(edited(("title:", "vehicle: cra.yaml\ntitle:"))))
 
 
 def test_a_vehicle_path_that_cannot_be_one_is_said(file: Path) -> None:
     said = problems(edited(("title:", 'vehicle: "a\\0"\ntitle:')))
-    assert said[0] == "a.yaml:1: vehicle: holds the control character \\x00"
-    assert "cannot read this vehicle file: embedded null byte" in said[1]
+    assert golden(said[0])
+    assert golden_in(said[1])
 
 
 def test_swap_replaces_the_fmu_and_remembers_the_old_one(file: Path) -> None:

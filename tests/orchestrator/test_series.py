@@ -22,7 +22,7 @@ from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from orchestrator.wiring.series import SeriesFile
-from tests.sentences import texts_of
+from tests.sentences import golden, golden_in, refused, texts_of
 from vocabulary.wheels import WHEELS
 
 from .fake_fmus import Var, make_fmu, out
@@ -213,9 +213,7 @@ def test_a_series_for_a_units_input_goes_before_equal_names(folder: Path) -> Non
     path.write_text(path.read_text().replace("units: {", "units: {driver: {fmu: driver}, "))
     made = plan_of(path)
     assert made.wires == ()
-    assert texts_of(made) == (
-        "plant.steer_angle has a value of its own: driver.steer_angle does not drive it",
-    )
+    assert golden(texts_of(made))
 
 
 @pytest.mark.parametrize("form", ["parquet", "mf4", "csv"])
@@ -246,8 +244,8 @@ def test_check_and_run_json_tell_of_a_series_and_a_changed_file_makes_results_st
         main(["check", str(path)])
     shown = " ".join(capsys.readouterr().out.split())
     assert not ended.value.code
-    assert "steer_angle data.csv: delta, linear scenario plant" in shown
-    assert "gear data.csv: gear, held scenario plant" in shown
+    assert golden_in(shown)
+    assert golden_in(shown)
 
     class Plant(Behaviour):
         def output(self, t, u):
@@ -263,7 +261,7 @@ def test_check_and_run_json_tell_of_a_series_and_a_changed_file_makes_results_st
     assert staleness(plan_of(path), folder / "out") is None
     data = Path("runs/data.csv")
     data.write_text(data.read_text().replace("500,90", "500,91"))
-    assert staleness(plan_of(path), folder / "out") == "plant: other time series"
+    assert golden(staleness(plan_of(path), folder / "out"))
 
 
 @pytest.mark.parametrize(
@@ -323,9 +321,7 @@ def test_a_series_may_hold_its_ends_and_a_held_one_reaches_one_interval_on(folde
 
 
 def test_an_archive_for_other_programs_has_no_place_for_a_series(folder: Path) -> None:
-    with pytest.raises(
-        ResultsError, match=r"no place for the time series of plant\.steer_angle, plant\.torque_"
-    ):
+    with refused(ResultsError, "ssp-unsupported"):
         write_ssp(plan_of(scenario()), folder / "a.ssp")
 
 
@@ -336,7 +332,7 @@ def test_a_series_from_a_pipe_or_a_device_is_refused_without_a_wait(form: str, f
     os.symlink("/dev/zero", f"runs/zero.{form}")
     for name in ("pipe", "zero"):
         said = problem(scenario(plant_steer_angle=f"{{file: {name}.{form}, column: delta}}"))
-        assert f"runs/{name}.{form}: it is a pipe, a socket or a device, not a file" in said
+        assert golden_in(said)
 
 
 @pytest.mark.parametrize(
@@ -380,10 +376,10 @@ def test_a_changed_record_beside_recorded_results_is_no_source_of_units(tmp_path
     assert SeriesFile(file).column("driver.steer_angle", "time").unit == "rad"
     text = beside.read_text()
     beside.write_text(text.replace('"driver.steer_angle": "rad"', '"driver.steer_angle": "deg"'))
-    with pytest.raises(ValueError, match=r"run\.json beside it is not what the run has written: 'units' was"):
+    with refused(ValueError):
         SeriesFile(file)
     beside.write_text("{")
-    with pytest.raises(ValueError, match=r"the run\.json beside it cannot be read: "):
+    with refused(ValueError):
         SeriesFile(file)
     bare = {key: value for key, value in json.loads(text).items() if key != "checksums"}
     beside.write_text(json.dumps(bare))

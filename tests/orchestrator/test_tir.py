@@ -12,7 +12,7 @@ import pytest
 from components.tyre_models.pacejka_2012_set import COMMON, LONGITUDINAL, REST
 from orchestrator.errors import ScenarioError
 from orchestrator.scenario.tir import read_tir
-from tests.sentences import texts_of
+from tests.sentences import golden_in, refused, texts_of
 
 from .tir_files import UNITS, text_of, write
 
@@ -139,7 +139,7 @@ def test_without_fzmax_loads_go_to_three_times_the_nominal_or_to_where_a_stiffne
     assert read(tmp_path, without=["FZMAX"]).values["fzmax"] == 12000.0
     assert read(tmp_path, {"FZMAX": "0", "LFZO": "0.5"}).values["fzmax"] == 6000.0
     assert read(tmp_path, {"PKY4": "3.2"}, without=["FZMAX"]).values["fzmax"] < 4000 * 3
-    assert any("has changed its sign" in str(w) for w in read(tmp_path, {"PKX2": "-20.5"}).warnings)
+    assert golden_in([str(w) for w in read(tmp_path, {"PKX2": "-20.5"}).warnings])
 
 
 @pytest.mark.parametrize(
@@ -203,7 +203,7 @@ def test_the_unloaded_radius_can_come_from_rim_and_width(tmp_path):
     given = {"RIM_RADIUS": "0.19", "WIDTH": "0.2", "ASPECT_RATIO": "0.6"}
     file = read(tmp_path, given, without=["UNLOADED_RADIUS"])
     assert file.values["unloaded_radius"] == pytest.approx(0.31)
-    assert "taken from RIM_RADIUS, WIDTH and ASPECT_RATIO" in str(file.warnings[0])
+    assert golden_in(str(file.warnings[0]))
 
 
 @pytest.mark.parametrize(
@@ -212,17 +212,17 @@ def test_the_unloaded_radius_can_come_from_rim_and_width(tmp_path):
 def test_what_is_no_such_file_is_refused_in_one_sentence(tmp_path, content):
     path = tmp_path / "b.tir"
     path.write_bytes(content)
-    with pytest.raises(ScenarioError, match="no tyre property file: it holds no coefficients"):
+    with refused(ScenarioError, "tyre-file-invalid"):
         read_tir(path)
 
 
 def test_a_missing_file_a_folder_and_a_very_large_one_are_refused(tmp_path):
-    with pytest.raises(ScenarioError, match="no such tyre property file"):
+    with refused(ScenarioError, "file-missing"):
         read_tir(tmp_path / "no.tir")
-    with pytest.raises(ScenarioError, match="cannot read this tyre property file"):
+    with refused(ScenarioError, "file-unreadable"):
         read_tir(tmp_path)
     (tmp_path / "large.tir").write_bytes(b"$" * 1_000_001)
-    with pytest.raises(ScenarioError, match="larger than 1 MB"):
+    with refused(ScenarioError, "file-unreadable"):
         read_tir(tmp_path / "large.tir")
 
 

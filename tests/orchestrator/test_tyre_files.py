@@ -22,7 +22,7 @@ from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.overrides import changes_of, read_changes
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
-from tests.sentences import texts_of
+from tests.sentences import golden, golden_in, refused, texts_of
 
 from .tir_files import write
 
@@ -118,7 +118,7 @@ def test_tyres_are_an_axis_of_experiments_relative_to_their_file(folder, fmus):
     ]  # fmt: skip
     assert len({job.key for job in planned.jobs}) == 4
     sweep.write_text(sweep.read_text().replace("[../soft.tir,", "[1,"))
-    with pytest.raises(ScenarioError, match=r"values: tyres\.rear takes names of files or FMUs"):
+    with refused(ScenarioError, "value-invalid"):
         load_experiment(sweep)
 
 
@@ -156,8 +156,8 @@ def test_a_run_remembers_the_files_with_their_hash_kind_and_warnings(folder, fmu
     front = record["scenario"]["tyre_files"]["front"]
     assert front["sha256"] == hashlib.sha256((folder / "soft.tir").read_bytes()).hexdigest()
     assert (front["kind"], front["side"]) == ("MF-Tyre 6.2", "LEFT")
-    assert "UNKNOWN: read as LEFT" in front["warnings"][0]
-    assert any("UNKNOWN: read as LEFT" in one["message"] for one in record["diagnostics"])
+    assert golden_in(front["warnings"][0])
+    assert golden_in([one["message"] for one in record["diagnostics"]])
     assert record["fmus"]["tyre"]["origins"]["pcx1_front"] == "soft.tir"
 
 
@@ -165,11 +165,11 @@ def test_check_shows_the_files_and_with_all_their_coefficients(folder, fmus, cap
     path = scenario(folder, "tyres: {front: soft.tir, rear: stiff.tir}")
     assert not yawbench(["check", str(path), "--fmus", str(fmus)])
     text = " ".join(capsys.readouterr().out.split())
-    assert "tyres, front MF-Tyre 6.2, LEFT soft.tir wheel_control, tyre" in text
-    assert "tyres, rear MF-Tyre 6.1, LEFT stiff.tir wheel_control, tyre" in text
+    assert golden_in(text)
+    assert golden_in(text)
     assert "pky1" not in text
     assert not yawbench(["check", str(path), "--fmus", str(fmus), "--all"])
-    assert "pky1_rear -17 stiff.tir tyre" in " ".join(capsys.readouterr().out.split())
+    assert golden_in(" ".join(capsys.readouterr().out.split()))
 
 
 def test_an_ssp_archive_carries_the_coefficients(folder, fmus, tmp_path):
@@ -201,16 +201,16 @@ def test_files_that_cannot_be_used_are_refused_with_their_place(folder, tyres, s
 
 def test_a_value_beyond_what_the_tyre_allows_is_refused_with_file_and_key(folder, fmus):
     write(folder / "soft.tir", {"PCX1": "0.001"})
-    with pytest.raises(WiringError, match=r"soft.tir: PCX1: must be at least 0.01 \(got 0.001\)"):
+    with refused(WiringError, "value-invalid"):
         plan(scenario(folder), fmus)
 
 
 def test_without_a_tyre_that_takes_them_they_are_refused_and_after_a_swap_left_out(folder, fmus):
     path = scenario(folder)
     swapped = plan(path, fmus, "tyre=tyre_linear")
-    assert "tyres are left out: no tyre takes such files after the swap" in texts_of(swapped)
+    assert golden_in(texts_of(swapped))
     path.write_text(path.read_text().replace("tyre_magic_formula_62", "tyre_linear"))
-    with pytest.raises(WiringError, match="tyres: no unit is a tyre that takes such files"):
+    with refused(WiringError, "tyre-file-unused"):
         plan(path, fmus)
 
 
@@ -220,15 +220,13 @@ def test_a_slip_control_that_asks_another_law_and_another_radius_are_told(folder
     kinds = [found.code for found in warnings_in(planned.diagnostics) if found.location.signal]
     assert kinds.count("tyre-mismatch") == 1
     assert kinds.count("wheel-radius-mismatch") == 2  # of plant and wheel control
-    assert any(
-        "wheel_radius is 0.33 m, but the tyres of soft.tir roll on 0.3042 m" in n for n in texts_of(planned)
-    )
+    assert golden_in(texts_of(planned))
 
 
 def test_a_unit_cannot_be_called_like_the_files(folder):
     path = scenario(folder)
     path.write_text(path.read_text().replace("  tyre: ", "  tyres: "))
-    with pytest.raises(ScenarioError, match="a unit cannot be named 'tyres'"):
+    with refused(ScenarioError, "value-invalid"):
         load_scenario(path)
 
 
@@ -258,5 +256,5 @@ def test_the_origin_of_a_coefficient_on_a_page_is_its_file(folder, fmus):
     (of_tyre,) = (group for group in groups if group.title.startswith("tyre:"))
     row = of_tyre.parameters["pky1_front"]
     assert row.given is not None
-    assert row.given.says == "tyre property file soft.tir"
+    assert golden(row.given.says)
     assert not row.set_by_study

@@ -15,7 +15,7 @@ from orchestrator.plan import Instance, Override, Plan, Wire
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
-from tests.sentences import texts_of
+from tests.sentences import golden, golden_in, refused, texts_of
 from vocabulary.wheels import WHEELS
 
 from .fake_fmus import Var, make_fmu, out
@@ -173,12 +173,9 @@ def test_the_working_directory_has_the_fmus_of_a_scenario_elsewhere(
 
 def test_no_folder_of_fmus_is_said(folder: Path, tmp_path: Path) -> None:
     folder.rename(tmp_path / "elsewhere")
-    assert problems(scenario(), ModelDescriptionError) == [
-        f"no folder fmus/ with FMUs in {tmp_path}, in {tmp_path} or above them; "
-        "make them with 'yawbench build' or name their folder with --fmus"
-    ]
+    assert golden(problems(scenario(), ModelDescriptionError))
     assert len(plan(fmus=tmp_path / "elsewhere").instances) == 4
-    with pytest.raises(ModelDescriptionError, match=r"^--fmus nowhere: no such folder$"):
+    with refused(ModelDescriptionError, "folder-missing"):
         plan(fmus=Path("nowhere"))
 
 
@@ -192,31 +189,19 @@ def test_an_fmu_can_be_a_path_relative_to_the_scenario(folder: Path, tmp_path: P
 
 def test_every_missing_fmu_is_said_with_those_there_are(folder: Path) -> None:
     path = scenario(UNITS.replace("controller_fnn", "controller_fn").replace("tyre_dugoff", "x/tyre.fmu"))
-    assert problems(path, ModelDescriptionError) == [
-        f"a.yaml:5: units.controller.fmu: no FMU 'controller_fn' in {folder}; did you mean 'controller_fnn'? "
-        "there are: controller_fnn and controller_off",
-        f"a.yaml:7: units.tyre.fmu: {folder.parent}/x/tyre.fmu: no such FMU",
-    ]
-    assert problems(scenario(), ModelDescriptionError, swaps=["tyre=tyre_x"]) == [
-        f"--swap tyre=tyre_x: no FMU 'tyre_x' in {folder}; there are: tyre_dugoff"
-    ]
+    assert golden(problems(path, ModelDescriptionError))
+    assert golden(problems(scenario(), ModelDescriptionError, swaps=["tyre=tyre_x"]))
 
 
 def test_a_corrupt_fmu_is_said_where_it_is_used(folder: Path) -> None:
     (folder / "tyre_dugoff.fmu").write_bytes(b"PK nonsense")
-    assert problems(scenario(), ModelDescriptionError) == [
-        f"a.yaml:7: units.tyre.fmu: {folder}/tyre_dugoff.fmu: the archive is damaged or cut off "
-        "(File is not a zip file)"
-    ]
+    assert golden(problems(scenario(), ModelDescriptionError))
 
 
 def test_an_fmu_for_one_instance_is_not_used_twice(folder: Path) -> None:
     make_fmu(folder / "lonely.fmu", once=True)
     path = scenario(UNITS + "  one: {fmu: lonely}\n  two: {fmu: lonely}\n")
-    assert problems(path) == [
-        "a.yaml:9: units.two.fmu: lonely can be instantiated only once per process, and one uses it already; "
-        "with --isolate each unit has a process of its own"
-    ]
+    assert golden(problems(path))
     assert len(make_plan(load_scenario(path), isolated=True).instances) == 6
 
 
@@ -227,12 +212,7 @@ def test_units_that_would_run_each_others_code_are_refused(folder: Path) -> None
     make_fmu(folder / "four.fmu", files={"resources/slavemodule.txt": b"json", "resources/json.py": b""})
     assert len(plan(scenario(UNITS + "  a: {fmu: two}\n  b: {fmu: three}\n")).instances) == 6
     path = scenario(UNITS + "  a: {fmu: one}\n  b: {fmu: two}\n  c: {fmu: four}\n")
-    assert problems(path) == [
-        "a.yaml: b (two) would run code of a (one): both FMUs bring a Python module 'model_of_mine', and a "
-        "process has room for one; rebuild one of them with another module name, or run with --isolate",
-        "a.yaml: c (four) would run other code: its Python module 'json' has the name of one of Python's "
-        "own; rebuild it with another module name",
-    ]
+    assert golden(problems(path))
 
 
 def test_a_unit_whose_module_is_loaded_already_is_refused(
@@ -247,10 +227,7 @@ def test_a_unit_whose_module_is_loaded_already_is_refused(
     path = scenario(UNITS + "  a: {fmu: one}\n")
     assert len(plan(path).instances) == 5  # the same code: no harm
     loaded.write_text("x = 2")
-    assert problems(path) == [
-        "a.yaml: a (one) would run other code: another Python module 'fakes_xyz' is loaded in this process "
-        "already; rebuild it with another module name"
-    ]
+    assert golden(problems(path))
 
 
 def test_a_unit_whose_folder_of_modules_is_loaded_from_another_archive_is_refused(
@@ -270,7 +247,7 @@ def test_a_unit_whose_folder_of_modules_is_loaded_from_another_archive_is_refuse
     path = scenario(UNITS + "  a: {fmu: one}\n")
     assert len(plan(path).instances) == 5
     loaded.write_text("x = 2")
-    assert "another Python module 'fakes_ns' is loaded in this process already" in problems(path)[0]
+    assert golden_in(problems(path)[0])
 
 
 # Parameters
@@ -351,13 +328,7 @@ def test_a_wrong_value_is_said_in_one_sentence(setting: str, expected: str) -> N
 def test_all_wrong_values_are_said_at_once_with_their_lines() -> None:
     Path("car.yaml").write_text("parameters:\n  wheel_radius: 5 kg\n  mass: 0\n")
     units = UNITS.replace("driver_sine", "driver_sine, parameters: {amplitude: x, frequency: -1}")
-    assert problems(scenario(units, head="vehicle: car.yaml\n")) == [
-        "a.yaml:5: units.driver.parameters.amplitude: 'x' is neither a number in rad nor a number with "
-        "its unit",
-        "a.yaml:5: units.driver.parameters.frequency: must be at least 0 Hz (got -1)",
-        "car.yaml:2: parameters.wheel_radius: '5 kg' is not a value in m: use m, mm, cm or km",
-        "car.yaml:3: parameters.mass: must be at least 1 kg (got 0)",
-    ]
+    assert golden(problems(scenario(units, head="vehicle: car.yaml\n")))
 
 
 # Swapping
@@ -370,22 +341,14 @@ def test_what_was_meant_for_the_replaced_fmu_is_left_out_with_a_note() -> None:
     made = plan(path, swaps=["controller=controller_off"])
     assert unit(made, "controller").parameters == {"gain": 2.0}
     assert unit(made, "tyre").constants == {f"friction_{w}": 0.65 for w in WHEELS}
-    assert texts_of(made)[:2] == (
-        "vehicle.rule_base is left out: no unit has such a parameter after the swap",
-        "controller.wheel_radius is left out: controller_off has no such parameter",
-    )
+    assert golden(texts_of(made)[:2])
 
 
 def test_a_mistake_stays_a_mistake_after_a_swap() -> None:
     units = UNITS.replace("step_size: 2 ms", "parameters: {gian: 2}")
     swap = ["controller=controller_off"]
-    assert problems(scenario(units), swaps=swap) == [
-        "a.yaml:5: units.controller.parameters.gian: "
-        "controller (controller_off) has no parameter 'gian'; did you mean 'gain'?"
-    ]
-    assert problems(scenario(), swaps=swap, settings=["controller.rule_base=2"]) == [
-        "--set controller.rule_base=2: controller (controller_off) has no parameter 'rule_base'; it has: gain"
-    ]
+    assert golden(problems(scenario(units), swaps=swap))
+    assert golden(problems(scenario(), swaps=swap, settings=["controller.rule_base=2"]))
 
 
 def test_a_constant_and_a_connection_of_the_replaced_fmu_are_left_out_with_a_note(folder: Path) -> None:
@@ -393,11 +356,7 @@ def test_a_constant_and_a_connection_of_the_replaced_fmu_are_left_out_with_a_not
     units = "\n".join(line for line in UNITS.splitlines() if "tyre" not in line) + "\n"
     rest = 'inputs: {friction: 1, "tyre_force*": 0}\n' + TORQUES + "record: [plant.acceleration_y]\n"
     made = plan(scenario(units, rest), swaps=["plant=plant_two_dof"])
-    assert texts_of(made) == (
-        "connections[0] is left out: plant has no input 'wheel_torque_*' any more",
-        "inputs.tyre_force* is left out: no unit has such an input after the swap",
-        "record[0] is left out: plant has no variable 'acceleration_y' any more",
-    )
+    assert golden(texts_of(made))
     assert made.record == ()
 
 
@@ -409,9 +368,7 @@ def test_a_friction_too_low_for_all_who_are_told_it_is_said_once_and_else_of_who
     one, two = "  plant: {fmu: plant_one}\n", "  reference: {fmu: reference_one}\n"
     where = "a.yaml:1: friction: must be at least"
     assert problems(scenario(one, "", head="friction: -1\n")) == [f"{where} 0 (got -1)"]
-    assert problems(scenario(one + two, "", head="friction: 0.05\n")) == [
-        f"{where} 0.1 (got 0.05), for reference.friction"
-    ]
+    assert golden(problems(scenario(one + two, "", head="friction: 0.05\n")))
 
 
 def test_friction_and_speed_that_nobody_takes_after_a_swap_are_left_out_with_a_note(folder: Path) -> None:
@@ -420,35 +377,24 @@ def test_friction_and_speed_that_nobody_takes_after_a_swap_are_left_out_with_a_n
     make_fmu(folder / "plant_two.fmu", outputs=["x"])
     units = "  plant: {fmu: plant_one}\n"
     path = scenario(units, "", head="friction: 0.4\nspeed: 20\n")
-    assert texts_of(plan(path, swaps=["plant=plant_two"]))[:2] == (
-        "speed is left out: no unit has such a parameter after the swap",
-        "friction is left out: no unit has such an input after the swap",
-    )
+    assert golden(texts_of(plan(path, swaps=["plant=plant_two"]))[:2])
     for setting in ("friction=0.3", "speed=30"):
         assert len(problems(path, swaps=["plant=plant_two"], settings=[setting])) == 1
     alone = scenario(units.replace("one", "two"), "", head="friction: 0.4\nspeed: 20\n")
-    assert [said.partition(": ")[2] for said in problems(alone)] == [
-        "friction: no unit has an input friction",
-        "speed: no unit has a parameter initial_speed or target_speed",
-    ]
+    assert golden([said.partition(": ")[2] for said in problems(alone)])
 
 
 def test_a_swap_works_though_the_replaced_fmu_is_not_there(folder: Path) -> None:
     units = UNITS.replace("controller_fnn, step_size: 2 ms", "gone, parameters: {secret: 1}")
     made = plan(scenario(units), swaps=["controller=controller_off"])
-    assert texts_of(made) == ("controller.secret is left out: controller_off has no such parameter",)
+    assert golden(texts_of(made))
 
 
 # Wires
 
 
 def test_an_input_without_a_source_is_said_with_what_fits() -> None:
-    assert problems(scenario(rest="inputs: {friction: 0.65}\n")) == [
-        "a.yaml:6: units.plant: plant.wheel_torque_* [N.m] has no source: no unit has an output of "
-        "this name; connect controller.torque_request_*, or give a constant under 'inputs'",
-        "a.yaml:7: units.tyre: tyre.friction_* [1] has no source: no unit has an output of this name; "
-        "give a constant under 'inputs'",
-    ]
+    assert golden(problems(scenario(rest="inputs: {friction: 0.65}\n")))
 
 
 def test_an_optional_input_keeps_its_start_value_where_nothing_drives_it(folder: Path) -> None:
@@ -464,19 +410,12 @@ def test_an_optional_input_keeps_its_start_value_where_nothing_drives_it(folder:
 
 def test_an_input_of_one_wheel_without_a_source_is_said_alone() -> None:
     rest = "inputs: {friction: 1, friction_fl: 1, friction_rl: 1, friction_rr: 1}\n" + TORQUES
-    assert [text.partition(" [1]")[0] for text in problems(scenario(rest=rest))] == [
-        "a.yaml:7: units.tyre: tyre.friction_fr"
-    ]
+    assert golden([text.partition(" [1]")[0] for text in problems(scenario(rest=rest))])
 
 
 def test_more_than_one_output_of_a_name_is_said_and_a_connection_settles_it() -> None:
     units = UNITS + "  second: {fmu: driver_sine}\n"
-    assert problems(scenario(units)) == [
-        "a.yaml:5: units.controller: controller.steer_angle has more than one source: driver.steer_angle and "
-        "second.steer_angle; name one under 'connections'",
-        "a.yaml:6: units.plant: plant.steer_angle has more than one source: driver.steer_angle and "
-        "second.steer_angle; name one under 'connections'",
-    ]
+    assert golden(problems(scenario(units)))
     more = "  - {from: second.steer_angle, to: plant.steer_angle}\n"
     more += "  - {from: driver.steer_angle, to: controller.steer_angle}\n"
     made = plan(scenario(units, CONSTANTS + TORQUES + more))
@@ -540,10 +479,7 @@ def test_a_wrong_connection_is_said_in_one_sentence(connection: str, expected: s
 
 def test_two_connections_to_one_input_are_said() -> None:
     more = "  - {from: controller.torque_request_rr, to: plant.wheel_torque_fl}\n"
-    assert problems(scenario(rest=CONSTANTS + TORQUES + more)) == [
-        "a.yaml:11: connections[1]: plant.wheel_torque_fl has a source already, controller.torque_request_fl "
-        "by connections[0]"
-    ]
+    assert golden(problems(scenario(rest=CONSTANTS + TORQUES + more)))
 
 
 def test_one_output_can_feed_four_wheels() -> None:
@@ -559,12 +495,7 @@ def wire_to(made: Plan, target: str, name: str) -> Wire:
 
 def test_units_that_differ_over_equal_names_are_said_with_the_target(folder: Path) -> None:
     make_fmu(folder / "driver_m.fmu", outputs=[out("steer_angle", unit="m")])
-    ends = "driver.steer_angle [m] to {}.steer_angle [rad]"
-    more = ": the units differ; a connection with a gain takes plain numbers"
-    assert problems(scenario(), swaps=["driver=driver_m"]) == [
-        f"a.yaml:5: units.controller: cannot connect {ends.format('controller')}{more}",
-        f"a.yaml:6: units.plant: cannot connect {ends.format('plant')}{more}",
-    ]
+    assert golden(problems(scenario(), swaps=["driver=driver_m"]))
 
 
 def test_a_wire_converts_between_units_of_one_dimension(folder: Path) -> None:
@@ -594,10 +525,7 @@ def test_units_are_known_by_what_the_fmu_defines(folder, unit, base, gain, offse
 
 def test_units_that_are_neither_known_nor_defined_fit_by_name_alone(folder: Path) -> None:
     make_fmu(folder / "other.fmu", outputs=[out("steer_angle", unit="radian")])
-    assert (
-        "[radian] to plant.steer_angle [rad]: the units differ"
-        in problems(scenario(), swaps=["driver=other"])[1]
-    )
+    assert golden_in(problems(scenario(), swaps=["driver=other"])[1])
     make_fmu(folder / "taker.fmu", inputs=[Var("steer_angle", "radian")], outputs=["y"])
     path = scenario("  other: {fmu: other}\n  taker: {fmu: taker}\n", "")
     assert not wire_to(plan(path), "taker", "steer_angle").converts
@@ -607,7 +535,7 @@ def test_a_unit_that_contradicts_its_name_counts_as_defined_and_is_noted(folder:
     make_fmu(folder / "other.fmu", outputs=[out("steer_angle", unit="deg")], definitions={"deg": 'rad="1"'})
     made = plan(swaps=["driver=other"])
     assert not wire_to(made, "plant", "steer_angle").converts
-    assert texts_of(made) == ("driver (other) defines deg otherwise than usual: taken as it defines it",)
+    assert golden(texts_of(made))
 
 
 def test_a_parameter_is_converted_into_a_unit_that_only_the_fmu_defines(folder: Path) -> None:
@@ -642,9 +570,7 @@ def test_gain_and_offset_take_plain_numbers_whatever_the_units_are(folder, given
 def test_a_gain_in_place_of_a_conversion_is_noted(folder: Path) -> None:
     make_fmu(folder / "driver_deg.fmu", outputs=[out("steer_angle", unit="deg")])
     rest = CONSTANTS + TORQUES + "  - {from: driver.steer_angle, to: plant.steer_angle, gain: 0.0625}\n"
-    assert texts_of(plan(scenario(rest=rest), swaps=["driver=driver_deg"])) == (
-        "connections[1]: its gain and offset stand in place of the conversion from deg to rad",
-    )
+    assert golden(texts_of(plan(scenario(rest=rest), swaps=["driver=driver_deg"])))
 
 
 def test_text_has_no_gain_and_a_whole_number_a_whole_one(folder: Path) -> None:
@@ -653,10 +579,9 @@ def test_text_has_no_gain_and_a_whole_number_a_whole_one(folder: Path) -> None:
     make_fmu(folder / "reader.fmu", inputs=[Var("word", type="String", start="")], outputs=["y"])
     units = "  a: {fmu: count}\n  b: {fmu: taker}\n  c: {fmu: reader}\n"
     rest = "connections:\n  - {from: a.n, to: b.n, gain: 2}\n  - {from: a.word, to: c.word, gain: 2}\n"
-    says = "gain and offset are for Real, and whole ones for Integer, not for"
-    assert problems(scenario(units, rest)) == [f"a.yaml:9: connections[1]: {says} String"]
+    assert golden(problems(scenario(units, rest)))
     rest = "connections:\n  - {from: a.n, to: b.n, gain: 0.5}\n"
-    assert problems(scenario(units, rest)) == [f"a.yaml:8: connections[0]: {says} Integer"]
+    assert golden(problems(scenario(units, rest)))
 
 
 def test_units_that_mean_the_same_fit(folder: Path) -> None:
@@ -666,17 +591,12 @@ def test_units_that_mean_the_same_fit(folder: Path) -> None:
 
 def test_an_fmu_without_units_is_connected_with_a_note(folder: Path) -> None:
     make_fmu(folder / "controller_bare.fmu", outputs=[out("torque_request_*", unit=None)])
-    assert texts_of(plan(swaps=["controller=controller_bare"])) == (
-        "controller (controller_bare) declares no unit for torque_request_*: not checked",
-    )
+    assert golden(texts_of(plan(swaps=["controller=controller_bare"])))
 
 
 def test_types_that_differ_over_equal_names_are_said(folder: Path) -> None:
     make_fmu(folder / "driver_int.fmu", outputs=[out("steer_angle", unit=None, type="Integer")])
-    assert problems(scenario(), swaps=["driver=driver_int"])[1] == (
-        "a.yaml:6: units.plant: cannot connect driver.steer_angle [Integer] to plant.steer_angle [Real]: "
-        "the types differ"
-    )
+    assert golden(problems(scenario(), swaps=["driver=driver_int"])[1])
 
 
 def test_enumerations_fit_if_the_input_knows_every_item_by_the_same_number(folder: Path) -> None:
@@ -689,10 +609,7 @@ def test_enumerations_fit_if_the_input_knows_every_item_by_the_same_number(folde
         return scenario("  sensor: {fmu: sensor}\n  taker: {fmu: taker}\n", "")
 
     assert len(plan(feed("dry", "wet")).wires) == 1
-    assert problems(feed("dry", "ice")) == [
-        "a.yaml:5: units.taker: cannot connect sensor.road [dry 1 and ice 2] to taker.road "
-        "[dry 1, wet 2 and ice 3]: the enumerations differ"
-    ]
+    assert golden(problems(feed("dry", "ice")))
 
 
 def test_a_real_algebraic_loop_is_said_with_its_path(folder: Path) -> None:
@@ -706,11 +623,7 @@ def test_a_real_algebraic_loop_is_said_with_its_path(folder: Path) -> None:
         ],
     )
     path = scenario(UNITS.replace("plant_seven_dof", "plant_loop"), CONSTANTS)
-    assert problems(path) == [
-        "a.yaml: algebraic loop: tyre.tyre_force_y_fl -> plant.tyre_force_y_fl -> plant.slip_angle_fl -> "
-        "tyre.slip_angle_fl -> tyre.tyre_force_y_fl; these values would define each other at one instant, so "
-        "one of these units has to give an output that does not follow its input directly"
-    ]
+    assert golden(problems(path))
 
 
 def test_a_loop_through_an_fmu_that_says_nothing_is_a_note(folder: Path) -> None:
@@ -724,11 +637,8 @@ def test_a_loop_through_an_fmu_that_says_nothing_is_a_note(folder: Path) -> None
         ],
     )
     (note,) = texts_of(plan(scenario(UNITS.replace("plant_seven_dof", "plant_silent"), CONSTANTS)))
-    assert note.startswith("possible algebraic loop: tyre.tyre_force_x_fl -> plant.tyre_force_x_fl -> ")
-    assert note.endswith(
-        "; an FMU here does not say which inputs its outputs follow, so a wire against the evaluation order "
-        "uses earlier values"
-    )
+    assert golden(note)
+    assert golden(note)
 
 
 # Constants
@@ -747,17 +657,12 @@ def test_a_constant_by_name_goes_before_one_by_pattern() -> None:
 
 def test_two_constants_for_one_input_are_said() -> None:
     rest = 'inputs: {"friction*": 0.8, "friction_*": 0.3}\n' + TORQUES
-    assert problems(scenario(rest=rest)) == [
-        "a.yaml:8: inputs.friction_*: tyre.friction_* has another constant already, by inputs.friction*"
-    ]
+    assert golden(problems(scenario(rest=rest)))
 
 
 def test_a_constant_for_driven_inputs_is_said_once_for_four_wheels() -> None:
     rest = 'inputs: {"friction*": 1, "slip_ratio*": 0}\n' + TORQUES
-    assert problems(scenario(rest=rest)) == [
-        "a.yaml:8: inputs.slip_ratio*: tyre.slip_ratio_* is driven by plant.slip_ratio_*: "
-        "a constant is for inputs that no unit drives, unless its key names tyre"
-    ]
+    assert golden(problems(scenario(rest=rest)))
 
 
 def test_a_constant_that_names_the_unit_goes_before_equal_names_with_a_note() -> None:
@@ -767,18 +672,12 @@ def test_a_constant_that_names_the_unit_goes_before_equal_names_with_a_note() ->
     assert unit(made, "plant").constants == {"steer_angle": math.pi / 180}
     assert [w.target for w in made.wires if w.output == "steer_angle"] == ["controller"]
     assert not [w for w in made.wires if w.input.startswith("slip_ratio")]
-    assert texts_of(made) == (
-        "plant.steer_angle has a value of its own: driver.steer_angle does not drive it",
-        "tyre.slip_ratio_* has a value of its own: plant.slip_ratio_* does not drive it",
-    )
+    assert golden(texts_of(made))
 
 
 def test_a_constant_never_goes_before_a_connection() -> None:
     rest = 'inputs: {"friction*": 1, "plant.wheel_torque_*": 0}\n' + TORQUES
-    assert problems(scenario(rest=rest)) == [
-        "a.yaml:8: inputs.plant.wheel_torque_*: plant.wheel_torque_* is driven by "
-        "controller.torque_request_*: a constant is for inputs that no unit drives"
-    ]
+    assert golden(problems(scenario(rest=rest)))
 
 
 # Which of several sources
@@ -844,7 +743,7 @@ def test_several_lists_of_units_count_in_the_order_that_all_of_them_allow(folder
 def test_what_a_swap_leaves_without_equal_names_is_no_error_but_a_note() -> None:
     path = scenario(rest=CONSTANTS + TORQUES + "  - {from: [driver], to: [controller]}\n")
     made = plan(path, swaps=["controller=controller_off"])
-    assert "connections[1] is left out: no names are equal any more" in texts_of(made)
+    assert golden_in(texts_of(made))
 
 
 def test_lists_that_prefer_in_a_circle_are_an_error_that_names_it(folder: Path) -> None:
@@ -862,9 +761,7 @@ def test_null_leaves_an_input_without_a_source(folder: Path) -> None:
     units = estimators(folder).replace("  road: {fmu: road}\n", "")
     refused = TORQUES + "  - {from: null, to: tyre.friction_*}\n"
     refused += "  - {from: [plant], to: [controller]}\n"
-    assert [p.partition(" has no source")[0] for p in problems(scenario(units, refused))] == [
-        "a.yaml:7: units.tyre: tyre.friction_* [1]"
-    ]
+    assert golden([p.partition(" has no source")[0] for p in problems(scenario(units, refused))])
     made = plan(scenario(units, 'inputs: {"friction_*": 0.3}\n' + refused))
     assert [unit(made, "tyre").constants[f"friction_{w}"] for w in WHEELS] == [0.3] * 4
     assert sources(made, "friction_fl") == {}
@@ -934,12 +831,7 @@ def test_recorded_outputs_are_in_the_order_of_the_list_each_once() -> None:
 
 def test_a_record_of_nothing_is_said() -> None:
     rest = CONSTANTS + TORQUES + 'record: [plant.yawrate, "*.beta"]\n'
-    assert problems(scenario(rest=rest)) == [
-        "a.yaml:11: record[0]: plant has no variable 'yawrate' to record; did you mean 'yaw_rate'?",
-        "a.yaml:11: record[1]: no unit has a variable 'beta' to record; its outputs are: steer_angle, "
-        "torque_request_*, yaw_rate, acceleration_y, slip_angle_*, slip_ratio_*, tyre_force_x_* and "
-        "tyre_force_y_*",
-    ]
+    assert golden(problems(scenario(rest=rest)))
 
 
 def test_every_value_says_where_it_comes_from(folder: Path) -> None:
@@ -986,9 +878,7 @@ def test_any_variable_is_recorded_by_its_name_and_patterns_mean_outputs_first() 
 
 def test_a_record_that_is_like_no_output_is_guessed_among_all_variables() -> None:
     rest = CONSTANTS + TORQUES + "record: [plant.whel_radius]\n"
-    assert problems(scenario(rest=rest)) == [
-        "a.yaml:11: record[0]: plant has no variable 'whel_radius' to record; did you mean 'wheel_radius'?"
-    ]
+    assert golden(problems(scenario(rest=rest)))
 
 
 def test_a_scenario_is_wired_anew_when_its_fmu_has_been_mended(folder):
@@ -1008,7 +898,8 @@ def test_an_error_has_a_code_a_location_and_a_message():
     assert error.location == Location(path, 10, "connections[0].to")
     assert str(error) == f"{path}:10: connections[0].to: {error.message}"
     (error,) = errors(scenario(), settings=["plant.mass=-1"])
-    assert (error.code, error.location) == ("value-invalid", Location(target="--set plant.mass=-1"))
+    assert error.code == "value-invalid"
+    assert golden(error.location)
 
 
 def test_an_input_without_a_source_is_not_sent_to_whatever_has_its_unit_of_measurement(folder):
@@ -1020,7 +911,7 @@ def test_an_input_without_a_source_is_not_sent_to_whatever_has_its_unit_of_measu
         ],
     )  # fmt: skip
     found = {problem.split("controller.")[1].split(" ")[0]: problem for problem in problems(scenario())}
-    assert "connect plant.yaw_rate, or give" in found["roll_rate"]
+    assert golden_in(found["roll_rate"])
     assert "no output of this name" not in found["brake"] and "connect" not in found["brake"]
 
 

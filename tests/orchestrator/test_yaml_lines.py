@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.scenario.yaml_lines import ALIASED, Document, read
+from orchestrator.scenario.yaml_lines import Document, read
+from tests.sentences import golden
 
 
 def sentences(made):
@@ -49,12 +50,12 @@ def test_a_quoted_merge_key_is_a_name_like_any_other(document):
 @pytest.mark.parametrize("value", ["1", "[1]", "[*a, 2]"])
 def test_a_merge_key_takes_nothing_but_mappings(document, value):
     made = document(f"a: &a {{x: 1}}\nb: {{<<: {value}}}\n")
-    assert sentences(made) == ["a.yaml:2: <<: write an alias of a mapping, or a list of such aliases"]
+    assert golden(sentences(made))
 
 
 def test_a_mapping_that_merges_itself_is_refused(document):
     (sentence,) = sentences(document("a: &a {x: 1, <<: *a}\n"))
-    assert sentence == "a.yaml:1: a: this alias contains itself"
+    assert golden(sentence)
 
 
 def test_aliases_of_aliases_that_would_fill_the_memory_are_refused(document):
@@ -62,22 +63,20 @@ def test_aliases_of_aliases_that_would_fill_the_memory_are_refused(document):
     lines += [f"x{n}: &x{n} [{', '.join([f'*x{n - 1}'] * 10)}]" for n in range(1, 10)]
     made = document("\n".join(lines))
     assert made.data is None
-    assert sentences(made) == [f"a.yaml:5: x4: aliases repeat more than {ALIASED} values"]
+    assert golden(sentences(made))
 
 
 def test_merge_keys_that_would_fill_the_memory_are_refused(document):
     lines = ["x0: &x0 {a: 1}"]
     lines += [f"x{n}: &x{n} {{<<: [{', '.join([f'*x{n - 1}'] * 10)}]}}" for n in range(1, 10)]
-    assert sentences(document("\n".join(lines))) == [
-        f"a.yaml:6: x5: aliases repeat more than {ALIASED} values"
-    ]
+    assert golden(sentences(document("\n".join(lines))))
 
 
 def test_a_chain_of_aliases_too_deep_to_follow_is_refused(document):
     opened, closed = "[" * 30, "]" * 30
     lines = [f"x0: &x0 {opened}{closed}", *(f"x{n}: &x{n} {opened}*x{n - 1}{closed}" for n in range(1, 20))]
     (sentence,) = sentences(document("\n".join(lines)))
-    assert sentence.startswith("a.yaml:2: x1: is nested too deeply: at most 40 collections in each other")
+    assert golden(sentence)
 
 
 def test_a_long_list_without_aliases_is_no_bomb(document, monkeypatch):
@@ -92,4 +91,4 @@ def test_a_line_that_names_the_version_of_yaml_is_read(document):
 
 def test_very_many_brackets_are_refused_before_they_are_scanned(document):
     (sentence,) = sentences(document("a:\n  " + "[" * 100_000))
-    assert sentence == "a.yaml:2: not valid YAML: more than 40 brackets in each other"
+    assert golden(sentence)
