@@ -222,7 +222,7 @@ def _other_jobs() -> list[Job]:
             (
                 run("diff/a"), run("diff/b", *swap), ("diff", "out/diff/a", "out/diff/b"),
                 ("plot", "out/diff/a", "out/diff/b", "--out", "out/diff/plot"),
-                ("animate", "out/diff/a", "out/diff/b", "--out", "out/diff/animation.html"),
+                ("animate", "out/diff/a", "out/diff/b", "--out", "out/diff/view.html"),
             ),
             10, True,
         ),

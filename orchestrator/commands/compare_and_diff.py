@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -35,7 +35,7 @@ def compare(context: typer.Context, scenario: ScenarioFile, swap: Swaps, wishes:
     fails is named and takes no other with it.
     """
     from ..experiments.comparison import comparison, comparison_table
-    from ..pages.comparison import comparison_facts
+    from ..pages.comparison import comparison_facts, most_different
     from ..results.folder import default_folder
 
     folder = wishes.out or default_folder(scenario, wishes.changes, suffix="-compare")
@@ -44,8 +44,11 @@ def compare(context: typer.Context, scenario: ScenarioFile, swap: Swaps, wishes:
     findings = conduct(comparison(scenario, swap, wishes.changes), folder, wishes, each)
     print_tables([comparison_table(findings)])
     command = command_of("compare", scenario, **wishes.changing | {"swap": swap})
-    facts = {"comparison": comparison_facts(findings)}
-    write_page([chapter_of(findings, folder, command, each, shown_in=folder, **facts)], folder)
+    view = most_different(findings)
+    views = [view] if view else []
+    facts = comparison_facts(findings)
+    chapter = chapter_of(findings, folder, command, shown_in=folder, views=views, comparison=facts)
+    write_page([chapter], folder)
     if findings.failed:
         raise typer.Exit(1)
 
@@ -130,8 +133,8 @@ def converge(
         figure = convergence_figure(rows, signal, experiment.spec.title, note)
         save(figure, folder / "converge")
         charts = [image_of(folder / "converge.svg", experiment.spec.title)]
-    facts = {"results": [table], "charts": charts}
-    write_page([chapter_of(findings, folder, command, each, shown_in=folder, **facts)], folder)
+    facts: dict[str, Any] = {"results": [table], "charts": charts}
+    write_page([chapter_of(findings, folder, command, shown_in=folder, **facts)], folder)
     if any(row.failed for row in rows):
         raise typer.Exit(1)
 

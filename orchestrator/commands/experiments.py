@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ..experiments.experiment import LoadedExperiment
     from ..experiments.outcome import Each, ExperimentResult
     from ..experiments.planning import PlannedExperiment
+    from ..pages.viewer import View
 
 
 def conduct(
@@ -103,7 +104,13 @@ def _over_region(
 
 
 def chapter_of(
-    findings: ExperimentResult, folder: Path, command: str, each: Each, *, shown_in: Path, **more: Any
+    findings: ExperimentResult,
+    folder: Path,
+    command: str,
+    *,
+    shown_in: Path,
+    views: Sequence[View] = (),
+    **more: Any,
 ) -> dict[str, Any]:
     """Return the chapter of an experiment for a page in `shown_in`; `more`: further template data."""
     from ..pages.report import chapter
@@ -118,7 +125,7 @@ def chapter_of(
     }
     with stoppable(folder):
         facts = chapter(
-            findings, command=command, stale=out_of_date, folder=folder, shown_in=shown_in, each=each
+            findings, command=command, stale=out_of_date, folder=folder, shown_in=shown_in, views=views
         )
     for name, why in out_of_date.items():
         say(f"{name}: not what a run would give now: {why}")
@@ -193,7 +200,7 @@ def of_files(context: typer.Context, files: Sequence[Path], wishes: RunOptions) 
             quick=wishes.quick and (experiment.spec.region is not None or bool(experiment.spec.repeats)),
             **wishes.changing,
         )
-        chapters.append(chapter_of(findings, folder, command, each, shown_in=page))
+        chapters.append(chapter_of(findings, folder, command, shown_in=page))
         failed = failed or bool(findings.failed) or bool(findings.not_made)
         if len(files) == 1:
             print_tables(all_tables(findings))
@@ -315,5 +322,5 @@ def tune(context: typer.Context, file: TuningFile, wishes: RunOptions) -> None:
         write_whole(folder / ENTRIES, entries_text(entries_of(experiment, found), command))
     save(history_figure(experiment, found, command), folder / "history")
     charts = [image_of(folder / "history.svg", experiment.spec.title)]
-    facts = {"results": [table], "charts": charts}
-    write_page([chapter_of(findings, folder, command, each, shown_in=folder, **facts)], folder)
+    facts: dict[str, Any] = {"results": [table], "charts": charts}
+    write_page([chapter_of(findings, folder, command, shown_in=folder, **facts)], folder)

@@ -107,13 +107,23 @@ Panels = Annotated[
 ]
 
 
+AsPage = Annotated[bool, typer.Option("--page", help="Write view.html, a page to explore the runs.")]
+
+
 @takes(*CHANGES, *MAKING)
-def plot(sources: RunSources, wishes: RunOptions, label: Labels = None, panel: Panels = None) -> None:
+def plot(
+    sources: RunSources,
+    wishes: RunOptions,
+    label: Labels = None,
+    panel: Panels = None,
+    page: AsPage = False,
+) -> None:
     """Draw runs, one or several overlaid.
 
-    Figures are written as SVG and PNG. A scenario is run first if its results (those of `yawbench
-    run` without --out) are missing or were made from another scenario or FMU. Without --out, the
-    figure of one run goes into its folder, that of several into the folder that holds them all.
+    Figures are written as SVG and PNG; with --page, a page to explore the runs is written instead.
+    A scenario is run first if its results (those of `yawbench run` without --out) are missing or were
+    made from another scenario or FMU. Without --out, the figure of one run goes into its folder, that of
+    several into the folder that holds them all.
     """
     from ..experiments.comparison import FIGURES
     from ..figures.panels import LabelledRun, check_panels, shown_by
@@ -122,10 +132,11 @@ def plot(sources: RunSources, wishes: RunOptions, label: Labels = None, panel: P
     from ..results.read import load_results
     from .progress import say
 
-    pass
-
     folders = recorded(sources, wishes)
     labels = labels_of(folders, label)
+    if page:
+        write_view(folders, labels, panel or (), wishes.out and wishes.out / "view.html")
+        return
     runs = [
         LabelledRun(name, load_results(folder, thin=True))
         for name, folder in zip(labels, folders, strict=True)
@@ -144,34 +155,48 @@ Page = Annotated[Path | None, typer.Option("--out", metavar="FILE.html", help="T
 
 @takes(*CHANGES, "fmus", "no_build")
 def animate(sources: RunSources, wishes: RunOptions, label: Labels = None, out: Page = None) -> None:
-    """Write a page that animates runs seen from above.
+    """Write a page to explore runs: the same as `plot --page`.
 
-    Cars, paths, lanes, patches of the road, steer angles, tyre forces and their friction circles; of at
-    most seven runs.
-    A scenario is run first if its results are missing or were made from another scenario or FMU.
-    Without --out, the page of one run is animation.html in its folder; that of several lies in the
-    folder that holds them all.
+    Recorded signals of all runs with a common cursor, zoom, differences from a baseline; cars, paths, lanes,
+    patches of the road, tyre forces and friction circles, animated. A scenario is run first if its
+    results are missing or were made from another scenario or FMU. Without --out, the page of one run is
+    view.html in its folder; that of several lies in the folder that holds them all.
     """
-    from ..errors import ResultsError, ScenarioError
+    folders = recorded(sources, wishes)
+    write_view(folders, labels_of(folders, label), (), out)
+
+
+def write_view(
+    folders: Sequence[Path], labels: Sequence[str], panels: Sequence[str], out: Path | None
+) -> None:
+    """Write the page of a viewer.
+
+    Args:
+        folders: of the runs.
+        labels: of the runs.
+        panels: signals shown at first; none: those that the papers draw.
+        out: the page; default: view.html in the folder of the run, or in that of all runs.
+
+    Raises:
+        ResultsError: a run cannot be read, or the page cannot be written.
+    """
+    from ..errors import ResultsError
+    from ..figures.panels import LabelledRun
     from ..files import write_whole
     from ..labels import changed_each
-    from ..pages.animation import MOST, page
+    from ..pages.viewer import SETTINGS, Settings, View, page
     from ..results.read import load_results
     from .progress import say
 
-    pass
-
-    if len(sources) > MOST:
-        raise ScenarioError(f"an animation shows up to {MOST} runs, not {len(sources)}")
-    folders = recorded(sources, wishes)
-    runs = list(zip(labels_of(folders, label), map(load_results, folders), strict=True))
-    titles = [results.record.title or name for name, results in runs]
-    changed = changed_each([(name, results.record.overrides) for name, results in runs])
+    runs = [LabelledRun(name, load_results(folder)) for name, folder in zip(labels, folders, strict=True)]
+    titles = [run.results.record.title or run.label for run in runs]
+    changed = changed_each([(run.label, run.results.record.overrides) for run in runs])
+    settings = Settings((View(panels=panels),)) if panels else SETTINGS
     if len(runs) == 1:
-        text = page(runs, title=titles[0], changed=changed)
+        text = page(runs, settings, title=titles[0], changed=changed)
     else:
-        text = page(runs, below="; ".join(dict.fromkeys(titles)), changed=changed)
-    file = out or folder_of_all(folders) / "animation.html"
+        text = page(runs, settings, below="; ".join(dict.fromkeys(titles)), changed=changed)
+    file = out or folder_of_all(folders) / "view.html"
     try:
         write_whole(file, text, named=out is not None)
     except OSError as error:

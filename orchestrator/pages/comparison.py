@@ -25,7 +25,7 @@ from ..metrics.run_metrics import MetricValue, metric
 from ..names import SignalName
 from ..results.read import Results
 from ..results.run_record import RunRecord
-from .page_parts import PageFigure, figure_of
+from .viewer import View
 
 SAME = 1e-9
 """Differences below this, relative to the signal's peak, are ignored; chosen: far above rounding, far below
@@ -265,7 +265,6 @@ def comparison_facts(findings: ExperimentResult) -> dict[str, Any] | None:
         "labels": [marked(*run) for run in runs],
         "rows": metric_rows(findings),
         "remarks": remarks(runs),
-        "most": _most_different(runs, found),
         "partings": [_parted(run.label, first.label, one) for run, one in zip(others, found, strict=True)],
         "rule": RULE,
     }
@@ -318,15 +317,16 @@ def _best(values: Sequence[MetricValue | None], apart: Collection[int]) -> int |
     return None if shown(first, unit) == shown(second, unit) else best
 
 
-def _most_different(runs: Sequence[LabelledRun], found: Sequence[RunComparison]) -> PageFigure | None:
-    """Return the figure of the signals that differ most from the first run, relative to their peaks."""
+def most_different(findings: ExperimentResult) -> View | None:
+    """Return the view of the signals that differ most from the first run, relative to their peaks."""
+    runs = [*findings.results.values()]
     apart: dict[str, float] = {}
-    for parting in (parting for one in found for parting in one.partings):
+    for parting in (one for other in runs[1:] for one in divergence(runs[0], other).partings):
         name = variable_of(parting.signal)
         if "*" not in name and not name.startswith("position_"):  # one line per run in each panel
             apart[name] = max(apart.get(name, 0.0), parting.relative)
     names = sorted(apart, key=lambda name: -apart[name])[:MOST_DIFFERENT]
-    return figure_of(("most", "", runs, names, ()), whole=True)
+    return View("The signals that differ most", names) if names else None
 
 
 def difference(first: MetricValue | None, other: MetricValue | None) -> str:

@@ -1,4 +1,4 @@
-"""Friction map under an animation, from the patches and the table in the road's recorded parameters."""
+"""Friction map of the road from above, from the patches and the table in its recorded parameters."""
 
 from __future__ import annotations
 

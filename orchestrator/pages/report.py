@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
+
+from markupsafe import Markup
 
 from ..errors import ScenarioError
 from ..experiments.confidence import LEVEL
@@ -17,7 +19,8 @@ from ..experiments.experiment import FIGURES
 from ..experiments.figures import runs_of, title_of
 from ..experiments.jobs import Job, PlanningCache
 from ..experiments.judging import ClaimResult
-from ..experiments.outcome import Each, ExperimentResult
+from ..experiments.outcome import ExperimentResult
+from ..experiments.schema import FigureSpec
 from ..experiments.tables import Cell, Table
 from ..experiments.verdict_tables import (
     HOLDS,
@@ -33,7 +36,7 @@ from ..experiments.verdict_tables import (
     run_tables,
     verdict,
 )
-from ..figures import plots
+from ..figures.portrait import signals_of
 from ..figures.style import LabelledRun
 from ..labels import changed
 from ..messages import counted
@@ -42,14 +45,10 @@ from ..plan import Plan
 from ..results.read import Results
 from ..scenario import catalogue, yaml_lines
 from ..scenario.load import LoadedScenario, load_scenario
-from .animation import assets
 from .diagram import diagrams, systems_of
 from .page_parts import (
-    Animation,
     FigureImage,
     anchor,
-    animation_of,
-    figure_of,
     fmus_of,
     image_of,
     made_by,
@@ -57,6 +56,7 @@ from .page_parts import (
 )
 from .provenance import count_kinds, groups_of
 from .rendering import render, style
+from .viewer import MOST, PANELS, Settings, View, assets, viewer
 
 
 def chapter(
@@ -66,7 +66,7 @@ def chapter(
     stale: dict[str, str],
     folder: Path,
     shown_in: Path,
-    each: Each = map,
+    views: Sequence[View] = (),
 ) -> dict[str, Any]:
     """Return the template data of an experiment's chapter.
 
@@ -76,7 +76,7 @@ def chapter(
         stale: run -> why its results are not those of its plan.
         folder: of its results and figures.
         shown_in: folder of the page.
-        each: `map` used to draw panels, perhaps in parallel.
+        views: of the viewer, before those of the figures.
     """
     experiment, spec = findings.experiment, findings.spec
     name = anchor(f"{experiment.path.absolute().parent.name} {experiment.path.stem}")
@@ -97,8 +97,8 @@ def chapter(
         "region": region_table(findings) if findings.regions else None,
         "limits": limit_tables(findings),
         "systems": systems(plans, spec.title),
-        "animation": animation(findings),
-        "figures": figures(findings, name, _relative_to(folder / FIGURES, shown_in), each),
+        "viewer": viewer_of(findings, name, views),
+        "figures": figure_files(findings, _relative_to(folder / FIGURES, shown_in)),
         "charts": charts(findings, folder / FIGURES),
         "tables": [*run_tables(findings), *derived_tables(findings, apart=True)],
         "definitions": definitions(findings),
@@ -196,19 +196,44 @@ def systems(plans: Sequence[tuple[Job, tuple[LoadedScenario, Plan]]], title: str
 
 LIVELY = tuple(map(metric, ("peak(sideslip)", "peak(yaw_rate)")))
 """Metrics of how lively a run is; the first that all runs have is used."""
+LARGEST = 1_500_000
+"""Size of the samples in a chapter [bytes]. Chosen: a page of 2.5 MB opens at once, also by mail."""
 
 
-def animation(findings: ExperimentResult) -> Animation | None:
-    """Return the animation of the liveliest figure with a path, with all of its runs."""
-    found = [
-        (figure, runs)
-        for figure in findings.spec.figures
-        if "path" in figure.panels and (runs := runs_of(findings, figure))
-    ]
-    for figure, runs in sorted(found, key=lambda one: -_liveliest(one[1])):
-        if seen := animation_of(runs, figure.title or plots.title_of(runs)):
-            return seen
-    return None
+def viewer_of(findings: ExperimentResult, chapter: str, views: Sequence[View] = ()) -> Markup | None:
+    """Return the viewer of all runs that figures show.
+
+    Args:
+        findings: the experiment and its results.
+        chapter: anchor of its chapter.
+        views: of all runs, before those of the figures, of which the liveliest comes first.
+    """
+    overlays = [spec for spec in findings.spec.figures if spec.kind == "overlay"]
+    named: dict[str, LabelledRun] = {}
+    for run in (run for spec in overlays for run in findings.experiment.matching(spec.runs)):
+        results = findings.results.get(run.name)
+        if results is not None and results.time.size and len(named) < MOST:
+            named.setdefault(run.name, LabelledRun(run.row or run.label, results))
+    if not named:
+        return None
+    numbers = {name: number for number, name in enumerate(named)}
+    drawn: list[tuple[float, View]] = []
+    for spec in overlays:
+        shown = [numbers[run.name] for run in findings.experiment.matching(spec.runs) if run.name in numbers]
+        lively = _liveliest([run for number, run in enumerate(named.values()) if number in shown])
+        drawn += [(lively, view) for view in _views(spec, title_of(findings, spec), shown) if shown]
+    ordered = [view for _, view in sorted(drawn, key=lambda one: -one[0])]
+    return viewer([*named.values()], Settings([*views, *ordered], largest=LARGEST), name=f"{chapter}-view")
+
+
+def _views(spec: FigureSpec, title: str, shown: Sequence[int]) -> Iterator[View]:
+    """Yield the views of a figure: its signals over time, and each portrait."""
+    portraits = [(name, pair) for name in spec.panels if (pair := signals_of(name))]
+    over_time = tuple(name for name in spec.panels if name != "path" and not signals_of(name))
+    if over_time or not portraits:
+        yield View(title, over_time or PANELS, shown)
+    for name, (x, y) in portraits:
+        yield View(f"{title}: {name}", (y,), shown, x)
 
 
 def _liveliest(runs: Sequence[LabelledRun]) -> float:
@@ -220,16 +245,13 @@ def _liveliest(runs: Sequence[LabelledRun]) -> float:
     return 0.0
 
 
-def figures(findings: ExperimentResult, chapter: str, files: str, each: Each = map) -> list[Any]:
-    """Return the overlay figures that runs have results for."""
-    wanted = []
-    for spec in findings.spec.figures:
-        runs = runs_of(findings, spec)
-        paths = tuple(f"{files}/{spec.name}.{kind}" for kind in ("svg", "png"))
-        if runs:
-            title = title_of(findings, spec)
-            wanted.append((f"{chapter}-{anchor(spec.name)}", title, runs, spec.panels, paths))
-    return [figure for figure in each(figure_of, wanted) if figure is not None]
+def figure_files(findings: ExperimentResult, files: str) -> list[dict[str, str]]:
+    """Return title and path, without suffix, of the overlay figures that runs have results for."""
+    return [
+        {"title": title_of(findings, spec), "file": f"{files}/{spec.name}"}
+        for spec in findings.spec.figures
+        if spec.kind == "overlay" and runs_of(findings, spec)
+    ]
 
 
 def charts(findings: ExperimentResult, folder: Path) -> list[FigureImage]:

@@ -94,7 +94,7 @@ READS: dict[str, tuple[str, ...]] = {
 PRODUCTS = (
     "overview.svg",
     "overview.png",
-    "animation.html",
+    "view.html",
     "evaluation.json",
     "step_steer.svg",
     "step_steer.png",
@@ -289,7 +289,7 @@ def test_a_link_is_replaced_by_the_figure_and_its_target_left_alone(work, home, 
     assert yawbench("plot", "theirs")[0] == 0
     assert yawbench("animate", "theirs")[0] == 0
     assert (home / "precious").read_text() == "own\n"
-    for name in ("overview.svg", "overview.png", "animation.html"):
+    for name in ("overview.svg", "overview.png", "view.html"):
         assert not (work / "theirs" / name).is_symlink()
         assert (work / "theirs" / name).stat().st_size > 1000
 

@@ -26,11 +26,9 @@ from orchestrator.experiments.planning import jobs_of
 from orchestrator.experiments.record import write_findings
 from orchestrator.experiments.tables import Table, for_terminal
 from orchestrator.experiments.verdict_tables import claim_tables, derived_tables, run_tables, share
-from orchestrator.figures.style import LabelledRun, shown
+from orchestrator.figures.style import shown
 from orchestrator.metrics.run_metrics import MetricValue
-from orchestrator.pages.animation import MOST
-from orchestrator.pages.page_parts import animation_of
-from orchestrator.pages.report import animation, chapter, report_page
+from orchestrator.pages.report import chapter, report_page, viewer_of
 from orchestrator.plan import Override
 from tests.pages.made_up import data_in
 from tests.sentences import texts_of
@@ -182,29 +180,32 @@ def test_a_margin_beyond_the_threshold_itself_is_told_in_words():
     ]  # fmt: skip
 
 
-def test_the_animation_shows_all_runs_of_the_figure_in_which_most_happens(study, tmp_path):
+def test_the_viewer_has_a_view_per_figure_the_one_in_which_most_happens_first(study, tmp_path):
     figures = """
 figures:
-  - {name: calm, title: Calm, runs: ["15mps/*"], panels: [path]}
+  - {name: calm, title: Calm, runs: ["15mps/*"], panels: [path, yaw_rate, sideslip(yaw_rate)]}
   - {name: lively, title: Lively, runs: ["25mps/*", slow], panels: [path]}"""
-    made = study(("\nfigures:", figures))
+    made = study(
+        ("\nfigures:", figures),
+        ('  - {name: both, title: Both at 15 m/s, runs: ["15mps/*"], panels: [sideslip, path]}\n', ""),
+    )
     gains = {"15mps/off": 1.1, "15mps/fnn": 1.0, "25mps/off": 3.0, "25mps/fnn": 1.0, "slow": 1.0}
     for name, gain in gains.items():
         run = car(gain)
         lost = replace(run, columns={k: x for k, x in run.columns.items() if "position" not in k})
         write(lost if name == "slow" else run, tmp_path / "out" / name)
-    seen = animation(judge_results(made, tmp_path / "out"))
-    assert seen is not None
-    assert seen.title == "Lively"
-    assert [one["label"] for one in data_in(seen.drawing)["runs"]] == ["no control", "neural network"]
-    assert seen.left_out == "slow: no position recorded"
-
-
-def test_runs_beyond_those_that_an_animation_can_show_are_named():
-    seen = animation_of([LabelledRun(str(k), car(1.0 + k)) for k in range(MOST + 2)], "Many")
-    assert seen is not None
-    assert len(data_in(seen.drawing)["runs"]) == MOST
-    assert seen.left_out == f"{MOST} and {MOST + 1}: an animation shows up to {MOST} runs"
+    shown = viewer_of(judge_results(made, tmp_path / "out"), "chapter")
+    assert shown is not None
+    data = data_in(shown)
+    assert [view["title"] for view in data["views"]] == ["Lively", "Calm", "Calm: sideslip(yaw_rate)"]
+    assert [view["x"] for view in data["views"]] == ["time", "time", "plant.yaw_rate"]
+    assert data["views"][1]["panels"] == ["plant.yaw_rate,reference.yaw_rate_ref"]
+    labels = [run["label"] for run in data["runs"]]
+    assert [[labels[k] for k in view["shown"]] for view in data["views"][:2]] == [
+        ["25 m/s, no control", "25 m/s, neural network", "slow"],
+        ["15 m/s, no control", "15 m/s, neural network"],
+    ]
+    assert [run["road"] is None for run in data["runs"]] == [label == "slow" for label in labels]
 
 
 def test_for_stands_for_one_run_per_combination(study, tmp_path):
@@ -605,7 +606,7 @@ def test_a_study_leaves_figures_tables_and_a_record(study, out):
     assert sorted(path.name for path in (out / "figures").iterdir()) == ["both.png", "both.svg"]
     report = page(findings, out)
     assert "15 m/s, no control 140 % > 100 % (section 3) ✓ holds 40 % 2000 N·m" in report
-    assert "figures/both.png" in report
+    assert "Both at 15 m/s: figures/both.svg , .png" in report
     assert "largest absolute value, from 6.5 to 8 s: max|β|" in report
     assert pq.read_table(out / "table.parquet").num_rows == 5
     rows = {row["run"]: row for row in csv.DictReader((out / "table.csv").open())}

@@ -87,7 +87,7 @@ def test_everything_made_of_a_run_names_all_that_was_changed(yawbench, tmp_path,
     yawbench("plot", "r")
     shown["figure"] = drawn[plots.__name__]
     yawbench("animate", "r", fmus=None)
-    shown["animation"] = unescape((tmp_path / "r/animation.html").read_text())
+    shown["viewer"] = unescape((tmp_path / "r/view.html").read_text())
     shown["check"] = flat(yawbench("check", SCENARIO, *SET, "--swap", "controller=controller_off")[0])
     for name, text in shown.items():
         assert [words for words in wanted if words not in text] == [], name

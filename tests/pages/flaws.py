@@ -9,7 +9,10 @@ const hidden = (e) => e.closest('thead') && getComputedStyle(e.closest('thead'))
 return [...document.querySelectorAll('body *')].filter((e) => {
   const box = e.getBoundingClientRect();
   if (!box.width || !box.height || !e.checkVisibility() || e.closest('svg') || hidden(e)) return false;
-  const clips = ['hidden', 'clip'].includes(getComputedStyle(e).overflowX);
+  if (e.closest('.yv-hidden')) return false;
+  const style = getComputedStyle(e);
+  const shortened = style.textOverflow === 'ellipsis' && e.title;
+  const clips = ['hidden', 'clip'].includes(style.overflowX) && !shortened;
   const clipped = clips && e.scrollWidth > e.clientWidth + 1;
   return box.right > innerWidth + 1 || box.left < -1 || clipped;
 }).map((e) => `${e.tagName} ${e.className}: ${e.textContent.trim().slice(0, 60)}`);
@@ -18,6 +21,7 @@ OVERLAPPING = """
 const leaves = 'p, li, h1, h2, h3, h4, summary, figcaption, caption, img, canvas, button, select, td, th';
 const boxes = [...document.querySelectorAll(leaves)]
   .filter((e) => !e.querySelector(leaves) && !e.closest('svg') && e.checkVisibility())
+  .filter((e) => !e.closest('.yv-hidden'))
   .filter((e) => !(e.closest('thead') && getComputedStyle(e.closest('thead')).position === 'absolute'))
   .map((e) => ({e, box: e.getBoundingClientRect()}))
   .filter(({box}) => box.width > 0 && box.height > 0)
@@ -75,6 +79,7 @@ Promise.all([...document.images].map(async (image) => {
 
 def flaws(chromium: Browser) -> list[str]:
     """Return all that is wrong with the page that is open, as sentences."""
+    chromium.wait_for("document.querySelectorAll('.yv:not(.yv-ready)').length === 0")
     found = [f"console: {said}" for said in chromium.console()]
     found += [f"fetched: {name[:60]}" for name in chromium.requests() if not name.startswith("data:")]
     if (wide := chromium.overflow()) > 0:

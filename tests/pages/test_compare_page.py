@@ -12,6 +12,7 @@ from tests.fmu_copies import put_fmus
 
 from .browser import DESK, PHONE
 from .flaws import flaws, open_all
+from .made_up import data_in
 
 ROOT = Path(__file__).parents[2]
 UNITS = (
@@ -70,7 +71,7 @@ def test_it_tells_where_the_runs_part(tree):
 
 def test_it_shows_the_system_its_parameters_and_how_to_repeat_it(tree):
     assert [text.partition(":")[0] for text in texts(tree, "h3")] == [
-        "What the runs come to", "Where the runs part", "The system", "Figures", "Seen from above",
+        "What the runs come to", "Where the runs part", "The system",
         "Parameters, and where they come from", "To repeat this",
     ]  # fmt: skip
     assert len(tree.cssselect("svg.diagonal, svg.stack")) == 2
@@ -91,18 +92,25 @@ def test_nothing_is_cut_overlapping_or_empty_at_any_width(chromium, page, width)
     assert flaws(chromium) == []
 
 
-def test_the_animation_in_the_page_plays(chromium, page):
+def test_the_viewer_comes_first_with_the_signals_that_differ_most(chromium, page):
     chromium.open(page, calm=False)
-    chromium.run("document.querySelector('.yb-play').click()")
-    chromium.wait_for("document.querySelector('.yb-animation').player.time > 0.02")
+    chromium.wait_for("document.querySelector('.yv-ready')")
+    assert chromium.run("return document.querySelector('.yv').getBoundingClientRect().top") < 250
+    data = data_in(page.read_text(encoding="utf-8"))
+    first, *others = data["views"]
+    assert first["title"] == "The signals that differ most"
+    assert len(first["panels"]) == 6 and first["shown"] == [0, 1, 2]
+    assert others
+    chromium.run("document.querySelector('.yv-play').click()")
+    chromium.wait_for("document.querySelector('.yv').viewer.state.time > 0.02")
     assert chromium.console() == []
 
 
-def test_on_a_phone_tables_become_cards_but_for_that_of_the_animation(chromium, page):
+def test_on_a_phone_tables_become_cards_but_for_those_of_the_viewer(chromium, page):
     chromium.open(page, width=PHONE)
     display = "return getComputedStyle(document.querySelector(arguments[0])).display"
     assert chromium.run(display, "table.first-free tbody tr") == "block"
-    assert chromium.run(display, ".yb-readouts td") == "table-cell"
+    assert chromium.run(display, ".yv-runs td") == "table-cell"
     open_all(chromium)
     assert chromium.run(display, "table.parameters td.none") == "none"
     chips = "return [...document.querySelectorAll('.kind.chosen')].map((one) => one.clientWidth)"

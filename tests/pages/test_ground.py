@@ -1,17 +1,18 @@
-"""The ground of an animation: the same friction at every place as the road gives its wheels."""
+"""The ground under the road of a viewer: the same friction at every place as the road gives its wheels."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from orchestrator.pages.animation import data_of, frames_of, page
+from orchestrator.figures.style import LabelledRun
 from orchestrator.pages.friction_map import MOST, clipped, ground_of
+from orchestrator.pages.viewer import viewer
 from tests.orchestrator.recorded import noted
 from vocabulary.friction_table import table_of
 from vocabulary.patches import friction_at, inside_polygon, patches_of
 
-from .made_up import whole_car
+from .made_up import data_in, whole_car
 
 TEXTS = (
     "y > 0",
@@ -62,13 +63,14 @@ def test_there_is_no_ground_without_patches_or_of_too_many_pieces():
         assert ground_of({"patches": text, **numbers}, (0, 9), (0, 9)) == []
 
 
-def test_an_animation_carries_the_ground_once_and_says_what_its_colours_mean():
-    run = whole_car()
+def test_a_viewer_carries_the_ground_once_and_says_what_its_colours_mean():
     road = {"name": "road_a", "parameters": {"patches": "y > 0", "base_friction": 0.8}, "constants": {},
             "defaults": {"patch_friction": 0.2}}  # fmt: skip
-    frames = frames_of(noted(run, fmus={"road": road}))
-    first, second = data_of([("a", frames), ("b", frames)])["runs"]
-    assert [friction for friction, _ in first["ground"]] == [0.8, 0.2]
-    assert second["ground"] == []
-    assert "slipperier" not in page([("a", whole_car())])
-    assert "ground: the bluer the slipperier, friction 0.2 and 0.8" in page([("a", run)])
+    run = whole_car()
+    assert "slippery" not in viewer([LabelledRun("a", run)])
+    on_road = noted(run, fmus={"road": road})
+    html = viewer([LabelledRun("a", on_road), LabelledRun("b", on_road)])
+    data = data_in(html)
+    assert [[friction for friction, _ in ground] for ground in data["grounds"]] == [[0.8, 0.2]]
+    assert [one["road"]["ground"] for one in data["runs"]] == [0, 0]
+    assert "ground: the bluer the more slippery, friction 0.2 and 0.8" in html

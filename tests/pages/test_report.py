@@ -21,6 +21,7 @@ from tests.orchestrator.recorded import record_text
 
 from .browser import DESK, PHONE
 from .flaws import flaws, open_all
+from .made_up import data_in
 
 ROOT = Path(__file__).parents[2]
 UNITS = (
@@ -134,20 +135,25 @@ def test_every_fmu_is_named_with_its_whole_hash(paper):
     assert all(re.fullmatch("[0-9a-f]{64}", sha) for sha in told)
 
 
-def test_every_figure_of_the_study_is_in_the_page_and_beside_it(paper):
-    assert texts(paper.tree, "figure > figcaption")[: len(paper.record["figures"])] == [
-        *paper.record["figures"].values()
-    ]
-    named = [file for text in paper.tree.cssselect("figure code") for file in [text.text_content()]]
-    assert len(named) == 2 * len(paper.record["figures"])
-    assert all((paper.folder / file).stat().st_size > 5000 for file in named)
+def test_every_figure_of_the_study_is_a_view_of_the_page_and_a_file(paper):
+    overlays = [one for one in load_experiment(paper.study).spec.figures if one.kind == "overlay"]
+    titles = [paper.record["figures"][one.name] for one in overlays]
+    named = [code for code in texts(paper.tree, "details li code") if code.endswith(".svg")]
+    assert [Path(file).stem for file in named] == [one.name for one in overlays]
+    for file in named:
+        assert (paper.folder / file).stat().st_size > 5000
+        assert (paper.folder / file).with_suffix(".png").stat().st_size > 5000
+    views = data_in(paper.page.read_text(encoding="utf-8"))["views"]
+    assert {title for view in views for title in titles if view["title"].startswith(title)} == set(titles)
+    assert all(any(view["title"].startswith(title) for title in titles) for view in views)
 
 
 def test_the_panels_stand_in_the_order_of_the_study(paper):
-    study = load_experiment(paper.study)
-    alts = [image.get("alt") for image in paper.tree.cssselect("figure .panel img")]
-    assert len(alts) == sum(len(figure.panels) for figure in study.spec.figures)
-    assert [alt.split(" ")[0] for alt in alts[:6]] == ["Steer", "Yaw", "Sideslip", "Yaw", "Lateral", "Path"]
+    spec = next(one for one in load_experiment(paper.study).spec.figures if one.kind == "overlay")
+    views = data_in(paper.page.read_text(encoding="utf-8"))["views"]
+    view = next(one for one in views if one["title"] == paper.record["figures"][spec.name])
+    shown = [panel.partition(".")[2].partition(",")[0] for panel in view["panels"]]
+    assert shown[:2] == [name for name in spec.panels if "(" not in name and name != "path"][:2]
 
 
 def test_parameters_tell_their_source(paper):
@@ -247,7 +253,7 @@ def test_several_studies_make_one_page_with_an_overview(report, half):
     assert texts(tree, "table.overview tbody th") == titles
     places = {element.get("id") for element in tree.cssselect("[id]")}
     assert {link.get("href")[1:] for link in tree.cssselect("a[href^='#']")} <= places
-    first = tree.cssselect("figure code")[0].text_content()
+    first = next(code for code in texts(tree, "details li code") if code.endswith(".svg"))
     assert Path("results", first).is_file()
 
 

@@ -44,7 +44,7 @@ function grid(c, eye, width, height) {
     c.moveTo(eye.x - across, y);
     c.lineTo(eye.x + across, y);
   }
-  stroke(c, '#e2e2e2', 1, px);
+  stroke(c, LINE, 1, px);
   return step;
 }
 
@@ -75,7 +75,7 @@ function ground(c, run) {
 function lanes(c, run, px, onGround) {
   const size = Math.max(0.15, 2.2 * px);
   for (const [start, end, right, left] of run.lanes) {
-    c.fillStyle = '#f0ede4';
+    c.fillStyle = LANE;
     if (!onGround) c.fillRect(start, right, end - start, left - right);
     const pieces = Math.ceil((end - start) / CONES);
     c.fillStyle = '#8a4b00';
@@ -109,7 +109,7 @@ function drawScene(canvas, density, runs, states, view, scale) {
     lanes(c, run, px, runs.some((one) => one.ground.length));
     if ('path_y' in run.channels) {
       polyline(c, run.channels.x, run.channels.path_y, 0, run.channels.x.length - 1);
-      stroke(c, '#999', 1, px, [5, 4]);
+      stroke(c, QUIET, 1, px, [5, 4]);
     }
   }
   runs.forEach((run, i) => {

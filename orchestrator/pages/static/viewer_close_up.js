@@ -47,7 +47,7 @@ function motion(c, state, car, run, px) {
   c.beginPath();
   c.moveTo(-0.3, 0);
   c.lineTo(length, 0);
-  stroke(c, '#999', 1, px, [4, 3]);
+  stroke(c, QUIET, 1, px, [4, 3]);
   arrow(c, 0, 0, length * Math.cos(state.sideslip), length * Math.sin(state.sideslip), run.colour, 2, px);
   c.beginPath();
   c.arc(0, 0, 3 * px, 0, 2 * Math.PI);

@@ -1,9 +1,12 @@
 // What scene and close-up share. Contexts are in metres, y to the left; px is the size of a pixel in metres.
 
-const GROUND = '#fff';
-const QUIET = '#666';
-const INK = '#111';
+let [GROUND, QUIET, INK, LINE, LANE] = ['#fff', '#666', '#111', '#e2e2e2', '#f0ede4'];
 const TYRE = [0.62, 0.2]; // length, width of a wheel seen from above [m]
+
+// Take the colours of the page, light or dark.
+function useTheme({ground, quiet, ink, line, lane}) {
+  [GROUND, QUIET, INK, LINE, LANE] = [ground, quiet, ink, line, lane];
+}
 
 // Fit a canvas's pixels to its size on the page; return its context, width and height there.
 function surface(canvas, density) {
@@ -78,7 +81,7 @@ function wheels(c, car, steer) {
     c.save();
     c.translate(x, y);
     if (name[0] === 'f') c.rotate(steer);
-    c.fillStyle = '#333';
+    c.fillStyle = INK;
     c.fillRect(-TYRE[0] / 2, -TYRE[1] / 2, TYRE[0], TYRE[1]);
     c.restore();
   }

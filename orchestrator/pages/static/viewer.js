@@ -1,0 +1,473 @@
+// The viewer: run table, bar, panels with one axis and one cursor, the road from above. Its state is the
+// fragment of the page's address, so that a link shows the same picture.
+
+const ZOOM = [0.1, 8];
+const PAPER = 3; // dots per pixel in print
+const plotters = new Map(); // dots per pixel -> uPlot, which takes them once, when it is made
+
+function plotter(ratio) {
+  if (!plotters.has(ratio)) plotters.set(ratio, makeUPlot(ratio));
+  return plotters.get(ratio);
+}
+
+class Viewer {
+  constructor(root, data, runs) {
+    Object.assign(this, {root, data, runs});
+    this.find = (name) => root.querySelector('.yv-' + name);
+    this.key = root.id;
+    this.state = this.initial();
+    this.restore();
+    this.shift();
+    this.panels = [];
+    this.listen();
+    this.road = this.find('road') ? new Road(this) : null;
+    this.refresh();
+    window.addEventListener('hashchange', () => { if (this.restore()) this.refresh(); });
+    new ResizeObserver(() => this.resized()).observe(root);
+    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.refresh());
+    addEventListener('beforeprint', () => this.print());
+    addEventListener('afterprint', () => this.refresh());
+    root.classList.add('yv-ready');
+  }
+
+  initial() {
+    return {
+      view: 0, ...this.viewed(0), span: null, time: this.data.still,
+      difference: false, tolerance: 0, camera: 'cars', offsets: {},
+    };
+  }
+
+  // Runs, baseline and panels of a view.
+  viewed(number) {
+    const {shown, panels, x} = this.data.views[number];
+    return {shown: [...shown], baseline: shown[0] || 0, panels: [...panels], x};
+  }
+
+  // ---- the address ----
+
+  remember() {
+    const {state} = this;
+    const plain = {...this.initial(), ...this.viewed(state.view)};
+    const words = new URLSearchParams();
+    const same = (one, other) => JSON.stringify(one) === JSON.stringify(other);
+    for (const [name, value] of Object.entries(state)) {
+      if (same(value, plain[name])) continue;
+      words.set(name, name === 'time' ? String(Number(value.toFixed(6))) : JSON.stringify(value));
+    }
+    const others = location.hash.slice(1).split('&&').filter((part) => part && !part.startsWith(this.key + '?') && part.includes('?'));
+    const own = `${this.key}?${words}`;
+    const all = [...others, ...(words.size || others.length || location.hash.includes('?') ? [own] : [])];
+    this.written = '#' + all.join('&&');
+    if (all.length && location.hash !== this.written) history.replaceState(null, '', this.written);
+  }
+
+  // Take over what the address says; return whether it says anything about this viewer.
+  restore() {
+    if (location.hash === this.written) return false;
+    const own = location.hash.slice(1).split('&&').find((part) => part.startsWith(this.key + '?'));
+    if (own === undefined) return false;
+    const state = this.initial();
+    const isRun = (v) => Number.isInteger(v) && v in this.runs;
+    const kinds = {
+      view: (v) => Number.isInteger(v) && v in this.data.views,
+      shown: (v) => Array.isArray(v) && v.every(isRun),
+      baseline: isRun,
+      panels: (v) => Array.isArray(v) && v.every((n) => typeof n === 'string' && this.known(n)),
+      span: (v) => v === null || (Array.isArray(v) && v.length === 2 && v.every(Number.isFinite) && v[0] < v[1]),
+      time: Number.isFinite, difference: (v) => typeof v === 'boolean', tolerance: (v) => Number.isFinite(v) && v >= 0,
+      x: (v) => this.axes().includes(v), camera: (v) => v === 'cars' || v === 'whole' || isRun(v),
+      offsets: (v) => v && typeof v === 'object' && !Array.isArray(v) && Object.values(v).every(Number.isFinite),
+    };
+    for (const [name, text] of new URLSearchParams(own.slice(this.key.length + 1))) {
+      let value;
+      try { value = JSON.parse(text); } catch { continue; }
+      if (!Object.hasOwn(kinds, name) || !kinds[name](value)) continue;
+      state[name] = value;
+      if (name === 'view') Object.assign(state, this.viewed(value));
+    }
+    this.state = state;
+    return true;
+  }
+
+  // ---- runs ----
+
+  shift() {
+    for (const run of this.runs) {
+      const by = this.state.offsets[run.number] || 0;
+      run.shifted = by ? run.time.map((t) => t + by) : run.time;
+    }
+  }
+
+  shows(run) { return this.state.shown.includes(run.number); }
+
+  get baseline() { return this.runs[this.state.baseline]; }
+
+  // The run that the cursor follows where the axis is not time.
+  lead() { return this.shows(this.baseline) ? this.baseline : this.runs.find((run) => this.shows(run)) || this.baseline; }
+
+  // Number of a run's line style: its own while there are enough, else its place among the shown.
+  style(run) {
+    const styles = this.data.dashes.length;
+    if (this.runs.length <= styles) return run.number;
+    return Math.max(this.state.shown.indexOf(run.number), 0) % styles;
+  }
+
+  colour(run) { return this.theme.runs[this.style(run)]; }
+
+  dash(run) { return this.data.dashes[this.style(run)]; }
+
+  meaning(name) {
+    const [one, other] = name.split(' - ').map((part) => this.data.signals[part]);
+    if (!one) return {label: name, unit: '', factor: 1};
+    if (!other) return one;
+    const reference = name.endsWith(`${name.split(' - ')[0].replace(/^.*\./, '')}_ref`);
+    return {...one, label: reference ? `${one.label}, error` : `${one.label} minus ${other.label.toLowerCase()}`};
+  }
+
+  swatch(run, reference) {
+    const dash = this.dash(run).map((part) => (2.2 * part).toFixed(1)).join(' ');
+    const stroke = reference || !this.shows(run) ? this.theme.pale : this.colour(run);
+    return `<svg width="30" height="10" aria-hidden="true"><line x1="1" y1="5" x2="29" y2="5" stroke="${stroke}" `
+      + `stroke-width="${reference ? 5 : 2.2}"${dash && !reference ? ` stroke-dasharray="${dash}"` : ''}/></svg>`;
+  }
+
+  faults() { return this.runs.filter((run) => this.shows(run)).flatMap((run) => run.faults); }
+
+  known(spec) { return spec.split(',').every((name) => name.trim().split(' - ').every((part) => part in this.data.signals)); }
+
+  // ---- the horizontal axis ----
+
+  axes() { return ['time', ...(this.runs.some((run) => run.distance) ? ['distance'] : []), ...Object.keys(this.data.signals)]; }
+
+  horizontal(run) {
+    const {x} = this.state;
+    if (x === 'time') return run.shifted;
+    if (x === 'distance') return run.distance || new Float64Array(run.rows).fill(NaN);
+    if (!run.has(x)) return new Float64Array(run.rows).fill(NaN);
+    const {factor} = this.data.signals[x];
+    return run.column(x).map((value) => value * factor);
+  }
+
+  get axisLabel() {
+    const {x} = this.state;
+    if (x === 'time') return 't in s';
+    if (x === 'distance') return 'distance in m';
+    const {label, unit} = this.data.signals[x];
+    return unit ? `${label} in ${unit}` : label;
+  }
+
+  whole() {
+    let range = [Infinity, -Infinity];
+    for (const run of this.runs) if (this.shows(run)) range = extremes(this.horizontal(run), range);
+    if (!(range[0] <= range[1])) return [0, 1];
+    if (this.state.x !== 'time' && this.state.x !== 'distance') {
+      const room = 0.04 * (range[1] - range[0]) || 1;
+      return [range[0] - room, range[1] + room];
+    }
+    return range[0] < range[1] ? range : [range[0], range[0] + 1];
+  }
+
+  span() { return this.state.span || this.whole(); }
+
+  zoomTo(span) {
+    const [low, high] = this.whole();
+    if (span && !(span[1] - span[0] > 1e-9 * Math.max(Math.abs(low), Math.abs(high), 1))) return;
+    this.state.span = span && (span[0] > low || span[1] < high) ? span : null;
+    this.redraw();
+  }
+
+  zoom(factor, around) {
+    const [from, to] = this.span();
+    const middle = around ?? (this.state.x === 'time' && this.state.time >= from && this.state.time <= to ? this.state.time : (from + to) / 2);
+    const [low, high] = this.whole();
+    const span = [middle - (middle - from) / factor, middle + (to - middle) / factor];
+    this.zoomTo([Math.max(span[0], low), Math.min(span[1], high)]);
+  }
+
+  // ---- the cursor ----
+
+  pointAt(panel, left, event) {
+    if (event.buttons) return; // a zoom is being drawn
+    const value = panel.plot.posToVal(left, 'x');
+    if (this.state.x === 'time') { this.seek(value, true); return; }
+    const lead = this.lead();
+    const xs = this.horizontal(lead);
+    const ys = panel.shown.find((line) => line.run === lead);
+    let [best, least] = [0, Infinity];
+    const wide = panel.plot.over.clientWidth;
+    const [from, to] = this.span();
+    for (let i = 0; i < xs.length; i++) {
+      const across = ((xs[i] - value) / (to - from)) * wide;
+      const up = ys && this.state.x !== 'distance' ? panel.plot.valToPos(ys.values[i] * panel.meaning.factor, 'y') - event.offsetY : 0;
+      const far = across * across + up * up;
+      if (far < least) [best, least] = [i, far];
+    }
+    this.seek(lead.shifted[best], true);
+  }
+
+  ends() {
+    const shown = this.runs.filter((run) => this.shows(run));
+    const all = shown.length ? shown : this.runs;
+    return [Math.min(...all.map((run) => run.shifted[0])), Math.max(...all.map((run) => run.shifted[run.rows - 1]))];
+  }
+
+  seek(time, hovering = false) {
+    if (!hovering && this.road) this.road.pause();
+    const [start, end] = this.ends();
+    this.state.time = Math.min(Math.max(time, start), end);
+    if (this.waiting) return;
+    this.waiting = true;
+    requestAnimationFrame(() => {
+      this.waiting = false;
+      this.moveCursor();
+    });
+  }
+
+  moveCursor() {
+    for (const panel of this.panels) panel.moveCursor();
+    const words = `${this.state.time.toFixed(3)} s`;
+    this.find('clock').textContent = words;
+    const slider = this.find('slider');
+    slider.value = this.state.time;
+    slider.setAttribute('aria-valuetext', words);
+    if (this.road) this.road.draw();
+    clearTimeout(this.later);
+    this.later = setTimeout(() => this.remember(), 200);
+  }
+
+  get step() {
+    const lead = this.lead();
+    return lead.rows > 1 ? (lead.end - lead.start) / (lead.rows - 1) : 1;
+  }
+
+  // ---- drawing ----
+
+  readTheme() {
+    const style = getComputedStyle(this.root);
+    const value = (name) => style.getPropertyValue('--yv-' + name).trim();
+    this.theme = {runs: [0, 1, 2, 3, 4, 5, 6].map((k) => value(`run-${k}`))};
+    for (const name of ['ink', 'quiet', 'line', 'pale', 'faulty', 'mark', 'ground', 'lane']) this.theme[name] = value(name);
+  }
+
+  refresh(ratio = devicePixelRatio || 1) {
+    this.Plot = plotter(ratio);
+    this.readTheme();
+    this.shift();
+    this.drawTable();
+    const holder = this.find('panels');
+    this.panels = this.state.panels.map((spec) => new Panel(this, spec));
+    holder.replaceChildren(...this.panels.map((panel) => panel.root));
+    this.find('difference').checked = this.state.difference;
+    this.find('tolerance').value = this.state.tolerance || '';
+    this.find('x').value = this.state.x;
+    if (this.find('views')) this.find('views').value = this.state.view;
+    const slider = this.find('slider');
+    [slider.min, slider.max] = this.ends();
+    slider.step = 'any';
+    if (this.road) this.road.arrange();
+    this.redraw();
+  }
+
+  redraw() {
+    this.panels.forEach((panel, k) => panel.draw(k === this.panels.length - 1));
+    this.wide = this.root.clientWidth;
+    this.moveCursor();
+  }
+
+  resized() {
+    if (this.root.clientWidth !== this.wide) this.redraw(); else if (this.road) this.road.draw();
+  }
+
+  print() {
+    this.refresh(PAPER);
+    if (this.road) this.road.draw(PAPER);
+  }
+
+  drawTable() {
+    const body = this.find('runs').tBodies[0];
+    [...body.rows].forEach((row, k) => {
+      row.querySelector('.yv-show').checked = this.shows(this.runs[k]);
+      const base = row.querySelector('.yv-base');
+      if (base) base.checked = this.state.baseline === k;
+      row.querySelector('.yv-swatch').innerHTML = this.swatch(this.runs[k]);
+      const offset = row.querySelector('.yv-offset');
+      if (offset) offset.value = this.state.offsets[k] || '';
+    });
+  }
+
+  // ---- what the reader does ----
+
+  listen() {
+    this.find('runs').addEventListener('change', (event) => {
+      const row = event.target.closest('tr');
+      const number = Number(row.dataset.run);
+      const {classList, value, checked} = event.target;
+      if (classList.contains('yv-show')) {
+        this.state.shown = this.runs.map((run) => run.number).filter((n) => (n === number ? checked : this.state.shown.includes(n)));
+      } else if (classList.contains('yv-base')) {
+        this.state.baseline = number;
+      } else if (classList.contains('yv-offset')) {
+        const by = Number(value);
+        if (Number.isFinite(by) && by) this.state.offsets[number] = by; else delete this.state.offsets[number];
+      }
+      this.refresh();
+    });
+    if (this.find('views')) {
+      this.find('views').addEventListener('change', (event) => {
+        const view = Number(event.target.value);
+        Object.assign(this.state, {view, span: null}, this.viewed(view));
+        this.refresh();
+      });
+    }
+    const add = this.find('add');
+    add.addEventListener('change', () => {
+      const spec = add.value.trim();
+      if (spec && this.known(spec)) {
+        if (!this.state.panels.includes(spec)) this.state.panels.push(spec);
+        add.value = '';
+        add.setCustomValidity('');
+        this.refresh();
+      } else {
+        add.setCustomValidity(spec ? 'not recorded' : '');
+        add.reportValidity();
+      }
+    });
+    this.find('x').addEventListener('change', (event) => {
+      const wanted = event.target.value.trim() || 'time';
+      if (this.axes().includes(wanted)) [this.state.x, this.state.span] = [wanted, null];
+      this.refresh();
+    });
+    this.find('difference').addEventListener('change', (event) => this.setDifference(event.target.checked));
+    this.find('tolerance').addEventListener('change', (event) => {
+      this.state.tolerance = Math.max(Number(event.target.value) || 0, 0);
+      if (this.state.tolerance) this.state.difference = true;
+      this.refresh();
+    });
+    this.find('all').addEventListener('click', () => this.zoomTo(null));
+    this.find('in').addEventListener('click', () => this.zoom(1.6));
+    this.find('out').addEventListener('click', () => this.zoom(1 / 1.6));
+    this.find('csv').addEventListener('click', () => this.save(new Blob([this.csv()], {type: 'text/csv'}), 'csv'));
+    this.find('png').addEventListener('click', () => this.picture().toBlob((blob) => this.save(blob, 'png')));
+    this.find('link').addEventListener('click', (event) => this.copyLink(event.target));
+    this.find('slider').addEventListener('input', (event) => this.seek(Number(event.target.value)));
+    const keys = this.data.alone ? document : this.root; // several viewers of a page: the one with the focus
+    keys.addEventListener('keydown', (event) => this.pressed(event));
+  }
+
+  setDifference(on) {
+    this.state.difference = on && this.runs.length > 1;
+    this.refresh();
+  }
+
+  pressed(event) {
+    const {tagName, type} = event.target;
+    const typing = tagName === 'SELECT' || (tagName === 'INPUT' && !['checkbox', 'radio', 'range'].includes(type));
+    if (event.altKey || event.ctrlKey || event.metaKey || typing) return;
+    const far = event.shiftKey ? 10 : 1;
+    const actions = {
+      ArrowLeft: () => this.seek(this.state.time - far * this.step),
+      ArrowRight: () => this.seek(this.state.time + far * this.step),
+      Home: () => this.seek(this.ends()[0]),
+      End: () => this.seek(this.ends()[1]),
+      '+': () => this.zoom(1.6), '-': () => this.zoom(1 / 1.6), 0: () => this.zoomTo(null),
+      d: () => this.setDifference(!this.state.difference),
+    };
+    if (type === 'radio') { delete actions.ArrowLeft; delete actions.ArrowRight; }
+    if (tagName !== 'BUTTON' && type !== 'checkbox' && type !== 'radio' && this.road) actions[' '] = () => this.road.toggle();
+    if (!actions[event.key]) return;
+    event.preventDefault();
+    actions[event.key]();
+  }
+
+  removePanel(spec) {
+    this.state.panels = this.state.panels.filter((one) => one !== spec);
+    this.refresh();
+  }
+
+  // The signals of all panels within the span, in SI units; a column per run and signal.
+  csv() {
+    const [from, to] = this.span();
+    const names = [...new Set(this.panels.flatMap((panel) => panel.signals))];
+    const shown = this.runs.filter((run) => this.shows(run));
+    const lines = [];
+    const quoted = (text) => `"${String(text).replaceAll('"', '""')}"`;
+    lines.push(['run', 'time [s]', ...names.map((name) => `${name} [${this.meaning(name).si || '1'}]`)].map(quoted).join(','));
+    for (const run of shown) {
+      const columns = names.map((name) => (run.has(name) ? run.column(name) : null));
+      const xs = this.horizontal(run);
+      for (let i = 0; i < run.rows; i++) {
+        if (xs[i] < from || xs[i] > to) continue;
+        lines.push([quoted(run.label), run.shifted[i], ...columns.map((column) => (column ? Number(column[i].toPrecision(9)) : ''))].join(','));
+      }
+    }
+    return lines.join('\n') + '\n';
+  }
+
+  picture() {
+    const ratio = this.panels[0] ? this.panels[0].plot.ctx.canvas.width / this.panels[0].plot.width : 1;
+    const sheet = document.createElement('canvas');
+    const sizes = this.panels.map((panel) => panel.plot.ctx.canvas);
+    const head = 22 * ratio;
+    const legend = 24 * ratio;
+    sheet.width = Math.max(...sizes.map((canvas) => canvas.width), 200);
+    sheet.height = sizes.reduce((sum, canvas) => sum + canvas.height + head, legend);
+    const c = sheet.getContext('2d');
+    c.fillStyle = this.theme.ground;
+    c.fillRect(0, 0, sheet.width, sheet.height);
+    c.font = `${13 * ratio}px system-ui, sans-serif`;
+    c.textBaseline = 'middle';
+    let x = 8 * ratio;
+    for (const run of this.runs.filter((one) => this.shows(one))) {
+      c.strokeStyle = this.colour(run);
+      c.lineWidth = 2.2 * ratio;
+      c.setLineDash(this.dash(run).map((part) => 2.2 * ratio * part));
+      c.beginPath();
+      c.moveTo(x, legend / 2);
+      c.lineTo(x + 30 * ratio, legend / 2);
+      c.stroke();
+      c.fillStyle = this.theme.ink;
+      c.fillText(run.label, x + 36 * ratio, legend / 2);
+      x += 56 * ratio + c.measureText(run.label).width;
+    }
+    let y = legend;
+    for (const [k, panel] of this.panels.entries()) {
+      c.fillStyle = this.theme.ink;
+      c.fillText(panel.root.querySelector('h4').textContent, 8 * ratio, y + head / 2);
+      c.drawImage(sizes[k], 0, y + head);
+      y += head + sizes[k].height;
+    }
+    return sheet;
+  }
+
+  save(blob, kind) {
+    const link = document.createElement('a');
+    link.href = URL.createObjectURL(blob);
+    link.download = `${this.data.file}.${kind}`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  }
+
+  async copyLink(button) {
+    this.remember();
+    try {
+      await navigator.clipboard.writeText(location.href);
+      button.textContent = 'Copied';
+    } catch {
+      button.textContent = 'See the address bar';
+    }
+    setTimeout(() => { button.textContent = 'Link'; }, 1500);
+  }
+}
+
+async function startAll() {
+  for (const root of document.querySelectorAll('.yv:not(.yv-started)')) {
+    root.classList.add('yv-started');
+    const data = JSON.parse(root.querySelector('script[type="application/json"]').textContent);
+    const blocks = [...root.querySelectorAll('script[type="text/plain"]')];
+    const bytes = await Promise.all(blocks.map((block) => inflate(block.textContent)));
+    root.viewer = new Viewer(root, data, data.runs.map((run, k) => new Run(run, bytes[k], k)));
+  }
+}
+
+if (document.readyState === 'loading') document.addEventListener('DOMContentLoaded', startAll);
+else startAll();

@@ -1,0 +1,141 @@
+// Recorded runs as the page carries them (`viewer_data.py` packs them), and values at a time.
+
+const WHEELS = ['fl', 'fr', 'rl', 'rr'];
+
+async function inflate(text) {
+  const raw = atob(text);
+  const bytes = new Uint8Array(raw.length);
+  for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('gzip'));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+function decodeTime([form, first, begin, end], rows, bytes) {
+  if (form === 'u') return Float64Array.from({length: rows}, (_, i) => begin + ((end - begin) * i) / (rows - 1));
+  const raw = new Uint8Array(8 * rows);
+  for (let i = 0; i < rows; i++) for (let k = 0; k < 8; k++) raw[8 * i + k] = bytes[first + k * rows + i];
+  return new Float64Array(raw.buffer);
+}
+
+function decodeColumn([form, offset, first, step, order, size], rows, bytes) {
+  const values = new Float64Array(rows);
+  if (form === 'c') return values.fill(first);
+  if (form === 'q') {
+    const mask = size === 3 ? 0xffffff : 0xffff;
+    for (let i = 0, code = 0, slope = 0; i < rows; i++) {
+      let folded = bytes[offset + i] | (bytes[offset + rows + i] << 8);
+      if (size === 3) folded |= bytes[offset + 2 * rows + i] << 16;
+      const change = (folded >>> 1) ^ -(folded & 1);
+      slope = order === 2 ? (slope + change) & mask : change;
+      code = (code + slope) & mask;
+      values[i] = (first + code) * step;
+    }
+    return values;
+  }
+  const bits = new Uint32Array(rows);
+  for (let i = 0, sum = 0; i < rows; i++) {
+    for (let k = 0; k < 4; k++) sum = (sum + bytes[offset + k * rows + i] * 256 ** k) % 2 ** 32;
+    bits[i] = sum;
+  }
+  return Float64Array.from(new Float32Array(bits.buffer));
+}
+
+// Index of the last row at or before t, and the way from there to the next row, 0 to 1.
+function place(time, t) {
+  let low = 0;
+  let high = time.length - 1;
+  if (t >= time[high]) return [high, 0];
+  if (t <= time[0]) return [0, 0];
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (time[middle] <= t) low = middle; else high = middle;
+  }
+  return [low, (t - time[low]) / (time[high] - time[low])];
+}
+
+class Run {
+  constructor(described, bytes, number) {
+    Object.assign(this, described, {number});
+    this.bytes = bytes;
+    this.time = decodeTime(described.time, described.rows, bytes);
+    this.start = this.time[0];
+    this.end = this.time[this.time.length - 1];
+    this.decoded = new Map();
+  }
+
+  has(name) { return name.split(' - ').every((part) => part in this.columns); }
+
+  // A recorded signal, or the difference `a - b` of two.
+  column(name) {
+    if (!this.decoded.has(name)) this.decoded.set(name, this.decode(name));
+    return this.decoded.get(name);
+  }
+
+  decode(name) {
+    const [one, other] = name.split(' - ');
+    if (other === undefined) return decodeColumn(this.columns[name], this.rows, this.bytes);
+    const from = this.column(other);
+    return this.column(one).map((value, i) => value - from[i]);
+  }
+
+  // The recorded value at t, of the nearest row; NaN where the run has none.
+  at(name, t) {
+    if (!this.has(name) || t < this.start - 1e-9 || t > this.end + 1e-9) return NaN;
+    const [row, part] = place(this.time, t);
+    return this.column(name)[part > 0.5 ? row + 1 : row];
+  }
+
+  // Distance travelled, from the position or the speed; null where neither was recorded.
+  get distance() {
+    if (this.travelled !== undefined) return this.travelled;
+    const road = this.road || {};
+    const total = new Float64Array(this.rows);
+    if (road.x) {
+      const [x, y] = [this.column(road.x), this.column(road.y)];
+      for (let i = 1; i < this.rows; i++) total[i] = total[i - 1] + Math.hypot(x[i] - x[i - 1], y[i] - y[i - 1]);
+      this.travelled = total;
+    } else if (road.velocity_x) {
+      const speed = this.column(road.velocity_x);
+      for (let i = 1; i < this.rows; i++) {
+        total[i] = total[i - 1] + 0.5 * (speed[i] + speed[i - 1]) * (this.time[i] - this.time[i - 1]);
+      }
+      this.travelled = total;
+    } else this.travelled = null;
+    return this.travelled;
+  }
+}
+
+// Values of a run at the times of another run, straight between rows, NaN outside.
+function resampled(values, time, wanted) {
+  if (time.length === wanted.length && time[0] === wanted[0] && time[time.length - 1] === wanted[wanted.length - 1]) return values;
+  return Float64Array.from(wanted, (t) => {
+    if (t < time[0] - 1e-9 || t > time[time.length - 1] + 1e-9) return NaN;
+    const [i, part] = place(time, t);
+    return part > 0 ? values[i] + part * (values[i + 1] - values[i]) : values[i];
+  });
+}
+
+function extremes(values, from = [Infinity, -Infinity]) {
+  let [low, high] = from;
+  for (const value of values) {
+    if (value < low) low = value;
+    if (value > high) high = value;
+  }
+  return [low, high];
+}
+
+// A number with some significant digits, as `figures/style.digits_of` writes it.
+function digitsOf(value, digits) {
+  if (Number.isNaN(value)) return 'no number';
+  if (!Number.isFinite(value)) return value > 0 ? 'never' : '-∞';
+  if (value === 0) return '0';
+  const rounded = Number(value.toExponential(digits - 1));
+  const decimals = digits - 1 - Math.floor(Math.log10(Math.abs(rounded)));
+  if (decimals > 6) return value.toExponential(digits - 1).replace(/e([+-])(\d)$/, 'e$10$2');
+  return value.toFixed(Math.max(decimals, 0));
+}
+
+function decimal(value, decimals) {
+  const shown = value.toFixed(decimals);
+  return Number(shown) === 0 ? shown.replace('-', '') : shown.replace('-', '−');
+}

@@ -1,0 +1,208 @@
+// The road from above and a close-up of each car, at the cursor's time; plays.
+
+const STANDS = 0.5; // speed below which a car counts as standing, with undefined sideslip [m/s]; chosen: below walking pace
+
+// What scene and close-ups need of a run: channels in SI units at every recorded row.
+function channelsOf(run) {
+  const {road} = run;
+  const column = (name) => (road[name] ? run.column(road[name]) : null);
+  const channels = {time: run.shifted, x: column('x'), y: column('y'), yaw: unwrapped(column('yaw'))};
+  for (const name of ['yaw_rate', 'steer_angle', 'yaw_moment', 'cone_overrun']) if (road[name]) channels[name] = column(name);
+  const [along, across] = [column('velocity_x'), column('velocity_y')];
+  if (along) channels.speed = across ? along.map((v, i) => Math.hypot(v, across[i])) : along.map(Math.abs);
+  if (road.sideslip) {
+    channels.sideslip = column('sideslip').map((angle, i) => (channels.speed && channels.speed[i] < STANDS ? NaN : angle));
+  }
+  if (road.path_offset) {
+    const off = column('path_offset');
+    channels.path_y = channels.y.map((y, i) => y - off[i]);
+  }
+  for (const wheel of WHEELS) {
+    if (!road['force_along_' + wheel]) break;
+    const [fx, fy] = [column('force_along_' + wheel), column('force_across_' + wheel)];
+    const angle = wheel[0] === 'f' && channels.steer_angle;
+    channels['force_x_' + wheel] = angle ? fx.map((f, i) => f * Math.cos(angle[i]) - fy[i] * Math.sin(angle[i])) : fx;
+    channels['force_y_' + wheel] = angle ? fx.map((f, i) => f * Math.sin(angle[i]) + fy[i] * Math.cos(angle[i])) : fy;
+    if (!('friction_' + wheel in road)) continue;
+    const mu = road['friction_' + wheel];
+    const friction = typeof mu === 'number' ? () => mu : ((values) => (i) => values[i])(run.column(mu));
+    channels['grip_' + wheel] = column('load_' + wheel).map((load, i) => friction(i) * Math.max(load, 0));
+  }
+  return untilLost(channels);
+}
+
+// The channels until the position ceases to be finite, as in a run that failed.
+function untilLost(channels) {
+  const {x, y, yaw} = channels;
+  const lost = x.findIndex((_, i) => !Number.isFinite(x[i] + y[i] + yaw[i]));
+  if (lost < 0) return channels;
+  return Object.fromEntries(Object.entries(channels).map(([name, values]) => [name, values.subarray(0, Math.max(lost, 1))]));
+}
+
+// A car at a time: its channels, straight between recorded rows.
+function stateAt(run, t) {
+  const [i, part] = place(run.channels.time, t);
+  const state = {index: i};
+  for (const [name, values] of Object.entries(run.channels)) {
+    state[name] = part > 0 ? between(name, values[i], values[i + 1], part) : values[i];
+  }
+  state.steer = state.steer_angle || 0;
+  return state;
+}
+
+// Whether a step is that of an angle which leaves its range at one end and comes back at the other.
+function turns(channel, step) {
+  return channel === 'sideslip' && Math.abs(step) > Math.PI;
+}
+
+function between(channel, from, to, part) {
+  const turn = 2 * Math.PI * Math.sign(to - from);
+  if (!turns(channel, to - from)) return from + part * (to - from);
+  const value = from + part * (to - turn - from);
+  return Math.abs(value) > Math.PI ? value + turn : value;
+}
+
+// Where the wheels are, from the centre of mass, in vehicle axes (x forward, y left).
+function wheelsOf(car) {
+  const half = car.track / 2;
+  return {
+    fl: [car.front_axle, half], fr: [car.front_axle, -half],
+    rl: [-car.rear_axle, half], rr: [-car.rear_axle, -half],
+  };
+}
+
+function unwrapped(angles) {
+  const whole = Float64Array.from(angles);
+  for (let i = 1; i < whole.length; i++) {
+    const turns = Math.round((whole[i] - whole[i - 1]) / (2 * Math.PI));
+    if (turns) for (let k = i; k < whole.length; k++) whole[k] -= 2 * Math.PI * turns;
+  }
+  return whole;
+}
+
+// Length per force [m/N], the same for all wheels and runs: friction circles of an axle never overlap;
+// without circles, no arrow is longer than half the track.
+function forceScale(runs) {
+  let largest = 0;
+  for (const {channels, car} of runs) {
+    const pairs = 'grip_fl' in channels ? [['grip_fl', 'grip_fr'], ['grip_rl', 'grip_rr']] : [];
+    for (const [left, right] of pairs) {
+      channels[left].forEach((one, i) => { const f = (one + channels[right][i]) / (0.96 * car.track); if (f > largest) largest = f; });
+    }
+    if (pairs.length || !('force_x_fl' in channels)) continue;
+    for (const wheel of WHEELS) {
+      channels['force_x_' + wheel].forEach((fx, i) => {
+        const f = Math.hypot(fx, channels['force_y_' + wheel][i]) / (0.5 * car.track);
+        if (f > largest) largest = f;
+      });
+    }
+  }
+  return largest > 0 ? 1 / largest : 0;
+}
+
+class Road {
+  constructor(viewer) {
+    Object.assign(this, {viewer, playing: false, rate: 1, view: {camera: 'cars', zoom: 1}});
+    const find = viewer.find;
+    Object.assign(this, {scene: find('scene'), button: find('play'), closeUps: find('closeups'), camera: find('camera')});
+    this.cars = viewer.runs.filter((run) => run.road && run.road.x);
+    for (const run of this.cars) {
+      run.channels = channelsOf(run);
+      Object.assign(run, run.road.outline, {ground: viewer.data.grounds[run.road.ground ?? -1] || []});
+      const grips = WHEELS.map((wheel) => extremes(run.channels['grip_' + wheel] || [0])[1]);
+      run.widest = Math.max(...grips, 0);
+    }
+    this.scale = forceScale(this.cars);
+    this.strongest = Math.max(...this.cars.map((run) => {
+      const [low, high] = extremes(run.channels.yaw_moment || [], [0, 0]);
+      return Math.max(high, -low);
+    }), 0);
+    this.button.addEventListener('click', () => this.toggle());
+    find('rate').addEventListener('change', (event) => { this.rate = Number(event.target.value); });
+    this.camera.addEventListener('change', (event) => {
+      const chosen = event.target.value;
+      viewer.state.camera = /^\d+$/.test(chosen) ? Number(chosen) : chosen;
+      this.view.zoom = 1;
+      this.draw();
+      viewer.remember();
+    });
+    find('nearer').addEventListener('click', () => this.zoom(1.25));
+    find('farther').addEventListener('click', () => this.zoom(0.8));
+  }
+
+  zoom(factor) {
+    this.view.zoom = Math.min(Math.max(this.view.zoom * factor, ZOOM[0]), ZOOM[1]);
+    this.draw();
+  }
+
+  // One close-up per shown run, and the cameras to choose from.
+  arrange() {
+    const {viewer} = this;
+    for (const run of this.cars) {
+      run.channels.time = run.shifted.subarray(0, run.channels.x.length);
+      [run.colour, run.dash] = [viewer.colour(run), viewer.dash(run)];
+    }
+    this.shown = this.cars.filter((run) => viewer.shows(run));
+    this.closeUps.replaceChildren(...this.shown.map((run) => {
+      const figure = document.createElement('figure');
+      figure.innerHTML = '<canvas role="img"></canvas><figcaption></figcaption>';
+      figure.firstChild.setAttribute('aria-label', `Tyre forces of ${run.label}`);
+      figure.lastChild.innerHTML = viewer.swatch(run);
+      figure.lastChild.append(` ${run.label}`);
+      const early = run.notes.length || run.end > viewer.ends()[1] - 1e-6 ? [] : [`ends at ${run.end.toFixed(2)} s`];
+      for (const note of [...run.notes, ...early]) {
+        const line = document.createElement('em');
+        line.textContent = note;
+        figure.lastChild.append(document.createElement('br'), line);
+      }
+      return figure;
+    }));
+    const chosen = String(viewer.state.camera);
+    const views = [['cars', this.shown.length > 1 ? 'all cars' : 'car'], ...(this.shown.length > 1 ? this.shown.map((run) => [String(run.number), run.label]) : []), ['whole', 'whole path']];
+    this.camera.replaceChildren(...views.map(([value, words]) => new Option(words, value)));
+    this.camera.value = views.some(([value]) => value === chosen) ? chosen : 'cars';
+  }
+
+  draw(density) {
+    const {viewer} = this;
+    useTheme(viewer.theme);
+    const time = viewer.state.time;
+    const states = this.shown.map((run) => stateAt(run, time));
+    const chosen = this.camera.value;
+    const index = this.shown.findIndex((run) => String(run.number) === chosen);
+    this.view.camera = index >= 0 ? index : (chosen === 'whole' ? 'whole' : 'cars');
+    this.states = states;
+    if (!this.shown.length) { surface(this.scene, density); return; }
+    drawScene(this.scene, density, this.shown, states, this.view, this.scale);
+    [...this.closeUps.querySelectorAll('canvas')].forEach((canvas, i) => {
+      drawCloseUp(canvas, density, this.shown[i], i, states[i], this.scale, this.strongest);
+    });
+  }
+
+  toggle() { if (this.playing) this.pause(); else this.play(); }
+
+  play() {
+    const {viewer} = this;
+    const [start, end] = viewer.ends();
+    if (!this.touched || viewer.state.time >= end) viewer.state.time = start;
+    this.touched = true;
+    this.playing = true;
+    this.button.textContent = 'Pause';
+    let before = null;
+    const next = (now) => {
+      if (!this.playing) return;
+      viewer.state.time = Math.min(viewer.state.time + (before === null ? 0 : ((now - before) / 1000) * this.rate), end);
+      before = now;
+      if (viewer.state.time >= end) this.pause();
+      viewer.moveCursor();
+      if (this.playing) requestAnimationFrame(next);
+    };
+    requestAnimationFrame(next);
+  }
+
+  pause() {
+    this.playing = false;
+    this.touched = true;
+    this.button.textContent = 'Play';
+  }
+}

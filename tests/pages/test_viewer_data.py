@@ -1,0 +1,129 @@
+"""What a page carries of recorded signals: every sample, within the stated error, in few bytes."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from orchestrator.pages.viewer_data import CLOSE, LEVELS, PackedRun, pack
+from orchestrator.results.read import Results
+from tests.orchestrator.recorded import results
+
+from .made_up import whole_car
+
+RNG = np.random.default_rng(11)
+
+
+def unpacked(packed: PackedRun, name: str) -> np.ndarray:
+    """Return a column as the browser decodes it, written independently of the script."""
+    raw = gzip.decompress(base64.b64decode(packed.block))
+    form, offset, *more = packed.columns[name]
+    n = packed.rows
+    if form == "c":
+        return np.full(n, more[0])
+    size = more[3] if form == "q" else 4
+    planes = np.frombuffer(raw[offset : offset + size * n], np.uint8).reshape(size, n).astype(np.int64)
+    words = sum(planes[k] << (8 * k) for k in range(size))
+    if form == "f":
+        return (np.cumsum(words) & 0xFFFFFFFF).astype("<u4").view("<f4").astype(float)
+    first, step, order, _ = more
+    codes = (words >> 1) ^ -(words & 1)
+    for _ in range(order):
+        codes = np.cumsum(codes) & (256**size - 1)
+    return (first + codes) * step
+
+
+def made(*, rows: int = 500, **columns: np.ndarray) -> Results:
+    return results({f"plant.{name}": values for name, values in columns.items()}, np.linspace(0, 5, rows))
+
+
+def test_every_sample_is_within_half_a_step_of_the_recorded_one():
+    runs = [whole_car(), whole_car(2.0)]
+    for run, packed in zip(runs, pack(runs), strict=True):
+        assert set(packed.columns) == set(run.columns)
+        for name, values in run.columns.items():
+            ends = [(one.columns[name].min(), one.columns[name].max()) for one in runs]
+            span = max(high for _, high in ends) - min(low for low, _ in ends)
+            error = np.max(np.abs(unpacked(packed, name) - values))
+            assert error <= 0.5 * span / LEVELS[2] * (1 + 1e-9), name
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e7])
+def test_any_shape_of_signal_survives(scale):
+    shapes = {
+        "noise": RNG.normal(size=500),
+        "walk": np.cumsum(RNG.normal(size=500)),
+        "jumps": RNG.integers(-1, 2, 500).astype(float),
+        "ramp": np.linspace(-3.0, 9.0, 500),
+        "far": 1e6 + RNG.normal(size=500),
+        "flag": RNG.integers(0, 2, 500).astype(bool),
+        "count": RNG.integers(0, 9, 500),
+    }
+    run = made(
+        **{name: values * scale if values.dtype.kind == "f" else values for name, values in shapes.items()}
+    )
+    (packed,) = pack([run])
+    for name, values in run.columns.items():
+        values = np.asarray(values, float)
+        error = np.max(np.abs(unpacked(packed, name) - values))
+        assert error <= 0.5 * np.ptp(values) / LEVELS[2] * (1 + 1e-6) + 1e-15 * np.max(np.abs(values)), name
+
+
+def test_zero_is_exactly_zero():
+    values = np.where(np.arange(500) % 3 == 0, 0.0, RNG.normal(size=500))
+    (packed,) = pack([made(moment=values)])
+    assert np.all(unpacked(packed, "plant.moment")[::3] == 0.0)
+
+
+def test_a_difference_of_close_runs_is_no_rounding():
+    one = np.sin(np.linspace(0, 6, 500))
+    apart = 1e-4 * np.cos(np.linspace(0, 9, 500))
+    assert np.max(np.abs(apart)) < CLOSE * np.ptp(one)
+    runs = pack([made(x=one), made(x=one + apart), made(x=5.0 * one)])
+    assert [run.columns["plant.x"][-1] for run in runs] == [3, 3, 2]
+    difference = unpacked(runs[1], "plant.x") - unpacked(runs[0], "plant.x")
+    np.testing.assert_allclose(difference, apart, atol=2e-3 * 1e-4 + 10 / LEVELS[3])
+
+
+def test_values_that_are_not_finite_and_exact_ones_are_single_precision():
+    values = RNG.normal(size=500)
+    values[7] = np.nan
+    values[9] = np.inf
+    (packed,) = pack([made(x=values)])
+    np.testing.assert_array_equal(unpacked(packed, "plant.x"), values.astype("f4"))
+    smooth = RNG.normal(size=500)
+    (packed,) = pack([made(x=smooth)], exact=True)
+    np.testing.assert_array_equal(unpacked(packed, "plant.x"), smooth.astype("f4"))
+
+
+def test_constants_and_both_ends_of_a_wire_cost_nothing():
+    noise = RNG.normal(size=500)
+    (one,) = pack([made(a=noise)])
+    (two,) = pack([made(a=noise, b=noise.copy(), still=np.full(500, 3.25))])
+    assert two.block == one.block
+    assert two.columns["plant.still"] == ["c", 0, 3.25]
+    np.testing.assert_array_equal(unpacked(two, "plant.b"), unpacked(two, "plant.a"))
+
+
+def test_text_columns_are_left_out():
+    run = made(x=np.zeros(500))
+    words = replace(run, columns={**run.columns, "plant.mode": np.array(["on"] * 500, dtype=object)})
+    assert set(pack([words])[0].columns) == {"plant.x"}
+
+
+def test_even_and_uneven_times():
+    even = made(x=np.zeros(500))
+    assert pack([even])[0].time == ["u", 0, 0.0, 5.0]
+    uneven = replace(even, time=np.sort(RNG.uniform(0, 5, 500)))
+    (packed,) = pack([uneven])
+    raw = gzip.decompress(base64.b64decode(packed.block))
+    planes = np.frombuffer(raw[: 8 * 500], np.uint8).reshape(8, 500)
+    np.testing.assert_array_equal(np.ascontiguousarray(planes.T).view("<f8").ravel(), uneven.time)
+
+
+def test_packing_is_repeatable():
+    assert pack([whole_car()]) == pack([whole_car()])
