@@ -15,6 +15,7 @@ from pydantic.fields import FieldInfo
 from orchestrator.experiments import ranking as ranking
 from orchestrator.experiments import schema as experiment
 from orchestrator.fault_kinds import KINDS, FaultLocation
+from orchestrator.names import SignalName, Target
 from orchestrator.scenario import scenario_schema as scenario
 
 from .text import NOTE, cell, code, docstring, table
@@ -107,7 +108,9 @@ def _kind(annotation: Any, models: list[type[BaseModel]]) -> str:
     origin, arms = typing.get_origin(annotation), typing.get_args(annotation)
     if annotation in models:
         return f"[{title(annotation)}](#{title(annotation).lower()})"
-    if annotation is scenario.Endpoint:
+    if annotation is Target:
+        return "text: target of an override"
+    if annotation is SignalName:
         return "text: unit.variable"
     if annotation is FaultLocation:
         return "text: unit.variable, unit.output -> unit"
