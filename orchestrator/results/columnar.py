@@ -35,14 +35,13 @@ class Columns:
 
     def add(self, block: np.ndarray, others: Sequence[list[Value]]) -> None:
         """Append rows; both arguments are copied."""
-        self._blocks.append(block.copy())
+        self._blocks.append(block.T.copy())  # while it is in the processor's cache
         self._others.extend(others)
         self.rows += len(block)
 
     def arrays(self) -> list[np.ndarray]:
         """Return the columns in order, time first: float64, int64, bool, or object for text."""
-        table = np.concatenate(self._blocks) if self._blocks else np.empty((0, self._reals))
-        reals = list(np.ascontiguousarray(table.T))
+        reals = list(np.concatenate([np.empty((self._reals, 0)), *self._blocks], axis=1))
         return [
             reals[place] if place < self._reals else self._other(place - self._reals) for place in self._order
         ]
