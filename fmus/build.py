@@ -21,7 +21,7 @@ from typing import Any
 
 from orchestrator.errors import BuildError, Diagnostic
 from orchestrator.files import draft_of, remove_draft
-from orchestrator.fmu.native import NATIVE, runs_as
+from orchestrator.fmu.native import NATIVE, REASON, runs_as
 from orchestrator.workers import Pool
 from vocabulary.roles import ROLES
 
@@ -30,6 +30,7 @@ from .check import defects, reference_files
 from .closure import Parts, Sources
 from .compiler import compile_launcher
 from .mark import BuildStamp, read_mark
+from .native.build import LATER
 from .packing import to_bytes
 from .presentation import CREDITS, presented
 from .recipe import TOOL, PythonRecipe, natural_name
@@ -254,8 +255,12 @@ def recipe_of(
     return recipe
 
 
-def bring_up_to_date(recipe: Recipe, target: Path, mark: BuildStamp, force: bool = False) -> bool:
+def bring_up_to_date(
+    recipe: Recipe, target: Path, mark: BuildStamp, force: bool = False, *, hurry: bool = False
+) -> bool:
     """Build an FMU unless it is current; return whether it was built. `mark` is still without its key.
+
+    With `hurry`, a native library that takes long to make is left for later, and the mark says so.
 
     Raises:
         BuildError: each problem begins with the FMU's name.
@@ -265,7 +270,9 @@ def bring_up_to_date(recipe: Recipe, target: Path, mark: BuildStamp, force: bool
         mark = replace(mark, key=recipe.key(), tool=TOOL)
         if not force and read_mark(target) == mark:
             return False
-        files, modules = recipe.make()
+        files, modules = recipe.make(hurry=hurry)
+        if files.get(REASON) == LATER.encode():
+            mark = mark.unfinished()
         credits = CREDITS if mark.is_component else {}
         if mark.is_component:
             target.parent.mkdir(parents=True, exist_ok=True)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import zipfile
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from orchestrator.files import check_regular
 
 _SIGN = b"yawbench "
+_UNFINISHED = "-unfinished"
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,19 @@ class BuildStamp:
     def is_component(self) -> bool:
         """True for one that the project builds by itself, and removes when its source is gone."""
         return not self.home
+
+    def unfinished(self) -> BuildStamp:
+        """Return the mark of the same FMU without the native library that it is to get."""
+        return replace(self, key=self.key + _UNFINISHED)
+
+    @property
+    def is_unfinished(self) -> bool:
+        """True for an FMU that is to get a native library."""
+        return self.key.endswith(_UNFINISHED)
+
+    def is_of(self, key: str | None) -> bool:
+        """Return whether the FMU was built from what has this key, finished or not."""
+        return key is not None and self.key.removesuffix(_UNFINISHED) == key
 
     def to_comment(self) -> bytes:
         """Return the comment of the archive."""

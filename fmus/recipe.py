@@ -75,8 +75,11 @@ class PythonRecipe:
             ]
         )
 
-    def make(self) -> tuple[dict[str, bytes], tuple[str, ...]]:
-        """Return the files of the archive, and the names of the Python modules among them."""
+    def make(self, *, hurry: bool = False) -> tuple[dict[str, bytes], tuple[str, ...]]:
+        """Return the files of the archive, and the names of the Python modules among them.
+
+        With `hurry`, a native library that takes long to make is left for later.
+        """
         module, files = self.module, self._files
         if self.defaults or self.name != natural_name(module):
             with staged(files, "yawbench_variant") as stage:
@@ -102,6 +105,7 @@ class PythonRecipe:
                 source="/".join(module) + ".py",
                 guid=description.get("guid", ""),
                 resources=stage.folder,
+                hurry=hurry,
             )
         packed |= made.files
         packed[REASON] = made.why_not.encode()

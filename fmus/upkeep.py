@@ -37,7 +37,7 @@ _NO_KEY = "none"
 
 
 class FmuUpdater:
-    """Brings FMUs up to date, each once. `tell` is called with the name of each that is built."""
+    """Brings FMUs up to date, each once. `tell` is called with a line for each that is built."""
 
     def __init__(self, tell: Callable[[str], None]) -> None:
         self._tell = tell
@@ -67,7 +67,7 @@ class FmuUpdater:
         )
         key = self._key(archive, mark)
         for place, its in marks.items():
-            if its and its.key == key:
+            if its and its.is_of(key):
                 return place, _built(its, current=True)
         at_home = _is_at_home(archive, mark)
         if key is not None and at_home and build:
@@ -109,17 +109,18 @@ class FmuUpdater:
         return recipe_of(source, role=mark.role or None, name=mark.name, defaults=mark.defaults)
 
     def _build(self, archive: Path, mark: BuildStamp) -> tuple[Path, BuildInfo]:
-        from .build import bring_up_to_date, component_mark
+        from .build import LATER, bring_up_to_date, component_mark
 
         target = place_of(archive.parent) / archive.name
         recipe = self._recipe(archive, mark)
         assert recipe is not None
         if mark.is_component:
             mark = component_mark(recipe)
-        bring_up_to_date(recipe, target, mark)
-        self._tell(recipe.name)
+        bring_up_to_date(recipe, target, mark, hurry=True)
         made = read_mark(target)
         assert made is not None
+        later = f"; it runs in Python: {LATER}" if made.is_unfinished else ""
+        self._tell(f"{recipe.name}: built{later}")
         return target, _built(made, current=True)
 
 

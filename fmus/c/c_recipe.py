@@ -117,7 +117,7 @@ class CRecipe:
     def _files(self) -> list[Path]:
         return [self.source / DESCRIPTION, *sorted(self.source.glob("*.[ch]"))]
 
-    def make(self) -> tuple[dict[str, bytes], tuple[str, ...]]:
+    def make(self, *, hurry: bool = False) -> tuple[dict[str, bytes], tuple[str, ...]]:
         if self._twin.exists():
             folder = self.source
             raise BuildError(f"there are both {folder.name}.py and {folder.name}/ in {folder.parent}")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import platform
 import shutil
 import sys
@@ -42,6 +43,11 @@ TO_WINDOWS = "x86_64-w64-mingw32-gcc"
 WINDOWS = ("-O1", "-static", "-Wl,--no-insert-timestamp", "-s")
 STORE = "native"
 """Of native libraries in the cache."""
+EFFORTS = "efforts"
+"""Of processor times that native libraries took, in the cache."""
+LONGEST = 3.0
+"""Processor time [s] of a native library for which no run waits; chosen: a run then begins within 3 s."""
+LATER = "its native library takes longer than a run should wait; 'yawbench build' makes it"
 
 
 @dataclass(frozen=True)
@@ -87,7 +93,9 @@ def _digests(*files: Path) -> str:
     return "\0".join(hashlib.sha256(file.read_bytes()).hexdigest() for file in files)
 
 
-def native(component: type[Any], home: Path, *, source: str, guid: str, resources: Path) -> Native:
+def native(
+    component: type[Any], home: Path, *, source: str, guid: str, resources: Path, hurry: bool = False
+) -> Native:
     """Return the native libraries of a component, or why there are none.
 
     Args:
@@ -96,13 +104,21 @@ def native(component: type[Any], home: Path, *, source: str, guid: str, resource
         source: its file, as a comment names it.
         guid: of the FMU.
         resources: folder that an instance is told of.
+        hurry: leave it for later if it took longer than `LONGEST` the last time.
     """
     if sys.platform != "linux" or platform.machine() != "x86_64":
         return Native(why_not=f"native units are built on Linux on x86-64, this is {platform.system()}")
     try:
         compiler_version(compiler_command())
+        entry = hashlib.sha256(component.fmu_name.encode()).hexdigest()
+        if hurry and float(recall(EFFORTS, entry) or 0.0) > LONGEST:
+            return Native(why_not=LATER)
+        began = _processor_time()
         text = emit(specialise(component, home), source, guid)
-        return _let_through(text, component, guid, resources)
+        made, new = _let_through(text, component, guid, resources)
+        if new:
+            keep(EFFORTS, entry, str(_processor_time() - began).encode())
+        return made
     except Refused as refused:
         return Native(why_not=str(refused))
     except BuildError as error:
@@ -111,7 +127,12 @@ def native(component: type[Any], home: Path, *, source: str, guid: str, resource
         return Native(why_not=f"not translated: {type(error).__name__}: {error}")
 
 
-def _let_through(text: str, component: type[Any], guid: str, resources: Path) -> Native:
+def _processor_time() -> float:
+    return sum(os.times()[:4])  # of this process and the compilers it has waited for
+
+
+def _let_through(text: str, component: type[Any], guid: str, resources: Path) -> tuple[Native, bool]:
+    """Return what the cache has for a text, or else make it; and whether it was made."""
     key = hashlib.sha256((text + _gate()).encode()).hexdigest()[:32]
     kept = recall(STORE, key)
     if kept is not None:
@@ -120,12 +141,12 @@ def _let_through(text: str, component: type[Any], guid: str, resources: Path) ->
         files = {}
         for path, size in said["files"]:
             files[path], rest = rest[:size], rest[size:]
-        return Native(files, said["why_not"])
+        return Native(files, said["why_not"]), False
     made = _made(text, component, guid, resources)
     header = {"files": [[path, len(data)] for path, data in made.files.items()], "why_not": made.why_not}
     head = json.dumps(header).encode()
     keep(STORE, key, len(head).to_bytes(8, "little") + head + b"".join(made.files.values()))
-    return made
+    return made, True
 
 
 def _made(text: str, component: type[Any], guid: str, resources: Path) -> Native:

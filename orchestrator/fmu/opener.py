@@ -59,7 +59,7 @@ class Opener:
     def _upkeep(self) -> FmuUpdater:
         from fmus.upkeep import FmuUpdater
 
-        return FmuUpdater(lambda name: self._tell(f"{name}: built"))
+        return FmuUpdater(self._tell)
 
     def bring(self, archive: Path, *, build: bool = True) -> Path:
         """Return the archive to open for `archive`, building it if necessary; it may not exist.

@@ -83,6 +83,24 @@ def test_an_edited_component_takes_effect_in_the_next_run(project):
     assert "built" not in yawbench(project, "run", "driver.yaml", "--out", "out").stderr
 
 
+def test_no_run_waits_for_a_native_library_that_takes_long(project):
+    builder = project / "fmus" / "native" / "build.py"
+    builder.write_text(builder.read_text().replace("LONGEST = 3.0", "LONGEST = 0.0"))
+    yawbench(project, "run", "driver.yaml", "--out", "out")  # from now on it is known what the library takes
+    amplitude = record(project)["defaults"]["amplitude"]
+    double(project)
+    edited = yawbench(project, "run", "driver.yaml", "--out", "out")
+    assert "driver_sine: built; it runs in Python: its native library takes longer than" in edited.stderr
+    assert record(project)["runs_as"].startswith("Python: its native library takes longer than")
+    assert record(project)["defaults"]["amplitude"] == 2.0 * amplitude
+    again = yawbench(project, "run", "driver.yaml", "--out", "out")
+    assert (again.returncode, "built" in again.stderr) == (0, False)
+    yawbench(project, "build", "driver_sine")
+    yawbench(project, "run", "driver.yaml", "--out", "out")
+    assert record(project)["runs_as"] == "native"
+    assert record(project)["defaults"]["amplitude"] == 2.0 * amplitude
+
+
 def test_a_broken_component_ends_the_run_before_it_begins_and_keeps_the_good_fmu(project):
     yawbench(project, "run", "driver.yaml", "--out", "out")
     good, results = (project / "fmus/driver_sine.fmu").read_bytes(), record(project)
