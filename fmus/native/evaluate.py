@@ -8,11 +8,10 @@ import inspect
 import re
 import types
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from . import ir
-from .lower import OPERATORS
 from .merge import Merging, alike
 from .read import Source, Sources
 from .shapes import Shape, build, numbers_of, shape_of, types_of
@@ -40,13 +39,6 @@ from .values import (
     same,
 )
 
-BINARY = {
-    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "//", ast.Mod: "%", ast.Pow: "**",
-    ast.BitAnd: "&", ast.BitOr: "|", ast.BitXor: "^", ast.RShift: ">>", ast.LShift: "<<",
-}  # fmt: skip
-COMPARED = {
-    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
-}  # fmt: skip
 DEEPEST = 60
 """Calls within each other; chosen: more than components have, fewer than a recursion without end."""
 
@@ -70,7 +62,7 @@ class Call:
 
 
 class Evaluation(Merging):
-    """The evaluation of expressions; `statements` adds statements, `calls` what is called."""
+    """Names, structures, attributes and items; `operators`, `statements`, `loops`, `calls` add the rest."""
 
     def __init__(self, sources: Sources) -> None:
         super().__init__()
@@ -90,17 +82,31 @@ class Evaluation(Merging):
         Raises:
             Refused: with file and line.
         """
-        method = getattr(self, f"_{type(node).__name__.lower()}", None)
+        return self.narrowed(self.dispatched("_", node))
+
+    def dispatched(self, prefix: str, node: ast.AST) -> Any:
+        """Return what the method for this kind of node gives: `prefix` and the kind are its name.
+
+        Raises:
+            Refused: there is no such method, or it refuses; with file and line.
+        """
+        kind = type(node).__name__
+        method = getattr(self, prefix + kind.lower(), None)
         self.at(node)
         if method is None:
-            raise Refused(f"{type(node).__name__} is not translated: {ast.unparse(node)}", self.where())
+            first = ast.unparse(node).strip().splitlines()[0]
+            raise Refused(f"{kind} is not translated: {first}", self.where())
         try:
-            return self.narrowed(method(node))
+            return method(node)
         except Refused as refused:
             if not refused.where:
                 self.at(node)
                 refused.where = self.where()
             raise
+
+    def call(self, function: Any, args: Sequence[Any], named: dict[str, Any]) -> Any:
+        """Return what a call returns; `calls` has the meaning."""
+        raise NotImplementedError
 
     def end(self, kind: str, message: str) -> NoReturn:
         """Raise on the path that is being followed, and follow it no further."""
@@ -235,49 +241,6 @@ class Evaluation(Merging):
             return Dict({k: self.imported(x) for k, x in value.items()})
         return value
 
-    # ---- comprehensions ---------------------------------------------------------------------
-
-    def _comprehended(self, generators: list[ast.comprehension], make: Any) -> list[Any]:
-        call, found = self.calls[-1], []
-        inner = replace(call, frame=Frame({}, call.frame))
-
-        def go(k: int) -> None:
-            if k == len(generators):
-                found.append(make())
-                return
-            for item in self.items(self.evaluate(generators[k].iter)):
-                self.assign(generators[k].target, item)  # type: ignore[attr-defined]
-                for condition in generators[k].ifs:
-                    holds = self.facts.known(self.truth_of(self.evaluate(condition)))
-                    if holds is None:
-                        raise Refused("a filter that is known at run time only")
-                    if not holds:
-                        break
-                else:
-                    go(k + 1)
-
-        self.calls.append(inner)
-        try:
-            go(0)
-        finally:
-            self.calls.pop()
-        return found
-
-    def _listcomp(self, node: ast.ListComp) -> Any:
-        return List(self._comprehended(node.generators, lambda: self.evaluate(node.elt)))
-
-    def _generatorexp(self, node: ast.GeneratorExp) -> Any:
-        return tuple(self._comprehended(node.generators, lambda: self.evaluate(node.elt)))
-
-    def _setcomp(self, node: ast.SetComp) -> Any:
-        return frozenset(self._comprehended(node.generators, lambda: self._key(self.evaluate(node.elt))))
-
-    def _dictcomp(self, node: ast.DictComp) -> Any:
-        def make() -> tuple[Any, Any]:
-            return self._key(self.evaluate(node.key)), self.evaluate(node.value)
-
-        return Dict(dict(self._comprehended(node.generators, make)))
-
     # ---- attributes and items ---------------------------------------------------------------
 
     def _attribute(self, node: ast.Attribute) -> Any:
@@ -320,7 +283,7 @@ class Evaluation(Merging):
         if isinstance(raw, classmethod):
             return Bound(raw.__func__, cls)
         if isinstance(raw, property):
-            return self.call(raw.fget, [owner], {})  # type: ignore[attr-defined]
+            return self.call(raw.fget, [owner], {})
         if isinstance(raw, types.FunctionType):
             return Bound(raw, owner)
         return raw if isinstance(owner, Instance) else getattr(owner, name)
@@ -440,166 +403,9 @@ class Evaluation(Merging):
         read = [self.let(type, "ring_item", ring.number, k, index) for k, type in enumerate(types)]
         return build(ring.item, iter(read))
 
-    # ---- operators --------------------------------------------------------------------------
-
-    def _binop(self, node: ast.BinOp) -> Any:
-        a, b = self.evaluate(node.left), self.evaluate(node.right)
-        self.at(node)
-        return self.operate(BINARY.get(type(node.op), "@"), a, b)
-
-    def operate(self, op: str, a: Any, b: Any) -> Any:
-        """Return a op b."""
-        if isinstance(a, Union) or isinstance(b, Union):
-            return self.by_form(a, lambda x: self.by_form(b, lambda y: self.operate(op, x, y)))
-        if is_number(a) and is_number(b):
-            return self.binary(op, a, b)
-        if isinstance(a, (List, list)) and op == "+" and isinstance(b, (List, list)):
-            return List([*self.items(a), *self.items(b)])
-        if isinstance(a, List) and op == "*" and isinstance(b, int):
-            return List(self.read(a) * b)
-        if isinstance(a, tuple) and isinstance(b, tuple) and op == "+":
-            return a + b
-        if isinstance(a, tuple) and isinstance(b, int) and op == "*":
-            return a * b
-        if (is_plain(a) and is_plain(b) and None not in (a, b)) or (
-            isinstance(a, frozenset) and isinstance(b, (set, frozenset))
-        ):
-            return OPERATORS[op](a, b)
-        if None in (a, b) and (is_number(a) or is_number(b)):
-            types = f"'{_type_name(a)}' and '{_type_name(b)}'"
-            self.end("TypeError", f"unsupported operand type(s) for {op}: {types}")
-        raise Refused(f"{op} of a {type(a).__name__} and a {type(b).__name__}")
-
-    def _unaryop(self, node: ast.UnaryOp) -> Any:
-        value = self.evaluate(node.operand)
-        self.at(node)
-        if isinstance(node.op, ast.Not):
-            return self.negation(self.truth_of(value))
-        if isinstance(node.op, ast.Invert):
-            raise Refused("~ is not translated")
-        negative = isinstance(node.op, ast.USub)
-        return self.by_form(value, lambda x: self.negative(x) if negative else self.binary("+", x, 0))
-
-    def truth_of(self, value: Any) -> ir.Operand:
-        """Return whether a value counts as true."""
-        if isinstance(value, Union):
-            return self.by_form(value, self.truth_of)  # type: ignore[no-any-return]
-        if is_number(value):
-            return self.truth(value)
-        if isinstance(value, Ring):
-            return self.compare("!=", self.ring_length(value), 0)
-        if isinstance(value, (List, Dict)):
-            return bool(self.read(value))
-        if isinstance(value, Picked):
-            return bool(len(value.items[0]))
-        return bool(value)
-
-    def _boolop(self, node: ast.BoolOp) -> Any:
-        conjunction = isinstance(node.op, ast.And)
-
-        def go(k: int) -> Any:
-            value = self.evaluate(node.values[k])
-            if k == len(node.values) - 1:
-                return value
-            test = self.truth_of(value)
-
-            def stay() -> Any:
-                return self.narrowed(value)
-
-            return self.branch(
-                test, *((lambda: go(k + 1), stay) if conjunction else (stay, lambda: go(k + 1)))
-            )
-
-        return go(0)
-
-    def _ifexp(self, node: ast.IfExp) -> Any:
-        test = self.truth_of(self.evaluate(node.test))
-        return self.branch(test, lambda: self.evaluate(node.body), lambda: self.evaluate(node.orelse))
-
-    def _namedexpr(self, node: ast.NamedExpr) -> Any:
-        value = self.evaluate(node.value)
-        self.assign(node.target, value)  # type: ignore[attr-defined]
-        return value
-
-    def _lambda(self, node: ast.Lambda) -> Any:
-        call = self.calls[-1]
-        return Closure(node, call.frame, call.source, tuple(self.values(node.args.defaults)))
-
-    def _compare(self, node: ast.Compare) -> Any:
-        def go(left: Any, k: int) -> Any:
-            right = self.evaluate(node.comparators[k])
-            self.at(node)
-            holds = self.compared(node.ops[k], left, right)
-            if k == len(node.ops) - 1:
-                return holds
-            return self.branch(self.truth_of(holds), lambda: go(right, k + 1), lambda: False)
-
-        return go(self.evaluate(node.left), 0)
-
-    def compared(self, op: ast.cmpop, a: Any, b: Any) -> ir.Operand:
-        """Return whether a comparison holds."""
-        if isinstance(a, Union) or isinstance(b, Union):
-            return self.by_form(a, lambda x: self.by_form(b, lambda y: self.compared(op, x, y)))  # type: ignore
-        if isinstance(op, (ast.In, ast.NotIn)):
-            found = self._contained(a, b)
-            return found if isinstance(op, ast.In) else self.negation(found)
-        if isinstance(op, (ast.Is, ast.IsNot)):
-            if isinstance(a, ir.Var) and isinstance(b, ir.Var):
-                raise Refused("whether two numbers are the same object")
-            return (a is b) == isinstance(op, ast.Is)
-        if is_number(a) and is_number(b):
-            return self.compare(COMPARED[type(op)], a, b)
-        if isinstance(op, (ast.Eq, ast.NotEq)):
-            equal = self._equal(a, b)
-            return equal if isinstance(op, ast.Eq) else self.negation(equal)
-        if None in (a, b) and (is_number(a) or is_number(b)):
-            types = f"'{_type_name(a)}' and '{_type_name(b)}'"
-            self.end("TypeError", f"'{COMPARED[type(op)]}' not supported between instances of {types}")
-        if is_plain(a) and is_plain(b):
-            return bool(OPERATORS[COMPARED[type(op)]](a, b))
-        raise Refused(f"comparing a {type(a).__name__} and a {type(b).__name__}")
-
-    def _equal(self, a: Any, b: Any) -> ir.Operand:
-        if isinstance(a, Union) or isinstance(b, Union):
-            return self.by_form(a, lambda x: self.by_form(b, lambda y: self._equal(x, y)))  # type: ignore
-        if is_number(a) and is_number(b):
-            return self.compare("==", a, b)
-        lists = isinstance(a, List), isinstance(b, List)
-        if all(lists) or (isinstance(a, tuple) and isinstance(b, tuple)):
-            one, other = self.items(a), self.items(b)
-            return len(one) == len(other) and self._all_equal(list(zip(one, other, strict=True)))
-        if isinstance(a, Box) or isinstance(b, Box):
-            return a is b
-        return not (isinstance(a, ir.Var) or isinstance(b, ir.Var)) and bool(a == b)
-
-    def _all_equal(self, pairs: list[tuple[Any, Any]]) -> ir.Operand:
-        if not pairs:
-            return True
-        return self.branch(  # type: ignore[no-any-return]
-            self._equal(*pairs[0]), lambda: self._all_equal(pairs[1:]), lambda: False
-        )
-
-    def _contained(self, a: Any, b: Any) -> ir.Operand:
-        if is_plain(a) and isinstance(b, (str, dict, set, frozenset, range)):
-            return a in b
-        items = self.items(b)
-
-        def go(k: int) -> ir.Operand:
-            if k == len(items):
-                return False
-            return self.branch(self._equal(a, items[k]), lambda: True, lambda: go(k + 1))  # type: ignore
-
-        return go(0)
-
 
 def _beyond(items: Any) -> str:
     return f"{'tuple' if isinstance(items, tuple) else 'list'} index out of range"
-
-
-def _type_name(value: Any) -> str:
-    if isinstance(value, ir.Var):
-        return {ir.REAL: "float", ir.BOOL: "bool"}.get(value.type, "int")
-    return type(value).__name__
 
 
 def joined_text(parts: Sequence[ir.Part]) -> str | Text:

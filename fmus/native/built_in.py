@@ -1,0 +1,358 @@
+"""What Python brings along: its functions, and methods of its lists, texts and dictionaries."""
+
+from __future__ import annotations
+
+import bisect
+import itertools
+import math
+import operator
+from collections.abc import Sequence
+from typing import Any
+
+from . import ir
+from .evaluate import joined_text
+from .loops import Looping
+from .values import (
+    UNSET,
+    Bound,
+    Box,
+    Bytes,
+    Closure,
+    Dict,
+    Failure,
+    Instance,
+    List,
+    Picked,
+    Refused,
+    Ring,
+    Span,
+    Text,
+    Union,
+    Unreachable,
+    is_number,
+    is_plain,
+)
+
+_OPERATORS = {
+    operator.mul: "*", operator.add: "+", operator.sub: "-", operator.truediv: "/", operator.floordiv: "//",
+    operator.mod: "%", operator.pow: "**",
+}  # fmt: skip
+
+
+_PURE = (set, frozenset, str, repr, ord, chr, divmod, pow, format, float, int, bool, tuple, complex, range)
+
+
+def _is_pure(function: Any) -> bool:
+    """Return whether a function does nothing but compute, so that it may be called at build time."""
+    if any(function is pure for pure in _PURE):
+        return True
+    owner = getattr(function, "__self__", None)
+    if isinstance(owner, (str, bytes, int, float, tuple, range, frozenset, dict)):
+        return True
+    return getattr(function, "__module__", "") in ("math", "_operator", "_bisect", "itertools")
+
+
+class Repeated:
+    """What `itertools.repeat` gives without end."""
+
+    def __init__(self, value: Any) -> None:
+        self.value = value
+
+
+class BuiltIn(Looping):
+    """Calls of what Python has built in."""
+
+    # ---- methods of lists, texts and dictionaries -------------------------------------------
+
+    def _method(self, owner: Any, name: str, args: list[Any], named: dict[str, Any]) -> Any:
+        if isinstance(owner, Text) and name == "encode":
+            return Bytes(owner)
+        if isinstance(owner, Ring):
+            return self._of_ring(owner, name, args)
+        if isinstance(owner, Dict):
+            return self._of_dict(owner, name, args)
+        assert isinstance(owner, List)
+        if name == "append":
+            self.promote(owner, args[0])
+            self.open(owner).append(args[0])
+            return None
+        if name == "pop":
+            return self.remove(owner, args[0] if args else -1, "pop from empty list")
+        if name in ("extend", "insert", "clear", "reverse"):
+            if owner.path is not None and name != "reverse":
+                raise Refused(f"{name} of a list of the state")
+            held = self.open(owner)
+            if name == "extend":
+                held += self.items(args[0])
+            else:
+                getattr(held, name)(*args)
+            return None
+        if name == "copy":
+            return List(self.read(owner))
+        if name in ("index", "count") and all(map(is_plain, (*self.read(owner), *args))):
+            return getattr(self.read(owner), name)(*args)
+        raise Refused(f"the method {name} of a list")
+
+    def _of_ring(self, ring: Ring, name: str, args: list[Any]) -> Any:
+        from .shapes import numbers_of
+
+        if name == "append":
+            items = numbers_of(ring.item, args[0], self.read, self)
+            self.out.append(ir.Push(ring.number, tuple(items)))
+            return None
+        if name == "pop" and args:
+            return self.remove(ring, args[0], "pop from empty list")
+        raise Refused(f"the method {name} of a list whose length changes")
+
+    def _of_dict(self, owner: Dict, name: str, args: list[Any]) -> Any:
+        held = self.read(owner)
+        if name == "items":
+            return tuple(held.items())
+        if name in ("keys", "values"):
+            return tuple(getattr(held, name)())
+        if name == "get":
+            return held.get(self._key(args[0]), args[1] if len(args) > 1 else None)
+        if name == "copy":
+            return Dict(held)
+        raise Refused(f"the method {name} of a dictionary")
+
+    # ---- what Python has built in -----------------------------------------------------------
+
+    def _built_in(self, function: Any, args: list[Any], named: dict[str, Any]) -> Any:
+        name = getattr(function, "__name__", "")
+        if function == itertools.chain.from_iterable:
+            return self._python_chain(*self.items(args[0]))
+        if name == "_replace" and isinstance(args[0], tuple):
+            return function(*args, **named)
+        if any(isinstance(x, Union) for x in args) and name not in ("getattr", "isinstance", "bool", "zip"):
+            k = next(i for i, x in enumerate(args) if isinstance(x, Union))
+            return self.by_form(
+                args[k], lambda x: self._built_in(function, [*args[:k], x, *args[k + 1 :]], named)
+            )
+        own = getattr(self, f"_python_{name}", None)
+        if own is not None and getattr(function, "__module__", "") in (
+            "builtins", "itertools", "math", "_bisect", "bisect", "functools", "_functools",
+        ):  # fmt: skip
+            return own(*args, **named)
+        if getattr(function, "__module__", "") == "math" and all(map(is_number, args)):
+            return self.function(name, *args)
+        if isinstance(function, type) and issubclass(function, BaseException):
+            return Failure(function, self._text(args))
+        for known, op in _OPERATORS.items():
+            if function is known:
+                return self.operate(op, *args)
+        plain = [tuple(self.items(x)) if isinstance(x, List) else x for x in args]
+        if _is_pure(function) and all(map(self._is_constant, (*plain, *named.values()))):
+            try:
+                return self.imported(function(*plain, **named))
+            except Exception as error:
+                self.fail(type(error).__name__, str(error))
+                raise Unreachable from None
+        raise Refused(f"a call of {name or type(function).__name__}")
+
+    def _is_constant(self, value: Any) -> bool:
+        if isinstance(value, tuple):
+            return all(map(self._is_constant, value))
+        return not isinstance(value, (ir.Var, Box, Union, Picked, Closure, Bound, Text, Bytes, Span))
+
+    def _python_len(self, value: Any) -> Any:
+        if isinstance(value, Ring):
+            return self.ring_length(value)
+        if isinstance(value, Picked):
+            return len(value.items[0])
+        return len(self.read(value) if isinstance(value, Box) else value)
+
+    def _python_abs(self, value: Any) -> Any:
+        return self.size(value)
+
+    def _python_fabs(self, value: Any) -> Any:
+        return self.function("fabs", value)
+
+    def _python_float(self, value: Any) -> Any:
+        return self.as_real(value) if is_number(value) else float(value)
+
+    def _python_int(self, value: Any) -> Any:
+        return self.whole("trunc", value) if is_number(value) else int(value)
+
+    def _python_round(self, value: Any, digits: Any = None) -> Any:
+        if digits is not None and isinstance(value, ir.Var):
+            raise Refused("round to a number of digits")
+        return self.whole("rint", value) if digits is None else round(value, digits)
+
+    def _python_bool(self, value: Any) -> Any:
+        return self.truth_of(value)
+
+    def _python_str(self, value: Any) -> Any:
+        return joined_text(self._formatted(value, "", False))
+
+    def _python_list(self, value: Any = ()) -> Any:
+        return List(self.items(value))
+
+    def _python_tuple(self, value: Any = ()) -> Any:
+        return tuple(self.items(value))
+
+    def _python_dict(self, value: Any = (), **named: Any) -> Any:
+        held = self.read(value) if isinstance(value, Dict) else dict(map(self.items, self.items(value)))
+        return Dict({**held, **named})
+
+    def _python_max(self, *args: Any, **named: Any) -> Any:
+        return self._extreme(">", args, named)
+
+    def _python_min(self, *args: Any, **named: Any) -> Any:
+        return self._extreme("<", args, named)
+
+    def _extreme(self, op: str, args: Sequence[Any], named: dict[str, Any]) -> Any:
+        items = self.items(args[0]) if len(args) == 1 else list(args)
+        if not items and "default" in named:
+            return named["default"]
+        if "key" in named or not items or not all(map(is_number, items)):
+            if all(map(self._is_constant, items)) and "key" not in named:
+                return (max if op == ">" else min)(items)
+            raise Refused("an extreme of what are no numbers")
+        best = items[0]
+        for item in items[1:]:
+            if not isinstance(best, ir.Var) and not isinstance(item, ir.Var):
+                best = (max if op == ">" else min)(best, item)
+                continue
+            type = ir.joined(ir.type_of(best), ir.type_of(item))
+            best = self.let(type, "select", self.compare(op, item, best), item, best)
+        return best
+
+    def _python_sum(self, values: Any, start: Any = 0) -> Any:
+        items = self.items(values)
+        if not all(map(is_number, (*items, start))):
+            raise Refused("a sum of what are no numbers")
+        return self.total(items, start)
+
+    def _python_any(self, values: Any) -> Any:
+        return self._decided(self.items(values), True)
+
+    def _python_all(self, values: Any) -> Any:
+        return self._decided(self.items(values), False)
+
+    def _decided(self, items: list[Any], by: bool) -> Any:
+        if not items:
+            return not by
+        test = self.truth_of(items[0])
+        on = lambda: self._decided(items[1:], by)  # noqa: E731
+        return self.branch(test, *((lambda: True, on) if by else (on, lambda: False)))
+
+    def _python_sorted(self, values: Any) -> Any:
+        items = self.items(values)
+        if not any(isinstance(x, ir.Var) for x in items):
+            return List(sorted(items))
+        for end in range(1, len(items)):  # by insertion, so that equal numbers keep their order
+            for k in range(end, 0, -1):
+                a, b = items[k - 1], items[k]
+                less = self.compare("<", b, a)
+                type = ir.joined(ir.type_of(a), ir.type_of(b))
+                items[k - 1] = self.let(type, "select", less, b, a)
+                items[k] = self.let(type, "select", less, a, b)
+        return List(items)
+
+    def _python_zip(self, *values: Any, strict: bool = False) -> Any:
+        lists = [x if isinstance(x, Repeated) else self.items(x) for x in values]
+        counts = {len(x) for x in lists if not isinstance(x, Repeated)}
+        if strict and len(counts) > 1:
+            self.fail("ValueError", "zip() arguments differ in length")
+            raise Unreachable
+        n = min(counts)
+        return tuple(zip(*[[x.value] * n if isinstance(x, Repeated) else x[:n] for x in lists], strict=True))
+
+    def _python_map(self, function: Any, *values: Any) -> Any:
+        return tuple(self.call(function, row, {}) for row in self._python_zip(*values))
+
+    def _python_enumerate(self, values: Any, start: int = 0) -> Any:
+        if isinstance(values, (Ring, Span)):
+            raise Refused("enumerate of a list whose length changes")
+        return tuple(enumerate(self.items(values), start))
+
+    def _python_reversed(self, values: Any) -> Any:
+        return tuple(reversed(self.items(values)))
+
+    def _python_pairwise(self, values: Any) -> Any:
+        if isinstance(values, Ring):
+            ring = values
+            last = self.binary("-", self.ring_length(ring), 1)
+
+            def pair(k: ir.Operand) -> tuple[Any, Any]:
+                return self.ring_item(ring, k), self.ring_item(ring, self.binary("+", k, 1))
+
+            return Span(0, last, pair)
+        return tuple(itertools.pairwise(self.items(values)))
+
+    def _python_repeat(self, value: Any, times: int | None = None) -> Any:
+        return Repeated(value) if times is None else (value,) * times
+
+    def _python_chain(self, *values: Any) -> Any:
+        return tuple(x for value in values for x in self.items(value))
+
+    def _python_range(self, *ends: Any) -> Any:
+        if not any(isinstance(x, ir.Var) for x in ends):
+            return range(*ends)
+        if len(ends) > 2:
+            raise Refused("a range whose step or ends are known at run time only")
+        return Span(ends[0] if len(ends) == 2 else 0, ends[-1], lambda k: k)
+
+    def _python_bisect_right(self, values: Any, x: Any) -> Any:
+        place: ir.Operand = 0
+        items = self.items(values)
+        if not any(isinstance(v, ir.Var) for v in (*items, x)):
+            return bisect.bisect_right(items, x)
+        low, high = 0, len(items)
+
+        def go(low: int, high: int) -> ir.Operand:  # as the library searches
+            if low == high:
+                return low
+            middle = (low + high) // 2
+            less = self.compare("<", x, items[middle])
+            return self.branch(less, lambda: go(low, middle), lambda: go(middle + 1, high))  # type: ignore
+
+        place = go(low, high)
+        return place
+
+    def _python_getattr(self, owner: Any, name: str, *default: Any) -> Any:
+        if default and isinstance(owner, Instance) and owner.slots.get(name, UNSET) is UNSET:
+            return default[0] if not hasattr(owner.cls, name) else self.attribute(owner, name)
+        return self.by_form(owner, lambda x: self.attribute(x, name))
+
+    def _python_isinstance(self, value: Any, kinds: Any) -> Any:
+        value = self.narrowed(value)
+        if isinstance(value, Union):
+            return self.by_form(value, lambda x: self._python_isinstance(x, kinds))
+        if isinstance(value, ir.Var):
+            of = {ir.REAL: float, ir.BOOL: bool}.get(value.type, int)
+            return issubclass(of, kinds)
+        if isinstance(value, Instance):
+            return issubclass(value.cls, kinds)
+        if isinstance(value, (List, Ring, Dict)):
+            return issubclass(dict if isinstance(value, Dict) else list, kinds)
+        return isinstance(value, kinds)
+
+    def _python_dist(self, one: Any, other: Any) -> Any:
+        pairs = zip(self.items(one), self.items(other), strict=True)
+        return self.function("dist", *[self.binary("-", a, b) for a, b in pairs])
+
+    def _python_hypot(self, *values: Any) -> Any:
+        return (
+            self.function("hypot", *values)
+            if any(isinstance(x, ir.Var) for x in values)
+            else math.hypot(*values)
+        )
+
+    def _python_prod(self, values: Any) -> Any:
+        product: ir.Operand = 1
+        for item in self.items(values):
+            product = self.binary("*", product, item)
+        return product
+
+    def _text(self, args: Sequence[Any]) -> Text:
+        if len(args) > 1:
+            raise Refused("an exception of several values")
+        if not args:
+            return Text(())
+        if isinstance(args[0], Text):
+            return args[0]
+        if not is_plain(args[0]):
+            raise Refused("an exception of something unknown")
+        return Text((str(args[0]),))

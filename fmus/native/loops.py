@@ -1,0 +1,287 @@
+"""Loops of a component: unrolled where the items are known, else followed until values keep their form."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from . import ir
+from .merge import items_of
+from .read import kinds_within, names_within
+from .shapes import Memo, Shape, Widening, build, numbers_of, shape_of, types_of
+from .statements import CONTINUE, EXIT, ON, OVER, RESULT, RETURN, Execution
+from .values import (
+    UNSET,
+    Box,
+    Bytes,
+    List,
+    Refused,
+    Ring,
+    Span,
+    now,
+    same,
+)
+
+UNROLLED = 16
+"""Passes up to which a loop over a range is written out; chosen: four wheels, seven sets."""
+WIDEST = 12
+"""Times a loop is followed until what it carries has its form."""
+
+
+@dataclass
+class Pass:
+    """One pass through a loop: its statements, how it ends, what has changed."""
+
+    out: list[ir.Statement]
+    exit: Any
+    starts: dict[tuple[Box, Any], Any]
+    ends: dict[tuple[Box, Any], Any]
+    contents: dict[Box, Any]
+
+
+class Looping(Execution):
+    """Loops."""
+
+    # ---- loops ------------------------------------------------------------------------------
+
+    def _do_while(self, node: ast.While) -> None:
+        self._loop(node, lambda: self.truth_of(self.evaluate(node.test)), lambda: self.block(node.body))
+
+    def _do_for(self, node: ast.For) -> None:
+        over = self.narrowed(self.evaluate(node.iter))
+        if isinstance(over, Ring):
+            ring = over
+            over = Span(0, self.ring_length(ring), lambda k: self.ring_item(ring, k))
+        if isinstance(over, range) and len(over) > UNROLLED and over.step == 1:
+            over = Span(over.start, over.stop, lambda k: k)
+        if isinstance(over, Bytes):
+            self._for_bytes(node, over)
+        elif isinstance(over, Span):
+            self._for_span(node, over)
+        else:
+            self._unrolled(node, self.items(over))
+
+    def _unrolled(self, node: ast.For, items: list[Any]) -> None:
+        def go(k: int) -> None:
+            if k == len(items):
+                self.leave(OVER)
+                return
+            self.assign(node.target, items[k])
+            self.block(node.body)
+            on = self._goes_on(self.exit)
+            self.branch(on, lambda: further(k + 1), lambda: None)
+
+        def further(k: int) -> None:
+            self.leave(ON)
+            go(k)
+
+        go(0)
+        self._after_loop(node)
+
+    def _goes_on(self, how: Any) -> ir.Operand:
+        if not isinstance(how, ir.Var):
+            return how in (ON, CONTINUE)
+        return self.branch(  # type: ignore[no-any-return]
+            self.compare("==", how, ON), lambda: True, lambda: self.compare("==", how, CONTINUE)
+        )
+
+    def _after_loop(self, node: ast.For | ast.While) -> None:
+        how = self.exit
+        if node.orelse:
+            over = self.compare("==", how, OVER)
+            self.branch(over, lambda: self._otherwise(node.orelse), lambda: None)
+            how = self.exit
+        if isinstance(how, ir.Var):
+            if kinds_within(node)[ast.Return]:
+                back = self.compare("==", how, RETURN)
+                how = self.branch(back, lambda: RETURN, lambda: ON)
+            else:
+                how = ON
+        self.leave(how if isinstance(how, ir.Var) or how == RETURN else ON)
+
+    def _otherwise(self, statements: Sequence[ast.stmt]) -> None:
+        self.leave(ON)
+        self.block(statements)
+
+    def _for_bytes(self, node: ast.For, over: Bytes) -> None:
+        kinds = kinds_within(node)
+        if node.orelse or kinds[ast.Break] or kinds[ast.Return]:
+            raise Refused("leaving a loop over a text")
+        for part in over.text.parts:
+            if isinstance(part, str):
+                self._unrolled(node, list(part.encode()))
+                continue
+            value, _ = part
+            if ir.type_of(value) != ir.INT:
+                raise Refused("the bytes of a number that is no integer")
+            count = self.new(ir.INT)
+            self.out.append(ir.Digits(count, value))
+
+            def digit(k: ir.Operand, count: ir.Var = count) -> ir.Var:
+                target = self.new(ir.INT)
+                self.out.append(ir.Digit(target, count, k))
+                return target
+
+            self._for_span(node, Span(0, count, digit))
+
+    def _for_span(self, node: ast.For, over: Span) -> None:
+        counter = List([over.first])
+
+        def test() -> ir.Operand:
+            return self.compare("<", self.read(counter)[0], over.end)
+
+        def body() -> None:
+            k = self.read(counter)[0]
+            self.write(counter, 0, self.binary("+", k, 1))
+            self.assign(node.target, over.item(k))
+            self.block(node.body)
+
+        self._loop(node, test, body)
+
+    def _loop(
+        self,
+        node: ast.For | ast.While,
+        test: Callable[[], ir.Operand],
+        body: Callable[[], None],
+    ) -> None:
+        since = now()
+        held = self.frame.slots
+        passing = {
+            name
+            for name in _stored(node)
+            if held.get(name, UNSET) is UNSET and not self._is_read_outside(node, name)
+        }  # names of one pass, which no other looks at
+        carried: dict[tuple[Box, Any], Shape] = {}
+        for _ in range(WIDEST):
+            heads: list[tuple[ir.Var, ir.Var]] = []
+            made = self._pass(test, body, carried, heads, passing)
+            if not isinstance(made.exit, ir.Var) and made.exit not in (ON, CONTINUE):
+                break  # it is left at once
+            widening = Widening()
+            grew = False
+            for key, end in made.ends.items():
+                box, name = key
+                if box.age > since or name == EXIT or (box is self.frame and name in passing):
+                    continue
+                memo = Memo()
+                before = carried.get(key) or shape_of(made.starts[key], self.read)
+                after = shape_of(end, lambda b: made.contents.get(b, b.slots), "", memo)  # noqa: B023
+                wide = widening.of(before, after)
+                if key not in carried or widening.grew:
+                    grew = True
+                carried[key] = wide
+            if not grew:
+                break
+        else:
+            raise Refused("a loop in which values take ever new forms")
+        self._finish_loop(node, made, carried, heads)
+
+    def _is_read_outside(self, loop: ast.AST, name: str) -> bool:
+        read = name, ast.Load
+        everywhere = names_within(self.calls[-1].source.node)
+        return name in (EXIT, RESULT) or everywhere[read] > names_within(loop)[read]
+
+    def _pass(
+        self,
+        test: Callable[[], ir.Operand],
+        body: Callable[[], None],
+        carried: dict[tuple[Box, Any], Shape],
+        heads: list[tuple[ir.Var, ir.Var]],
+        passing: set[str],
+    ) -> Pass:
+        starts: dict[tuple[Box, Any], Any] = {}
+
+        def run() -> Any:
+            for (box, key), shape in carried.items():
+                leaves = []
+                for type in types_of(shape):
+                    kept, head = self.new(type), self.new(type)
+                    heads.append((kept, head))
+                    self.out.append(ir.Let(head, "copy", (kept,)))
+                    leaves.append(head)
+                value = build(shape, iter(leaves))
+                starts[box, key] = value
+                self.write(box, key, value)
+            self.branch(test(), body, lambda: self.leave(OVER))
+            how = self.exit
+            self.leave(ON)
+            for name in passing:
+                self.open(self.frame).pop(name, None)
+            return how
+
+        path = self.followed(run, self.facts.copy())
+        if path.dead:
+            raise Refused("a loop whose every pass raises")
+        ends: dict[tuple[Box, Any], Any] = {}
+        for box, slots in path.changed.items():
+            keys = range(len(slots)) if isinstance(slots, list) else list(slots)
+            for key in keys:
+                before = starts.get((box, key), items_of(box.slots, key) if _has(box, key) else UNSET)
+                if not same(before, slots[key]):
+                    starts.setdefault((box, key), before)
+                    ends[box, key] = slots[key]
+            if isinstance(slots, list) and len(slots) != len(box.slots) and not path.dead:
+                raise Refused("a list that is made longer or shorter in a loop")
+        for key in carried:
+            box, name = key
+            held = path.changed.get(box, box.slots)
+            ends.setdefault(key, items_of(held, name))
+        return Pass(path.out, path.value, starts, ends, path.changed)
+
+    def _finish_loop(
+        self,
+        node: ast.For | ast.While,
+        made: Pass,
+        carried: dict[tuple[Box, Any], Shape],
+        heads: list[tuple[ir.Var, ir.Var]],
+    ) -> None:
+        if not isinstance(made.exit, ir.Var):
+            if made.exit in (ON, CONTINUE):
+                raise Refused("a loop without end")
+            self.out += made.out  # one pass, which always leaves
+            for (box, name), end in made.ends.items():
+                self.write(box, name, end)
+            self.leave(made.exit)
+            self._after_loop(node)
+            return
+        queue = iter(heads)
+        kept: dict[tuple[Box, Any], list[ir.Var]] = {}
+        for key, shape in carried.items():
+            box, name = key
+            leaves = [next(queue)[0] for _ in types_of(shape)]
+            start = items_of(box.slots, name) if _has(box, name) else UNSET
+            for leaf, number in zip(leaves, numbers_of(shape, start, self.read, self), strict=True):
+                self.out.append(ir.Let(leaf, "copy", (number,)))
+            kept[key] = leaves
+        outer, self.out = self.out, made.out
+
+        def contents(box: Box) -> Any:
+            return made.contents.get(box, box.slots)
+
+        sets = []
+        for key, shape in carried.items():
+            for leaf, number in zip(
+                kept[key], numbers_of(shape, made.ends[key], contents, self), strict=True
+            ):
+                sets.append((leaf, self.let(leaf.type, "copy", number)))
+        self.out += [ir.Let(leaf, "copy", (number,)) for leaf, number in sets]
+        stays = self._goes_on(made.exit)
+        leaving = self.let(ir.BOOL, "not", stays)
+        self.out.append(ir.Leave(leaving))
+        body, self.out = self.out, outer
+        self.out.append(ir.Loop(body))
+        for (box, name), shape in carried.items():
+            leaves = [self.let(leaf.type, "copy", leaf) for leaf in kept[box, name]]
+            self.write(box, name, build(shape, iter(leaves)))
+        self.leave(made.exit)
+        self._after_loop(node)
+
+
+def _has(box: Box, key: Any) -> bool:
+    return key < len(box.slots) if isinstance(box, List) else key in box.slots
+
+
+def _stored(loop: ast.AST) -> set[str]:
+    return {name for name, context in names_within(loop) if context is ast.Store}

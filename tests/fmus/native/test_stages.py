@@ -1,0 +1,189 @@
+"""The stages of a translation, each by itself: read, evaluate, lower, emit; `test_gate` has the gate."""
+
+from __future__ import annotations
+
+import ast
+import math
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from fmus.compiler import compiler_command
+from fmus.native import ir
+from fmus.native.emit import constant, quoted
+from fmus.native.lower import Lowering
+from fmus.native.read import Sources, kinds_within, names_within
+from fmus.native.specialise import specialise
+from fmus.native.values import Refused
+
+from .small import component_of, source
+
+# ---- read ---------------------------------------------------------------------------------------
+
+
+def outer(gain):
+    def scaled(x):
+        return gain * x
+
+    return scaled
+
+
+one, other = lambda x: x, lambda x: -x
+
+
+def test_read_finds_a_function_with_its_line_its_names_and_the_variables_around_it():
+    found = Sources(Path(__file__).parent).of(outer(3.0))
+    assert (found.file, found.node.name, found.node.lineno) == (
+        Path(__file__).name,
+        "scaled",
+        outer.__code__.co_firstlineno + 1,
+    )
+    assert found.cells == {"gain": 3.0}
+    assert found.names["outer"] is outer
+
+
+def test_read_refuses_what_it_cannot_tell_from_its_neighbour():
+    with pytest.raises(Refused, match="cannot be told from others in its line"):
+        Sources(Path(__file__).parent).of(other)
+
+
+def test_read_counts_what_a_tree_consists_of():
+    tree = ast.parse("for x in y:\n    z = x + x\n    if z:\n        break")
+    assert (kinds_within(tree)[ast.Break], kinds_within(tree)[ast.Return]) == (1, 0)
+    assert names_within(tree) == {
+        ("x", ast.Store): 1, ("y", ast.Load): 1, ("z", ast.Store): 1, ("x", ast.Load): 2, ("z", ast.Load): 1,
+    }  # fmt: skip
+
+
+# ---- evaluate -----------------------------------------------------------------------------------
+
+
+def output_of(body: str, folder: Path) -> ir.Function:
+    with component_of(source(body), folder) as (component, home):
+        return specialise(component, home).functions["output"]
+
+
+EVALUATED = {
+    "arithmetic": "return (2.0 * 3.0 + len((1, 2)) - abs(-1),)",
+    "a branch": "return (7.0 if 2 > 1 else u[0],)",
+    "a loop": "total = 1.0\n    for k in range(4):\n        total += k\n    return (total,)",
+    "a comprehension": "return (sum([x * x for x in (1.0, 2.0, 3.0) if x < 3.0]) + 2.0,)",
+    "a call": "square = lambda x: x * x\n    return (square(2.0) + 3.0,)",
+    "a dictionary": "return ({'a': 7.0}['a'],)",
+    "a text": "return (7.0 if f'{1 + 1}' == '2' else u[0],)",
+    "taking apart": "a, *rest = (3.0, 1.0, 3.0)\n    return (a + sum(rest),)",
+}
+
+
+@pytest.mark.parametrize("construct", EVALUATED)
+def test_what_is_known_at_build_time_is_evaluated_then(construct, tmp_path):
+    function = output_of(f"def output(self, t, u):\n    {EVALUATED[construct]}", tmp_path)
+    assert list(function.body) == []
+    assert [value for _, value in function.stores] == [7.0]
+
+
+FOLLOWED = {
+    "a branch on an input": ("x = 0.0\n    if u[0] > 1.0:\n        x = u[1]\n    return (x,)", {ir.If: 1}),
+    "a branch known at build time": ("return (u[0] if 2 > 1 else u[1] / 0.0,)", {}),
+    "a loop over few items": (
+        "x = 0.0\n    for y in u:\n        x += y\n    return (x,)",
+        {ir.Loop: 0, ir.Let: 2},
+    ),
+    "a loop over many": (
+        "x = u[0]\n    for k in range(99):\n        x *= 0.5\n    return (x,)",
+        {ir.Loop: 1, ir.Leave: 1},
+    ),
+    "a loop of unknown length": (
+        "x = u[0]\n    while abs(x) > 1.0:\n        x *= 0.5\n    return (x,)",
+        {ir.Loop: 1, ir.Leave: 1},
+    ),
+    "a table at an unknown index": ("return ((1.0, 2.0, 4.0)[int(abs(u[0])) % 3],)", {ir.Load: 1}),
+    "an exception": (
+        "if u[0] > 1.0:\n        raise ValueError('no')\n    return (u[0],)",
+        {ir.If: 1, ir.Raise: 1},
+    ),
+}
+
+
+@pytest.mark.parametrize("construct", FOLLOWED)
+def test_what_hangs_on_an_input_becomes_a_statement(construct, tmp_path):
+    body, expected = FOLLOWED[construct]
+    function = output_of(f"def output(self, t, u):\n    {body}", tmp_path)
+    kinds = [type(statement) for statement in ir.every(function.body)]
+    assert {kind: kinds.count(kind) for kind in expected} == expected
+    assert kinds if expected else not kinds
+
+
+# ---- lower --------------------------------------------------------------------------------------
+
+
+def test_numbers_that_are_known_are_computed_and_others_let():
+    lowering = Lowering()
+    assert (lowering.binary("+", 1, 2), lowering.binary("**", 2.0, 3), lowering.compare("<", 1, 2)) == (
+        3,
+        8.0,
+        True,
+    )
+    assert lowering.out == []
+    x = lowering.new(ir.REAL)
+    y = lowering.binary("*", x, 2.0)
+    assert lowering.out == [ir.Let(y, "mul", (x, 2.0))]
+
+
+def test_what_would_lose_the_sign_of_a_zero_is_not_left_out():
+    lowering = Lowering()
+    x = lowering.new(ir.REAL)
+    lowering.binary("+", x, 0.0)  # 0.0 where x is -0.0
+    lowering.binary("-", 0.0, x)  # 0.0 where x is 0.0
+    assert [statement.op for statement in lowering.out if isinstance(statement, ir.Let)] == ["add", "sub"]
+
+
+def test_a_division_raises_where_its_divisor_is_zero():
+    lowering = Lowering()
+    lowering.where = lambda: "small.py:7"
+    a, b = lowering.new(ir.REAL), lowering.new(ir.REAL)
+    lowering.binary("/", a, b)
+    (raised,) = (s for s in ir.every(lowering.out) if isinstance(s, ir.Raise))
+    assert (raised.kind, raised.where) == ("ZeroDivisionError", "small.py:7")
+
+
+def test_types_join_as_python_numbers_do():
+    assert ir.joined(ir.INT, ir.BOOL) == ir.INT
+    assert ir.joined(ir.INT, ir.REAL) == ir.REAL
+    with pytest.raises(ValueError, match="64 bits"):
+        ir.joined(ir.WORD, ir.REAL)
+
+
+# ---- emit ---------------------------------------------------------------------------------------
+
+NUMBERS = (
+    0.0,
+    -0.0,
+    1.0,
+    0.1,
+    -1e-310,
+    5e-324,
+    1.7976931348623157e308,
+    2.0**53,
+    math.pi,
+    math.inf,
+    -math.inf,
+)
+TEXTS = ("plain", 'a "quote" and a \\', "100 %d ??/ trigraph", "Größe µ", "new\nline\ttab", "")
+
+
+def test_constants_and_texts_in_c_are_those_of_python(tmp_path):
+    """Compiled and printed: numbers to the last bit, texts byte by byte."""
+    lines = [f'printf("%a\\n", {constant(x)});' for x in NUMBERS]
+    lines += [
+        f'for (const char *c = {quoted(text)}; *c; c++) printf("%02x", *c & 255); puts("");' for text in TEXTS
+    ]
+    head = "#include <math.h>\n#include <stdio.h>\nint main(void)\n{\n"
+    (tmp_path / "numbers.c").write_text(head + "\n".join(lines) + "\nreturn 0;\n}\n")
+    subprocess.run([*compiler_command(), "-std=c11", "numbers.c", "-o", "numbers"], cwd=tmp_path, check=True)
+    said = subprocess.run([tmp_path / "numbers"], capture_output=True, text=True, check=True).stdout.split(
+        "\n"
+    )
+    assert [float.fromhex(word).hex() for word in said[: len(NUMBERS)]] == [x.hex() for x in NUMBERS]
+    assert [bytes.fromhex(word).decode() for word in said[len(NUMBERS) : -1]] == list(TEXTS)
