@@ -13,7 +13,7 @@ from orchestrator.errors import Diagnostic, Location, ScenarioError
 from orchestrator.experiments.experiment import LoadedExperiment as Design
 from orchestrator.experiments.experiment import NamedRun
 from orchestrator.experiments.figures import draw_over_axes
-from orchestrator.experiments.jobs import Job, Outcome, PlanningCache, measured
+from orchestrator.experiments.jobs import Job, Outcome, measured
 from orchestrator.experiments.judged_schema import si_number, text_of
 from orchestrator.experiments.outcome import ExperimentResult
 from orchestrator.experiments.planning import metrics_of, plan_experiment
@@ -161,8 +161,8 @@ class Experiment:
         """
         workers = None if workers is None else arguments.count(workers, "workers")
         keep, progress = arguments.flag(keep, "keep"), arguments.flag(progress, "progress")
-        once = PlanningCache(**self.base._opening())
-        planned = plan_experiment(self.design, self.base.path.parent, once=once)
+        planner = self.base._planner()
+        planned = plan_experiment(self.design, self.base.path.parent, planner=planner)
         metrics = metrics_of(planned.experiment)
         with _bar(self.design.spec.title, len(self), shown=progress) as told:
             outcomes = make_all(planned.jobs, self.base.programs, workers=workers, done=told, run=_in_memory)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from components.fmi.component import Component
 from orchestrator.errors import ScenarioError
 from orchestrator.experiments.execution import Executor
-from orchestrator.experiments.jobs import Job, OnOutcome, PlanningCache, run_job
+from orchestrator.experiments.jobs import Job, OnOutcome, run_job
 from orchestrator.experiments.ranking import UNIT, EntrySpec, load_ranking
 from orchestrator.experiments.ranking_scores import RankingResult, run_ranking
 from orchestrator.experiments.ranking_tables import (
@@ -24,6 +24,7 @@ from orchestrator.experiments.ranking_tables import (
 )
 from orchestrator.experiments.record import to_pandas
 from orchestrator.messages import hint
+from orchestrator.planner import Planner
 from orchestrator.results.lock import writing
 from orchestrator.scenario import catalogue
 
@@ -92,7 +93,7 @@ def rank(
     kept = {key: one for key, one in loaded.entries.items() if key in wanted or key in more}
     loaded = replace(loaded, entries=kept)
     opened = {path: program.fmu for path, program in programs.items()}
-    once = PlanningCache(build=True, tell=lambda text: None, opened=opened)
+    planner = Planner(build=True, tell=lambda text: None, opened=opened)
     with contextlib.ExitStack() as stack:
         folder = Path(kept_in or stack.enter_context(tempfile.TemporaryDirectory()))
         stack.enter_context(writing(folder))
@@ -101,7 +102,7 @@ def rank(
             make_all(jobs, programs, workers=workers, done=told, run=run_job)
 
         execute = stack.enter_context(
-            Executor(folder, loaded.identity, runner, once, of_jobs={"format": "parquet"})
+            Executor(folder, loaded.identity, runner, planner, of_jobs={"format": "parquet"})
         )
         return Ranking(run_ranking(loaded, execute, keep=out is not None))
 

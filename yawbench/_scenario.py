@@ -20,17 +20,14 @@ from orchestrator.errors import (
     warnings_in,
 )
 from orchestrator.fault_kinds import FaultList
-from orchestrator.fmu.opener import Opener
 from orchestrator.master.log import Log
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.messages import hint, short
 from orchestrator.names import Target
 from orchestrator.plan import Instance, Override, Plan, Value
+from orchestrator.planner import Planner
 from orchestrator.scenario import catalogue, scenario_schema
-from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.overrides import faults_at, setting
-from orchestrator.tyres.stand import cornering_stiffness
-from orchestrator.wiring.make_plan import make_plan
 from vocabulary.roles import role_of
 
 from . import arguments
@@ -195,7 +192,7 @@ class Scenario:
     @cached_property
     def loaded(self) -> scenario_schema.LoadedScenario:
         """The scenario as its schema has it, all changes applied; the file is read once."""
-        return load_scenario(self.path, changes=self.changes)
+        return Planner().load(self.path, self.changes)
 
     def plan(self) -> Plan:
         """Return what a run does: units in order, wires, constants, time grid.
@@ -204,7 +201,7 @@ class Scenario:
             YawbenchError: an FMU is missing, a component whose source has changed cannot be built, or
                 the units cannot be connected.
         """
-        plan = make_plan(self.loaded, opener=Opener(**self._opening()), measure=cornering_stiffness)
+        plan = self._planner().plan(self.loaded)
         notes = tuple(
             Diagnostic(
                 "instance-in-python",
@@ -216,10 +213,10 @@ class Scenario:
         )
         return replace(plan, diagnostics=plan.diagnostics + notes)
 
-    def _opening(self) -> dict[str, Any]:
-        """Return the options of an `Opener`: build silently if out of date; the plain Python components."""
+    def _planner(self) -> Planner:
+        """Return a planner that builds FMUs silently if out of date and knows the plain Python components."""
         opened = {path: program.fmu for path, program in self.programs.items()}
-        return {"build": True, "tell": lambda text: None, "opened": opened}
+        return Planner(build=True, tell=lambda text: None, opened=opened)
 
     def run(self, *, progress: Callable[[int, int], None] | None = None) -> Run:
         """Run the scenario in this process and return its results; nothing is written.

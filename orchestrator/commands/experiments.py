@@ -88,7 +88,7 @@ def _over_region(
     from ..experiments.region import judge_region, plan_region
 
     with execute.display.planning(0) as planning:
-        plan = plan_region(planned, execute.folder, once=execute.once, progress=planning)
+        plan = plan_region(planned, execute.folder, planner=execute.planner, progress=planning)
     jobs = {job.key: job for job in plan.jobs.values()}
     records = execute.journal.records
     if execute.runner is None and (left := left_to_do(list(jobs.values()), records)):

@@ -246,13 +246,8 @@ def plan_of_scenario(scenario: Path, wishes: RunOptions) -> Plan:
     Raises:
         YawbenchError: the scenario, an option or an FMU is invalid, or a component cannot be built.
     """
-    from ..fmu.opener import Opener
-    from ..scenario.load import load_scenario
-    from ..tyres.stand import cornering_stiffness
-    from ..wiring.make_plan import make_plan
+    from ..planner import Planner
 
-    loaded = load_scenario(scenario, changes=wishes.changes, validate=not wishes.no_validate)
-    opener = Opener(build=wishes.build)
-    return make_plan(
-        loaded, fmus=wishes.fmus, opener=opener, isolated=wishes.isolate, measure=cornering_stiffness
-    )
+    planner = Planner(build=wishes.build)
+    loaded = planner.load(scenario, wishes.changes, validate=not wishes.no_validate)
+    return planner.plan(loaded, fmus=wishes.fmus, isolated=wishes.isolate)

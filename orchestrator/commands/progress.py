@@ -119,13 +119,13 @@ def executor_of(
         of_jobs: fields of all jobs in place of the options'.
     """
     from ..experiments.execution import Executor, runner_of
-    from ..experiments.jobs import PlanningCache
+    from ..planner import Planner
 
     runner = None if wishes.no_run else runner_of(wishes.jobs, wishes.scheduler)
-    once = PlanningCache(build=wishes.build)
+    planner = Planner(build=wishes.build)
     given = wishes.of_jobs | of_jobs
     return Executor(
-        folder, identity, runner, once, wishes.fresh, given, each, Terminal(making=not wishes.no_run)
+        folder, identity, runner, planner, wishes.fresh, given, each, Terminal(making=not wishes.no_run)
     )
 
 

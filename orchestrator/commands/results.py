@@ -33,8 +33,9 @@ def recorded(sources: Sequence[Path], wishes: RunOptions) -> list[Path]:
         ScenarioError: a scenario or an option is invalid.
     """
     from ..errors import ScenarioError
-    from ..experiments.jobs import Job, PlanningCache, execute, ready
+    from ..experiments.jobs import Job, execute, ready
     from ..fmu.opener import stale_fmus
+    from ..planner import Planner
     from ..results.folder import default_folder
     from ..results.freshness import staleness
     from ..scenario import catalogue
@@ -49,7 +50,7 @@ def recorded(sources: Sequence[Path], wishes: RunOptions) -> list[Path]:
         )
     given = [Job(one.stem, one, Path(), wishes.changes, **wishes.of_jobs) for one in scenarios]
     jobs = {}
-    for job in ready(given, once=PlanningCache(build=wishes.build)):
+    for job in ready(given, planner=Planner(build=wishes.build)):
         assert job.plan is not None
         jobs[job.scenario] = replace(job, out=default_folder(job.scenario, job.plan.changes))
     for note in stale_fmus(unit.fmu for job in jobs.values() if job.plan for unit in job.plan.instances):

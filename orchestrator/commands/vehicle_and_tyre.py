@@ -59,7 +59,7 @@ def vehicle(
     acceleration; yaw gain, natural frequency and damping over speed. All in tables, and in one figure.
     """
     from ..errors import ScenarioError
-    from ..fmu.opener import Opener
+    from ..planner import Planner
     from ..results.folder import below_results
     from ..scenario import catalogue, yaml_lines
     from ..scenario.scenario_schema import Vehicle
@@ -75,9 +75,9 @@ def vehicle(
         raise ScenarioError(document.sorted_errors())
     for one in suspicious_vehicle(spec.parameters):
         say(f"note: {one}")
-    opener = Opener(build=wishes.build)
-    names = plant.split(",") if plant else [fitting_plant(file, tyre, wishes.fmus, opener)]
-    tracks = [TestTrack(file, name.strip(), tyre, friction, wishes.fmus, opener) for name in names]
+    planner = Planner(build=wishes.build)
+    names = plant.split(",") if plant else [fitting_plant(file, tyre, wishes.fmus, planner)]
+    tracks = [TestTrack(file, name.strip(), tyre, friction, wishes.fmus, planner) for name in names]
     cars = [handling_of(track) for track in tracks]
     print_tables(_tables(cars))
     for car in cars:

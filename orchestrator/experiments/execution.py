@@ -20,6 +20,7 @@ from .. import checksums
 from ..errors import ResultsError, ScenarioError
 from ..metrics.run_metrics import metric, results_to_be, unit_in
 from ..plan import Plan
+from ..planner import Planner
 from ..results.freshness import altered, staleness
 from .experiment import Case, LoadedExperiment, NamedRun
 from .jobs import (
@@ -28,7 +29,6 @@ from .jobs import (
     MetricRequests,
     OnOutcome,
     Outcome,
-    PlanningCache,
     execute,
     read_back,
     ready,
@@ -64,7 +64,7 @@ class NoDisplay(Display):
 
 @dataclass(frozen=True)
 class Executor(AbstractContextManager["Executor"]):
-    """Executes experiments in one locked results folder, with one journal and one cache of files and FMUs.
+    """Executes experiments in one locked results folder, with one journal and one planner.
 
     The journal has the runs of experiments with axes; those of others have results in folders of their own.
     """
@@ -72,7 +72,7 @@ class Executor(AbstractContextManager["Executor"]):
     folder: Path
     identity: str  # of the experiments, in the journal
     runner: Runner | None  # None: missing runs are not made
-    once: PlanningCache = field(default_factory=PlanningCache)
+    planner: Planner = field(default_factory=Planner)
     fresh: bool = False  # whether finished runs are made again
     of_jobs: Mapping[str, Any] = field(default_factory=dict)  # fields of all jobs, see `jobs_of`
     each: Each = map  # to read results with
@@ -123,8 +123,9 @@ class Executor(AbstractContextManager["Executor"]):
             YawbenchError: a run cannot start.
         """
         with self.display.planning(len(experiment.cases)) as progress:
+            given = {**self.of_jobs, **of_jobs}
             planned = plan_experiment(
-                experiment, self.folder, once=self.once, progress=progress, **{**self.of_jobs, **of_jobs}
+                experiment, self.folder, planner=self.planner, progress=progress, **given
             )
         self.display.planned(planned)
         return planned
@@ -136,7 +137,7 @@ class Executor(AbstractContextManager["Executor"]):
             ScenarioError: some of the runs cannot start; lists each problem once.
         """
         jobs = [Job(run.label, run.scenario, self.folder, run.changes, **self.of_jobs) for run in runs]
-        return [job.plan for job in ready(jobs, once=self.once) if job.plan]
+        return [job.plan for job in ready(jobs, planner=self.planner) if job.plan]
 
     def run(self, title: str, jobs: Sequence[Job], *, journaled: bool) -> list[Outcome]:
         """Execute those of the jobs that are not finished, and return their outcomes.

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import copy
 import sys
 import traceback
 from collections.abc import Callable, Hashable, Sequence
@@ -26,14 +25,12 @@ from ..errors import (
     warnings_in,
 )
 from ..interrupts import StopFlag, interrupts
-from ..messages import hint, printable
+from ..messages import printable
 from ..metrics.run_metrics import evaluate, metric
-from ..names import match
 from ..plan import Override, Plan
+from ..planner import Planner
 from ..results.freshness import key_of
 from ..results.read import Results, load_results
-from ..scenario import yaml_lines
-from ..scenario.yaml_lines import Document
 from ..workers import Finished, Pool
 
 if TYPE_CHECKING:
@@ -152,58 +149,22 @@ OnOutcome = Callable[[Outcome], None]
 """Callback, called once per finished job."""
 
 
-class PlanningCache:
-    """Cache of parsed files and opened FMUs for making many plans; `options`: of the `Opener`."""
-
-    def __init__(self, **options: Any) -> None:
-        from ..fmu.opener import Opener
-
-        self._documents: dict[Path, Document] = {}
-
-        self.opener = Opener(**options)
-
-    def read(self, path: Path, *, what: str) -> Document:
-        """Return a fresh copy of what `yaml_lines.read` returns."""
-        if path not in self._documents:
-            self._documents[path] = yaml_lines.read(path, what=what)
-        return copy.deepcopy(self._documents[path])
-
-
-def planned(job: Job, once: PlanningCache | None = None) -> tuple[LoadedScenario, Plan]:
-    """Return a job's scenario with its overrides applied, and its plan; `once`: cache for many jobs.
+def planned(job: Job, planner: Planner | None = None) -> tuple[LoadedScenario, Plan]:
+    """Return a job's scenario with its overrides applied, and its plan; `planner`: one for many jobs.
 
     Raises:
         YawbenchError: the scenario, an option or an FMU is wrong.
     """
-    from ..scenario.load import load_scenario
-    from ..tyres.stand import cornering_stiffness
-    from ..wiring.make_plan import make_plan
-
-    once = once or PlanningCache()
-    scenario = load_scenario(job.scenario, changes=job.changes, read=once.read)
+    planner = planner or Planner()
+    scenario = planner.load(job.scenario, job.changes)
     isolated = job.call_limit is not None
-    plan = make_plan(
-        scenario, fmus=job.fmus, opener=once.opener, isolated=isolated, measure=cornering_stiffness
-    )
-    if not job.record:
-        return scenario, plan
-    recorded = {str(name): name for name in plan.record}
-    unknown = [name for name in job.record if name not in recorded and "*" not in name]
-    if unknown:
-        guess = hint(unknown[0], recorded, lead="recorded are")
-        raise ScenarioError(f"{job.scenario}: {unknown[0]!r} is not recorded{guess}", code="signal-unknown")
-    chosen = [
-        name
-        for text, name in recorded.items()
-        if any(match(pattern, one) is not None for pattern in job.record for one in (text, name.variable))
-    ]
-    return scenario, replace(plan, record=tuple(chosen))
+    return scenario, planner.plan(scenario, fmus=job.fmus, isolated=isolated, record=job.record)
 
 
 def ready(
     jobs: Sequence[Job],
     *,
-    once: PlanningCache | None = None,
+    planner: Planner | None = None,
     progress: Callable[[int], None] = lambda done: None,
     group: Callable[[Diagnostic], tuple[Hashable, Diagnostic]] = lambda error: (error, error),
 ) -> list[Job]:
@@ -211,7 +172,7 @@ def ready(
 
     Args:
         jobs: the runs.
-        once: cache of files and FMUs; builds stale FMUs first if its opener does.
+        planner: makes the plans; builds stale FMUs first if its opener does.
         progress: called with the number of jobs planned so far.
         group: returns what an error is about, and how it is reported; only the first error about a thing
             is.
@@ -220,11 +181,11 @@ def ready(
         BuildError: stale FMUs cannot be built.
         ScenarioError: some jobs cannot start; lists each error once.
     """
-    once, found = once or PlanningCache(), []
+    planner, found = planner or Planner(), []
     errors: dict[Hashable, Diagnostic] = {}
     for number, job in enumerate(jobs, start=1):
         try:
-            found.append(replace(job, plan=planned(job, once)[1]))
+            found.append(replace(job, plan=planned(job, planner)[1]))
         except BuildError:
             raise
         except YawbenchError as error:

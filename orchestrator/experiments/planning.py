@@ -11,13 +11,14 @@ from ..errors import Diagnostic, Location, ScenarioError
 from ..metrics.run_metrics import STANDARD, metric, results_to_be, unit_in
 from ..names import SignalName, Target
 from ..plan import Fmu, Instance, Plan, Variable
+from ..planner import Planner
 from ..results.read import Results
 from ..scenario import quantities
 from ..scenario.yaml_lines import dotted
 from ..wiring.context import FACTS
 from .axes import AxisSpec, Level
 from .experiment import RUNS, Case, LoadedExperiment, NamedRun
-from .jobs import Job, MetricRequests, PlanningCache, keyed, ready
+from .jobs import Job, MetricRequests, keyed, ready
 from .judged_schema import MetricReference, MetricSpec, si_number
 
 
@@ -91,7 +92,7 @@ def plan_experiment(
     experiment: LoadedExperiment,
     out: Path,
     *,
-    once: PlanningCache | None = None,
+    planner: Planner | None = None,
     progress: Callable[[int], None] = lambda done: None,
     **of_jobs: Any,
 ) -> PlannedExperiment:
@@ -100,7 +101,7 @@ def plan_experiment(
     Args:
         experiment: as loaded.
         out: its results folder.
-        once: cache of files and FMUs.
+        planner: makes the plans.
         progress: called with the number of cases planned so far.
         of_jobs: see `jobs_of`.
 
@@ -117,7 +118,7 @@ def plan_experiment(
         where = Location(experiment.path, target=f"axes.{axis[0]}")
         return axis, Diagnostic(error.code, str(error), location=where)
 
-    jobs = ready(jobs_of(experiment, out, **of_jobs), once=once, progress=progress, group=about)
+    jobs = ready(jobs_of(experiment, out, **of_jobs), planner=planner, progress=progress, group=about)
     plans = [job.plan for job in jobs if job.plan]
     made_up = [*{tuple(plan.record): results_to_be(plan) for plan in plans}.values()]
     if not experiment.spec.metrics and not any(job.test for job in jobs):

@@ -18,10 +18,11 @@ from ..metrics.run_metrics import MetricValue
 from ..names import OF_RUN, Target
 from ..plan import DEFAULT, Override, Plan
 from ..plan import Value as Given
+from ..planner import Planner
 from .axes import Level, OpenValueSpec, OpenVariantSpec, changes_at, latin_hypercube, levels_of
 from .experiment import RUNS, LoadedExperiment, NamedRun
 from .grids import ranked
-from .jobs import Job, MeasuredRun, PlanningCache, keyed, ready
+from .jobs import Job, MeasuredRun, keyed, ready
 from .judged_schema import Claim, MetricReference
 from .judging import ClaimResult, judge
 from .margins import TIMES, LevelVerdict, OpenValueScan, PointVerdict, Region
@@ -233,7 +234,7 @@ def plan_region(
     planned: PlannedExperiment,
     folder: Path,
     *,
-    once: PlanningCache,
+    planner: Planner,
     progress: Callable[[int], None] = lambda done: None,
 ) -> RegionPlan:
     """Plan the runs for judging all claims over the region; checks only reuse these runs.
@@ -241,7 +242,7 @@ def plan_region(
     Args:
         planned: the experiment, whose file has a region.
         folder: results folder of the experiment.
-        once: cache of files and FMUs.
+        planner: makes the plans.
         progress: called with the number of runs planned so far.
 
     Raises:
@@ -279,7 +280,7 @@ def plan_region(
         return key, Diagnostic(error.code, str(error), location=where)
 
     metrics = metrics_of(runs.experiment)
-    made = [keyed(job, metrics) for job in ready(jobs, once=once, progress=progress, group=about)]
+    made = [keyed(job, metrics) for job in ready(jobs, planner=planner, progress=progress, group=about)]
     known = {
         key: one
         for key, one in asked.items()

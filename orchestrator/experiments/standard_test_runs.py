@@ -81,7 +81,7 @@ def entry_speeds(
         ResultsError: a run did not record a signal that the test needs.
     """
     base = Job("", scenario, execute.folder, (*changes,), **execute.of_jobs)
-    loaded, plan = planned(base, execute.once)
+    loaded, plan = planned(base, execute.planner)
     first = 0.0 if loaded.speed is None else float(convert(str(loaded.speed), "m/s"))
     if first <= 0.0:
         raise ScenarioError(

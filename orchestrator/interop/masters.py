@@ -46,10 +46,9 @@ from ..master.log import Log
 from ..master.master import Master
 from ..names import SignalName
 from ..plan import Override
+from ..planner import Planner
 from ..scenario import ssp_read
-from ..scenario.load import load_scenario
 from ..scenario.ssp_archive import PARAMETER_SET
-from ..wiring.make_plan import make_plan
 
 
 @dataclass(frozen=True)
@@ -102,7 +101,8 @@ def run_own(request: Request) -> Recording:
         YawbenchError: the archive cannot be read, or the run fails.
     """
     jacobi = Override.of("algorithm", "jacobi", "second-opinion")
-    plan = make_plan(load_scenario(Path(request.archive), changes=[jacobi]))
+    planner = Planner()
+    plan = planner.plan(planner.load(Path(request.archive), [jacobi]))
     log, slaves = Log(), dict[str, FmuInstance]()
     plan = replace(plan, record=tuple(SignalName(*column) for column in request.columns))
     rows = np.zeros((request.n_steps + 1, 1 + len(request.columns)))

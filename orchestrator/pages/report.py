@@ -17,7 +17,7 @@ from ..errors import ScenarioError
 from ..experiments.confidence import LEVEL
 from ..experiments.experiment import FIGURES
 from ..experiments.figures import runs_of, title_of
-from ..experiments.jobs import Job, PlanningCache
+from ..experiments.jobs import Job
 from ..experiments.judging import ClaimResult
 from ..experiments.outcome import ExperimentResult
 from ..experiments.schema import FigureSpec
@@ -42,9 +42,10 @@ from ..labels import changed
 from ..messages import counted
 from ..metrics.run_metrics import evaluate, metric
 from ..plan import Plan
+from ..planner import Planner
 from ..results.read import Results
 from ..scenario import catalogue, yaml_lines
-from ..scenario.load import LoadedScenario, load_scenario
+from ..scenario.load import LoadedScenario
 from .diagram import diagrams, systems_of
 from .page_parts import (
     FigureImage,
@@ -147,9 +148,9 @@ def plans_of(findings: ExperimentResult) -> list[tuple[Job, tuple[LoadedScenario
     for job in findings.planned.jobs if findings.planned else ():
         fmus = tuple(unit.fmu.sha256 for unit in job.plan.instances) if job.plan else ()
         jobs.setdefault((job.scenario, fmus) if findings.spec.axes else job.label, job)
-    once = PlanningCache()
+    planner = Planner()
     return [
-        (job, (load_scenario(job.scenario, changes=job.changes, read=once.read), job.plan))
+        (job, (planner.load(job.scenario, job.changes), job.plan))
         for job in jobs.values()
         if job.plan is not None
     ]

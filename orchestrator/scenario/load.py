@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 from ..errors import ScenarioError
 from ..files import reads
@@ -27,6 +28,7 @@ def load_scenario(
     path: Path | str,
     *,
     changes: Sequence[Override] = (),
+    data: dict[str, Any] | None = None,
     read: Callable[..., Document] = yaml_lines.read,
     validate: bool = True,
 ) -> LoadedScenario:
@@ -35,6 +37,7 @@ def load_scenario(
     Args:
         path: the YAML file, or the archive.
         changes: overrides of the file; see `overrides`.
+        data: its content, if there is no such file: messages name `path`.
         read: reads a file, called like `yaml_lines.read`; the returned document is modified.
         validate: False: accept FMUs with invalid model descriptions.
 
@@ -42,7 +45,10 @@ def load_scenario(
         ScenarioError: with all errors of the file, its vehicle file and the overrides.
     """
     archive = Path(path).suffix.lower() == ".ssp"
-    document = _read_archive(Path(path)) if archive else read(Path(path), what="scenario file")
+    if data is not None:
+        document = Document(Path(path), data=data)
+    else:
+        document = _read_archive(Path(path)) if archive else read(Path(path), what="scenario file")
     wanted = changes if isinstance(document.data, dict) else ()
     overrides.apply_vehicle(document, wanted)
     vehicle_document = _read_vehicle(document, read)

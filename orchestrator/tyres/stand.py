@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -21,10 +21,8 @@ from ..master.simulate import simulate_in_memory
 from ..messages import listed
 from ..names import SignalName
 from ..plan import Fmu, InputSeries, Instance, Plan, Value
-from ..scenario import yaml_lines
 from ..scenario.load import load_scenario
 from ..scenario.overrides import is_path
-from ..scenario.yaml_lines import Document
 from ..wiring.make_plan import make_plan
 
 if TYPE_CHECKING:
@@ -145,7 +143,7 @@ def put_on_stand(source: str, *, friction: float, fmus: Path | None, build: bool
         "inputs": {name: friction if name.startswith("friction") else 0.0 for name in inputs},
         **({"tyres": os.path.abspath(source)} if file else {}),
     }
-    return TyreStand(make_plan(load_scenario(place, read=reader_of(data)), opener=opener))
+    return TyreStand(make_plan(load_scenario(place, data=data), opener=opener))
 
 
 def open_given(
@@ -171,15 +169,6 @@ def open_given(
     if missing := [variable for variable in known_by if variable not in found.variables]:
         raise ScenarioError(f"{fmu}: this is no {role}: it has no {listed(missing)}", code="fmu-wrong-kind")
     return found
-
-
-def reader_of(data: dict[str, Any]) -> Callable[..., Document]:
-    """Return a reader for a scenario given as data, and for the files that it names."""
-
-    def read(path: Path, *, what: str) -> Document:
-        return Document(path, data=data) if what == "scenario file" else yaml_lines.read(path, what=what)
-
-    return read
 
 
 def cornering_stiffness(tyres: Instance, loads: Mapping[str, float]) -> dict[str, float]:

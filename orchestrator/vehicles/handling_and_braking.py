@@ -28,15 +28,13 @@ from vocabulary.wheels import WHEELS
 from ..errors import SimulationError, WiringError
 from ..evaluation.steering_tests import gradients
 from ..figures.style import QUIET, ROW, frame, line_style, new_figure
-from ..fmu.opener import Opener
 from ..master.simulate import simulate_in_memory
 from ..plan import Fmu, Plan
+from ..planner import Planner
 from ..results.read import Results
 from ..scenario import yaml_lines
-from ..scenario.load import load_scenario
 from ..scenario.overrides import is_path
-from ..tyres.stand import KNOWN_BY, cornering_stiffness, open_given, reader_of
-from ..wiring.make_plan import make_plan
+from ..tyres.stand import KNOWN_BY, open_given
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,7 +60,7 @@ class TestTrack:
         tyre: likewise; "": the tyre that the file is made for.
         friction: coefficient of the road [1].
         fmus: folder of FMUs given by name; None: the nearest.
-        opener: opens FMUs, and may first build those that are out of date.
+        planner: makes the plans, and may first build FMUs that are out of date.
     """
 
     __test__ = False  # not a pytest class
@@ -72,7 +70,7 @@ class TestTrack:
     tyre: str = ""
     friction: float = 1.0
     fmus: Path | None = None
-    opener: Opener = field(default_factory=Opener)
+    planner: Planner = field(default_factory=Planner)
 
     @cached_property
     def place(self) -> Path:
@@ -83,7 +81,7 @@ class TestTrack:
     def plant_fmu(self) -> Fmu:
         """The plant's FMU."""
         return open_given(
-            self.plant, "plant", PLANT_KNOWN_BY, place=self.place, fmus=self.fmus, opener=self.opener
+            self.plant, "plant", PLANT_KNOWN_BY, place=self.place, fmus=self.fmus, opener=self.planner.opener
         )
 
     def has(self, variable: str) -> bool:
@@ -112,7 +110,7 @@ class TestTrack:
         Raises:
             YawbenchError: the file, the plant or the tyres are invalid, or do not fit together.
         """
-        open_given(self.tyres, "tyre", KNOWN_BY, place=self.place, fmus=self.fmus, opener=self.opener)
+        open_given(self.tyres, "tyre", KNOWN_BY, place=self.place, fmus=self.fmus, opener=self.planner.opener)
         units: dict[str, Any] = {"driver": dict(driver)}
         plant: dict[str, Any] = {"fmu": self._named(self.plant), "parameters": of_plant}
         inputs: dict[str, Any] = {}
@@ -136,8 +134,7 @@ class TestTrack:
             "inputs": inputs,
             "connections": connections,
         }
-        loaded = load_scenario(self.place, read=reader_of(data))
-        return make_plan(loaded, fmus=self.fmus, opener=self.opener, measure=cornering_stiffness)
+        return self.planner.plan(self.planner.load(self.place, data=data), fmus=self.fmus)
 
     def drive(self, driver: Mapping[str, Any], speed: float, stop_time: float, **of_plant: float) -> Results:
         """Return the results of a run; arguments as of `plan`.
@@ -151,7 +148,7 @@ class TestTrack:
         return os.path.abspath(fmu) if is_path(fmu) else fmu
 
 
-def fitting_plant(vehicle: Path, tyre: str, fmus: Path | None, opener: Opener) -> str:
+def fitting_plant(vehicle: Path, tyre: str, fmus: Path | None, planner: Planner) -> str:
     """Return the plant with the most degrees of freedom that a file has the values for.
 
     Raises:
@@ -160,11 +157,11 @@ def fitting_plant(vehicle: Path, tyre: str, fmus: Path | None, opener: Opener) -
     steer = {"fmu": "driver_sine"}
     for plant in PLANTS[:-1]:
         try:
-            TestTrack(vehicle, plant, tyre, fmus=fmus, opener=opener).plan(steer, 20.0, STEP)
+            TestTrack(vehicle, plant, tyre, fmus=fmus, planner=planner).plan(steer, 20.0, STEP)
         except WiringError:
             continue
         return plant
-    TestTrack(vehicle, PLANTS[-1], tyre, fmus=fmus, opener=opener).plan(steer, 20.0, STEP)
+    TestTrack(vehicle, PLANTS[-1], tyre, fmus=fmus, planner=planner).plan(steer, 20.0, STEP)
     return PLANTS[-1]
 
 

@@ -28,7 +28,8 @@ STAGES = (
     {"metrics"},
     {"master"},  # hands rows to a recorder of `results`, has `metrics` look at them
     {"figures"},
-    {"tyres"},  # measures for `experiments` what units want to know of their tyres
+    {"tyres"},  # measures for plans what units want to know of their tyres
+    {"planner"},
     {"evaluation"},
     {"experiments"},
     {"interop", "vehicles"},

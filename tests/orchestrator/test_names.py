@@ -137,7 +137,7 @@ def test_parameters_columns_and_wires_have_such_names(folder):
     assert {"plant.body.w", "plant.x[1]", "plant.frame[1].y"} <= set(results)
     assert results.find("body.w") is results["plant.body.w"]
     assert abs(results["plant.body.w"]).max() > 0
-    assert [change["place"] for change in results.run["changes"]] == ["driver.a[1]", "driver.wave.f"]
+    assert [one.place for one in results.record.changes] == ["driver.a[1]", "driver.wave.f"]
 
 
 def test_a_scenario_records_them_by_name_and_by_pattern(folder):

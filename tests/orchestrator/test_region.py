@@ -13,12 +13,13 @@ from lxml import html
 from orchestrator.cli import main
 from orchestrator.errors import Diagnostic, ScenarioError
 from orchestrator.experiments.experiment import load_experiment
-from orchestrator.experiments.jobs import MeasuredRun, PlanningCache
+from orchestrator.experiments.jobs import MeasuredRun
 from orchestrator.experiments.margins import Gap, PointVerdict, Region, margin
 from orchestrator.experiments.outcome import ExperimentResult
 from orchestrator.experiments.planning import plan_experiment
 from orchestrator.experiments.region import judge_region, plan_region, runs_of
 from orchestrator.experiments.verdict_tables import region_words, verdict
+from orchestrator.planner import Planner
 from tests.checkout import ROOT
 
 SCENARIO = """
@@ -73,8 +74,8 @@ def judged(tmp_path, fmus):
         (tmp_path / "sine.yaml").write_text(SCENARIO)
         (tmp_path / "double.yaml").write_text(SCENARIO.replace("0.05", "0.1"))
         experiment = load_experiment(tmp_path / "study.yaml")
-        once = PlanningCache()
-        planned = plan_experiment(experiment, tmp_path / "o", fmus=fmus, once=once)
+        planner = Planner()
+        planned = plan_experiment(experiment, tmp_path / "o", fmus=fmus, planner=planner)
 
         def record(job) -> MeasuredRun:
             own = job.plan.instances[0].parameters
@@ -86,7 +87,7 @@ def judged(tmp_path, fmus):
             )
 
         findings = ExperimentResult(experiment, [record(job) for job in planned.jobs], {}, planned)
-        plan = plan_region(planned, tmp_path / "o", once=once)
+        plan = plan_region(planned, tmp_path / "o", planner=planner)
         records = {job.key: record(job) for job in plan.jobs.values()}
         regions = judge_region(plan, findings, records)
         return ExperimentResult(experiment, findings.records, {}, planned, regions)

@@ -13,8 +13,8 @@ from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coef
 from orchestrator.cli import main
 from orchestrator.commands.check import show
 from orchestrator.errors import WiringError, warnings_in
-from orchestrator.fmu.opener import Opener
 from orchestrator.master.simulate import simulate_in_memory
+from orchestrator.planner import Planner
 from orchestrator.scenario.load import load_scenario
 from orchestrator.tyres.stand import cornering_stiffness
 from orchestrator.vehicles import handling_and_braking as handling
@@ -172,13 +172,13 @@ def test_the_yaw_mode_is_the_pair_that_moves_the_car(rates):
     ],
 )
 def test_a_file_is_driven_on_the_largest_plant_that_it_is_enough_for(fmus, name, plant):
-    assert fitting_plant(file(name), "", fmus, Opener()) == plant
+    assert fitting_plant(file(name), "", fmus, Planner()) == plant
 
 
 def test_a_file_that_is_no_car_says_what_it_lacks(fmus, tmp_path):
     (tmp_path / "no_car.yaml").write_text("parameters: {mass: 1e3, wheelbase: 2.5, cg_to_front_axle: 1.2}")
     with pytest.raises(WiringError, match="gives neither yaw_inertia, track_width nor cg_height nor what"):
-        fitting_plant(tmp_path / "no_car.yaml", "", fmus, Opener())
+        fitting_plant(tmp_path / "no_car.yaml", "", fmus, Planner())
 
 
 def test_the_command_prints_tables_and_draws_one_figure(fmus, tmp_path, capsys):

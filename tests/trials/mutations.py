@@ -132,7 +132,7 @@ def case_of(group: str, number: int, seed: int, box: Sandbox) -> tuple[Path, str
     return file, kind_of(text.decode())
 
 
-def load(file: Path, kind: str, once: Any) -> None:
+def load(file: Path, kind: str, planner: Any) -> None:
     """Read a file as the commands do, up to where runs would begin."""
     from orchestrator.experiments.experiment import load_experiment
     from orchestrator.metrics.run_metrics import evaluate_all
@@ -141,7 +141,7 @@ def load(file: Path, kind: str, once: Any) -> None:
     from orchestrator.scenario.load import load_scenario
     from orchestrator.wiring.make_plan import make_plan
 
-    fmus, opener = ROOT / "fmus", once.opener
+    fmus, opener = ROOT / "fmus", planner.opener
     if kind == "study":
         load_experiment(file)
     elif kind == "sweep":
@@ -195,17 +195,19 @@ def work(pipe: Connection, group: str, numbers: list[int], seed: int, folder: Pa
     os.environ.update(box.environment())
     tempfile.tempdir = None
     os.chdir(box.work)
-    from orchestrator.experiments.jobs import PlanningCache
+    from orchestrator.planner import Planner
 
-    once = PlanningCache()
+    planner = Planner()
     sys.unraisablehook = lambda _: None  # as in the command line
-    outcome_of(lambda: load(box.scenarios / "fnn_sideslip" / "25mps.yaml", "scenario", once))  # modules, FMUs
+    outcome_of(
+        lambda: load(box.scenarios / "fnn_sideslip" / "25mps.yaml", "scenario", planner)
+    )  # modules, FMUs
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     for number in numbers:
         file, kind = case_of(group, number, seed, box)
         pipe.send(("begin", number, kind))
         began = time.process_time()
-        outcome, said = outcome_of(lambda: load(file, kind, once))  # noqa: B023
+        outcome, said = outcome_of(lambda: load(file, kind, planner))  # noqa: B023
         if (took := time.process_time() - began) > limit:
             outcome, said = "HANG", f"{took:.1f} s: {said}"
         pipe.send(("end", number, (outcome, said)))

@@ -340,11 +340,10 @@ def b_fault(kind: str, name: str, **more: Any) -> Callable[[Any], Any]:
 
 def plan_all(axes: Mapping[Any, Any]) -> None:
     """Make an experiment, and plan its runs as `run` does before it makes them."""
-    from orchestrator.experiments.jobs import PlanningCache
     from orchestrator.experiments.planning import plan_experiment
 
     made = yb.experiment(BENCH.base, axes, metrics="peak(sideslip)")
-    plan_experiment(made.design, made.base.path.parent, once=PlanningCache(**made.base._opening()))
+    plan_experiment(made.design, made.base.path.parent, planner=made.base._planner())
 
 
 def rank(name: str, **more: Any) -> Callable[[Any], Any]:

@@ -1,0 +1,92 @@
+"""From a scenario file and overrides to the plan of a run: for commands, experiments and the library."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from .errors import ScenarioError
+from .fmu.opener import Opener
+from .messages import hint
+from .names import match
+from .plan import Override, Plan
+from .scenario import yaml_lines
+from .scenario.load import LoadedScenario, load_scenario
+from .scenario.yaml_lines import Document
+from .tyres.stand import cornering_stiffness
+from .wiring.make_plan import make_plan
+
+
+class Planner:
+    """Makes plans; reads every file and opens every FMU once for all of them.
+
+    Args:
+        options: of the `Opener`.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        self._documents: dict[Path, Document] = {}
+        self.opener = Opener(**options)
+
+    def load(
+        self,
+        path: Path,
+        changes: Sequence[Override] = (),
+        *,
+        data: dict[str, Any] | None = None,
+        validate: bool = True,
+    ) -> LoadedScenario:
+        """Load a scenario; arguments as of `load_scenario`.
+
+        Raises:
+            ScenarioError: with all problems of its files and the overrides.
+        """
+        return load_scenario(path, changes=changes, data=data, read=self._read, validate=validate)
+
+    def plan(
+        self,
+        scenario: LoadedScenario,
+        *,
+        fmus: Path | None = None,
+        isolated: bool = False,
+        record: Sequence[str] = (),
+    ) -> Plan:
+        """Return the plan of a scenario.
+
+        Args:
+            scenario: as loaded.
+            fmus: folder of the FMUs given by name; None: the nearest `fmus/` that contains any.
+            isolated: whether each instance will run in its own process.
+            record: signals that are recorded, or patterns of names; default: those the scenario records.
+
+        Raises:
+            YawbenchError: an FMU is missing or cannot be built, the instances cannot be connected, or a
+                signal is not recorded.
+        """
+        plan = make_plan(
+            scenario, fmus=fmus, opener=self.opener, isolated=isolated, measure=cornering_stiffness
+        )
+        if not record:
+            return plan
+        recorded = {str(name): name for name in plan.record}
+        unknown = [name for name in record if name not in recorded and "*" not in name]
+        if unknown:
+            guess = hint(unknown[0], recorded, lead="recorded are")
+            raise ScenarioError(
+                f"{scenario.path}: {unknown[0]!r} is not recorded{guess}", code="signal-unknown"
+            )
+        chosen = [
+            name
+            for text, name in recorded.items()
+            if any(match(pattern, one) is not None for pattern in record for one in (text, name.variable))
+        ]
+        return replace(plan, record=tuple(chosen))
+
+    def _read(self, path: Path, *, what: str) -> Document:
+        """Return a fresh copy of what `yaml_lines.read` returns."""
+        if path not in self._documents:
+            self._documents[path] = yaml_lines.read(path, what=what)
+        return copy.deepcopy(self._documents[path])
