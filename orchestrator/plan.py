@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -162,11 +163,51 @@ class InputSeries:
         return self.at(np.array([time])).tolist()[0]
 
 
-class ValueOrigin(NamedTuple):
+PAPER, LITERATURE, CHOSEN, ERRATUM, VARIED, NEUTRAL = (
+    "paper", "literature", "chosen", "erratum", "varied", "neutral",
+)  # fmt: skip
+"""Kinds of sources: `VARIED` is an override, `NEUTRAL` has no source of its own."""
+
+
+@dataclass(frozen=True)
+class ValueSource:
+    """The source of a value: its kind, the source in words, and the file and line that give the value."""
+
+    kind: str
+    says: str = ""
+    file: str = ""
+    line: int = 0
+
+    @classmethod
+    def parse(cls, text: str, otherwise: str = "") -> ValueSource:
+        """Return the source with this text, whose first word may be the kind, which else is `otherwise`."""
+        return cls(_first_word(text) or otherwise or (LITERATURE if text else NEUTRAL), text)
+
+    @classmethod
+    def of_comment(cls, comment: str, file_source: str) -> ValueSource:
+        """Return the source in a comment, "its unit, remarks; source", in a file with a source."""
+        parts = comment.split("; ")
+        begin = next((i for i, part in enumerate(parts) if _first_word(part)), 0)
+        return cls.parse("; ".join(parts[begin:]), _first_word(file_source) or NEUTRAL)
+
+
+def _first_word(source: str) -> str:
+    word = re.match(r"[a-z]*", source)
+    return word[0] if word and word[0] in (PAPER, ERRATUM, CHOSEN) else ""
+
+
+@dataclass(frozen=True)
+class ValueOrigin:
     """Where the value of a parameter or constant comes from."""
 
     kind: str  # "default" (of the FMU), "vehicle", "derived", "scenario", "file", or an override's: "--set"
     detail: str = ""  # the formula of a derived value, the name of a file
+    source: ValueSource | None = field(default=None, compare=False)  # None: the FMU's default
+
+    @classmethod
+    def derived(cls, formula: str) -> ValueOrigin:
+        """Return the origin of a value that follows from others."""
+        return cls("derived", formula, ValueSource(NEUTRAL, f"derived: {formula}"))
 
     def __str__(self) -> str:
         if self.kind == "file":

@@ -1,14 +1,12 @@
-"""The provenance of parameter values: from a paper, an erratum, our choice, or the study itself.
+"""The parameters on a page, with the provenance of their values as the run recorded it.
 
-It is read from where the value is: from the parameter's source in its FMU, from the comment next to it in the
-scenario or vehicle file, or from that file's `source`. The first word of a source is its kind: `paper`,
-`erratum`, `chosen`; anything else is literature.
+The source of a value is decided when a run is planned, and is part of its record; the source of a default is
+in the FMU that has it.
 """
 
 from __future__ import annotations
 
-import linecache
-import re
+import os
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -17,27 +15,20 @@ from pathlib import Path
 from vocabulary.wheels import WHEEL_NAMES, WHEELS
 
 from ..messages import fold
-from ..names import SignalName
-from ..plan import DEFAULT, Instance, Plan, Value, Variable
-from ..scenario.load import LoadedScenario
-from ..scenario.yaml_lines import Document, KeyPath
-from ..wiring.context import facts_of
-
-PAPER, LITERATURE, CHOSEN, ERRATUM, VARIED, NEUTRAL = (
-    "paper", "literature", "chosen", "erratum", "varied", "neutral",
-)  # fmt: skip
-_COMMENT = re.compile(r"#\s*(.*?)\s*$")
-
-
-@dataclass(frozen=True)
-class ValueSource:
-    """The provenance of a value: its kind, and the text of the source."""
-
-    kind: str
-    says: str
-
-
-VARIED_BY_STUDY = ValueSource(VARIED, "set by the study")
+from ..plan import (
+    CHOSEN,
+    ERRATUM,
+    LITERATURE,
+    NEUTRAL,
+    PAPER,
+    VARIED,
+    Instance,
+    Plan,
+    Value,
+    ValueSource,
+    Variable,
+)
+from ..results.run_record import NOT_RECORDED, RunRecord
 
 
 @dataclass
@@ -67,10 +58,15 @@ class ParameterGroup:
     parameters: dict[str, PageParameter] = field(default_factory=dict)
 
     def note(
-        self, name: str, variable: Variable, meaning: str, value: str, origin: ValueSource | None
+        self,
+        name: str,
+        variable: Variable,
+        meaning: str,
+        value: str,
+        origin: ValueSource | None,
+        default: ValueSource,
     ) -> None:
-        """Add the value of a variable in one run, and its provenance; None: the FMU's default."""
-        default = origin_of(variable.source)
+        """Add the value of a variable in one run, and its source; None: that of the FMU's default."""
         row = self.parameters.setdefault(name, PageParameter(name, meaning, variable.unit or "", default))
         row.values[value] = None
         if origin is not None and origin.kind == VARIED:
@@ -79,65 +75,63 @@ class ParameterGroup:
             row.given = row.given or origin
 
 
-def origin_of(source: str, otherwise: str = "") -> ValueSource:
-    """Parse a source; `otherwise` is the kind of a source that names none."""
-    return ValueSource(_first_word(source) or otherwise or (LITERATURE if source else NEUTRAL), source)
+def groups_of(runs: Sequence[tuple[RunRecord, Plan]]) -> list[ParameterGroup]:
+    """Return all parameters of runs: the vehicles', those of each instance's FMUs, constants.
 
-
-def _first_word(source: str) -> str:
-    word = re.match(r"[a-z]*", source)
-    return word[0] if word and word[0] in (PAPER, ERRATUM, CHOSEN) else ""
-
-
-def said_in(comment: str, file: str) -> ValueSource:
-    """Parse a comment, "its unit, remarks; source", in a file with a source."""
-    parts = comment.split("; ")
-    begin = next((i for i, part in enumerate(parts) if _first_word(part)), 0)
-    return origin_of("; ".join(parts[begin:]), _first_word(file) or NEUTRAL)
-
-
-def groups_of(runs: Sequence[tuple[LoadedScenario, Plan]]) -> list[ParameterGroup]:
-    """Return all parameters of the runs: the vehicles', those of each instance's FMUs, constants."""
+    Args:
+        runs: the record of each run, and its plan, whose FMUs describe the variables.
+    """
     vehicles: dict[str, ParameterGroup] = {}
     units: dict[tuple[str, str], ParameterGroup] = {}
     constants = ParameterGroup("Constant inputs", "no unit gives them")
     order: dict[str, None] = {}
-    linecache.checkcache()
-    for scenario, plan in runs:
-        by_name = {unit.name: unit for unit in plan.instances}
-        for name in [name for name in scenario.units if name in by_name]:
+    for record, plan in runs:
+        by_name = {unit.name: unit for unit in plan.instances if unit.name in record.fmus}
+        given = record.scenario.get("units", {})
+        for name in [name for name in given if name in by_name]:
             order[name] = None
-            unit = by_name[name]
+            unit, fmu = by_name[name], record.fmus[name]
             own = units.setdefault(
-                (name, unit.fmu.name), ParameterGroup(f"{name}: {unit.fmu.name}", unit.fmu.description)
+                (name, fmu.name), ParameterGroup(f"{name}: {fmu.name}", unit.fmu.description)
             )
+            values = fmu.defaults | fmu.parameters
+            own_names = given[name].get("parameters", {})
+            of_vehicle = record.scenario.get("vehicle_parameters", {}).keys() - own_names
             for variable in unit.fmu.of("parameter"):
-                from_vehicle = (
-                    variable.name in scenario.vehicle_file.parameters
-                    and variable.name not in scenario.units[name].parameters
-                )
-                value = unit.parameter(variable.name)
-                group, origin = own, _origin(scenario, unit, variable.name)
-                if from_vehicle:
-                    file = scenario.vehicle_document.path
-                    group = vehicles.setdefault(str(file), _vehicle_group(scenario, file))
-                group.note(variable.name, variable, variable.description, text_of(value), origin)
-            _constants(constants, scenario, unit)
+                if variable.name not in values:
+                    continue
+                group = _vehicle_group(vehicles, record) if variable.name in of_vehicle else own
+                default = _default(record, unit, variable)
+                value, source = text_of(values[variable.name]), record.source(name, variable.name)
+                group.note(variable.name, variable, variable.description, value, source, default)
+            _constants(constants, record, unit)
     ordered = [units[key] for name in order for key in units if key[0] == name]
     return [group for group in (*vehicles.values(), *ordered, constants) if group.parameters]
 
 
-def _vehicle_group(scenario: LoadedScenario, file: Path) -> ParameterGroup:
-    vehicle = scenario.vehicle_file
-    return ParameterGroup(f"The car: {vehicle.title or file.stem}", f"{file.name}; {vehicle.source}")
+def _default(record: RunRecord, unit: Instance, variable: Variable) -> ValueSource:
+    """Return the source of a variable's default, which only the FMU of the run knows."""
+    same = record.fmus[unit.name].sha256 == unit.fmu.sha256
+    return ValueSource.parse(variable.source) if same else NOT_RECORDED
 
 
-def _constants(group: ParameterGroup, scenario: LoadedScenario, unit: Instance) -> None:
+def _vehicle_group(vehicles: dict[str, ParameterGroup], record: RunRecord) -> ParameterGroup:
+    """Return the group of a run's vehicle file."""
+    told = record.scenario
+    file = Path(os.path.normpath(Path(record.scenario_file).parent / str(told.get("vehicle", ""))))
+    title, source = told.get("vehicle_title") or file.stem, told.get("vehicle_source", NOT_RECORDED.says)
+    return vehicles.setdefault(str(file), ParameterGroup(f"The car: {title}", f"{file.name}; {source}"))
+
+
+def _constants(group: ParameterGroup, record: RunRecord, unit: Instance) -> None:
     """Add the constants of an instance; four equal wheels become one name that ends with `*`."""
+    fmu = record.fmus[unit.name]
+    texts = {name: text_of(value) for name, value in fmu.constants.items()}
+    texts |= {name: f"{series.file}: {series.column}" for name, series in fmu.series.items()}
     alike: dict[str, list[str]] = {}
-    for name, value in unit.constants.items():
-        series = unit.series.get(name)
-        alike.setdefault(f"{series.file}: {series.column}" if series else text_of(value), []).append(name)
+    for name in dict.fromkeys((*unit.constants, *unit.fmu.variables)):
+        if name in texts:
+            alike.setdefault(texts[name], []).append(name)
     for value_text, names in alike.items():
         for name in fold(names):
             first = name.removesuffix("*") + WHEELS[0] if name.endswith("*") else name
@@ -145,74 +139,8 @@ def _constants(group: ParameterGroup, scenario: LoadedScenario, unit: Instance) 
             meaning = variable.description
             if first != name:
                 meaning = meaning.removesuffix(f", {WHEEL_NAMES[WHEELS[0]]}")
-            origin = _origin_of_constant(scenario, unit, first)
-            group.note(f"{unit.name}.{name}", variable, meaning, value_text, origin)
-
-
-def _origin_of_constant(scenario: LoadedScenario, unit: Instance, name: str) -> ValueSource | None:
-    """Return the provenance of an input's constant, None if it is the FMU's own."""
-    origin = unit.origins.get(name, DEFAULT)
-    if origin.kind == "scenario":
-        given = [
-            pattern
-            for pattern in scenario.inputs
-            if SignalName.parse_input(pattern, scenario.units).matches(unit.name, name)
-        ]
-        exact = max(given, key=lambda one: ("*" not in one, "." in one), default=None)
-        return _provenance_in_scenario(scenario, ("inputs", exact) if exact else (_fact(scenario, name),))
-    return None if origin == DEFAULT else VARIED_BY_STUDY
-
-
-def _origin(scenario: LoadedScenario, unit: Instance, name: str) -> ValueSource | None:
-    """Return the provenance of a value from the scenario or vehicle file, None if it is the FMU's own."""
-    origin = unit.origins.get(name, DEFAULT)
-    if origin == DEFAULT:
-        return None
-    if origin.kind == "vehicle":
-        measure = unit.fmu.variables[name].unit or "1"
-        words = _comment_on_line(scenario.vehicle_document, ("parameters", name))
-        words = re.sub(rf"^{re.escape(measure)}(?![\w/.])[,;]?\s*", "", words)
-        return said_in(words, scenario.vehicle_file.source)
-    if origin.kind == "derived":
-        return ValueSource(NEUTRAL, str(origin))
-    if origin.kind == "scenario":
-        own = name in scenario.units[unit.name].parameters
-        key: KeyPath = ("units", unit.name, "parameters", name) if own else (_fact(scenario, name),)
-        return _provenance_in_scenario(scenario, key)
-    if origin.kind == "file":
-        of_tyres = any(origin.detail == file.path.name for file in scenario.tyre_files.values())
-        return ValueSource(LITERATURE, f"{'tyre property ' if of_tyres else ''}file {origin}")
-    return VARIED_BY_STUDY
-
-
-def _provenance_in_scenario(scenario: LoadedScenario, key: KeyPath) -> ValueSource:
-    """Return the provenance in the scenario's comment on a value, next to it or above its instance."""
-    words = _comment_on_line(scenario.document, key)
-    if key[0] == "units":
-        words = words or _comment_above(scenario.document, key[:2])
-    return said_in(words or scenario.source, scenario.source)
-
-
-def _fact(scenario: LoadedScenario, name: str) -> str:
-    """Return the scenario's global value that sets a parameter or an input, "" if none does."""
-    facts = (fact for fact, one, _, _ in facts_of(scenario) if name in (*one.inputs, *one.parameters))
-    return next(facts, "")
-
-
-def _comment_on_line(document: Document, key: KeyPath) -> str:
-    """Return the comment on the line of a value, "" if there is none."""
-    match = _COMMENT.search(linecache.getline(str(document.path), document.lines.get(key, 0)))
-    return match[1] if match else ""
-
-
-def _comment_above(document: Document, key: KeyPath) -> str:
-    """Return the comment lines right above a key."""
-    number = document.lines.get(key, 1) - 1
-    found: list[str] = []
-    while (line := linecache.getline(str(document.path), number).strip()).startswith("#"):
-        found.insert(0, line.lstrip("# "))
-        number -= 1
-    return " ".join(found)
+            source, default = record.source(unit.name, first), _default(record, unit, variable)
+            group.note(f"{unit.name}.{name}", variable, meaning, value_text, source, default)
 
 
 def text_of(value: Value | None) -> str:

@@ -8,12 +8,13 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
 from markupsafe import Markup
 
-from ..errors import ScenarioError
+from ..errors import ResultsError, ScenarioError
 from ..experiments.confidence import LEVEL
 from ..experiments.experiment import FIGURES
 from ..experiments.figures import runs_of, title_of
@@ -44,6 +45,7 @@ from ..metrics.run_metrics import evaluate, metric
 from ..plan import Plan
 from ..planner import Planner
 from ..results.read import Results
+from ..results.run_record import RunRecord, load_record, run_record
 from ..scenario import catalogue, yaml_lines
 from ..scenario.load import LoadedScenario
 from .diagram import diagrams, systems_of
@@ -82,7 +84,7 @@ def chapter(
     experiment, spec = findings.experiment, findings.spec
     name = anchor(f"{experiment.path.absolute().parent.name} {experiment.path.stem}")
     plans = plans_of(findings)
-    groups = groups_of([plan for _, plan in plans])
+    groups = groups_of([(record_of(job, plan), plan) for job, (_, plan) in plans])
     made = runs_made(findings)
     failed = findings.failed
     return {
@@ -140,6 +142,14 @@ def repeats(findings: ExperimentResult) -> str:
         f"Numbers with ± are means over {number} repeats ({said}), with {sure}. "
         "A verdict whose threshold lies inside reads undecided."
     )
+
+
+def record_of(job: Job, plan: Plan) -> RunRecord:
+    """Return the record of a job's run, or as it would be if the run has kept none."""
+    try:
+        return load_record(job.out)
+    except ResultsError:
+        return run_record(plan, status="", started=datetime.now(timezone.utc))
 
 
 def plans_of(findings: ExperimentResult) -> list[tuple[Job, tuple[LoadedScenario, Plan]]]:

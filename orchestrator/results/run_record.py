@@ -27,7 +27,7 @@ from ..errors import Diagnostic, Location, ResultsError, Severity, warnings_in
 from ..files import read_bytes, reading, reason
 from ..fmu.native import runs_as
 from ..messages import short
-from ..plan import DEFAULT, InputSeries, Instance, Override, Plan, Wire
+from ..plan import DEFAULT, NEUTRAL, InputSeries, Instance, Override, Plan, ValueSource, Wire
 from .folder import FAILED, LARGEST, RUN_FILE, refuse_dead
 from .formats import FILES, RESULTS_FILE
 
@@ -53,6 +53,15 @@ class SeriesRecord(_Part):
     sha256: str = ""
 
 
+class SourceRecord(_Part):
+    """The source of a value: its kind, the source in words, and the file and line that give the value."""
+
+    kind: str = NEUTRAL  # see `plan.ValueSource`
+    says: str = ""
+    file: str = ""
+    line: int = 0
+
+
 class FmuRecord(_Part):
     """An FMU with the values that its instance had in the run."""
 
@@ -68,7 +77,8 @@ class FmuRecord(_Part):
     step_size: float | None = None
     tolerance: float | None = None
     parameters: dict[str, Any] = {}
-    origins: dict[str, str] = {}
+    origins: dict[str, str] = {}  # of the values that are not the FMU's
+    sources: dict[str, NonNegativeInt] = {}  # of the same: index into `RunRecord.sources`
     defaults: dict[str, Any] = {}  # the FMU's values of parameters that the run does not set
     constants: dict[str, Any] = {}
     series: dict[str, SeriesRecord] = {}
@@ -205,6 +215,10 @@ class OverrideRecord(_Part):
     origin: str = ""
 
 
+NOT_RECORDED = ValueSource(NEUTRAL, "source not recorded")
+"""Of values in records of earlier versions."""
+
+
 class RunRecord(_Part):
     """The record of a run."""
 
@@ -225,6 +239,7 @@ class RunRecord(_Part):
     units: dict[str, str | None] = {}  # units of time and of the columns
     texts: list[str] | None = None  # columns that hold text
     fmus: dict[str, FmuRecord] = {}
+    sources: list[SourceRecord] = []  # of values of parameters and constants, each once
     changes: list[OverrideRecord] = []
     connections: list[ConnectionRecord] = []
     faults: list[FaultRecord] = []
@@ -251,6 +266,17 @@ class RunRecord(_Part):
             with contextlib.suppress(ValueError):  # the record was edited
                 found.append(Override.of(one.place, one.value, one.origin))
         return tuple(found)
+
+    def source(self, instance: str, name: str) -> ValueSource | None:
+        """Return the source of a parameter's or constant's value, None for the FMU's default."""
+        fmu = self.fmus[instance]
+        if name not in fmu.origins and "origins" in fmu.model_fields_set:
+            return None
+        index = fmu.sources.get(name, len(self.sources))
+        if index >= len(self.sources):
+            return NOT_RECORDED
+        one = self.sources[index]
+        return ValueSource(one.kind, one.says, one.file, one.line)
 
     @property
     def all_diagnostics(self) -> tuple[Diagnostic, ...]:
@@ -306,6 +332,7 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> RunRecord:
         started: when the run began, with a time zone.
     """
     units = {unit.name: unit for unit in plan.instances}
+    sources: dict[ValueSource, int] = {}
     record = RunRecord(
         status=status,
         error=None,
@@ -321,7 +348,8 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> RunRecord:
         evaluation_order=list(units),
         units=units_of(plan),
         texts=[f"{u}.{name}" for u, name in plan.record if units[u].fmu.variables[name].type == "String"],
-        fmus={name: _fmu(unit, plan) for name, unit in units.items()},
+        fmus={name: _fmu(unit, plan, sources) for name, unit in units.items()},
+        sources=[SourceRecord(**asdict(source)) for source in sources],
         changes=[OverrideRecord.model_validate(change.record) for change in plan.changes],
         connections=connections_of(plan),
         scenario=plan.scenario,
@@ -366,8 +394,10 @@ def _connection(wire: Wire, units: Mapping[str, Instance]) -> ConnectionRecord:
     return ends
 
 
-def _fmu(unit: Instance, plan: Plan) -> FmuRecord:
+def _fmu(unit: Instance, plan: Plan, sources: dict[ValueSource, int]) -> FmuRecord:
+    """Return the record of an instance; adds the sources of its values, with their index."""
     fmu = unit.fmu
+    given = {name: origin.source for name, origin in unit.origins.items() if origin.source is not None}
     record = FmuRecord(
         name=fmu.name,
         role=unit.role,
@@ -382,6 +412,7 @@ def _fmu(unit: Instance, plan: Plan) -> FmuRecord:
         tolerance=unit.tolerance or fmu.tolerance,
         parameters=dict(unit.parameters),
         origins={name: str(origin) for name, origin in unit.origins.items() if origin != DEFAULT},
+        sources={name: sources.setdefault(source, len(sources)) for name, source in given.items()},
         defaults={v.name: v.start for v in fmu.of("parameter") if v.name not in unit.parameters},
         constants={name: value for name, value in unit.constants.items() if name not in unit.series},
     )

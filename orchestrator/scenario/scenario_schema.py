@@ -287,7 +287,9 @@ class LoadedScenario(ScenarioSpec):
         if self.start_time:
             times["start_time"] = float(self.start_time)
         tyres = {axle: file.record() for axle, file in self.tyre_files.items()}
+        vehicle = {"vehicle_title": self.vehicle_file.title, "vehicle_source": self.vehicle_file.source}
         return {
             **{"file": str(self.path), **data, **times, "vehicle_parameters": self.vehicle_file.parameters},
+            **(vehicle if self.vehicle else {}),
             **({"tyre_files": tyres} if tyres else {}),
         }

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -37,6 +39,10 @@ class Document:
     """Key of an overridden value -> its override."""
     errors: dict[Diagnostic, None] = field(default_factory=dict)
     """An ordered set."""
+    comments: dict[int, str] = field(default_factory=dict)
+    """Line -> the comment at its end."""
+    comment_lines: dict[int, str] = field(default_factory=dict)
+    """Line that holds nothing else -> its comment."""
     notes: list[Diagnostic] = field(default_factory=list)
     """Diagnostics that are not errors, for the plan."""
 
@@ -70,6 +76,19 @@ class Document:
             if key[:n] in self.overrides:
                 return self.overrides[key[:n]]
         return None
+
+    def comment(self, key: KeyPath) -> str:
+        """Return the comment on the line of a key, "" if there is none."""
+        return self.comments.get(self.lines.get(key, 0), "")
+
+    def comment_above(self, key: KeyPath) -> str:
+        """Return the comment lines right above a key."""
+        line = self.lines.get(key, 0) - 1
+        found: list[str] = []
+        while line in self.comment_lines:
+            found.insert(0, self.comment_lines[line])
+            line -= 1
+        return " ".join(found)
 
     def remove(self, key: KeyPath, i: int) -> None:
         """Remove item `i` of the list at `key`; the lines and overrides of later items move with them."""
@@ -128,14 +147,33 @@ def read(path: Path, *, what: str) -> Document:
         return fail(None, f"cannot read this {what}: it is nested too deeply", "file-too-large")
     document.lines[()] = 1
     if node is not None:
+        reader = _Reader(document, constructor)
         try:
-            document.data = _Reader(document, constructor).value(node, (), ())
+            document.data = reader.value(node, (), ())
+            _keep_comments(document, text, reader.scalars)
         except _TooMuchError as error:
             document.report(error.key[:1], str(error), "file-too-large")
             return document
     if document.data is None and not document.errors:
         return fail(None, f"this {what} is empty", "file-empty")
     return document
+
+
+_COMMENT = re.compile(r"(?:^|(?<=[ \t]))#")
+
+
+def _keep_comments(document: Document, text: str, scalars: Sequence[tuple[int, int]]) -> None:
+    """Add the comments of a text to a document; `scalars`: begin and end of those that have a #."""
+    inside = {at for begin, end in scalars for at in range(begin, end)}
+    begin = 0
+    for number, line in enumerate(text.split("\n"), start=1):
+        for found in _COMMENT.finditer(line):
+            if begin + found.start() not in inside:
+                alone = not line[: found.start()].strip()
+                of_kind = document.comment_lines if alone else document.comments
+                of_kind[number] = line[found.end() :].strip()
+                break
+        begin += len(line) + 1
 
 
 def scalar(text: str) -> Any:
@@ -223,6 +261,8 @@ class _Reader:
     constructor: Any
     seen: set[int] = field(default_factory=set)
     repeated: int = 0
+    scalars: list[tuple[int, int]] = field(default_factory=list)
+    """Begin and end in the text of the scalars that have a #."""
 
     def value(self, node: Any, key: KeyPath, above: tuple[int, ...]) -> Any:
         if id(node) in above:
@@ -245,6 +285,7 @@ class _Reader:
         return (self._sequence if node.id == "sequence" else self._mapping)(node, key, above)
 
     def _scalar(self, node: Any, kind: str, key: KeyPath) -> Any:
+        self._note_place(node)
         if kind not in ("int", "float", "bool", "null"):
             self._check_text(node.value, key)
             return node.value
@@ -257,6 +298,10 @@ class _Reader:
             self.document.report(key, f"{short(node.value)} is too large a whole number")
             return None
         return value
+
+    def _note_place(self, node: Any) -> None:
+        if "#" in node.value:
+            self.scalars.append((node.start_mark.index, node.end_mark.index))
 
     def _check_text(self, text: str, key: KeyPath) -> None:
         if (character := unprintable(text)) is not None:
@@ -292,6 +337,7 @@ class _Reader:
                 add(Diagnostic("key-duplicate", sentence, location=Location(path, line)))
                 continue
             own[name.value] = lines[below] = line
+            self._note_place(name)
             self._check_text(name.value, below)
             mapping[name.value] = self.value(item, below, above)
         return mapping

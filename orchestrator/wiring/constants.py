@@ -83,7 +83,7 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
             except ValueError as error:
                 system.report(key, f"{error}, for {instance}.{name}", code_of(error))
             level = CHANGED_INPUTS if fact_changed and scenario.document.override(key) else INPUTS
-            given_by = origin(scenario.document, key)
+            given_by = origin(scenario, key)
             one = Constant(value, key, given_by, of_unit, "*" not in pattern, level)
             other = found.setdefault((instance, name), one)
             if other.rank < one.rank:
@@ -122,7 +122,7 @@ def _of_facts(system: WiringContext) -> Iterator[tuple[Input, Constant]]:
             except ValueError as error:
                 refused.setdefault(str(error), []).append(f"{instance}.{one}")
             level = CHANGED_FACT if changed else FACT
-            yield (instance, one), Constant(value, key, origin(scenario.document, key), False, True, level)
+            yield (instance, one), Constant(value, key, origin(scenario, key), False, True, level)
         everywhere = [len(inputs) for inputs in refused.values()] == [len(takers)]
         for sentence, inputs in refused.items():
             for one in inputs:

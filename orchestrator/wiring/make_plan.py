@@ -223,7 +223,7 @@ def _take_from_tyres(
     stiffness = dict(zip(STIFFNESSES, (2.0 * found[wheel] for wheel in WHEELS[::2]), strict=True))
     for instance, names in distributed.lacking.items():
         formula = {
-            name: ValueOrigin("derived", f"two of {tyres[0].fmu.name} at {load:.6g} N each")
+            name: ValueOrigin.derived(f"two of {tyres[0].fmu.name} at {load:.6g} N each")
             for name, load in zip(STIFFNESSES, loads, strict=True)
         }
         instances[instance] = replace(

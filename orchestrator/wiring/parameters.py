@@ -7,8 +7,10 @@ quantities of the car must get all of them, because the defaults of its FMU desc
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from vocabulary.friction_table import table_of
@@ -19,8 +21,9 @@ from ..errors import code_of
 from ..files import TEXT, read_bytes
 from ..fmu.binary import integer_limits
 from ..messages import closest, fold, hint, listed, short
-from ..plan import DEFAULT, Fmu, Value, ValueOrigin, Variable
+from ..plan import DEFAULT, LITERATURE, VARIED, Fmu, Value, ValueOrigin, ValueSource, Variable
 from ..scenario import quantities
+from ..scenario.load import LoadedScenario
 from ..scenario.scenario_schema import TextSpec
 from ..scenario.yaml_lines import Document, KeyPath
 from .context import WiringContext, facts_of
@@ -96,10 +99,30 @@ def _other(variable: Variable, given: Value) -> Value:
     return given
 
 
-def origin(document: Document, key: KeyPath) -> ValueOrigin:
-    """Return where the value at a key comes from: the kind of file, or the override."""
+def origin(scenario: LoadedScenario, key: KeyPath, *, unit: str | None = None) -> ValueOrigin:
+    """Return where the value at a key comes from: the override, or the file with the comment on the value.
+
+    A comment above an instance is on all its values; without any, the source is that of the file.
+
+    Args:
+        scenario: of the file; keys that begin with "parameters" are of its vehicle file.
+        key: of the value.
+        unit: measurement unit of a vehicle file's value, with which its comment may begin.
+    """
+    of_vehicle = key[0] == "parameters"
+    document = scenario.vehicle_document if of_vehicle else scenario.document
     change = document.override(key)
-    return ValueOrigin(change.origin if change else "vehicle" if key[0] == "parameters" else "scenario")
+    if change is not None:
+        return ValueOrigin(change.origin, source=ValueSource(VARIED, change.origin))
+    comment, of_file = document.comment(key), scenario.source
+    if of_vehicle:
+        of_file = scenario.vehicle_file.source
+        comment = re.sub(rf"^{re.escape(unit or '1')}(?![\w/.])[,;]?\s*", "", comment)
+    else:
+        comment = comment or (document.comment_above(key[:2]) if key[0] == "units" else "") or of_file
+    source = ValueSource.of_comment(comment, of_file)
+    placed = replace(source, file=str(document.path), line=document.lines.get(key, 0))
+    return ValueOrigin("vehicle" if of_vehicle else "scenario", source=placed)
 
 
 class Parameters:
@@ -144,7 +167,8 @@ class Parameters:
             self._given[unit][name] = value_for(self._fmus[unit].variables[name], raw)
         except ValueError as error:
             self._system.report(key, f"{says}{error}", code_of(error), document)
-        self._system.origins[unit][name] = came or origin(document, key)
+        unit_of = self._fmus[unit].variables[name].unit
+        self._system.origins[unit][name] = came or origin(self._scenario, key, unit=unit_of)
 
     def _takers(self, name: str) -> list[str]:
         return [unit for unit, fmu in self._fmus.items() if _is_parameter(fmu, name)]
@@ -170,7 +194,8 @@ class Parameters:
             except ValueError as error:
                 self._system.report(key, f"{raw.file}: {error}", "file-unreadable")
             else:
-                self._give(unit, name, text, place, ValueOrigin("file", raw.file), f"{raw.file}: ")
+                came = _from_file(raw.file, f"file {raw.file}", place)
+                self._give(unit, name, text, place, came, f"{raw.file}: ")
 
     def _from_facts(self) -> set[tuple[str, str]]:
         """Set the parameters that facts reach; return the (instance, parameter) of overridden facts."""
@@ -197,7 +222,7 @@ class Parameters:
         """Set the coefficients of tyre property files in every instance that declares them."""
         place = self._scenario.tyres_place
         for axle, file in self._scenario.tyre_files.items():
-            came = ValueOrigin("file", file.path.name)
+            came = _from_file(file.path.name, f"tyre property file {file.path.name}", place)
             for name, value in file.values.items():
                 for unit in self._takers(f"{name}_{axle}"):
                     self._give(unit, f"{name}_{axle}", value, place, came, f"{file.path}: {name.upper()}: ")
@@ -245,7 +270,7 @@ class Parameters:
         self.car = car_of(numbers)
         for name, formula in self.car.formulas.items():
             for unit in self._takers(name):
-                came, says = ValueOrigin("derived", formula), f"{unit}.{name} = {formula}: "
+                came, says = ValueOrigin.derived(formula), f"{unit}.{name} = {formula}: "
                 self._give(unit, name, self.car.values[name], (document, ("parameters",)), came, says)
         for name in idle:
             if name not in self.car.used and document.override(("parameters", name)):
@@ -283,6 +308,14 @@ class Parameters:
             return False
         before = self._system.replaced(unit)
         return before is None or _is_parameter(before, name)
+
+
+def _from_file(name: str, says: str, place: tuple[Document, KeyPath]) -> ValueOrigin:
+    """Return the origin of values in a file that is named at a place."""
+    document, key = place
+    return ValueOrigin(
+        "file", name, ValueSource(LITERATURE, says, str(document.path), document.lines.get(key, 0))
+    )
 
 
 def _text_of(path: Path) -> str:

@@ -10,6 +10,7 @@ from ruamel.yaml import YAML
 from components.cars.sprung_car import FourteenDofParameters, ride_of
 from orchestrator.commands.check import show
 from orchestrator.errors import WiringError
+from orchestrator.plan import ValueOrigin
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.derivations import DERIVATIONS, car_of, contradictions
 from orchestrator.wiring.make_plan import make_plan
@@ -208,7 +209,7 @@ def test_a_reference_is_told_what_the_tyres_have_at_their_static_loads(plan):
     load = 0.5 * 1830.0 * G * 1.65 / 3.05
     assert asked == {"fl": pytest.approx(load), "rl": pytest.approx(0.5 * 1830.0 * G - load)}
     formula = f"two of tyre_x at {load:.6g} N each"
-    assert reference.origins["cornering_stiffness_front"] == ("derived", formula)
+    assert reference.origins["cornering_stiffness_front"] == ValueOrigin("derived", formula)
 
 
 def test_a_reference_without_tyres_to_ask_is_refused(plan):

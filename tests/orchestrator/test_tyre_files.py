@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +16,11 @@ from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.planning import plan_experiment
 from orchestrator.interop.ssp_write import write_ssp
 from orchestrator.names import Target
+from orchestrator.pages.provenance import groups_of
 from orchestrator.results.folder import default_folder
 from orchestrator.results.freshness import key_of
 from orchestrator.results.read import load_results
+from orchestrator.results.run_record import run_record
 from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.overrides import changes_of, read_changes
 from orchestrator.wiring.make_plan import make_plan
@@ -249,10 +252,9 @@ def test_aligning_moments_come_by_a_connection_and_camber_with_the_plants_roll(t
 
 
 def test_the_origin_of_a_coefficient_on_a_page_is_its_file(folder, fmus):
-    from orchestrator.pages.provenance import groups_of
-
     loaded = load_scenario(scenario(folder))
-    groups = groups_of([(loaded, make_plan(loaded, fmus=fmus))])
+    plan = make_plan(loaded, fmus=fmus)
+    groups = groups_of([(run_record(plan, status="", started=datetime.now()), plan)])
     (of_tyre,) = (group for group in groups if group.title.startswith("tyre:"))
     row = of_tyre.parameters["pky1_front"]
     assert row.given is not None

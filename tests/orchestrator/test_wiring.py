@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from orchestrator.errors import Diagnostic, Location, ModelDescriptionError, WiringError, YawbenchError
-from orchestrator.plan import Instance, Override, Plan, Wire
+from orchestrator.plan import Instance, Override, Plan, ValueOrigin, Wire
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
@@ -927,7 +927,7 @@ def test_a_parameter_that_is_text_can_come_from_a_file(folder):
 
     made = unit(plan(with_road("patches: {file: sub/patches.txt}")), "road")
     assert made.parameters["patches"] == "y > 0\nx < 5 # Größe\n"
-    assert made.origins["patches"] == ("file", "sub/patches.txt")
+    assert made.origins["patches"] == ValueOrigin("file", "sub/patches.txt")
     for given, sentence in (
         ("patches: {file: none.txt}", "none.txt: no such file or directory"),
         ("patches: {file: sub}", "sub: is a directory"),

@@ -92,3 +92,15 @@ def test_a_line_that_names_the_version_of_yaml_is_read(document):
 def test_very_many_brackets_are_refused_before_they_are_scanned(document):
     (sentence,) = sentences(document("a:\n  " + "[" * 100_000))
     assert golden(sentence)
+
+
+def test_comments_are_kept_by_their_line_and_a_number_sign_in_a_text_is_none(document):
+    made = document(
+        "# first\n#  above\na: {b: 'x # y', c: z#1}  # beside: d # e\n\n"
+        "'k # l': |  \n  # text\n  more\nm: 1 #last"
+    )
+    assert made.comments == {3: "beside: d # e", 8: "last"}
+    assert made.comment_lines == {1: "first", 2: "above"}
+    assert made.comment(("a", "b")) == "beside: d # e"
+    assert (made.comment_above(("a",)), made.comment_above(("m",))) == ("first above", "")
+    assert made.comment(("k # l",)) == made.comment(("nothing",)) == ""

@@ -9,25 +9,17 @@ from pathlib import Path
 import pytest
 
 from orchestrator.checksums import checksum
-from orchestrator.pages.provenance import (
-    CHOSEN,
-    ERRATUM,
-    LITERATURE,
-    NEUTRAL,
-    PAPER,
-    ValueSource,
-    groups_of,
-    origin_of,
-    said_in,
-)
+from orchestrator.pages.provenance import groups_of
+from orchestrator.plan import CHOSEN, ERRATUM, LITERATURE, NEUTRAL, PAPER, ValueSource
 from orchestrator.results.freshness import key_of, staleness
-from orchestrator.results.run_record import run_record
+from orchestrator.results.run_record import RunRecord, run_record
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.fmu_copies import put_fmus
 from tests.orchestrator.recorded import record_text
 
+NOW = datetime.now(timezone.utc)
 UNITS = ("driver_sine", "reference_steady_state", "controller_fnn")
 SCENARIO = """
 title: Half a car
@@ -70,7 +62,7 @@ parameters:
     ],
 )
 def test_the_first_word_of_a_source_says_what_it_is(source, kind):
-    assert origin_of(source) == ValueSource(kind, source)
+    assert ValueSource.parse(source) == ValueSource(kind, source)
 
 
 @pytest.mark.parametrize(
@@ -86,7 +78,7 @@ def test_the_first_word_of_a_source_says_what_it_is(source, kind):
     ],
 )
 def test_a_comment_says_where_a_value_comes_from_or_else_its_file_does(comment, origin):
-    assert said_in(comment, "paper A, table 1, unless a line says otherwise") == origin
+    assert ValueSource.of_comment(comment, "paper A, table 1, unless a line says otherwise") == origin
 
 
 @pytest.fixture(scope="module")
@@ -106,8 +98,14 @@ def planned(folder, *settings, **values):
 
 @pytest.fixture(scope="module")
 def groups(folder):
-    runs = [planned(folder), planned(folder, "driver.amplitude=0.1")]
-    return {group.title: group.parameters for group in groups_of(runs)}
+    plans = [planned(folder)[1], planned(folder, "driver.amplitude=0.1")[1]]
+    return {group.title: group.parameters for group in groups_in(*plans)}
+
+
+def groups_in(*plans):
+    """Return the groups of the runs of plans, from their records as they are read back."""
+    records = [json.loads(run_record(one, status="", started=NOW).to_json()) for one in plans]
+    return groups_of([*zip(map(RunRecord.model_validate, records), plans, strict=True)])
 
 
 def test_the_car_s_parameters_come_from_its_file_line_by_line(groups):
@@ -162,7 +160,7 @@ def test_constants_are_shown_with_their_own_values_and_meanings(folder):
     scenario = load_scenario(folder / "split.yaml")
     (found,) = [
         group.parameters
-        for group in groups_of([(scenario, make_plan(scenario, fmus=folder / "fmus"))])
+        for group in groups_in(make_plan(scenario, fmus=folder / "fmus"))
         if group.title == "Constant inputs"
     ]
     values = {name: next(iter(one.values)) for name, one in found.items()}
@@ -182,7 +180,7 @@ def recorded(plan, folder: Path, **changes) -> Path:
     """Write what a run of a plan leaves, with changes."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "results.csv").write_text("time,x\n0.0,1.0\n0.1,2.0\n")
-    record = run_record(plan, status="completed", started=datetime.now(timezone.utc))
+    record = run_record(plan, status="completed", started=NOW)
     record = record.content() | {"key": key_of(plan), "rows": 2, "checksum": checksum(folder / "results.csv")}
     (folder / "run.json").write_text(record_text(record | changes))
     return folder
@@ -249,6 +247,37 @@ def test_a_value_given_by_a_fact_has_the_source_that_stands_beside_the_fact(fold
     text = text.replace("inputs:", "friction: 0.7   # chosen: wet\ninputs:")
     (folder / "fact.yaml").write_text(text)
     scenario = load_scenario(folder / "fact.yaml")
-    groups = groups_of([(scenario, make_plan(scenario, fmus=folder / "fmus"))])
+    groups = groups_in(make_plan(scenario, fmus=folder / "fmus"))
     origin = groups[-1].parameters["reference.friction"].origin
     assert (origin.kind, origin.says) == (CHOSEN, "chosen: wet")
+
+
+def test_the_record_names_file_and_line_of_every_given_value(folder):
+    _, plan = planned(folder, "driver.amplitude=0.1")
+    record = run_record(plan, status="", started=NOW)
+    lines = {file: (folder / file).read_text().splitlines() for file in ("half.yaml", "car.yaml")}
+    for name, fmu in record.fmus.items():
+        assert fmu.sources.keys() == fmu.origins.keys()
+        for parameter, kind in fmu.origins.items():
+            source = record.source(name, parameter)
+            if kind in ("vehicle", "scenario"):
+                line = lines[Path(source.file).name][source.line - 1]
+                assert parameter in line or line.lstrip().startswith(f"{name}:"), (name, parameter)
+            else:
+                assert (source.file, source.line) == ("", 0)
+    assert record.source("driver", "amplitude") == ValueSource("varied", "--set")
+    assert record.source("controller", "learning_rate") is None
+
+
+def test_older_records_say_that_the_source_is_not_recorded(folder):
+    _, plan = planned(folder)
+    old = json.loads(run_record(plan, status="", started=NOW).to_json())
+    del old["sources"], old["scenario"]["vehicle_title"], old["scenario"]["vehicle_source"]
+    for fmu in old["fmus"].values():
+        del fmu["sources"]
+    groups = {one.title: one for one in groups_of([(RunRecord.model_validate(old), plan)])}
+    assert groups["The car: car"].below == "car.yaml; source not recorded"
+    driver = groups["driver: driver_sine"].parameters
+    assert driver["frequency"].origin == ValueSource(NEUTRAL, "source not recorded")
+    learning = groups["controller: controller_fnn"].parameters["learning_rate"]
+    assert learning.origin == ValueSource(PAPER, "paper A, equation (35)")  # as its FMU says

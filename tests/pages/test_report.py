@@ -227,6 +227,25 @@ def test_stale_results_are_shown_as_such_where_nothing_may_run(report, half):
     assert "amplitude/0.02: driver: other constants" in tree.text_content()
 
 
+def test_an_edit_after_the_run_does_not_change_where_the_page_says_that_values_come_from(report, half):
+    file = half / "half.yaml"
+    file.write_text(SCENARIO.replace("friction: 0.7}", "friction: 0.7}  # paper A, table 1"))
+    report()
+
+    def parameters():
+        tree = html.fromstring(Path("results/half/study/report.html").read_text(encoding="utf-8"))
+        return texts(tree, "table.parameters tr")
+
+    before = parameters()
+    assert any("paper A, table 1" in row for row in before)
+    file.write_text(SCENARIO.replace("friction: 0.7}", "friction: 0.7}  # chosen: a guess"))
+    assert report()[0] == 0
+    assert parameters() == before
+    file.write_text(SCENARIO.replace("velocity_x: 20, friction: 0.7", "velocity_x: 25, friction: 0.5"))
+    assert report("--no-run")[0] == 0
+    assert parameters() == before
+
+
 def test_a_run_that_failed_is_named_and_its_claims_are_not_judged(report, half):
     report()
     record = json.loads(Path("results/half/study/amplitude/0.05/run.json").read_text())
