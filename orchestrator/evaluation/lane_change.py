@@ -13,7 +13,7 @@ leaves the score to the user; the highest clean entry speed is the common one.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -75,41 +75,6 @@ def evaluate_lane_change(judged: Evaluation, trace: Trace) -> None:
 
 
 CLEAN = "clean"
-
-
-def highest_clean(
-    clean: Callable[[float], bool], *, first: float, step: float, resolution: float, least: float, most: float
-) -> tuple[float | None, float | None]:
-    """Search the highest clean value; return it and the lowest value above it that is not clean.
-
-    None stands for a value that does not exist within the bounds.
-
-    Args:
-        clean: called once per value.
-        first, step: where the search starts, and its step.
-        resolution: largest difference between the two values at the end.
-        least, most: bounds of the values.
-
-    >>> highest_clean(lambda v: v < 61.3, first=50, step=10, resolution=1, least=10, most=200)
-    (61.25, 61.875)
-    """
-    good = bad = None
-    value = min(max(first, least), most)
-    while good is None or bad is None:
-        if clean(value):
-            good, nearer = value, min(value + step, most)
-        else:
-            bad, nearer = value, max(value - step, least)
-        if nearer == value:
-            return good, bad
-        value = nearer
-    while bad - good > resolution:
-        value = 0.5 * (good + bad)
-        if clean(value):
-            good = value
-        else:
-            bad = value
-    return good, bad
 
 
 def judge_entry_speeds(runs: Sequence[Evaluation]) -> TestSeries:

@@ -3,18 +3,19 @@
 An experiment may depend on the results of earlier ones in the same folder: the next generation of a search,
 amplitudes that are multiples of a measured angle, the next step of a bisection. Such a sequence is a function
 that builds experiments and hands each to an `Executor`. It is deterministic and finished runs are in the
-journal, so calling it again resumes it where it was interrupted.
+journal, so calling it again resumes it where it was interrupted. Searches for limits run `side_by_side`: a
+round of all of them is one experiment.
 """
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from .. import checksums
 from ..errors import ResultsError, ScenarioError
@@ -37,6 +38,7 @@ from .journal import Journal
 from .outcome import Each, ExperimentResult, judge_records, judge_results
 from .planning import PlannedExperiment, plan_experiment
 
+T = TypeVar("T")
 Runner = Callable[[Sequence[Job], OnOutcome], object]
 """Executes jobs and reports each outcome; see `runner_of`."""
 
@@ -158,6 +160,67 @@ class Executor(AbstractContextManager["Executor"]):
         left = list(jobs) if again else left_to_do(jobs, journal.records if journal else {})
         with self.display.running(title, jobs, left, journaled=journaled) as told:
             return finish(left, journal, runner=self.runner, told=told) if self.runner and left else []
+
+
+Search = Generator[float, bool, T]
+"""A search for a limit: yields values, is sent whether each of them passes, and returns what it has found."""
+
+
+def highest_passing(
+    *, first: float, step: float, resolution: float, least: float, most: float
+) -> Search[tuple[float | None, float | None]]:
+    """Search the highest value that passes, in steps and halves; return it and the lowest failing one above.
+
+    None stands for a value that does not exist within the bounds.
+
+    Args:
+        first, step: where the search starts, and its step.
+        resolution: largest difference between the two values at the end.
+        least, most: bounds of the values.
+
+    >>> search = highest_passing(first=50, step=10, resolution=1, least=10, most=200)
+    >>> side_by_side({"x": search}, lambda values: {name: v < 61.3 for name, v in values.items()})
+    {'x': (61.25, 61.875)}
+    """
+    good = bad = None
+    value = min(max(first, least), most)
+    while good is None or bad is None:
+        if (yield value):
+            good, nearer = value, min(value + step, most)
+        else:
+            bad, nearer = value, max(value - step, least)
+        if nearer == value:
+            return good, bad
+        value = nearer
+    while bad - good > resolution:
+        value = 0.5 * (good + bad)
+        if (yield value):
+            good = value
+        else:
+            bad = value
+    return good, bad
+
+
+def side_by_side(
+    searches: Mapping[str, Search[T]], passing: Callable[[dict[str, float]], Mapping[str, bool]]
+) -> dict[str, T]:
+    """Run searches in rounds, so that the runs of a round are one experiment; return what each has found.
+
+    Args:
+        searches: name -> search.
+        passing: maps the value that each search asks for in a round to whether it passes.
+    """
+    found: dict[str, T] = {}
+    answers: Mapping[str, bool | None] = dict.fromkeys(searches)  # None starts a generator
+    while answers:
+        values = {}
+        for name, answer in answers.items():
+            try:
+                values[name] = searches[name].send(answer)  # type: ignore[arg-type]
+            except StopIteration as end:  # noqa: PERF203 - this is how a generator returns
+                found[name] = end.value
+        answers = passing(values) if values else {}
+    return found
 
 
 def left_to_do(jobs: Sequence[Job], records: Mapping[str, MeasuredRun]) -> list[Job]:

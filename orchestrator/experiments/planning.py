@@ -120,7 +120,7 @@ def plan_experiment(
 
     jobs = ready(jobs_of(experiment, out, **of_jobs), planner=planner, progress=progress, group=about)
     plans = [job.plan for job in jobs if job.plan]
-    made_up = [*{tuple(plan.record): results_to_be(plan) for plan in plans}.values()]
+    made_up = list(map(results_to_be, {tuple(plan.record): plan for plan in plans}.values()))
     if not experiment.spec.metrics and not any(job.test for job in jobs):
         found = {
             name: MetricSpec.model_validate({"metric": name})

@@ -9,14 +9,14 @@ from pathlib import Path
 
 from ..errors import ScenarioError
 from ..evaluation.judgement import Evaluation, TestSeries
-from ..evaluation.lane_change import evaluate_lane_change, highest_clean, is_clean, judge_entry_speeds
+from ..evaluation.lane_change import evaluate_lane_change, is_clean, judge_entry_speeds
 from ..evaluation.sine_with_dwell import amplitudes
 from ..evaluation.trace import Trace, trace_of
 from ..names import Target
 from ..plan import Override, Plan
 from ..results.read import load_results
 from ..scenario.quantities import convert
-from .execution import Executor
+from .execution import Executor, highest_passing, side_by_side
 from .experiment import NamedRun
 from .jobs import Job, planned
 
@@ -103,7 +103,8 @@ def entry_speeds(
         judged.append(evaluate_lane_change(driven[-1]))
         return is_clean(judged[-1])
 
-    highest_clean(clean, first=first, step=STEP, resolution=RESOLUTION, least=LEAST, most=MOST)
+    search = highest_passing(first=first, step=STEP, resolution=RESOLUTION, least=LEAST, most=MOST)
+    side_by_side({"": search}, lambda speeds: {name: clean(speed) for name, speed in speeds.items()})
     return driven, judge_entry_speeds(judged)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from orchestrator.errors import ScenarioError
 from orchestrator.experiments.axes import DesignAxisSpec, Level, axis_of_levels
-from orchestrator.experiments.execution import Executor
+from orchestrator.experiments.execution import Executor, highest_passing, side_by_side
 from orchestrator.experiments.experiment import NamedRun, experiment_of
 from orchestrator.experiments.jobs import Outcome, run_job
 from orchestrator.plan import Override
@@ -27,26 +27,24 @@ def named_runs(folder):
     return [NamedRun(name, name, name, folder / "gyro.yaml", (change,)) for name, change in given.items()]
 
 
-def bisected(folder, execute, limit, width):
-    """Return run -> gain, to a width, from which on the last value is above a limit."""
+def bisected(folder, execute, limit, resolution):
+    """Return run -> highest gain with a last value below a limit, and the lowest above, in rounds."""
     runs = named_runs(folder)
-    brackets = dict.fromkeys(RATES, (0.0, 1.0))
-    while any(high - low > width for low, high in brackets.values()):
-        tried = {name: Level(0.5 * (low + high), "") for name, (low, high) in brackets.items()}
-        axis = axis_of_levels(GAIN, tried.values())
+
+    def below(gains):
+        design = [(name, (Level(gain, f"{gain:g}"),)) for name, gain in gains.items()]
         found = execute(
             experiment_of(
-                folder / "bisection.yaml", runs, title="bisection", axes={"gain": axis},
-                design=[(name, (level,)) for name, level in tried.items()],
+                folder / "bisection.yaml", runs, title="bisection", design=design,
+                axes={"gain": axis_of_levels(GAIN, [level for _, (level,) in design])},
                 metrics={"last": {"metric": "final(sensor.yaw_rate)"}},
             ),
             keep=False,
         )  # fmt: skip
-        for case in found.experiment.cases:
-            (low, high), gain = brackets[case.run.name], float(case.point[0].value)
-            above = found.value(case, "last").number > limit
-            brackets[case.run.name] = (low, gain) if above else (gain, high)
-    return {name: high for name, (_, high) in brackets.items()}
+        return {case.run.name: found.value(case, "last").number < limit for case in found.experiment.cases}
+
+    bounds = {"first": 0.5, "step": 0.25, "resolution": resolution, "least": 0.0, "most": 1.0}
+    return side_by_side({name: highest_passing(**bounds) for name in RATES}, below)
 
 
 @pytest.fixture
@@ -66,10 +64,11 @@ def test_a_bisection_of_several_runs_resumes_with_what_is_in_the_journal(executo
     execute, made = executor()
     with execute:
         found = bisected(tmp_path, execute, 0.7, 1 / 8)
-    assert found == {"slow": 0.75, "fast": 0.375}  # 0.7 and 0.35 rounded up to eighths
+    assert found == {"slow": (0.625, 0.75), "fast": (0.25, 0.375)}  # about 0.7 and 0.35
     assert len(made) == len(RATES) * 3
     with executor()[0] as execute:
-        assert bisected(tmp_path, execute, 0.7, 1 / 16) == {"slow": 0.75, "fast": 0.375}
+        found = bisected(tmp_path, execute, 0.7, 1 / 16)
+    assert found == {"slow": (0.6875, 0.75), "fast": (0.3125, 0.375)}
     assert len(made) == len(RATES) * 4  # one more halving
 
 
@@ -109,3 +108,27 @@ def test_signals_are_recorded_by_patterns_of_their_names(executor, tmp_path):
         )
         with pytest.raises(ScenarioError):
             replace(execute, of_jobs={**execute.of_jobs, "record": ("yaw_rate",)}).plans([run])
+
+
+def found_by(passing, **bounds):
+    search = highest_passing(**bounds)
+    return side_by_side({"x": search}, lambda values: {name: passing(v) for name, v in values.items()})["x"]
+
+
+@pytest.mark.parametrize("edge", [47.3, 60.0, 61.26, 83.0])
+def test_the_highest_passing_value_is_found_to_the_resolution_from_either_side(edge):
+    asked = []
+
+    def passing(v):
+        asked.append(v)
+        return v < edge
+
+    good, bad = found_by(passing, first=60.0, step=10.0, resolution=0.5, least=10.0, most=250.0)
+    assert good < edge <= bad <= good + 0.5
+    assert len(asked) == len(set(asked)) < 12
+
+
+def test_a_search_where_all_or_no_values_pass_ends_at_the_bounds():
+    bounds = {"first": 60.0, "step": 10.0, "resolution": 0.5, "least": 35.0, "most": 82.0}
+    assert found_by(lambda v: True, **bounds) == (82.0, None)
+    assert found_by(lambda v: False, **bounds) == (None, 35.0)

@@ -14,7 +14,7 @@ import yawbench as yb
 from components.drivers.sine_sweep import SineSweepParameters, sweep
 from orchestrator.evaluation.braking_and_wind import evaluate_turn
 from orchestrator.evaluation.judgement import Evaluation, Verdict
-from orchestrator.evaluation.lane_change import evaluate_lane_change, highest_clean, judge_entry_speeds
+from orchestrator.evaluation.lane_change import evaluate_lane_change, judge_entry_speeds
 from orchestrator.evaluation.steering_tests import evaluate_step, evaluate_sweep, evaluate_understeer
 from orchestrator.evaluation.trace import Trace, trace_of
 from orchestrator.results.read import Results
@@ -187,25 +187,6 @@ def test_a_lane_change_that_touches_a_cone_says_where():
     assert evaluate_lane_change(stopped).verdict is Verdict.NOT_JUDGED
     plain = evaluate_lane_change(Trace("no lanes", t, signals, facts={"track_start": 25.0}))
     assert plain["exit"] == pytest.approx(20.0 - 0.1 * 7.99)
-
-
-@pytest.mark.parametrize("edge", [47.3, 60.0, 61.26, 83.0])
-def test_the_highest_clean_speed_is_found_to_the_resolution_from_either_side(edge):
-    asked = []
-
-    def clean(v):
-        asked.append(v)
-        return v < edge
-
-    good, bad = highest_clean(clean, first=60.0, step=10.0, resolution=0.5, least=10.0, most=250.0)
-    assert good < edge <= bad <= good + 0.5
-    assert len(asked) == len(set(asked)) < 12
-
-
-def test_what_is_always_clean_or_never_ends_at_the_bounds():
-    bounds = {"first": 60.0, "step": 10.0, "resolution": 0.5, "least": 35.0, "most": 82.0}
-    assert highest_clean(lambda v: True, **bounds) == (82.0, None)
-    assert highest_clean(lambda v: False, **bounds) == (None, 35.0)
 
 
 def test_a_series_counts_no_clean_run_above_one_that_was_not():
