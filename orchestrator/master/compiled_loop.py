@@ -174,16 +174,22 @@ class CompiledLoop:
             rows: one per point, all at the same distance in memory.
             cycle: the programs repeat after this number of points.
             programs: phase of the cycle -> the operations of a step, whose `data` describe them.
+
+        Raises:
+            ValueError: `rows` are too few, or not at the same distance.
         """
         for phase in [phase for phase, (made_of, _) in self._programs.items() if phase not in programs]:
             del self._programs[phase]
         addresses = [self._address(k % cycle, programs[k % cycle]) for k in points[:cycle]]
         self._table = np.resize(np.array(addresses, np.uint64), len(points))
         self._rows = rows
-        run, first = self._run, _address_of(rows[0])
+        run, n = self._run, len(points)
+        ends = [_address_of(row) for row in (*rows[: min(n, 2)], *rows[n - 1 : n])]
+        first, second, last = ends[0], ends[-2], ends[-1]
+        if len(rows) < n or last - first != (second - first) * (n - 1):
+            raise ValueError(f"{n} rows at the same distance are needed")
         run.programs, run.first, run.k, run.at = _address_of(self._table), points[0], points[0], -1
-        run.rows = first
-        run.stride = (_address_of(rows[1]) - first) // rows[0].itemsize if len(points) > 1 else 0
+        run.rows, run.stride = first, (second - first) // rows[0].itemsize
 
     def _address(self, phase: int, operations: Sequence[Any]) -> int:
         """Return the address of a program as plain data."""

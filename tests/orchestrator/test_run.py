@@ -314,7 +314,9 @@ def run_process(*arguments):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="os.kill ends the process there")
-def test_ctrl_c_ends_a_component_that_never_comes_back(faulty, fmus, tmp_path):
+@pytest.mark.parametrize("loop", ["compiled", "python"])
+def test_ctrl_c_ends_a_component_that_never_comes_back(loop, faulty, fmus, tmp_path, monkeypatch):
+    monkeypatch.setenv("YAWBENCH_LOOP", loop)
     scenario = faulty("os.kill(os.getppid(), signal.SIGINT)\n            while True: pass")
     done = run_process("run", scenario, "--fmus", fmus, "--out", tmp_path / "out")
     assert done.returncode == 130
