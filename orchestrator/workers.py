@@ -63,6 +63,7 @@ class Worker(SupervisedProcess):
         super().__init__(lambda *pipes: start(__name__, *pipes, preload=[__name__, *preload]))
         self.calls = 0
         self.busy = False
+        self.retires = False  # see `retire`
 
     def give(self, number: int, function: Callable[..., Any], arguments: Sequence[Any]) -> None:
         """Have it call a function, importable by name."""
@@ -80,7 +81,7 @@ class Worker(SupervisedProcess):
         """Wait for the answer and return it."""
         died, value, error = "", None, None
         try:
-            value, error = self.hear(REPLY)
+            value, error, self.retires = self.hear(REPLY)
         except ProcessLost as lost:
             died = str(lost)
         self.busy = False
@@ -133,7 +134,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
                 return
             for worker in _answering(busy):
                 finished = worker.finished()
-                if finished.died or worker.calls >= self._lasting:
+                if finished.died or worker.retires or worker.calls >= self._lasting:
                     self._workers.remove(worker)
                     worker.close()
                 yield finished
@@ -206,6 +207,15 @@ def _require_files(needed: int) -> None:
         )
 
 
+_retires = False
+
+
+def retire() -> None:
+    """Have the worker that calls this function be replaced by a fresh process after the current call."""
+    global _retires
+    _retires = True
+
+
 def main(reading: str, writing: str) -> None:
     """Execute calls until the pipe is closed."""
     warnings.filterwarnings("ignore", category=RecordWarning)  # the parent warns
@@ -217,7 +227,7 @@ def main(reading: str, writing: str) -> None:
             answer = function(*arguments), None
         except Exception as error:
             answer = None, _portable(error)
-        channel.send_object(REPLY, answer)
+        channel.send_object(REPLY, (*answer, _retires))
 
 
 def _portable(error: Exception) -> Exception:

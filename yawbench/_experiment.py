@@ -147,8 +147,8 @@ class Experiment:
     def run(self, *, workers: int | None = None, keep: bool = True, progress: bool = False) -> Runs:
         """Make all runs and return what they come to; nothing is written.
 
-        Every run has a process of its own, but for those of plain Python, which follow each other in this
-        one. A run that fails is a row of the table with its reason. Remarks on the runs, if any, are one
+        Runs are made by worker processes, but for those of plain Python, which follow each other in this one.
+        A run that fails is a row of the table with its reason. Remarks on the runs, if any, are one
         `YawbenchWarning`.
 
         Args:

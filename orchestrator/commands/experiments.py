@@ -221,8 +221,8 @@ StudyFile = Annotated[
 def study(context: typer.Context, file: StudyFile, wishes: RunOptions) -> None:
     """Run a study: tables, figures, a verdict per claim.
 
-    Begin with report.html. Without --out, results go to results/<folder of the study>/<its name>. Every
-    run has a process of its own; one that fails is named in the table and takes no other with it. Runs
+    Begin with report.html. Without --out, results go to results/<folder of the study>/<its name>. Runs
+    are made by worker processes; one that fails is named in the table and takes no other with it. Runs
     that have been made already, of the same scenario, FMUs and program, are not made again. If the file
     has a region, claims are also judged over the open values there: how far each verdict carries.
     """
@@ -240,8 +240,8 @@ def sweep(context: typer.Context, file: SweepFile, wishes: RunOptions) -> None:
 
     Its metrics become a table, limits, curves and maps. Without --out, results go to
     results/<folder of the sweep file>/<its name>: report.html; table.csv and table.parquet, one row per
-    run; figures. Every run has a process of its own. An interrupted sweep goes on where it was; nothing
-    that is finished is run again.
+    run; figures. Runs are made by worker processes. An interrupted sweep goes on where it was; nothing that
+    is finished is run again.
     """
     of_files(context, [file], wishes)
 

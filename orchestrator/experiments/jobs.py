@@ -31,7 +31,7 @@ from ..plan import Override, Plan
 from ..planner import Planner
 from ..results.freshness import key_of
 from ..results.read import Results, load_results
-from ..workers import Finished, Pool
+from ..workers import Finished, Pool, retire
 
 if TYPE_CHECKING:
     from ..master.run_loop import OpenInstance
@@ -42,6 +42,8 @@ MANY = 10
 
 TRIES = 2
 """Attempts at a run whose process dies; chosen: a kill from outside rarely happens twice."""
+LASTING = 200
+"""Runs that a worker makes before it is replaced."""
 NEEDED = ("orchestrator.experiments.jobs", "orchestrator.master.simulate", "pyarrow.csv")
 """Modules to preload for runs, because they are slow to import."""
 FOR_TESTS = ("scipy.signal", "orchestrator.evaluation.sine_with_dwell")
@@ -291,9 +293,11 @@ def execute(
     done: Callable[[Outcome], None] = lambda outcome: None,
     run: Callable[[Job], Any] = run_job,
 ) -> list[Outcome]:
-    """Execute all jobs, each in a fresh process, and return their outcomes in order.
+    """Execute all jobs in worker processes and return their outcomes in order.
 
-    A run whose process died is executed again after the others, since the process may have been killed
+    A worker keeps the instances of native FMUs for its next run, until a run fails or it has made `LASTING`;
+    other FMUs are loaded into a copy of it, or it is replaced after their run. A run whose process died is
+    executed again after the others, in a fresh worker that keeps nothing: the process may have been killed
     from outside.
 
     Args:
@@ -316,10 +320,12 @@ def execute(
 
     preload = (*NEEDED, *(FOR_TESTS if any(job.test for job in jobs) else ()))
     left = list(range(len(jobs)))
-    with interrupts(stop, lambda: None), Pool(workers, preload=preload, lasting=1) as pool:
+    with interrupts(stop, lambda: None), Pool(workers, preload=preload, lasting=LASTING) as pool:
         for tries in reversed(range(TRIES)):
             again = []
-            for finished in pool.each(_report_of, [(jobs[number], run) for number in left], look=look):
+            keep = tries == TRIES - 1
+            calls = [(jobs[number], run, keep) for number in left]
+            for finished in pool.each(_report_of, calls, look=look):
                 number = left[finished.number]
                 outcome = _outcome(jobs[number], finished)
                 if outcome.died and tries:
@@ -342,13 +348,24 @@ def _outcome(job: Job, finished: Finished) -> Outcome:
     return Outcome(job, tuple(diagnostics), status, finished.seconds, value, interrupted)
 
 
-def _report_of(job: Job, run: Callable[[Job], Any]) -> tuple[int, list[Diagnostic], Any, bool]:
-    """Execute a job in a worker; return exit status, diagnostics, value, and whether it was interrupted."""
+def _report_of(job: Job, run: Callable[[Job], Any], keep: bool) -> tuple[int, list[Diagnostic], Any, bool]:
+    """Execute a job in a worker; return exit status, diagnostics, value, and whether it was interrupted.
+
+    Args:
+        keep: keep instances for the worker's next run.
+    """
+    from ..master.fmi import keep_instances
+
+    kept = keep_instances() if keep else None
+    report: tuple[int, list[Diagnostic], Any, bool]
     try:
-        return 0, [], run(job), False
+        report = 0, [], run(job), False
     except (YawbenchError, Interrupted) as error:
-        interrupted = isinstance(error, Interrupted)
-        return error.exit_status, error.diagnostics, None, interrupted
+        report = error.exit_status, error.diagnostics, None, isinstance(error, Interrupted)
     except BaseException as error:
         print(printable("".join(traceback.format_exception(error))), file=sys.stderr)
-        return 1, [Diagnostic("internal-error", f"{type(error).__name__}: {error}")], None, False
+        lost = Diagnostic("internal-error", f"{type(error).__name__}: {error}")
+        report = 1, [lost], None, False
+    if kept is None or kept.others or report[0]:
+        retire()
+    return report

@@ -30,6 +30,16 @@ def runs_as(archive: Path) -> str | None:
     return NATIVE if sys.platform == "linux" else "Python: the native library is for Linux"
 
 
+def is_native(directory: Path) -> bool:
+    """Return whether the FMU unpacked in a folder was built here and runs natively in this process."""
+    if sys.platform != "linux" or os.environ.get(WANTED) == "python":
+        return False
+    try:
+        return (directory / REASON).stat().st_size == 0
+    except OSError:
+        return False
+
+
 @lru_cache(maxsize=1024)
 def _reason(archive: str, changed: int) -> str | None:
     try:

@@ -25,7 +25,8 @@ from fmpy.fmi2 import (
 from fmpy.fmi3 import fmi3IntermediateUpdateCallback, fmi3LogMessageCallback
 
 from ..fmu.binary import INTEGERS
-from ..plan import Instance
+from ..fmu.native import is_native
+from ..plan import Instance, Plan
 from .compiled_loop import Kind, OperationData
 from .instance import BoundCall, CtypesInstance, ExperimentSetup, PlainCall, Status
 from .log import DISCARD, OK, WARNING, Log, listen, receive
@@ -228,10 +229,77 @@ SLAVES: dict[int, type[CtypesInstance]] = {2: Fmi2Instance, 3: Fmi3Instance}
 """Major version of FMI -> class of its instances."""
 
 
+class KeptInstances:
+    """Instances that this process keeps between runs: they are reset instead of made anew.
+
+    Only of native FMUs: the gate of their build has shown that after a reset they compute what new ones do.
+    They are known by checksum, folder and name, so an FMU that has changed is opened anew.
+    """
+
+    def __init__(self) -> None:
+        self.process = os.getpid()
+        self.others = False
+        """Whether an FMU of another kind has been loaded into this process, which may have changed it."""
+        self._idle: dict[tuple[str, Path, str], CtypesInstance] = {}
+
+    def take(self, unit: Instance, log: Log, corrupted: set[Path]) -> CtypesInstance | None:
+        """Return an idle instance for a `plan.Instance`; None if there is none."""
+        instance = self._idle.pop(_known_by(unit), None)
+        if instance is not None:
+            instance.renew(log, corrupted)
+        return instance
+
+    def keep(self, unit: Instance, instance: CtypesInstance) -> None:
+        """Keep an instance that is reset; if there are too many, free the one that was idle for longest."""
+        self._idle[_known_by(unit)] = instance
+        if len(self._idle) > MOST_KEPT:
+            self._idle.pop(next(iter(self._idle))).release()
+
+
+MOST_KEPT = 200
+"""Largest number of idle instances; chosen: those of ten times as many variants as a system has instances."""
+_kept: KeptInstances | None = None
+
+
+def _known_by(unit: Instance) -> tuple[str, Path, str]:
+    return unit.fmu.sha256, unit.fmu.directory, unit.name
+
+
+def keep_instances() -> KeptInstances:
+    """Have `open_unit` keep the instances of native FMUs from now on, in this process alone."""
+    global _kept
+    if _kept is None or _kept.process != os.getpid():
+        _kept = KeptInstances()
+    return _kept
+
+
+def protected(plan: Plan) -> bool:
+    """Return whether a run must not load its FMUs into this process, which keeps instances for other runs."""
+    return _keeping() is not None and not all(is_native(unit.fmu.directory) for unit in plan.instances)
+
+
+def keeps(plan: Plan) -> bool:
+    """Return whether this process keeps the instances of a run, all of which are native."""
+    return _keeping() is not None and not protected(plan)
+
+
+def _keeping() -> KeptInstances | None:
+    return _kept if _kept is not None and _kept.process == os.getpid() else None
+
+
 def open_unit(unit: Instance, log: Log, corrupted: set[Path]) -> CtypesInstance:
     """Return the running instance for a `plan.Instance`; arguments and errors as for `CtypesInstance`."""
+    kept = _keeping()
+    if kept is not None and (idle := kept.take(unit, log, corrupted)) is not None:
+        return idle
     state = ProcessState()
     try:
-        return SLAVES[unit.fmu.fmi](unit, log, corrupted)
+        instance = SLAVES[unit.fmu.fmi](unit, log, corrupted)
     finally:
         state.restore(unit.name, log)
+    if kept is not None:
+        if is_native(unit.fmu.directory):
+            instance.keep = functools.partial(kept.keep, unit)
+        else:
+            kept.others = True
+    return instance

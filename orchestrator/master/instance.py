@@ -27,7 +27,7 @@ from ..fmu.binary import CORE, INTEGERS, binary_of, binary_problem
 from ..messages import listed
 from ..plan import Instance, Value, ValueRef
 from .compiled_loop import Kind, OperationData
-from .log import ERROR, FATAL, OK, STATUS, WARNING, Log, known, unlisten
+from .log import ERROR, FATAL, OK, STATUS, WARNING, Log, known, relisten, unlisten
 
 Status = int
 
@@ -141,12 +141,10 @@ class CtypesInstance(FmuInstance, ABC):
         """
         self.name = unit.name
         self._directory = unit.fmu.directory
-        self._corrupted = corrupted
+        self.keep: Callable[[CtypesInstance], None] | None = None
+        """Takes the instance, reset, when it would be freed."""
         self._component: int | None = None
-        self._may_terminate = False
-        self._freed = False
-        self._worst = OK
-        self._log = log
+        self._begin(log, corrupted)
         self._listener = 0
         self._library = self._load(unit)
         if missing := [name for name in CORE[self.version] if not self._has(name)]:
@@ -168,6 +166,18 @@ class CtypesInstance(FmuInstance, ABC):
                 time=0.0,
                 code="fmu-not-loadable",
             )
+
+    def _begin(self, log: Log, corrupted: set[Path]) -> None:
+        self._log = log
+        self._corrupted = corrupted
+        self._may_terminate = False
+        self._freed = False
+        self._worst = OK
+
+    def renew(self, log: Log, corrupted: set[Path]) -> None:
+        """Use an instance that was reset for another run."""
+        self._begin(log, corrupted)
+        relisten(self._listener, log)
 
     def _load(self, unit: Instance) -> ctypes.CDLL:
         problem, here = binary_problem(unit.fmu), os.getcwd()
@@ -328,6 +338,13 @@ class CtypesInstance(FmuInstance, ABC):
                     self._log.add(self.name, WARNING, "", f"{self.prefix}Terminate returned {STATUS[status]}")
                 if status >= FATAL:
                     return
+            if self.keep is not None and self._worst <= WARNING and self._do("Reset") == OK:
+                return self.keep(self)
+        return self.release()
+
+    def release(self) -> None:
+        """Free the instance and its library."""
+        if self._component is not None:
             self._do("FreeInstance")
         unlisten(self._listener)
         fmpy.freeLibrary(self._library._handle)

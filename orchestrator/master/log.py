@@ -157,6 +157,12 @@ def listen(log: Log, unit: str, kept: Any = None) -> int:
     return number
 
 
+def relisten(number: int, log: Log) -> None:
+    """Pass the messages of an instance on to another log."""
+    _, unit, kept = _listeners[number]
+    _listeners[number] = (log, unit, kept)
+
+
 def unlisten(number: int) -> None:
     """Forget an instance that has been freed."""
     _listeners.pop(number, None)

@@ -31,7 +31,7 @@ from ..results.read import Results
 from ..results.recorder import Recorder
 from ..results.run_record import DiagnosticRecord, EndRecord, ErrorRecord, WarningRecord, run_record
 from .child_run import ChildRun, can_be_apart
-from .fmi import open_unit
+from .fmi import keeps, open_unit, protected
 from .log import STATUS, Log, Message
 from .run_loop import OpenInstance, RunLoop, RunProgress
 
@@ -90,7 +90,7 @@ def simulate(
         ResultsError: `out` is not writable, or the format needs a package that is missing.
     """
     recorder = recorder_of(format)(Path(out), *_columns(plan))
-    run = Simulation(plan, recorder, progress, apart=apart and can_be_apart())
+    run = Simulation(plan, recorder, progress, apart=apart and can_be_apart() and not keeps(plan))
     run.make(opener)
     return RunInfo(
         Path(out),
@@ -123,7 +123,8 @@ def simulate_in_memory(
             code="results-too-large",
         )
     recorder = MemoryRecorder(*_columns(plan))
-    Simulation(plan, recorder, progress, apart=False).make(opener)
+    apart = opener is open_unit and protected(plan) and can_be_apart()
+    Simulation(plan, recorder, progress, apart=apart).make(opener)
     assert recorder.results is not None
     return recorder.results
 

@@ -49,12 +49,12 @@ def jobs(folder: Path, *labels: str) -> list[Job]:
     return [Job(label, Path("made_up.yaml"), folder / label) for label in labels]
 
 
-def test_every_run_has_a_process_of_its_own_and_outcomes_keep_their_order(tmp_path):
+def test_runs_are_shared_among_workers_and_outcomes_keep_their_order(tmp_path):
     outcomes = execute(jobs(tmp_path, "a", "b", "c", "d"), workers=2, run=record)
     assert [outcome.job.label for outcome in outcomes] == ["a", "b", "c", "d"]
     assert all(outcome.ok for outcome in outcomes)
     pids = {(tmp_path / label / "pid").read_text() for label in "abcd"}
-    assert len(pids) == 4
+    assert len(pids) == 2
     assert str(os.getpid()) not in pids
 
 
