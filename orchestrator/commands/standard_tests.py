@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from ..evaluation.standard_tests import TESTS
+from ..evaluation.standard_tests import DRIVEN, TESTS
 from .options import CHANGES, MAKING, RunOptions, takes
 from .progress import executor_of, hold, say, stoppable
 
@@ -28,9 +28,8 @@ if TYPE_CHECKING:
 GROUND = "proving_ground"
 """Folder of the standard tests' scenarios."""
 
-TestToDrive = Annotated[
-    Literal["sine-with-dwell", "iso-3888-1", "iso-3888-2"], typer.Argument(help="The test.", metavar="TEST")
-]
+DrivenName = Literal[tuple(DRIVEN)]  # type: ignore[valid-type]
+TestToDrive = Annotated[DrivenName, typer.Argument(help="The test.", metavar="TEST")]  # type: ignore[valid-type]
 ScenarioOption = Annotated[
     str | None,
     typer.Option(
@@ -78,99 +77,56 @@ def drive(
     kilometre per hour, from the scenario's own speed in steps and halves.
     """
     from ..errors import ScenarioError
-    from ..experiments.standard_test_runs import AMPLITUDE, SPEED
+    from ..experiments.standard_test_runs import TestDriver
     from ..results.folder import default_folder
     from ..scenario import catalogue
 
+    chosen = DRIVEN[test]
     changes = (*_vehicle(vehicle), *wishes.changes)
-    one_run = catalogue.find(scenario or f"{GROUND}/{test.replace('-', '_')}", "a scenario")
+    one_run = catalogue.find(scenario or f"{GROUND}/{str(test).replace('-', '_')}", "a scenario")
     folder = wishes.out or default_folder(one_run, changes, suffix="_series")
     execute = executor_of(folder, str(one_run), wishes, format="parquet")
-    given = {str(change.target) for change in changes}
-    if test == "sine-with-dwell":
-        if AMPLITUDE in given:
-            raise ScenarioError(
-                f"{AMPLITUDE}: the series itself says which amplitudes are driven", code="option-invalid"
-            )
-        slow = catalogue.find(slow_steer or f"{GROUND}/slowly_increasing_steer", "a scenario")
-        hold(context, folder)
-        status = _drive_dwell(one_run, changes, execute, slow, angle, figures=figures)
-    else:
-        if angle or slow_steer:
-            raise ScenarioError(
-                f"{test} needs no A: leave --angle and --slow-steer away", code="option-invalid"
-            )
-        if given & {SPEED, "stop_time"}:
-            raise ScenarioError(
-                f"{SPEED} and stop_time: the series itself says at what speeds is driven",
-                code="option-invalid",
-            )
-        hold(context, folder)
-        status = _drive_lane_change(one_run, changes, execute, figures=figures)
-    if status:
-        raise typer.Exit(status)
+    if (angle or slow_steer) and not chosen.needs_angle:
+        raise ScenarioError(f"{test} needs no A: leave --angle and --slow-steer away", code="option-invalid")
+    for change in changes:
+        if str(change.target) in chosen.varies:
+            why = "the series itself says what is driven"
+            raise ScenarioError(f"{change.target}: {why}", code="option-invalid")
+    steer = f"{GROUND}/slowly_increasing_steer"
+    slow = catalogue.find(slow_steer or steer, "a scenario") if chosen.needs_angle else None
+    hold(context, folder)
+    known = None
+    if slow:
+        known = angle_of(angle) or _angle_driven(slow, changes, execute)
+        say(f"A = {math.degrees(known):.1f} degrees")
+    driver = TestDriver(
+        chosen, one_run, changes, execute, lambda title, runs: _made(title, runs, execute), known
+    )
+    series = chosen.drive(driver)
+    EvaluatedRuns(chosen, driver.traces, driver.judged, series, known, folder).conclude(each=figures)
+    if driver.status:
+        raise typer.Exit(driver.status)
 
 
-def _drive_dwell(
-    scenario: Path,
-    changes: Sequence[Override],
-    execute: Executor,
-    slow: Path,
-    angle: str | None,
-    *,
-    figures: bool,
-) -> int:
-    """Make and evaluate the series of sine with dwell; return the exit status.
+def _angle_driven(scenario: Path, changes: Sequence[Override], execute: Executor) -> float:
+    """Return A [rad] from runs of slowly increasing steer.
 
     Raises:
-        ResultsError: A is not known.
-        typer.Exit: slowly increasing steer has failed.
+        ResultsError: they do not give it.
+        typer.Exit: one of them has failed.
     """
     from ..errors import ResultsError
     from ..evaluation.judgement import NotJudged
-    from ..evaluation.sine_with_dwell import judge_series
-    from ..evaluation.standard_tests import TESTS
     from ..evaluation.steering_tests import characteristic_angle, evaluate_slow_steer
-    from ..experiments.standard_test_runs import dwell_runs, slow_steer_runs, traces
+    from ..experiments.standard_test_runs import slow_steer_runs, traces
 
-    chosen = TESTS["sine-with-dwell"]
-    known = angle_of(angle)
-    if known is None:
-        found, status = _made("slowly increasing steer", slow_steer_runs(slow, changes, execute), execute)
-        if status:
-            raise typer.Exit(status)
-        try:
-            known = characteristic_angle([evaluate_slow_steer(trace) for trace in traces(found)])
-        except NotJudged as why:
-            raise ResultsError(str(why), code="test-not-applicable") from None
-    say(f"A = {math.degrees(known):.1f} degrees")
-    ladder, status = _made("sine with dwell", dwell_runs(scenario, changes, known), execute)
-    recorded = traces(ladder)
-    judged = [chosen.evaluate(trace, known) for trace in recorded]
-    series = judge_series(judged, known)
-    EvaluatedRuns(chosen, recorded, judged, series, known, execute.folder).conclude(each=figures)
-    return status
-
-
-def _drive_lane_change(
-    scenario: Path, changes: Sequence[Override], execute: Executor, *, figures: bool
-) -> int:
-    """Search the highest clean entry speed and evaluate its runs; return the exit status."""
-    from ..evaluation.standard_tests import TESTS
-    from ..experiments.standard_test_runs import entry_speeds
-
-    chosen = TESTS["lane-change"]
-    failed: list[int] = []
-
-    def made(run: NamedRun) -> Job | None:
-        (job,), status = _made(f"{run.name} km/h", [run], execute)
-        failed.extend([status] if status else [])
-        return None if status else job
-
-    traces, series = entry_speeds(scenario, changes, execute, made)
-    judged = [chosen.evaluate(trace) for trace in traces]
-    EvaluatedRuns(chosen, traces, judged, series, None, execute.folder).conclude(each=figures)
-    return max(failed, default=0)
+    jobs, status = _made("slowly increasing steer", slow_steer_runs(scenario, changes, execute), execute)
+    if status:
+        raise typer.Exit(status)
+    try:
+        return characteristic_angle([evaluate_slow_steer(trace) for trace in traces(jobs)])
+    except NotJudged as why:
+        raise ResultsError(str(why), code="test-not-applicable") from None
 
 
 def _made(title: str, runs: Sequence[NamedRun], execute: Executor) -> tuple[list[Job], int]:
@@ -250,7 +206,6 @@ def evaluate(
     Of sine with dwell, A comes from runs of slowly increasing steer (--slow-steer) or is given
     (--angle); several runs are judged as a series. Exit status 1 if nothing could be judged.
     """
-    from ..evaluation.sine_with_dwell import is_series, judge_series
     from ..evaluation.trace import load_mapping, load_trace
     from ..results.folder import below_results
     from .progress import say
@@ -263,7 +218,7 @@ def evaluate(
     known = _angle(angle, slow_steer, mapping, chosen)
     traces = [load_trace(place, mapping, label) for place, label in zip(places, labels, strict=True)]
     judged = [chosen.evaluate(trace, known) for trace in traces]
-    series = judge_series(judged, known) if known and is_series(judged) else None
+    series = chosen.judge_together(judged, known)
     recorded_here = all(place.is_dir() for place in places)
     folder = out or (folder_of_all(places) if recorded_here else below_results("evaluation"))
     EvaluatedRuns(chosen, traces, judged, series, known, folder).conclude(

@@ -25,7 +25,7 @@ Plants = Annotated[
     typer.Option(
         "--plant",
         metavar="FMU,FMU,...",
-        help="Plants; default: the one with the most degrees of freedom that the file suffices for.",
+        help="Plants; default: the most detailed one that the file has the values for.",
     ),
 ]
 TyreOption = Annotated[

@@ -6,15 +6,16 @@ without a number, and a criterion that needs it is not judged, never passed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from enum import Enum
 from functools import wraps
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Protocol
 
 from ..metrics.measures import si
 
 if TYPE_CHECKING:
+    from ..plan import Value
     from .trace import Trace
 
 P = ParamSpec("P")
@@ -126,6 +127,47 @@ class TestSeries:
     summary: str  # in a sentence
     found: dict[str, Any]  # plain data, for files
     rulings: dict[str, CriterionResult] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class SeriesRun:
+    """A run that a standard test asks for: a variation of its scenario."""
+
+    folder: str  # below that of the series
+    label: str
+    values: Mapping[str, Value]  # target of an override -> value
+    origin: str  # of these overrides, for records
+    partly: bool = True  # whether it is judged, as far as it goes, if it fails
+
+
+class SeriesDriver(Protocol):
+    """What the series of a standard test is driven with."""
+
+    angle: float | None  # A [rad], of tests that need it
+    judged: list[Evaluation]  # of all runs so far
+
+    @property
+    def speed(self) -> float:
+        """Speed of the scenario [m/s], above 0."""
+
+    @property
+    def duration(self) -> float:
+        """Duration of the scenario [s]."""
+
+    def make(self, runs: Sequence[SeriesRun]) -> list[Evaluation]:
+        """Make runs that have no results yet; return the evaluations of those that can be judged."""
+
+    def search_highest(
+        self,
+        passes: Callable[[float], bool],
+        *,
+        first: float,
+        step: float,
+        resolution: float,
+        least: float,
+        most: float,
+    ) -> None:
+        """Search the highest value that passes: from `first` in steps, then by bisection."""  # fmt: skip
 
 
 def overall(verdicts: Iterable[Verdict]) -> Verdict | None:

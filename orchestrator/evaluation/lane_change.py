@@ -13,6 +13,7 @@ leaves the score to the user; the highest clean entry speed is the common one.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,7 @@ import numpy as np
 from vocabulary.lane_change import Lane, lanes_of
 
 from ..figures.style import CHANGED, QUIET, frame, line_style, new_figure
-from .judgement import Evaluation, TestSeries, Verdict, evaluation
+from .judgement import Evaluation, SeriesDriver, SeriesRun, TestSeries, Verdict, evaluation
 from .sine_with_dwell_figures import MARKS
 from .trace import Trace, at, first_crossing
 
@@ -75,6 +76,28 @@ def evaluate_lane_change(judged: Evaluation, trace: Trace) -> None:
 
 
 CLEAN = "clean"
+
+
+KMH = 1.0 / 3.6
+SEARCH_STEP, RESOLUTION = 10.0 * KMH, 0.5 * KMH
+"""Step of the coarse search for the entry speed, and its final resolution [m/s]."""
+SLOWEST, FASTEST = 10.0 * KMH, 250.0 * KMH
+"""Bounds of the search for the entry speed [m/s]."""
+
+
+def drive_series(driver: SeriesDriver) -> TestSeries:
+    """Search for the highest clean entry speed, from that of the scenario."""
+
+    def clean(speed: float) -> bool:
+        seconds = math.ceil(10.0 * driver.duration * driver.speed / speed) / 10.0  # for the same distance
+        values = {"speed": speed, "stop_time": seconds}
+        name = f"{speed / KMH:.2f}"
+        run = SeriesRun(name, f"{name} km/h", values, "entry speed", partly=False)
+        return any(map(is_clean, driver.make([run])))
+
+    bounds = {"step": SEARCH_STEP, "resolution": RESOLUTION, "least": SLOWEST, "most": FASTEST}
+    driver.search_highest(clean, first=driver.speed, **bounds)
+    return judge_entry_speeds(driver.judged)
 
 
 def judge_entry_speeds(runs: Sequence[Evaluation]) -> TestSeries:

@@ -38,7 +38,16 @@ import numpy as np
 
 from ..figures.style import shown
 from ..metrics.measures import running_integral
-from .judgement import CriterionResult, Evaluation, NotJudged, TestSeries, Verdict, evaluation
+from .judgement import (
+    CriterionResult,
+    Evaluation,
+    NotJudged,
+    SeriesDriver,
+    SeriesRun,
+    TestSeries,
+    Verdict,
+    evaluation,
+)
 from .trace import Trace, at, first_crossing, likeness, opposed, prepared, refuse_opposed, running_mean
 
 RATE, LASTS, MEAN = math.radians(75.0), 0.2, 0.1
@@ -342,6 +351,27 @@ def is_series(runs: Sequence[Evaluation]) -> bool:
     """Return whether runs can form a series: more than one, all with different amplitudes."""
     found = sorted(_amplitude(run) for run in runs if run["amplitude"] is not None)
     return len(runs) > 1 and all(b - a > SAME for a, b in itertools.pairwise(found))
+
+
+def judge_together(runs: Sequence[Evaluation], angle: float | None) -> TestSeries | None:
+    """Judge recorded runs as a series if they can form one and A [rad] is known."""
+    return judge_series(runs, angle) if angle and is_series(runs) else None
+
+
+AMPLITUDE = "driver.amplitude"
+"""Target that the series varies: amplitude of the hand-wheel angle [rad], positive to the left."""
+SIDES = (("left", 1.0), ("right", -1.0))
+
+
+def drive_series(driver: SeriesDriver) -> TestSeries:
+    """Drive all amplitudes, left first and right first, and judge them."""
+    assert driver.angle is not None
+    runs = []
+    for name, side in SIDES:
+        for amplitude in amplitudes(driver.angle):
+            folder = f"{name}_first/{math.degrees(amplitude):.2f}"
+            runs.append(SeriesRun(folder, folder, {AMPLITUDE: side * amplitude}, "sine with dwell"))
+    return judge_series(driver.make(runs), driver.angle)
 
 
 def judge_series(runs: Sequence[Evaluation], angle: float) -> TestSeries:

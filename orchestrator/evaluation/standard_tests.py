@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from .judgement import Evaluation, TestSeries
+    from .judgement import Evaluation, SeriesDriver, TestSeries
     from .trace import Trace
 
 
@@ -23,11 +24,25 @@ class StandardTest:
     columns: tuple[str, ...]  # keys of the quantities in tables of several runs
     needs_angle: bool = False  # whether the function takes A
     drawing: str = ""  # module in this package with `draw_run` and `draw_series`
+    together: str = ""  # "module:function" that judges several recorded runs as a series
+    driving: str = ""  # "module:function" that makes and judges a series of runs
+    driven_as: tuple[str, ...] = ()  # names for `yawbench drive`; their scenarios are named alike
+    varies: tuple[str, ...] = ()  # override targets that the series sets itself
 
     def evaluate(self, trace: Trace, angle: float | None = None) -> Evaluation:
         """Return the evaluation of a run; `angle`: A [rad], if it is known and the test uses it."""
         judged: Evaluation = _named(self.function)(trace, *([angle] if self.needs_angle else []))
         return judged
+
+    def drive(self, driver: SeriesDriver) -> TestSeries:
+        """Make the runs of the test and return their verdict; only for tests that are driven."""
+        series: TestSeries = _named(self.driving)(driver)
+        return series
+
+    def judge_together(self, runs: Sequence[Evaluation], angle: float | None) -> TestSeries | None:
+        """Return the verdict on several recorded runs together, None if they form no series."""
+        series: TestSeries | None = _named(self.together)(runs, angle) if self.together else None
+        return series
 
     def draw(self, trace: Trace, judged: Evaluation) -> Figure | None:
         """Return the figure of a run, None if there is nothing to draw."""
@@ -60,6 +75,10 @@ TESTS: dict[str, StandardTest] = {
             ("amplitude", "ratio_1000", "ratio_1750", "displacement", "sideslip", "speed_end"),
             needs_angle=True,
             drawing="sine_with_dwell_figures",
+            together="sine_with_dwell:judge_together",
+            driving="sine_with_dwell:drive_series",
+            driven_as=("sine-with-dwell",),
+            varies=("driver.amplitude",),
         ),
         StandardTest(
             "step-steer",
@@ -109,7 +128,12 @@ TESTS: dict[str, StandardTest] = {
             "lane_change:evaluate_lane_change",
             ("entry", "exit", "overrun", "sideslip", "acceleration", "hand"),
             drawing="lane_change",
+            driving="lane_change:drive_series",
+            driven_as=("iso-3888-1", "iso-3888-2"),
+            varies=("speed", "stop_time"),
         ),
     )
 }
 """Name -> test, in the order in which they are usually driven."""
+DRIVEN = {name: test for test in TESTS.values() for name in test.driven_as}
+"""Name for `yawbench drive` -> test."""

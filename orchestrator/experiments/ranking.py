@@ -37,7 +37,7 @@ from pydantic import Field, field_validator, model_validator
 from .. import checksums
 from ..errors import ResultsError, ScenarioError
 from ..evaluation.judgement import Evaluation, NotJudged
-from ..evaluation.sine_with_dwell import amplitudes
+from ..evaluation.sine_with_dwell import AMPLITUDE, SIDES, amplitudes
 from ..evaluation.steering_tests import characteristic_angle
 from ..files import reads
 from ..messages import hint
@@ -52,7 +52,7 @@ from .execution import Executor
 from .experiment import Case, LoadedExperiment, NamedRun, experiment_of
 from .judged_schema import text_of
 from .outcome import ExperimentResult
-from .standard_test_runs import AMPLITUDE, SIDES, slow_steer_amplitude
+from .standard_test_runs import slow_steer_amplitude
 
 UNIT = "controller"
 """The instance that all entries swap."""

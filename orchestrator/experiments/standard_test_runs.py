@@ -2,36 +2,113 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 from ..errors import ScenarioError
-from ..evaluation.judgement import Evaluation, TestSeries
-from ..evaluation.lane_change import evaluate_lane_change, is_clean, judge_entry_speeds
-from ..evaluation.sine_with_dwell import amplitudes
+from ..evaluation.judgement import Evaluation, SeriesRun
+from ..evaluation.sine_with_dwell import AMPLITUDE, SIDES
+from ..evaluation.standard_tests import StandardTest
 from ..evaluation.trace import Trace, trace_of
 from ..names import Target
 from ..plan import Override, Plan
 from ..results.read import load_results
+from ..scenario.load import LoadedScenario
 from ..scenario.quantities import convert
 from .execution import Executor, highest_passing, side_by_side
 from .experiment import NamedRun
 from .jobs import Job, planned
 
-AMPLITUDE = "driver.amplitude"
-"""Target that sine with dwell varies: amplitude of the hand-wheel angle [rad], positive to the left."""
-SIDES = (("left", 1.0), ("right", -1.0))
 SLOW_STEER = "slowly_increasing_steer"
 """Folder of the runs of slowly increasing steer."""
-SPEED = "speed"
-"""Target that lane changes vary: speed of the scenario [m/s]."""
-KMH = 1.0 / 3.6
-STEP, RESOLUTION = 10.0 * KMH, 0.5 * KMH
-"""Step of the coarse search for the entry speed, and its final resolution [m/s]."""
-LEAST, MOST = 10.0 * KMH, 250.0 * KMH
-"""Bounds of the search for the entry speed [m/s]."""
+STEERED = "slowly increasing steer"
+"""Origin of their overrides."""
+
+
+@dataclass
+class TestDriver:
+    """Drives the series of a standard test as named runs (see `evaluation.judgement.SeriesDriver`).
+
+    Args:
+        test: evaluates the runs.
+        scenario: of all runs.
+        changes: overrides of all runs.
+        execute: makes plans.
+        make_runs: called with a title and runs; executes those without results; returns their jobs and the
+            exit status, not 0 if one of them failed.
+        angle: A [rad], of tests that need it.
+
+    Attributes:
+        traces, judged: of all runs so far that can be judged.
+        status: the largest exit status so far.
+    """
+
+    __test__ = False  # not a pytest class
+
+    test: StandardTest
+    scenario: Path
+    changes: Sequence[Override]
+    execute: Executor
+    make_runs: Callable[[str, Sequence[NamedRun]], tuple[list[Job], int]]
+    angle: float | None = None
+    traces: list[Trace] = field(default_factory=list)
+    judged: list[Evaluation] = field(default_factory=list)
+    status: int = 0
+
+    @cached_property
+    def _planned(self) -> tuple[LoadedScenario, Plan]:
+        base = Job("", self.scenario, self.execute.folder, (*self.changes,), **self.execute.of_jobs)
+        return planned(base, self.execute.planner)
+
+    @cached_property
+    def speed(self) -> float:
+        """Speed of the scenario [m/s].
+
+        Raises:
+            ScenarioError: it has none above 0.
+        """
+        given = self._planned[0].speed
+        speed = 0.0 if given is None else float(convert(str(given), "m/s"))
+        if speed <= 0.0:
+            raise ScenarioError(
+                f"{self.scenario}: tells no speed above 0, from which the series could begin",
+                code="fmu-wrong-kind",
+            )
+        return speed
+
+    @property
+    def duration(self) -> float:
+        """Duration of the scenario [s]."""
+        plan = self._planned[1]
+        return float(plan.step * plan.n_steps)
+
+    def make(self, runs: Sequence[SeriesRun]) -> list[Evaluation]:
+        """Make runs that have no results yet; return the evaluations of those that can be judged.
+
+        Raises:
+            ScenarioError: a run cannot start.
+            ResultsError: a run did not record a signal that the test needs.
+        """
+        named = []
+        for run in runs:
+            own = (Override.of(target, value, run.origin) for target, value in run.values.items())
+            named.append(_run(run.folder, self.scenario, self.changes, *own))
+        title = runs[0].label if len(runs) == 1 else self.test.name.replace("-", " ")
+        jobs, status = self.make_runs(title, named)
+        self.status = max(self.status, status)
+        made = [(run, job) for run, job in zip(runs, jobs, strict=True) if run.partly or not status]
+        new = [replace(traces([job])[0], label=run.label) for run, job in made]
+        judged = [self.test.evaluate(trace, self.angle) for trace in new]
+        self.traces += new
+        self.judged += judged
+        return judged
+
+    def search_highest(self, passes: Callable[[float], bool], **bounds: float) -> None:
+        """Search the highest value that passes; `bounds`: see `highest_passing`."""
+        search = highest_passing(**bounds)
+        side_by_side({"": search}, lambda values: {name: passes(value) for name, value in values.items()})
 
 
 def slow_steer_runs(scenario: Path, changes: Sequence[Override], execute: Executor) -> list[NamedRun]:
@@ -43,69 +120,9 @@ def slow_steer_runs(scenario: Path, changes: Sequence[Override], execute: Execut
     (plan,) = execute.plans([NamedRun("", "", "", scenario, (*changes,))])
     given = slow_steer_amplitude(plan, scenario)
     return [
-        _run(f"{SLOW_STEER}/{name}", scenario, changes, steered(side * given, "slowly increasing steer"))
+        _run(f"{SLOW_STEER}/{name}", scenario, changes, Override.of(AMPLITUDE, side * given, STEERED))
         for name, side in SIDES
     ]
-
-
-def dwell_runs(scenario: Path, changes: Sequence[Override], angle: float) -> list[NamedRun]:
-    """Return runs of sine with dwell for the angle A [rad], left first and right first."""
-    return [
-        _run(
-            f"{name}_first/{math.degrees(amplitude):.2f}", scenario, changes,
-            steered(side * amplitude, "sine with dwell"),
-        )
-        for name, side in SIDES
-        for amplitude in amplitudes(angle)
-    ]  # fmt: skip
-
-
-def steered(amplitude: float, origin: str) -> Override:
-    """Return the override that sets the driver's amplitude [rad]."""
-    return Override.of(AMPLITUDE, amplitude, origin)
-
-
-def entry_speeds(
-    scenario: Path, changes: Sequence[Override], execute: Executor, make: Callable[[NamedRun], Job | None]
-) -> tuple[list[Trace], TestSeries]:
-    """Search for the highest clean entry speed; return the runs made and the series' verdict.
-
-    Args:
-        scenario: of one run; the search starts at its own speed.
-        changes: overrides of all runs.
-        execute: makes plans.
-        make: executes a run unless its results exist; returns its job, None if there are no results.
-
-    Raises:
-        ScenarioError: a run cannot start, or the scenario has no speed.
-        ResultsError: a run did not record a signal that the test needs.
-    """
-    base = Job("", scenario, execute.folder, (*changes,), **execute.of_jobs)
-    loaded, plan = planned(base, execute.planner)
-    first = 0.0 if loaded.speed is None else float(convert(str(loaded.speed), "m/s"))
-    if first <= 0.0:
-        raise ScenarioError(
-            f"{scenario}: tells no speed above 0, from which the series could begin",
-            code="fmu-wrong-kind",
-        )
-    duration = float(plan.step * plan.n_steps)
-    driven: list[Trace] = []
-    judged: list[Evaluation] = []
-
-    def clean(speed: float) -> bool:
-        seconds = math.ceil(10.0 * duration * first / speed) / 10.0  # long enough for the same distance
-        at = Override.of(SPEED, speed, "entry speed"), Override.of("stop_time", seconds, "entry speed")
-        job = make(_run(f"{speed / KMH:.2f}", scenario, changes, *at))
-        if job is None:
-            return False
-        driven.extend(traces([job]))
-        driven[-1] = replace(driven[-1], label=f"{job.label} km/h")
-        judged.append(evaluate_lane_change(driven[-1]))
-        return is_clean(judged[-1])
-
-    search = highest_passing(first=first, step=STEP, resolution=RESOLUTION, least=LEAST, most=MOST)
-    side_by_side({"": search}, lambda speeds: {name: clean(speed) for name, speed in speeds.items()})
-    return driven, judge_entry_speeds(judged)
 
 
 def traces(jobs: Sequence[Job]) -> list[Trace]:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import pi
@@ -23,11 +24,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vocabulary.roles import role_in
 from vocabulary.wheels import WHEELS
 
-from ..errors import SimulationError, WiringError
+from ..errors import ModelDescriptionError, SimulationError, WiringError
 from ..evaluation.steering_tests import gradients
 from ..figures.style import QUIET, ROW, frame, line_style, new_figure
+from ..fmu.opener import find_fmu, find_folder
 from ..master.simulate import simulate_in_memory
 from ..plan import Fmu, Plan
 from ..planner import Planner
@@ -40,8 +43,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-PLANTS = ("plant_fourteen_dof", "plant_eight_dof", "plant_seven_dof", "plant_two_dof")
-"""Plants in the order in which they are tried for a vehicle file."""
 STEP = 0.002
 """Communication step [s]. Chosen: steady turns and yaw differ by less than 1e-4 from those at 1 ms."""
 TORQUES = "wheel_torque_fl"
@@ -148,21 +149,43 @@ class TestTrack:
         return os.path.abspath(fmu) if is_path(fmu) else fmu
 
 
-def fitting_plant(vehicle: Path, tyre: str, fmus: Path | None, planner: Planner) -> str:
-    """Return the plant with the most degrees of freedom that a file has the values for.
+def plants_in(fmus: Path | None, scenario: Path, planner: Planner) -> list[str]:
+    """Return the plants in a folder of FMUs, those with the most parameters first: they model the most.
+
+    FMUs that cannot be opened are left out.
 
     Raises:
-        YawbenchError: there is none; says why not for the plant with the fewest.
+        ModelDescriptionError: there is none, or no folder of FMUs.
+    """
+    opener = planner.opener
+    folder = fmus or find_folder(scenario, opener=opener)
+    parameters: dict[str, int] = {}
+    for name in opener.names(folder):
+        if role_in(name) == "plant":
+            with suppress(ModelDescriptionError):
+                fmu = opener.open(find_fmu(name, scenario=scenario, fmus=folder, opener=opener))
+                parameters[name] = len(fmu.of("parameter"))
+    if not parameters:
+        raise ModelDescriptionError(f"{folder}: holds no plant")
+    return sorted(parameters, key=lambda name: (-parameters[name], name))
+
+
+def fitting_plant(vehicle: Path, tyre: str, fmus: Path | None, planner: Planner) -> str:
+    """Return the most detailed plant that a vehicle file has the values for (see `plants_in`).
+
+    Raises:
+        YawbenchError: there is none; says why not for the simplest plant.
     """
     steer = {"fmu": "driver_sine"}
-    for plant in PLANTS[:-1]:
+    *detailed, simplest = plants_in(fmus, vehicle, planner)
+    for plant in detailed:
         try:
             TestTrack(vehicle, plant, tyre, fmus=fmus, planner=planner).plan(steer, 20.0, STEP)
         except WiringError:
             continue
         return plant
-    TestTrack(vehicle, PLANTS[-1], tyre, fmus=fmus, planner=planner).plan(steer, 20.0, STEP)
-    return PLANTS[-1]
+    TestTrack(vehicle, simplest, tyre, fmus=fmus, planner=planner).plan(steer, 20.0, STEP)
+    return simplest
 
 
 SPEEDS = tuple(v / 3.6 for v in (40.0, 60.0, 80.0, 100.0, 120.0, 140.0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -13,6 +14,9 @@ import pytest
 import yawbench as yb
 from orchestrator.coupling import ALGORITHMS, CouplingAlgorithm, CouplingWeights
 from orchestrator.errors import ScenarioError
+from orchestrator.evaluation import judgement
+from orchestrator.evaluation.judgement import SeriesRun, evaluation
+from orchestrator.evaluation.standard_tests import DRIVEN, TESTS, StandardTest
 from orchestrator.fault_kinds import KINDS, FaultKind
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.results import formats
@@ -103,3 +107,32 @@ def test_a_coupling_algorithm_is_one_entry(steered, monkeypatch):
     assert steered.set({"algorithm": "averaged"}).plan().algorithm == "averaged"
     with pytest.raises(ScenarioError, match="'extrapolated' or 'averaged'"):
         steered.set({"algorithm": "average"})
+
+
+def test_a_standard_test_with_its_series_is_a_module_and_an_entry(steered, monkeypatch):
+    @evaluation
+    def evaluate(judged, trace):
+        judged.add("angle", "largest angle", np.max(np.abs(trace["steering_wheel_angle"])), "rad")
+        judged.rule("some", judged["angle"] > 0.15, "larger than 0.15 rad")
+
+    def drive(driver):
+        runs = [SeriesRun(f"{a:g}", f"{a:g} rad", {"driver.amplitude": a}, "wiggle") for a in (0.1, 0.2)]
+        judged = driver.make(runs)
+        return judgement.TestSeries(
+            judged, f"{len(judged)} runs of {driver.duration:g} s.", {"runs": len(judged)}
+        )
+
+    module = ModuleType("orchestrator.evaluation.wiggle")
+    module.evaluate, module.drive = evaluate, drive
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    entry = StandardTest(
+        "wiggle", "a dummy", "wiggle:evaluate", ("angle",), driving="wiggle:drive", driven_as=("wiggle-1",)
+    )
+    monkeypatch.setitem(TESTS, "wiggle", entry)
+    monkeypatch.setitem(DRIVEN, "wiggle-1", entry)
+    monkeypatch.delitem(sys.modules, "orchestrator.commands.standard_tests", raising=False)
+    assert status_of("drive", "wiggle-1", "--scenario", "steered.yaml", "--out", "out") == 0
+    found = json.loads(Path("out/evaluation.json").read_text())
+    assert found["series"] == {"runs": 2}
+    assert [run["verdict"] for run in found["runs"]] == ["failed", "passed"]
+    assert status_of("evaluate", "wiggle", "out/0.1", "--no-figures") == 0

@@ -507,7 +507,7 @@ def test_a_series_with_a_car_that_rolls_over_has_a_verdict(tmp_path, capsys):
     "options, sentence",
     [
         (("--vehicle", "large_salon"), "did you mean 'large_saloon'?"),
-        (("--set", "driver.amplitude=1"), "the series itself says which amplitudes are driven"),
+        (("--set", "driver.amplitude=1"), "driver.amplitude: the series itself says what is driven"),
         (("--angle", "400 deg"), "--angle: must be between 0 and 360 degrees"),
         (("--angle", "3 m"), "--angle: '3 m' is not a value in rad"),
     ],
@@ -522,7 +522,7 @@ def test_what_a_series_cannot_be_driven_with_is_said_before_any_run(options, sen
     "options, sentence",
     [
         (("--angle", "40 deg"), "iso-3888-2 needs no A: leave --angle and --slow-steer away"),
-        (("--set", "speed=70km/h"), "the series itself says at what speeds is driven"),
+        (("--set", "speed=70km/h"), "speed: the series itself says what is driven"),
     ],
 )
 def test_what_a_series_of_lane_changes_cannot_be_driven_with_is_said_before_any_run(

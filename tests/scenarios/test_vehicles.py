@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from math import pi
 from pathlib import Path
 
@@ -19,7 +20,6 @@ from orchestrator.scenario.load import load_scenario
 from orchestrator.tyres.stand import cornering_stiffness
 from orchestrator.vehicles import handling_and_braking as handling
 from orchestrator.vehicles.handling_and_braking import (
-    PLANTS,
     SAMPLE,
     STEP,
     TURN_SPEED,
@@ -29,6 +29,7 @@ from orchestrator.vehicles.handling_and_braking import (
     fitting_plant,
     handling_of,
     modes_of,
+    plants_in,
 )
 from orchestrator.wiring.derivations import car_of
 from orchestrator.wiring.make_plan import make_plan
@@ -42,6 +43,9 @@ STEADY_TURN = FOLDER.parent / "one_car" / "steady_turn.yaml"
 LIBRARY = ("mid_size", "small_car", "suv", "van", "large_saloon", "saloon75", "hard")
 """Cars for every plant."""
 PER_G = 9.80665 * 180.0 / pi
+
+
+PLANTS = ("plant_fourteen_dof", "plant_eight_dof", "plant_seven_dof", "plant_two_dof")
 
 
 def file(name):
@@ -173,6 +177,16 @@ def test_the_yaw_mode_is_the_pair_that_moves_the_car(rates):
 )
 def test_a_file_is_driven_on_the_largest_plant_that_it_is_enough_for(fmus, name, plant):
     assert fitting_plant(file(name), "", fmus, Planner()) == plant
+
+
+def test_a_plant_is_chosen_from_the_folder_as_soon_as_it_is_there(fmus, tmp_path):
+    for archive in fmus.glob("*.fmu"):
+        shutil.copy(archive, tmp_path)
+    assert plants_in(tmp_path, file("mid_size"), Planner()) == [*PLANTS]
+    shutil.copy(fmus / "plant_fourteen_dof.fmu", tmp_path / "plant_another.fmu")
+    (tmp_path / "plant_broken.fmu").write_bytes(b"no archive")
+    assert plants_in(tmp_path, file("mid_size"), Planner()) == ["plant_another", *PLANTS]
+    assert fitting_plant(file("mid_size"), "", tmp_path, Planner()) == "plant_another"
 
 
 def test_a_file_that_is_no_car_says_what_it_lacks(fmus, tmp_path):
