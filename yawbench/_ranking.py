@@ -14,7 +14,7 @@ from components.fmi.component import Component
 from orchestrator.errors import ScenarioError
 from orchestrator.experiments.execution import Executor
 from orchestrator.experiments.jobs import Job, OnOutcome, run_job
-from orchestrator.experiments.ranking import UNIT, EntrySpec, load_ranking
+from orchestrator.experiments.ranking import CONTROLLER, EntrySpec, load_ranking
 from orchestrator.experiments.ranking_scores import RankingResult, run_ranking
 from orchestrator.experiments.ranking_tables import (
     columns_of_cells,
@@ -118,7 +118,7 @@ def _entry(given: Any, name: str) -> tuple[dict[str, EntrySpec], dict[Path, Pyth
         return {name or Path(fmu).stem: _spec(name or Path(fmu).stem, fmu)}, {}
     if arguments.is_a(given, type) and not issubclass(given, Component):
         given = _object_of(given)
-    program = PythonComponent(given, unit=UNIT, role=UNIT)
+    program = PythonComponent(given, unit=CONTROLLER, role=CONTROLLER)
     words = name or program.path.stem
     return {words: _spec(words, str(program.path))}, {program.path: program}
 
@@ -168,7 +168,7 @@ class Ranking:
             ScenarioError: there is no such entry.
         """
         name = arguments.text(name, "name of an entry")
-        places = {one.entry: one.place for one in self.ranked.standings}
+        places = {one.entry: one.place for one in self.ranked.scores}
         if name not in places:
             raise ScenarioError(
                 f"there is no entry {name!r}{hint(name, places, lead='known')}", code="entry-unknown"
@@ -190,7 +190,7 @@ class Ranking:
         return shown_in_notebooks(drawn[kind](self.ranked, "yawbench.rank"))
 
     def __repr__(self) -> str:
-        rows, columns = self.ranked.standings, self.ranked.ranking.conditions
+        rows, columns = self.ranked.scores, self.ranked.ranking.conditions
         return f"<Ranking of {len(rows)} controllers in {len(columns)} conditions>"
 
     def _repr_html_(self) -> str:

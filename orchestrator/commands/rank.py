@@ -80,18 +80,18 @@ def rank(
         command = command_of("rank", file, quick=quick, controller=controller, condition=condition)
         _write(ranked, folder, command, pooled(context, wishes))
     print_tables([table_of(ranked, "gains", "speed lost", "chatter")])
-    if lacking := [one.entry for one in ranked.standings if one.missing]:
+    if lacking := [one.entry for one in ranked.scores if one.missing]:
         say(f"without a place, as runs are missing: {', '.join(lacking)}")
 
 
 def _entry(given: str) -> tuple[str, EntrySpec]:
     """Return the name and the entry of a controller given on the command line."""
     from ..errors import ScenarioError
-    from ..experiments.ranking import UNIT, EntrySpec
+    from ..experiments.ranking import CONTROLLER, EntrySpec
     from ..fault_kinds import FaultList
     from ..scenario.overrides import is_path, swap_of
 
-    fmu, *brought = swap_of(UNIT, given, "--controller")
+    fmu, *brought = swap_of(CONTROLLER, given, "--controller")
     name = Path(str(fmu.value)).stem
     if is_path(str(fmu.value)) and not Path(str(fmu.value)).is_file():
         raise ScenarioError(f"--controller {fmu.value}: there is no such file", code="file-missing")
@@ -122,7 +122,7 @@ def _write(ranked: RankingResult, folder: Path, command: str, each: Each) -> Non
     from ..pages.ranking_page import ranking_page
     from ..pages.report import PAGE
 
-    kept = [(run.picture, run.angle) for run in ranked.runs if run.picture and run.picture.is_dir()]
+    kept = [(run.results, run.angle) for run in ranked.runs if run.results and run.results.is_dir()]
     list(each(draw_run, *zip(*kept, strict=True)) if kept else ())
     for name, columns in (
         ("table", columns_of_entries),

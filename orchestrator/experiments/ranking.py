@@ -54,7 +54,7 @@ from .judged_schema import text_of
 from .outcome import ExperimentResult
 from .standard_test_runs import slow_steer_amplitude
 
-UNIT = "controller"
+CONTROLLER = "controller"
 """The instance that all entries swap."""
 
 
@@ -211,8 +211,8 @@ class LoadedRanking:
         spec, folder = self.entries[name]
         elsewhere = overrides.is_path(spec.fmu) and folder != self.path.parent
         fmu = str((folder / spec.fmu).absolute()) if elsewhere else spec.fmu
-        settings = {f"{UNIT}.{parameter}": value for parameter, value in spec.parameters.items()}
-        return VariantSpec.model_validate({"swap": {UNIT: fmu}, "set": settings})
+        settings = {f"{CONTROLLER}.{parameter}": value for parameter, value in spec.parameters.items()}
+        return VariantSpec.model_validate({"swap": {CONTROLLER: fmu}, "set": settings})
 
     def changes_of_entry(self, name: str) -> list[Override]:
         """Return the overrides that put an entry's controller into a scenario."""

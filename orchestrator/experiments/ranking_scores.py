@@ -28,8 +28,8 @@ from .execution import Executor
 from .jobs import STEP_TIME, Job, MeasuredRun
 from .outcome import ExperimentResult
 from .ranking import (
+    CONTROLLER,
     RECORDED,
-    UNIT,
     EntrySpec,
     LoadedRanking,
     angle_experiment,
@@ -63,8 +63,8 @@ class RankedRun:
         return abs(self.amplitude) / self.angle
 
     @property
-    def picture(self) -> Path | None:
-        """Folder of its results, where its figure is drawn; None if it keeps none."""
+    def results(self) -> Path | None:
+        """Folder of its results; None if it keeps none."""
         return self.job.out if self.job and self.job.keep else None
 
     def __getitem__(self, key: str) -> float | None:
@@ -227,7 +227,7 @@ class EntryScore:
         return (-self.count("passed"), -round(self.share, 9), math.inf if slip is None else round(slip, 9))
 
 
-def standings(ranking: LoadedRanking, runs: Iterable[RankedRun]) -> list[EntryScore]:
+def scores_of(ranking: LoadedRanking, runs: Iterable[RankedRun]) -> list[EntryScore]:
     """Return the scores of all entries, best first, those that are not ranked last.
 
     Args:
@@ -282,7 +282,7 @@ class RankingResult:
     ranking: LoadedRanking
     angles: dict[str, float]  # car -> A [rad]
     runs: list[RankedRun]
-    standings: list[EntryScore]
+    scores: list[EntryScore]  # best first
 
 
 def run_ranking(
@@ -315,10 +315,10 @@ def run_ranking(
         only=lambda case: not only or case.point[0].value in only,
         keep=lambda case: case.number in kept,
         record=RECORDED,
-        timed=UNIT,
+        timed=CONTROLLER,
     )
     runs = _ranked_runs(ranking, angles, found)
-    return RankingResult(ranking, angles, runs, standings(ranking, runs))
+    return RankingResult(ranking, angles, runs, scores_of(ranking, runs))
 
 
 def _ranked_runs(

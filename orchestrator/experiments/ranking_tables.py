@@ -56,7 +56,7 @@ def draw_matrix(ranked: RankingResult, note: str) -> Figure:
     """Draw which controller passes which condition: a row per controller, best at the top."""
     from matplotlib.patches import Patch, Rectangle
 
-    rows = ranked.standings
+    rows = ranked.scores
     conditions = ranked.ranking.conditions
     wide = len(conditions)
     digits = deciding_digits(rows)
@@ -100,7 +100,7 @@ def draw_pareto(ranked: RankingResult, note: str) -> Figure:
     """
     every = [
         (1e-3 * x, y, one)
-        for one in ranked.standings
+        for one in ranked.scores
         if (x := one.mean("intervention")) is not None and (y := one.mean("margin")) is not None
     ]
     points = [point for point in every if point[2].mean("effort")]
@@ -214,8 +214,8 @@ def row_of(one: EntryScore, digits: Digits) -> dict[str, Words]:
 
 def table_of(ranked: RankingResult, *left_out: str) -> Table:
     """Return the table of controllers, best first; `left_out`: headings to omit."""
-    digits = deciding_digits(ranked.standings)
-    rows = [row_of(one, digits) for one in ranked.standings]
+    digits = deciding_digits(ranked.scores)
+    rows = [row_of(one, digits) for one in ranked.scores]
     kept = [heading for heading in rows[0] if heading not in left_out]
     texts = ("place", "passed", "spun", "runs", "margin", "sideslip", "time per step")
     numbers = {kept.index(heading) for heading in texts if heading in kept}
@@ -264,7 +264,7 @@ def _numbers(name: str, unit: str, values: Iterable[float | None]) -> TableColum
 
 def columns_of_entries(ranked: RankingResult) -> list[TableColumn]:
     """Return columns with a row per controller, in SI units."""
-    rows = ranked.standings
+    rows = ranked.scores
     return [
         _text("entry", (one.entry for one in rows)),
         _text("title", (one.spec.title for one in rows)),
@@ -282,7 +282,7 @@ def columns_of_entries(ranked: RankingResult) -> list[TableColumn]:
 
 def columns_of_cells(ranked: RankingResult) -> list[TableColumn]:
     """Return columns with a row per controller and condition, in SI units."""
-    cells = [cell for one in ranked.standings for cell in one.cells.values()]
+    cells = [cell for one in ranked.scores for cell in one.cells.values()]
     numbers = []
     for key, unit in {**UNITS, STEP_TIME: "s"}.items():
         numbers.append(_numbers(key, unit, [None if one.missing else one.number(key) for one in cells]))
@@ -304,7 +304,7 @@ def columns_of_cells(ranked: RankingResult) -> list[TableColumn]:
 
 def columns_of_runs(ranked: RankingResult) -> list[TableColumn]:
     """Return columns with a row per run, in SI units."""
-    runs = [run for one in ranked.standings for cell in one.cells.values() for run in cell.runs]
+    runs = [run for one in ranked.scores for cell in one.cells.values() for run in cell.runs]
     units = {
         "ratio_1000": "1", "ratio_1750": "1", "displacement": "m", "sideslip": "rad", "speed": "m/s",
         "speed_end": "m/s", "intervention": "N.m.s", "effort": "N.m.s", "chatter": "N.m/s",

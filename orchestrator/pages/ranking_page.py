@@ -53,7 +53,7 @@ def ranking_page(ranked: RankingResult, folder: Path, command: str) -> str:
         command: command line that repeats it.
     """
     ranking = ranked.ranking
-    digits = deciding_digits(ranked.standings)
+    digits = deciding_digits(ranked.scores)
     after = ["margin", "sideslip", "intervention", "time per step"]
     return render(
         "ranking.html.j2",
@@ -62,20 +62,20 @@ def ranking_page(ranked: RankingResult, folder: Path, command: str) -> str:
         rule=RULE,
         notes=[*ranking.spec.notes, *ranking.edited],
         quick=ranking.quick,
-        missing=[one.spec.title for one in ranked.standings if one.missing],
+        missing=[one.spec.title for one in ranked.scores if one.missing],
         first=["place", "controller", "passed", "runs"],
         after=after,
         conditions=[
             {"name": name, "short": one.heading, "title": one.title}
             for name, one in ranking.conditions.items()
         ],
-        rows=[_row(ranked, one, after, digits) for one in ranked.standings],
+        rows=[_row(ranked, one, after, digits) for one in ranked.scores],
         states=STATES,
         pareto=_image(folder / FIGURES / "pareto.svg", "Stability over intervention"),
         table=replace(table_of(ranked), title="", notes=[]),
         described=_conditions(ranked),
         entries=_entries(ranked),
-        cells=[_cell(ranked, one, cell, folder) for one in ranked.standings for cell in one.cells.values()],
+        cells=[_cell(ranked, one, cell, folder) for one in ranked.scores for cell in one.cells.values()],
         command=command,
         folder=str(folder),
         style=style(),
@@ -118,10 +118,10 @@ def _id(cell: RankingCell) -> str:
 def _cell(ranked: RankingResult, one: EntryScore, cell: RankingCell, folder: Path) -> dict[str, Any]:
     """Return the details of a cell: its numbers, all its runs, its figure, its command."""
     condition = ranked.ranking.conditions[cell.condition]
-    kept = next((run for run in cell.runs if run.picture), None)
+    kept = next((run for run in cell.runs if run.results), None)
     picture = None
-    if kept and kept.picture and (kept.picture / f"{RUN}.svg").is_file():
-        picture = Path(os.path.relpath(kept.picture / f"{RUN}.svg", folder)).as_posix()
+    if kept and kept.results and (kept.results / f"{RUN}.svg").is_file():
+        picture = Path(os.path.relpath(kept.results / f"{RUN}.svg", folder)).as_posix()
     sums = {
         "runs that pass": f"{sum(run.passed for run in cell.runs)} of {len(cell.runs)}",
         "stability margin": spread(cell.margin, lambda x: f"{x:.1f} points"),
@@ -200,7 +200,7 @@ def _conditions(ranked: RankingResult) -> Table:
 def _entries(ranked: RankingResult) -> Table:
     """Return the table of controllers."""
     table = Table("", ["controller", "name", "FMU", "parameters", "gains", "source"])
-    for one in ranked.standings:
+    for one in ranked.scores:
         spec: EntrySpec = one.spec
         given = ", ".join(f"{name} {number}" for name, number in spec.parameters.items())
         table.rows.append([spec.title, one.entry, spec.fmu, given or None, spec.gains, spec.source])
