@@ -21,9 +21,11 @@ from ..experiments.figures import runs_of, title_of
 from ..experiments.jobs import Job
 from ..experiments.judging import ClaimResult
 from ..experiments.outcome import ExperimentResult
+from ..experiments.region import runs_of as runs_of_claim
 from ..experiments.schema import FigureSpec
 from ..experiments.tables import Cell, Table
 from ..experiments.verdict_tables import (
+    FAILS,
     HOLDS,
     counts_of,
     derived_tables,
@@ -40,7 +42,7 @@ from ..experiments.verdict_tables import (
 from ..figures.portrait import signals_of
 from ..figures.style import LabelledRun
 from ..labels import changed
-from ..messages import counted
+from ..messages import counted, listed
 from ..metrics.run_metrics import evaluate, metric
 from ..plan import Plan
 from ..planner import Planner
@@ -87,6 +89,13 @@ def chapter(
     groups = groups_of([(record_of(job, plan), plan) for job, (_, plan) in plans])
     made = runs_made(findings)
     failed = findings.failed
+    drawing, numbers = viewer_of(findings, name, views)
+
+    def link(one: ClaimResult) -> str:
+        """Return the address that shows a claim's runs in the viewer; "" if it has none of them."""
+        shown = [numbers[run] for run in runs_of_claim(experiment, one.said) if run in numbers]
+        return f"#{name}{VIEW}?shown={shown}&baseline={shown[0]}".replace(" ", "") if shown else ""
+
     return {
         "id": name,
         "title": spec.title,
@@ -95,12 +104,13 @@ def chapter(
         "counts": counts_of(findings.claims),
         "reach": reach(findings),
         "conclusions": conclusions(findings),
-        "claims": [judged(one) for one in findings.claims],
-        "checks": [judged(one) for one in findings.checks],
+        "answer": answer(findings),
+        "claims": [judged(one) | {"link": link(one)} for one in findings.claims],
+        "checks": [judged(one) | {"link": link(one)} for one in findings.checks],
         "region": region_table(findings) if findings.regions else None,
         "limits": limit_tables(findings),
         "systems": systems(plans, spec.title),
-        "viewer": viewer_of(findings, name, views),
+        "viewer": drawing,
         "figures": figure_files(findings, _relative_to(folder / FIGURES, shown_in)),
         "charts": charts(findings, folder / FIGURES),
         "tables": [*run_tables(findings), *derived_tables(findings, apart=True)],
@@ -179,6 +189,19 @@ def conclusions(findings: ExperimentResult) -> list[dict[str, Any]]:
     return sorted(told, key=lambda one: not one["robust"])
 
 
+def answer(findings: ExperimentResult) -> str:
+    """Return the verdicts in one sentence: how many claims (or checks) hold, and where they were judged."""
+    kind, results = ("claims", findings.claims) if findings.claims else ("checks", findings.checks)
+    if not results:
+        return ""
+    counts = [
+        f"{count} {word if count == 1 else SEVERAL.get(word, word)}"
+        for word, count in counts_of(results).items()
+    ]
+    where = reach(findings)
+    return f"Of {len(results)} {kind}, {listed(counts, last='and')}{f', {where}' if where else ''}."
+
+
 def judged(one: ClaimResult) -> dict[str, Any]:
     """Return a claim with its measured values and verdict."""
     return {
@@ -207,12 +230,18 @@ def systems(plans: Sequence[tuple[Job, tuple[LoadedScenario, Plan]]], title: str
 
 LIVELY = tuple(map(metric, ("peak(sideslip)", "peak(yaw_rate)")))
 """Metrics of how lively a run is; the first that all runs have is used."""
+SEVERAL = {HOLDS: "hold", **{word: word.replace("does", "do", 1) for word in FAILS.values()}}
+"""Verdict -> its plural."""
+VIEW = "-view"
+"""Suffix of a chapter's anchor: its viewer."""
 LARGEST = 1_500_000
 """Size of the samples in a chapter [bytes]. Chosen: a page of 2.5 MB opens at once, also by mail."""
 
 
-def viewer_of(findings: ExperimentResult, chapter: str, views: Sequence[View] = ()) -> Markup | None:
-    """Return the viewer of all runs that figures show.
+def viewer_of(
+    findings: ExperimentResult, chapter: str, views: Sequence[View] = ()
+) -> tuple[Markup | None, dict[str, int]]:
+    """Return the viewer of all runs of figures and claims, and the number of each run in it.
 
     Args:
         findings: the experiment and its results.
@@ -221,12 +250,14 @@ def viewer_of(findings: ExperimentResult, chapter: str, views: Sequence[View] = 
     """
     overlays = [spec for spec in findings.spec.figures if spec.kind == "overlay"]
     named: dict[str, LabelledRun] = {}
-    for run in (run for spec in overlays for run in findings.experiment.matching(spec.runs)):
+    wanted = [run.name for spec in overlays for run in findings.experiment.matching(spec.runs)]
+    wanted += [name for one in findings.judgements for name in runs_of_claim(findings.experiment, one.said)]
+    for run in (findings.experiment.runs[name] for name in wanted):
         results = findings.results.get(run.name)
         if results is not None and results.time.size and len(named) < MOST:
             named.setdefault(run.name, LabelledRun(run.row or run.label, results))
     if not named:
-        return None
+        return None, {}
     numbers = {name: number for number, name in enumerate(named)}
     drawn: list[tuple[float, View]] = []
     for spec in overlays:
@@ -234,7 +265,8 @@ def viewer_of(findings: ExperimentResult, chapter: str, views: Sequence[View] = 
         lively = _liveliest([run for number, run in enumerate(named.values()) if number in shown])
         drawn += [(lively, view) for view in _views(spec, title_of(findings, spec), shown) if shown]
     ordered = [view for _, view in sorted(drawn, key=lambda one: -one[0])]
-    return viewer([*named.values()], Settings([*views, *ordered], largest=LARGEST), name=f"{chapter}-view")
+    settings = Settings([*views, *ordered], largest=LARGEST)
+    return viewer([*named.values()], settings, name=f"{chapter}{VIEW}"), numbers
 
 
 def _views(spec: FigureSpec, title: str, shown: Sequence[int]) -> Iterator[View]:

@@ -194,7 +194,7 @@ figures:
         run = car(gain)
         lost = replace(run, columns={k: x for k, x in run.columns.items() if "position" not in k})
         write(lost if name == "slow" else run, tmp_path / "out" / name)
-    shown = viewer_of(judge_results(made, tmp_path / "out"), "chapter")
+    shown, _ = viewer_of(judge_results(made, tmp_path / "out"), "chapter")
     assert shown is not None
     data = data_in(shown)
     assert [view["title"] for view in data["views"]] == ["Lively", "Calm", "Calm: sideslip(yaw_rate)"]

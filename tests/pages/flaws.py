@@ -18,13 +18,17 @@ return [...document.querySelectorAll('body *')].filter((e) => {
 }).map((e) => `${e.tagName} ${e.className}: ${e.textContent.trim().slice(0, 60)}`);
 """
 OVERLAPPING = """
+const scrolledAway = (e, box) => {
+  const frame = e.closest('.yv-table, .beside > :first-child')?.getBoundingClientRect();
+  return frame && (box.bottom > frame.bottom || box.top < frame.top);
+};
 const leaves = 'p, li, h1, h2, h3, h4, summary, figcaption, caption, img, canvas, button, select, td, th';
 const boxes = [...document.querySelectorAll(leaves)]
   .filter((e) => !e.querySelector(leaves) && !e.closest('svg') && e.checkVisibility())
   .filter((e) => !e.closest('.yv-hidden'))
   .filter((e) => !(e.closest('thead') && getComputedStyle(e.closest('thead')).position === 'absolute'))
   .map((e) => ({e, box: e.getBoundingClientRect()}))
-  .filter(({box}) => box.width > 0 && box.height > 0)
+  .filter(({e, box}) => box.width > 0 && box.height > 0 && !scrolledAway(e, box))
   .sort((a, b) => a.box.top - b.box.top);
 const found = [];
 boxes.forEach(({e, box}, i) => {

@@ -156,6 +156,31 @@ def test_the_panels_stand_in_the_order_of_the_study(paper):
     assert shown[:2] == [name for name in spec.panels if "(" not in name and name != "path"][:2]
 
 
+def test_the_answer_comes_first_and_a_claim_shows_its_runs(chromium, paper):
+    chromium.open(paper.page)
+    chromium.wait_for("document.querySelector('.yv-ready')")
+    (answer,) = texts(paper.tree, "p.said")
+    claims = paper.record["claims"] or paper.record["checks"]
+    assert answer.startswith(f"Of {len(claims)} ")
+    holds = sum(claim["verdict"] == "holds" for claim in claims)
+    assert f"{holds} hold" in answer
+    tops = chromium.run(
+        "return ['p.said', 'table.claims', '.yv', '.yv-chart'].map((name) =>"
+        " document.querySelector(name).getBoundingClientRect().top)"
+    )
+    assert max(tops) < 700
+    links = paper.tree.cssselect("table.claims a")
+    assert len(links) == len(paper.record["claims"]) + len(paper.record["checks"])
+    state = "return document.querySelector('.yv').viewer.state"
+    for k in (0, len(links) - 1):
+        chromium.run("document.querySelectorAll('table.claims a')[arguments[0]].click()", k)
+        wanted = json.loads(re.findall(r"shown=(\[[\d,]*\])", links[k].get("href"))[0])
+        text = json.dumps(wanted, separators=(",", ":"))
+        chromium.wait_for(f"JSON.stringify(document.querySelector('.yv').viewer.state.shown) === '{text}'")
+        assert chromium.run(state)["baseline"] == wanted[0]
+    assert chromium.console() == []
+
+
 def test_parameters_tell_their_source(paper):
     every = paper.tree.cssselect("table.parameters tbody tr")  # the vehicle's first, then those of units
     rows = {row[0].text_content(): row for row in reversed(every)}
@@ -271,7 +296,7 @@ def test_several_studies_make_one_page_with_an_overview(report, half):
     assert texts(tree, ".chapter > h2") == titles
     assert texts(tree, "table.overview tbody th") == titles
     places = {element.get("id") for element in tree.cssselect("[id]")}
-    assert {link.get("href")[1:] for link in tree.cssselect("a[href^='#']")} <= places
+    assert {link.get("href")[1:].partition("?")[0] for link in tree.cssselect("a[href^='#']")} <= places
     first = next(code for code in texts(tree, "details li code") if code.endswith(".svg"))
     assert Path("results", first).is_file()
 

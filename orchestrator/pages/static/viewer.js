@@ -22,7 +22,11 @@ class Viewer {
     this.listen();
     this.road = this.find('road') ? new Road(this) : null;
     this.refresh();
-    window.addEventListener('hashchange', () => { if (this.restore()) this.refresh(); });
+    window.addEventListener('hashchange', () => {
+      if (!this.restore()) return;
+      this.refresh();
+      root.scrollIntoView({block: 'nearest'});
+    });
     new ResizeObserver(() => this.resized()).observe(root);
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.refresh());
     addEventListener('beforeprint', () => this.print());
@@ -284,7 +288,8 @@ class Viewer {
   }
 
   drawTable() {
-    const body = this.find('runs').tBodies[0];
+    const table = this.find('runs');
+    const body = table.tBodies[0];
     [...body.rows].forEach((row, k) => {
       row.querySelector('.yv-show').checked = this.shows(this.runs[k]);
       const base = row.querySelector('.yv-base');
@@ -293,6 +298,8 @@ class Viewer {
       const offset = row.querySelector('.yv-offset');
       if (offset) offset.value = this.state.offsets[k] || '';
     });
+    const first = body.rows[Math.min(...this.state.shown)];
+    if (first) table.parentElement.scrollTop = first.offsetTop - table.tHead.offsetHeight;
   }
 
   // ---- what the reader does ----
