@@ -7,7 +7,8 @@
 Tests themselves ask for codes, places and numbers. `tests/sentences.json` has the sentences of each test in
 the order in which it asks for them. `pytest --rewrite-sentences PATH...` replaces those of the tests that it
 runs by what the program says now, and removes those of tests that are gone; then review the difference.
-Paths of temporary folders, of the repository and of Python are replaced by names.
+Paths of temporary folders, of the repository and of Python, times and numbers of processes are replaced by
+names.
 """
 
 from __future__ import annotations
@@ -55,6 +56,10 @@ class _Sentences:
         base = item.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]
         names = [(rf"{re.escape(str(base))}/[\w.-]+", "<tmp>"), (re.escape(str(ROOT)), "<root>")]
         names += [(re.escape(path), "<python>") for path in (sys.executable, sys.prefix)]
+        names += [
+            (r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\+\d\d:\d\d)?", "<time>"),
+            (r"\bprocess \d+", "process <id>"),
+        ]
         self.volatile = [(re.compile(pattern), name) for pattern, name in names]
         self.test, self.given = item.nodeid, []
 
@@ -156,19 +161,17 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Refuse sentences of tests that do not exist, in all files that are collected as a whole."""
+    """Find sentences of tests that are gone: rewriting removes them, a run of all files refuses them."""
     there = {item.nodeid for item in items}
-    chosen = {part.partition("::")[0] for part in map(str, config.args) if "::" in part}
-    whole = {test.partition("::")[0] for test in there} - {Path(file).as_posix() for file in chosen}
-    gone = [
-        test
-        for test in _sentences.of
-        if test not in there and ((file := test.partition("::")[0]) in whole or not (ROOT / file).exists())
-    ]
+    parts = {Path(part.partition("::")[0]).as_posix() for part in map(str, config.args) if "::" in part}
+    whole = {test.partition("::")[0] for test in there} - parts
+    files = {test.partition("::")[0] for test in _sentences.of}
+    gone_files = {file for file in files if not (ROOT / file).exists()}
+    gone = [t for t in _sentences.of if t not in there and t.partition("::")[0] in whole | gone_files]
     if _sentences.rewriting:
         for test in gone:
             del _sentences.of[test]
-    elif gone:
+    elif gone and files <= whole | gone_files:
         raise pytest.UsageError(
             f"{FILE.name} has sentences of tests that do not exist: {gone[:9]}; {COMMAND}"
         )

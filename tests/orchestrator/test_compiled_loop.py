@@ -26,6 +26,7 @@ from orchestrator.results.read import load_results
 from orchestrator.scenario.catalogue import names
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
+from tests.sentences import golden_in
 
 from . import models3
 from .conftest import compiled
@@ -269,7 +270,7 @@ def test_without_a_compiler_the_loop_is_in_python(fmus, tmp_path, monkeypatch, c
         with pytest.raises(SystemExit) as ended:
             main(["run", str(tmp_path / "s.yaml"), "--fmus", str(fmus), "--out", str(out)])
         assert not ended.value.code
-        assert f"note: {why}; Python makes the steps, which takes longer\n" in capsys.readouterr().err
+        assert golden_in(capsys.readouterr().err)
         assert load_results(out).record.loop == f"Python: {why}"
     finally:
         load_compiled.cache_clear()

@@ -9,6 +9,7 @@ from orchestrator.errors import Interrupted, SimulationError
 from orchestrator.master.log import DISCARD, ERROR, FATAL, OK, PENDING, WARNING
 from orchestrator.master.simulate import simulate
 from orchestrator.results.read import load_results
+from tests.sentences import golden, golden_in
 
 from .fakes import Behaviour, Clock, Echo, FakeSlave, Function, Mixed, Stage, make_plan
 
@@ -53,7 +54,7 @@ def raise_at(when, error):
 def test_a_failed_step_is_one_sentence_with_unit_time_and_reason(tmp_path):
     units = ramp_into(raise_at(0.5, ValueError("velocity_x must exceed 1 m/s (got 0.2)")))
     sentence, results, _ = fail(tmp_path, units, ["source.x -> target.x"])
-    assert sentence == "target: step failed at t = 0.5 s: ValueError: velocity_x must exceed 1 m/s (got 0.2)"
+    assert golden(sentence)
     assert results.record.status == "failed"
     assert results.record.error.message == sentence
     assert results.record.error.unit == "target"
@@ -121,14 +122,14 @@ def answer(tmp_path, kind, *, status=1):
 @pytest.mark.parametrize(("status", "word"), [(DISCARD, "Discard"), (ERROR, "Error"), (FATAL, "Fatal")])
 def test_a_status_without_a_message_is_named(status, word, tmp_path):
     sentence, _, slaves = answer(tmp_path, answering(status))
-    assert sentence == f"target: step failed at t = 0.2 s: the FMU returned {word} and gave no reason"
+    assert golden(sentence)
     assert slaves["target"].worst == status
 
 
 def test_the_first_error_that_was_logged_is_the_reason(tmp_path):
     kind = answering(ERROR, (WARNING, "getting warm"), (ERROR, "pressure\n  too high"), (ERROR, "giving up"))
     sentence, _, _ = answer(tmp_path, kind)
-    assert sentence == "target: step failed at t = 0.2 s: pressure too high"
+    assert golden(sentence)
 
 
 def test_an_error_after_which_a_unit_went_on_is_reported_and_not_taken_for_the_reason(tmp_path):
@@ -144,12 +145,12 @@ def test_an_error_after_which_a_unit_went_on_is_reported_and_not_taken_for_the_r
             return calls._replace(step=step)
 
     sentence, _, _ = answer(tmp_path, Slave)
-    assert sentence == "target: step failed at t = 0.3 s: the FMU returned Error and gave no reason"
+    assert golden(sentence)
 
     units = {"source": Clock(x=lambda t: 10.0 * t), "target": Passing()}
     opener = Opener(units, "target", answering(OK, (ERROR, "a glitch, never mind")))
     info = simulate(make_plan(units, ["source.x -> target.x"]), tmp_path, opener=opener)
-    assert [(m.instance, m.time, m.text) for m in info.warnings] == [("target", 0.2, "a glitch, never mind")]
+    assert golden([(m.instance, m.time, m.text) for m in info.warnings])
     assert [w.status for w in load_results(tmp_path).record.warnings] == ["Error"]
 
 
@@ -163,20 +164,20 @@ def test_a_component_s_own_sentence_is_not_wrapped_in_another(tmp_path):
         "step failed at t = 0.2 s: ValueError: 100 % too much: no (plants/a.py:7); inputs: x = 1.0, y = 2.0"
     )
     sentence, _, _ = answer(tmp_path, answering(DISCARD, (ERROR, text)))
-    assert sentence == "target: step failed at t = 0.2 s: ValueError: 100 % too much: no (plants/a.py:7)"
+    assert golden(sentence)
 
 
 @pytest.mark.parametrize(("call", "words"), [("set", "setting inputs"), ("get", "reading outputs")])
 def test_a_failed_set_or_get_says_so(call, words, tmp_path):
     sentence, results, _ = answer(tmp_path, answering(ERROR, (ERROR, "no"), call=call, at=6))
-    assert f"target: {words} failed at t = " in sentence
+    assert golden_in(sentence)
     assert sentence.endswith(" s: no")
     assert 1 <= len(results.time) < 11
 
 
 def test_an_asynchronous_unit_is_refused(tmp_path):
     sentence, _, _ = answer(tmp_path, answering(PENDING))
-    assert sentence.endswith("the FMU wants to compute asynchronously, which is not supported")
+    assert golden(sentence)
 
 
 def test_a_warning_is_reported_and_the_run_goes_on(tmp_path):
@@ -197,9 +198,7 @@ def test_a_warning_without_a_message_is_reported_too(tmp_path):
         make_plan(units, ["source.x -> target.x"]), tmp_path,
         opener=Opener(units, "target", answering(WARNING)),
     )  # fmt: skip
-    assert [(m.instance, m.text) for m in info.warnings] == [
-        ("target", "step: the FMU returned Warning and gave no reason")
-    ]
+    assert golden([(m.instance, m.text) for m in info.warnings])
 
 
 def test_an_error_logged_during_initialization_ends_the_run_although_the_status_is_ok(tmp_path):
@@ -209,7 +208,7 @@ def test_an_error_logged_during_initialization_ends_the_run_although_the_status_
             return OK
 
     sentence, results, slaves = answer(tmp_path, Slave)
-    assert sentence == "target: initialization failed at t = 0 s: ValueError: mass is -1"
+    assert golden(sentence)
     assert len(results.time) == 0
     assert [slave.freed for slave in slaves.values()] == [1, 1]
 
@@ -239,7 +238,7 @@ def test_a_value_that_is_not_finite_names_its_wire_and_time(value, word, algorit
     }
     wires = ["source.ok -> b.x", "source.x -> a.x"]
     sentence, results, _ = fail(tmp_path, units, wires, algorithm=algorithm)
-    assert sentence == f"source: x is {word} at t = 0.5 s, on the wire source.x -> a.x"
+    assert golden(sentence)
     assert results.time.tolist() == [0.0, 0.1, 0.2, 0.3, 0.4]
 
 
@@ -250,7 +249,7 @@ def test_a_failure_downstream_of_a_nan_is_blamed_on_its_source(tmp_path):
 
     units = {"source": Clock(x=lambda t: math.nan if t > 0.45 else t), "target": Passing(act)}
     sentence, _, _ = fail(tmp_path, units, ["source.x -> target.x"])
-    assert sentence == "source: x is not a number at t = 0.5 s, on the wire source.x -> target.x"
+    assert golden(sentence)
 
 
 def test_a_nan_from_a_unit_that_has_logged_an_error_is_explained_by_it(tmp_path):
@@ -270,7 +269,7 @@ def test_a_nan_from_a_unit_that_has_logged_an_error_is_explained_by_it(tmp_path)
 
     units = {"source": Clock(x=lambda t: t), "target": Passing()}
     sentence, _, _ = fail(tmp_path, units, ["source.x -> target.x"], opener=Opener(units, "source", Slave))
-    assert sentence == "source: reading Real [17] failed at t = 0.5 s: KeyError: 17"
+    assert golden(sentence)
 
 
 @pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
@@ -285,7 +284,7 @@ def test_a_value_on_no_wire_that_is_not_finite_is_a_warning_with_its_first_time(
     plan = make_plan(units, ["source.x -> target.x"], algorithm=algorithm)
     info = simulate(plan, tmp_path, opener=Stage(units))
     said = [(m.instance, m.time, m.text) for m in info.warnings]
-    assert said == [("source", time, "spare is not a number; it is on no wire")]
+    assert golden(said)
     results = load_results(tmp_path)
     assert results.record.status == "completed"
     assert [(w.unit, w.time) for w in results.record.warnings] == [("source", time)]
@@ -303,7 +302,7 @@ def test_after_a_warning_of_one_value_all_others_are_still_looked_at(tmp_path):
         "target": Passing(),
     }
     sentence, results, _ = fail(tmp_path, units, ["source.x -> target.x"])
-    assert sentence == "source: x is infinite at t = 0.8 s, on the wire source.x -> target.x"
+    assert golden(sentence)
     assert [w.text.split()[0] for w in results.record.warnings] == ["spare", "more"]
     assert [w.time for w in results.record.warnings] == [0.3, 0.5]
 
@@ -319,7 +318,8 @@ def test_a_value_on_no_wire_is_named_also_of_a_unit_that_floods_the_log(tmp_path
     stage = Stage(units)
     info = simulate(make_plan(units, ["source.x -> target.x"]), tmp_path, opener=stage)
     first = info.warnings[0]
-    assert (first.time, first.text) == (0.6, "y is not a number; it is on no wire")
+    assert first.time == 0.6
+    assert golden(first.text)
 
 
 def test_a_nan_at_the_start_that_the_loop_heals_is_no_error(tmp_path):
@@ -334,7 +334,7 @@ def test_a_nan_at_the_start_that_the_loop_heals_is_no_error(tmp_path):
 def test_a_nan_that_stays_after_initialization_names_its_wire(tmp_path):
     units = {"source": Clock(x=lambda t: math.nan), "target": Passing()}
     sentence, _, _ = fail(tmp_path, units, ["source.x -> target.x"])
-    assert sentence == "source: x is not a number at t = 0 s, on the wire source.x -> target.x"
+    assert golden(sentence)
 
 
 def interrupt_at(when, number):
@@ -351,7 +351,7 @@ def test_an_interrupted_run_ends_between_two_steps_and_keeps_its_results(number,
     units = ramp_into(interrupt_at(0.5, number))
     status = 128 + number
     sentence, results, slaves = fail(tmp_path, units, ["source.x -> target.x"], status=status)
-    assert sentence == "the run was interrupted at t = 0.6 s"
+    assert golden(sentence)
     assert results.record.status == "interrupted"
     assert results.time.tolist()[-1] == 0.6
     assert [slave.freed for slave in slaves.values()] == [1, 1]
@@ -365,7 +365,7 @@ def test_a_run_interrupted_during_initialization_has_no_rows(tmp_path):
             return OK
 
     sentence, results, slaves = answer(tmp_path, Slave, status=130)
-    assert sentence == "the run was interrupted during initialization"
+    assert golden(sentence)
     assert results.record.status == "interrupted"
     assert len(results.time) == 0
     assert [slave.freed for slave in slaves.values()] == [1, 1]
@@ -397,7 +397,8 @@ def test_a_failed_run_stands_beside_the_results_of_one_that_reached_its_end(tmp_
     failing = ramp_into(raise_at(0.5, ValueError("no")))
     with pytest.raises(SimulationError) as caught:
         simulate(make_plan(failing, ["source.x -> target.x"]), tmp_path, opener=Stage(failing))
-    assert str(caught.value.diagnostics[-1]) == f"What was recorded until then: {tmp_path / 'failed'}"
+    assert caught.value.code == "fmu-call-failed"
+    assert golden(str(caught.value.diagnostics[-1]))
     results = load_results(tmp_path)
     assert list(results) == ["a.x"]
     assert results.record.status == "completed"
@@ -440,4 +441,4 @@ def test_results_are_whole_on_the_disk_before_a_unit_is_freed(tmp_path):
     assert not before.record.units_freed
     after = load_results(tmp_path).record
     assert after.units_freed
-    assert [w.text for w in after.warnings] == ["fmi2Terminate returned Error"]
+    assert golden([w.text for w in after.warnings])

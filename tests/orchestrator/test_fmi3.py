@@ -11,6 +11,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.results.read import load_results
+from tests.sentences import golden_in
 
 from . import models3
 from .conftest import compiled
@@ -121,7 +122,7 @@ def test_a_value_on_a_wire_that_a_type_cannot_hold_ends_the_run(run, isolate):
     units = {"a": ("Every", {}), "b": ("Every", {})}
     status, said, _ = run(units, *isolate, inputs=constants, connections=wires)
     assert status == 1
-    assert "b: setting inputs failed at t = 0 s: 1000 does not fit into a variable of type Int8" in said
+    assert golden_in(said)
 
 
 @together_and_apart
@@ -160,7 +161,7 @@ def test_units_of_both_versions_share_a_scenario(run, tmp_path, library, isolate
 def test_an_fmu_that_wants_to_end_ends_the_run_after_its_last_step(run, isolate):
     status, said, results = run({"a": ("Stair", {})}, *isolate, stop_time=20, step_size=0.5)
     assert status == 0, said
-    assert "ended: a ended the run at t = 9 s" in said
+    assert golden_in(said)
     assert (results.time[-1], results["a.counter"][-1]) == (9.0, 10)
     assert results.record.ended.time == 9.0
 
@@ -176,14 +177,14 @@ def test_a_step_from_which_an_fmu_returns_early_is_gone_to_its_end(run, isolate)
 def test_an_fmu_that_returns_early_and_stays_is_an_error(run, isolate):
     status, said, _ = run({"a": ("Stuck", {})}, *isolate)
     assert status == 1
-    assert "a: step failed at t = 0 s: it returned early and stays at t = 0 s" in said
+    assert golden_in(said)
 
 
 @together_and_apart
 def test_a_parameter_that_does_not_take_ends_the_run(run, isolate):
     status, said, _ = run({"a": ("Deaf", {"parameters": {"k": 2.0}})}, *isolate)
     assert status == 1
-    assert "a: a parameter did not take the value that was set: k is 1 1/s, not 2 1/s" in said
+    assert golden_in(said)
 
 
 @together_and_apart
@@ -191,7 +192,7 @@ def test_an_fmu_that_refuses_to_be_instantiated_says_why(run, isolate):
     status, said, _ = run({"a": ("Refusing", {})}, *isolate)
     assert status == 1
     assert "a: " in said
-    assert "Refusing.fmu cannot be instantiated: no licence; 100%s of them are taken" in said
+    assert golden_in(said)
 
 
 @pytest.mark.parametrize(
@@ -219,7 +220,7 @@ def test_other_interfaces_are_refused(run, tmp_path, models, interface, words):
     path = make_fmu(tmp_path, "Dahlquist", models, interface=interface)
     status, said, _ = run({"a": (path, {})})
     assert status == 2
-    assert f"an FMU for {words} only; supported are FMI 2.0 and 3.0 for co-simulation" in said
+    assert golden_in(said)
 
 
 @together_and_apart
@@ -242,4 +243,4 @@ def test_check_shows_arrays_and_their_constants(run):
     shown = [line.split() for line in said.splitlines()]
     assert ["u[1]", "2.5", "scenario", "m"] in shown
     assert ["u[2]", "2.5", "scenario", "m"] in shown
-    assert "Nothing is wrong" in said
+    assert golden_in(said)

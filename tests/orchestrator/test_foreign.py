@@ -15,6 +15,7 @@ from orchestrator.results.freshness import staleness
 from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
+from tests.sentences import golden_in
 
 HERE = Path(__file__).parent
 INPUT, OUTPUT, ANSWER = 1000001, 4000000000, 7
@@ -135,7 +136,7 @@ def test_enumerations_are_wired_and_given_by_name(run, isolate):
     assert set(results["b.Enumeration_out"]) == {4}
     status, said, _ = run(*isolate, given={"Enumeration": "snow"})
     assert status == 2
-    assert "must be one of dry, wet or ice" in said
+    assert golden_in(said)
 
 
 @together_and_apart
@@ -143,7 +144,7 @@ def test_enumerations_are_wired_and_given_by_name(run, isolate):
 def test_a_step_that_fails_is_a_sentence_and_the_results_so_far(run, isolate, answer):
     status, said, results = run(*isolate, answer=answer)
     assert status == 1
-    assert "b: step failed at t = 0.25 s: valve 3 of b is 99.5% open, größer als gedacht\n" in said
+    assert golden_in(said)
     assert results.record.status == "failed"
     assert results.time[-1] == 0.25
     assert results.record.error.inputs == {
@@ -155,7 +156,7 @@ def test_a_step_that_fails_is_a_sentence_and_the_results_so_far(run, isolate, an
 def test_a_warning_is_said_and_the_run_goes_on(run, isolate):
     status, said, results = run(*isolate, answer=1)
     assert status == 0
-    assert "valve 3 of b is 99.5% open, größer als gedacht" in said
+    assert golden_in(said)
     assert results.time[-1] == 0.5
 
 
@@ -181,7 +182,7 @@ def test_a_parameter_reaches_an_fmu_that_resets_when_the_experiment_is_set_up(ru
 def test_a_parameter_that_does_not_take_ends_the_run(run, isolate):
     status, said, results = run(*isolate, answer=2, guid="{deaf}")
     assert status == 1
-    assert "b: a parameter did not take the value that was set: answer is 0, not 2" in said
+    assert golden_in(said)
     assert results.record.status == "failed"
     assert results.record.error.unit == "b"
 
@@ -190,7 +191,7 @@ def test_a_parameter_that_does_not_take_ends_the_run(run, isolate):
 def test_a_parameter_that_cannot_be_read_back_is_a_warning(run, isolate):
     status, said, results = run(*isolate, answer=1, guid="{mute}")
     assert status == 0
-    assert "b at t = 0 s: whether answer took the value that was set is not known" in said
+    assert golden_in(said)
     assert results.time[-1] == 0.5
 
 
@@ -245,7 +246,7 @@ def test_text_parameters_and_inputs_are_recorded_by_name(run, isolate, form):
 def test_an_fmu_that_wants_to_end_ends_the_run_in_good_order(run, isolate, guid, rows, reached):
     status, said, results = run(*isolate, guid=guid)
     assert status == 0, said
-    assert f"ended: a ended the run at t = {reached} s" in said
+    assert golden_in(said)
     assert results.time.size == rows
     assert (results.record.status, results.record.error) == ("completed", None)
     assert results.record.ended.unit == "a"
@@ -299,11 +300,11 @@ def test_a_description_that_is_formally_wrong_runs_with_a_warning_if_asked_to(ru
     status, said, _ = run(**WRONG)
     assert status == 2
     assert "a: " in said or "two.yaml" in said
-    assert "not valid FMI 2.0: The unit" in said
-    assert "'validate: false' for the unit (--set UNIT.validate=false) makes it a warning" in said
+    assert golden_in(said)
+    assert golden_in(said)
     status, said, results = run("--no-validate", **WRONG)
     assert status == 0, said
-    assert 'warning: a at t = 0 s: the model description is not valid FMI 2.0: The unit "bar"' in said
+    assert golden_in(said)
     assert [w.unit for w in results.record.warnings] == ["a", "b"]
     assert results["b.Real_out"][-1] == 3.0
 
@@ -311,7 +312,7 @@ def test_a_description_that_is_formally_wrong_runs_with_a_warning_if_asked_to(ru
 def test_one_unit_may_be_left_unvalidated_by_the_scenario(run):
     status, said, _ = run(**WRONG, more=", validate: false")
     assert status == 2
-    assert "two.yaml:7: units.a.fmu" in said
+    assert golden_in(said)
     assert "units.b" not in said
 
 
@@ -347,11 +348,11 @@ def test_an_fmu_without_a_function_that_is_needed_is_refused_before_the_run(
 ):
     status, said, results = run(binary=bare_library)
     assert (status, results) == (2, None)
-    assert "a: the library of foreign lacks fmi2SetString, which String_in needs" in said
+    assert golden_in(said)
     with pytest.raises(SystemExit) as exit_:
         main(["check", str(tmp_path / "two.yaml")])
     assert exit_.value.code == 2
-    assert "a: the library of foreign lacks fmi2GetString, which String_out needs" in capsys.readouterr().err
+    assert golden_in(capsys.readouterr().err)
 
 
 @together_and_apart

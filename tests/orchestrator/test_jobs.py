@@ -14,7 +14,7 @@ from orchestrator.errors import ResultsError, ScenarioError, SimulationError, Ya
 from orchestrator.experiments.jobs import Job, execute, read_back, ready
 from orchestrator.results.read import load_results
 from orchestrator.workers import Pool
-from tests.sentences import texts_of
+from tests.sentences import golden, golden_in, refused, texts_of
 
 from .recorded import car, write
 
@@ -63,19 +63,17 @@ def test_a_run_that_fails_or_dies_takes_no_other_with_it(tmp_path):
     outcomes = {one.job.label: one for one in execute(jobs(tmp_path, *labels), workers=2, run=obey)}
     assert outcomes["good"].ok
     assert outcomes["fine"].ok
-    assert outcomes["fails"].reason == "plant: step failed at t = 1 s"
+    assert golden(outcomes["fails"].reason)
     assert outcomes["fails"].exit_status == 1
     assert texts_of(outcomes["wrong"]) == ("first problem", "second problem")
     assert outcomes["wrong"].exit_status == 2
-    assert outcomes["dies"].reason == (
-        "the process of this run died of SIGKILL (sent from outside or for want of memory)"
-    )
-    assert outcomes["leaves"].reason == "the process of this run ended itself with exit status 3"
+    assert golden(outcomes["dies"].reason)
+    assert golden(outcomes["leaves"].reason)
 
 
 def test_an_error_of_the_program_itself_is_reported_too(tmp_path):
     (outcome,) = execute(jobs(tmp_path, "breaks"), run=obey)
-    assert texts_of(outcome) == ("ZeroDivisionError: by zero",)
+    assert golden(texts_of(outcome))
     assert outcome.exit_status == 1
 
 
@@ -90,9 +88,7 @@ def test_results_of_an_earlier_run_cannot_pass_for_new(tmp_path):
     (failed,) = execute(jobs(tmp_path, "fails"), run=obey)
     assert not failed.ok
     assert load_results(tmp_path / "fails").record.status == "completed"  # nothing is lost
-    assert read_back(tmp_path / "fails", "of the new run") == (
-        f"{tmp_path / 'fails'}: holds the results of another run than the one just made"
-    )
+    assert golden(read_back(tmp_path / "fails", "of the new run"))
 
 
 @pytest.mark.parametrize("why", [KeyboardInterrupt, ValueError])
@@ -104,7 +100,7 @@ def test_when_the_caller_stops_all_runs_end(tmp_path, monkeypatch, why):
     os.mkfifo(tmp_path / "fifo")
     with pytest.raises(why):
         execute(jobs(tmp_path, "hangs", "waits"), workers=2, run=obey, done=stop)
-    with pytest.raises(OSError, match="No such device"):  # nobody reads any more
+    with refused(OSError):  # nobody reads any more
         os.open(tmp_path / "fifo", os.O_WRONLY | os.O_NONBLOCK)
 
 
@@ -160,8 +156,8 @@ def test_only_a_run_that_reached_its_end_is_read_back(tmp_path):
     write(car(n=5), tmp_path / "whole")
     write(car(n=5), tmp_path / "part", status="failed", error={"message": "plant: step failed"})
     assert read_back(tmp_path / "whole").folder == load_results(tmp_path / "whole").folder
-    assert read_back(tmp_path / "part") == f"{tmp_path / 'part'}: this run ended early: plant: step failed"
-    assert "no results here" in read_back(tmp_path / "none")
+    assert golden(read_back(tmp_path / "part"))
+    assert golden_in(read_back(tmp_path / "none"))
 
 
 def test_all_problems_of_all_jobs_are_found_before_any_runs(tmp_path):
@@ -194,7 +190,7 @@ def test_processes_that_share_work_keep_its_order_and_hand_on_what_is_raised():
             workers.map(half, [2, 4, 6, 7, 8, 10])
         assert workers.map(half, [2, 4]) == [1, 2]
         assert workers.map(half, []) == []
-        with pytest.raises(YawbenchError, match="has been killed"):
+        with refused(YawbenchError, "run-process-died"):
             workers.map(half, [2, 99])
 
 
@@ -203,7 +199,7 @@ def test_too_few_open_files_are_told_before_a_process_starts(tmp_path):
     allowed = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (30, allowed[1]))
     try:
-        with pytest.raises(YawbenchError, match=r"only 30 files may be open .* need \d+ \(`ulimit -n"):
+        with refused(YawbenchError, "too-few-open-files"):
             execute(jobs(tmp_path, "a"))
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, allowed)

@@ -9,6 +9,7 @@ from orchestrator.pages.comparison import differences
 from orchestrator.results.read import UNREADABLE, found_runs, load_results
 from orchestrator.results.run_record import FmuRecord, RunRecord
 from tests.fmu_copies import put_fmus
+from tests.sentences import golden, golden_in
 
 from .recorded import car, write
 
@@ -73,7 +74,7 @@ def test_runs_that_are_the_same_say_so(yawbench, tmp_path):
     write(car(), tmp_path / "other")
     status, out, said = yawbench("diff", tmp_path / "one", tmp_path / "other")
     assert (status, out) == (0, "")
-    assert said == "The runs are the same, in what they were made of and in every number.\n"
+    assert golden(said)
 
 
 @pytest.mark.parametrize(
@@ -149,7 +150,7 @@ def test_a_run_whose_record_was_changed_is_listed_and_left_out_of_an_evaluation_
     assert (status, out) == (2, "")
     assert said.startswith(sentence)
     _, _, said = yawbench("evaluate", "step-steer", tmp_path, "--no-figures")
-    assert f"note: left out: {sentence}" in said
+    assert golden_in(said)
     for command in (("plot", tmp_path / "one"), ("diff", tmp_path / "one", tmp_path / "other")):
         status, out, said = yawbench(*command)
         assert (status, out) == (2, "")

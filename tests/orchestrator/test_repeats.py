@@ -14,9 +14,9 @@ from orchestrator.experiments.figures import draw_over_axes
 from orchestrator.experiments.jobs import run_job
 from orchestrator.experiments.outcome import judge_records
 from orchestrator.experiments.planning import plan_experiment
-from orchestrator.experiments.verdict_tables import HOLDS, UNDECIDED, limit_tables, run_tables, verdict
+from orchestrator.experiments.verdict_tables import limit_tables, run_tables, verdict
 from orchestrator.metrics.run_metrics import MetricValue
-from tests.sentences import texts_of
+from tests.sentences import golden, texts_of
 
 SCENARIO = """
 title: A car that turns, and its gyro
@@ -109,28 +109,21 @@ def test_numbers_over_repeats_are_means_with_their_confidence(findings):
 
 def test_tables_have_a_row_for_all_repeats_together(findings):
     (table,) = run_tables(findings)
-    assert [row[0] for row in table.text()] == [
-        *("a weak gyro, quiet", "a weak gyro, noisy", "a gyro, quiet", "a gyro, noisy")
-    ]
+    assert golden([row[0] for row in table.text()])
     assert [" ± " in row[1] for row in table.text()] == [False, True, False, True]
 
 
 def test_a_threshold_within_confidence_leaves_the_verdict_open(load, findings):
-    assert [(one.said.says, verdict(one)) for one in findings.checks] == [
-        ("A weak gyro tells nine tenths where it is quiet.", "does not hold"),
-        ("A weak gyro tells nine tenths where it is noisy.", "does not hold"),
-        ("A gyro tells nine tenths where it is quiet.", HOLDS),
-        ("A gyro tells nine tenths where it is noisy.", UNDECIDED),
-    ]
+    assert golden([(one.said.says, verdict(one)) for one in findings.checks])
     sure = load(("at_least: 90 %", "at_least: 75 %"))
     judged = replace(findings, experiment=sure).checks
-    assert [verdict(one) for one in judged] == ["does not hold", "does not hold", HOLDS, HOLDS]
+    assert golden([verdict(one) for one in judged])
 
 
 def test_a_grid_says_how_far_down_its_columns_hold(findings):
     (table,) = limit_tables(findings)
     *cells, down_to = table.text()
-    assert down_to == ["enough down to", "-", "quiet"]
+    assert golden(down_to)
     assert cells[0] == ["quiet", "50.0 % ✗", "100 %"]
     assert cells[1][2].endswith("?")
 

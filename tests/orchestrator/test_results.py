@@ -8,7 +8,7 @@ from orchestrator.errors import ResultsError
 from orchestrator.results import read
 from orchestrator.results.csv_file import BLOCK, CsvFile
 from orchestrator.results.read import load_results
-from tests.sentences import texts_of
+from tests.sentences import golden, refused, texts_of
 
 RUN = {
     "status": "completed",
@@ -81,17 +81,15 @@ def test_a_recorded_role_comes_before_the_names(folder):
 def test_a_variable_of_two_units_is_ambiguous_until_a_role_is_given(folder):
     (folder / "results.csv").write_text("time,car.yaw_rate,ecu.yaw_rate\n0.0,1.0,2.0\n")
     results = load_results(folder)
-    with pytest.raises(ResultsError, match=r"more than one unit: car\.yaw_rate, ecu\.yaw_rate\.$"):
+    with refused(ResultsError, "signal-ambiguous"):
         results.find("yaw_rate")
     assert results.find("yaw_rate", role="controller").tolist() == [2.0]
 
 
 def test_an_unknown_column_suggests_the_likely_one(folder):
-    with pytest.raises(
-        ResultsError, match=r"no column 'car\.yawrate' was recorded; did you mean 'car\.yaw_rate'"
-    ):
+    with refused(ResultsError, "signal-unknown"):
         load_results(folder)["car.yawrate"]
-    with pytest.raises(ResultsError, match="no column 'yaw_rate' of a driver was recorded"):
+    with refused(ResultsError, "signal-unknown"):
         load_results(folder).find("yaw_rate", role="driver")
 
 
@@ -103,9 +101,7 @@ def test_results_without_rows_have_empty_columns(folder):
 
 def test_results_that_were_cut_off_are_no_results(folder):
     (folder / "run.json").write_text(json.dumps({**RUN, "rows": 3}))
-    with pytest.raises(
-        ResultsError, match=r"results\.csv: holds 2 of the 3 rows of its run; run it again\.$"
-    ):
+    with refused(ResultsError, "results-unreadable"):
         load_results(folder)
 
 
@@ -171,7 +167,7 @@ def test_a_record_of_another_kind_is_one_sentence(folder, changes, sentence):
     with pytest.raises(ResultsError) as caught:
         load_results(folder)
     (problem,) = texts_of(caught.value)
-    assert problem.startswith(f"{folder / 'run.json'}: is not the record of a run: {sentence}")
+    assert golden(problem)
 
 
 def test_a_changed_file_of_results_is_found_by_its_checksum(folder):
@@ -179,7 +175,7 @@ def test_a_changed_file_of_results_is_found_by_its_checksum(folder):
     (folder / "run.json").write_text(json.dumps({**RUN, "checksum": known}))
     assert len(load_results(folder).time) == 2
     (folder / "results.csv").write_text(CSV.replace("0.5", "0.6"))
-    with pytest.raises(ResultsError, match=r"it is not what its run has written \(its checksum in run\.json"):
+    with refused(ResultsError, "results-unreadable"):
         load_results(folder)
 
 
@@ -221,5 +217,5 @@ def test_a_line_without_end_is_not_read_to_its_end(tmp_path):
     file = tmp_path / "results.csv"
     with file.open("wb") as stream:
         stream.truncate(10 * BLOCK)
-    with pytest.raises(ValueError, match="a line is longer than 8000000 bytes"):
+    with refused(ValueError):
         CsvFile(file)

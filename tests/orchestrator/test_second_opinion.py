@@ -30,6 +30,7 @@ from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.evidence import measured
+from tests.sentences import golden, golden_in, refused
 
 from . import fmpy_exchanging
 
@@ -113,7 +114,7 @@ def test_names_with_brackets_are_printed_whole(capsys):
 
 def test_a_system_without_recorded_reals_has_nothing_to_compare(fmus, tmp_path):
     plan = replace(plan_of(fmus), record=())
-    with pytest.raises(WiringError, match="nothing to compare: no output of type Real is recorded"):
+    with refused(WiringError, "nothing-to-compare"):
         second_opinion(plan, tmp_path)
 
 
@@ -133,7 +134,7 @@ def test_signals_that_do_not_change_are_told(capsys):
     gaps = differences(request, own, own)
     show([SecondOpinion(MASTERS[0], False, "", gaps, {"theirs": 1e-6, "ours": 1e-6}, still)])
     said = capsys.readouterr().out
-    assert "Constant during the run, so their agreement says little: 3 of 4 signals, a.rounded" in said
+    assert golden_in(said)
     show([SecondOpinion(MASTERS[0], False, "", gaps, {"theirs": 1e-6, "ours": 1e-6})])
     assert "Constant" not in capsys.readouterr().out
 
@@ -150,7 +151,7 @@ def test_the_example_of_the_documentation_compares_signals_that_move(fmus, tmp_p
 def test_a_master_that_is_not_installed_costs_a_sentence(fmus, tmp_path):
     missing = OtherMaster("Nobody", "nobody", "nobody_at_all", one_step=False)
     (one,) = second_opinion(plan_of(fmus), tmp_path, masters=[missing])
-    assert one.problem == "nobody_at_all is not installed: pip install 'yawbench[interop]'"
+    assert golden(one.problem)
 
 
 def test_a_master_that_fails_costs_a_sentence(fmus, tmp_path):
@@ -164,7 +165,7 @@ def test_a_master_that_never_ends_costs_a_sentence(fmus, tmp_path, monkeypatch):
     plan = plan_of(fmus)
     request = module._request(plan, False, tmp_path)
     monkeypatch.setattr(module, "LIMIT", 0.01)
-    assert module._run("own", request, tmp_path) == "it did not end within 0.01 s"
+    assert golden(module._run("own", request, tmp_path))
 
 
 def test_the_command_prints_every_signal_and_the_times(fmus, capsys):
@@ -175,13 +176,11 @@ def test_the_command_prints_every_signal_and_the_times(fmus, capsys):
     assert not exit_.value.code
     said = capsys.readouterr().out
     assert "plant.yaw_rate" in said
-    assert "us per communication step" in said
+    assert golden_in(said)
 
 
 def test_an_unknown_master_is_refused(capsys):
     with pytest.raises(SystemExit) as exit_:
         main(["second-opinion", "any.yaml", "--master", "libcosmi"])
     assert exit_.value.code == 2
-    assert capsys.readouterr().err.strip() == (
-        "--master libcosmi: there is no such master; did you mean 'libcosim'?"
-    )
+    assert golden(capsys.readouterr().err.strip())

@@ -20,6 +20,7 @@ from orchestrator.errors import Diagnostic, Location, RecordWarning, ResultsErro
 from orchestrator.experiments.jobs import MeasuredRun
 from orchestrator.experiments.journal import Journal
 from orchestrator.results.read import load_results
+from tests.sentences import golden, golden_in, refused
 
 UNIT = '''
 import os
@@ -159,7 +160,7 @@ def test_one_row_per_run_with_units_and_figures_and_a_page(moods, yawbench, tmp_
     about = json.loads(table.schema.metadata[b"experiment"])
     assert about["experiment"]["title"] == "Moods"
     assert len(about["fmus"]) == 2
-    assert "Calm up to [N.m]" in out
+    assert golden_in(out)
     figures = {path.name for path in (tmp_path / "out" / "figures").iterdir()}
     assert figures == {f"{name}.{kind}" for name in ("curve", "map", "limit") for kind in ("png", "svg")}
     page = html.fromstring((tmp_path / "out" / "report.html").read_text())
@@ -167,7 +168,7 @@ def test_one_row_per_run_with_units_and_figures_and_a_page(moods, yawbench, tmp_
     assert [image.get("alt") for image in page.cssselect("figure.chart img")] == [
         "Moods: curve", "Moods: map", "Moods: limit",
     ]  # fmt: skip
-    assert "Calm up to [N.m]" in page.text_content()
+    assert golden_in(page.text_content())
     assert len(list(csv.DictReader((tmp_path / "out" / "table.csv").open()))) == 6
 
 
@@ -199,16 +200,14 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_is_not_made_again(moods, 
     failed = [row for row in rows(tmp_path / "out") if row["status"] == "failed"]
     assert [row["level"] for row in failed] == [20, 20]
     assert failed[0]["moment"] is None
-    assert failed[0]["reason"].startswith(
-        "controller: step failed at t = 0.05 s: ValueError: twenty is too much"
-    )
-    assert "level 20 N.m, amplitude 1 deg failed: controller: step failed" in err
-    assert "level 20 N.m, amplitude 1 deg failed" in (tmp_path / "out" / "report.html").read_text()
+    assert golden(failed[0]["reason"])
+    assert golden_in(err)
+    assert golden_in((tmp_path / "out" / "report.html").read_text())
     before = (tmp_path / "out" / "runs.jsonl").read_bytes()
     table = (tmp_path / "out" / "table.parquet").read_bytes()
     status, _, err = yawbench(file, "out")
     assert status == 1
-    assert "all finished before" in err
+    assert golden_in(err)
     assert (tmp_path / "out" / "runs.jsonl").read_bytes() == before
     assert (tmp_path / "out" / "table.parquet").read_bytes() == table
 
@@ -223,7 +222,7 @@ def test_isolated_runs_that_hang_or_crash_are_rows_that_name_the_unit(moods, yaw
     assert "controller" in crashed["reason"]
     assert "SIGKILL" in crashed["reason"]
     assert "controller" in hung["reason"]
-    assert "did not come back within 3 s" in hung["reason"]
+    assert golden_in(hung["reason"])
     yawbench(moods(10), "together")
     assert calm == rows(tmp_path / "together")
 
@@ -245,14 +244,14 @@ def test_a_run_that_kills_its_process_every_time_is_named_and_tried_again_next_t
     assert yawbench(file, "out")[0] == 1
     found = rows(tmp_path / "out")
     assert [row["status"] for row in found] == ["completed"] * 2 + ["failed"] * 2
-    assert found[2]["reason"] == "the process of this run died of signal SIGKILL"
+    assert golden(found[2]["reason"])
     assert len(journal(tmp_path / "out")) == 2
     assert "4 runs, 2 finished before" in yawbench(file, "out")[2]
 
 
 def test_more_levels_add_runs_and_repeat_none(moods, yawbench, tmp_path):
     yawbench(moods(10), "out")
-    assert "4 runs, 2 finished before" in yawbench(moods(10, 15), "out")[2]
+    assert golden_in(yawbench(moods(10, 15), "out")[2])
     assert len({entry["key"] for entry in journal(tmp_path / "out")}) == len(journal(tmp_path / "out")) == 4
     yawbench(moods(10, 15), "anew")
     assert rows(tmp_path / "out") == rows(tmp_path / "anew")
@@ -273,9 +272,9 @@ def test_kept_results_can_be_loaded_in_every_format_and_are_made_once(moods, yaw
     results = load_results(tmp_path / "out" / "runs" / rows(tmp_path / "out")[1]["key"][:12])
     assert results.file.name == "results.parquet"
     assert results["controller.yaw_moment"][-1] == pytest.approx(1.0)
-    assert "all finished before" in yawbench(file, "out", "--keep")[2]
+    assert golden_in(yawbench(file, "out", "--keep")[2])
     more = moods(5, 10)  # what was the first run is the third now
-    assert "4 runs, 2 finished before" in yawbench(more, "out", "--keep")[2]
+    assert golden_in(yawbench(more, "out", "--keep")[2])
     kept = [load_results(tmp_path / "out" / "runs" / row["key"][:12]) for row in rows(tmp_path / "out")]
     assert [run["controller.yaw_moment"][-1] for run in kept] == pytest.approx([0.5, 0.5, 1.0, 1.0])
 
@@ -287,7 +286,7 @@ def interrupted(file, out, fmus, tmp_path, number):
     process = subprocess.Popen(
         [*command, "--fmus", str(fmus), "--jobs", "1"], stderr=subprocess.PIPE, text=True
     )
-    assert (tmp_path / "slow").read_text() == "it has begun"
+    assert golden((tmp_path / "slow").read_text())
     process.send_signal(number)
     told = process.communicate()[1]
     (tmp_path / "slow").unlink()
@@ -302,12 +301,12 @@ def test_a_sweep_that_was_stopped_goes_on_where_it_was(number, moods, yawbench, 
     status, told = interrupted(file, "out", fmus, tmp_path, number)
     assert status == (-number if number == signal.SIGKILL else 128 + number)
     if number != signal.SIGKILL:
-        assert f"Interrupted; what was recorded until then: {tmp_path / 'out'}" in told
+        assert golden_in(told)
     before = journal(tmp_path / "out")
     assert len(before) == 4
     status, _, told = yawbench(file, "out")
     assert status == 0
-    assert "8 runs, 4 finished before" in told
+    assert golden_in(told)
     after = journal(tmp_path / "out")
     assert after[:4] == before
     assert len({entry["key"] for entry in after}) == len(after) == 8
@@ -324,7 +323,7 @@ def test_a_folder_of_another_sweep_is_refused(moods, yawbench, tmp_path):
     other.write_text(file.read_text())
     status, _, err = yawbench(other, "out")
     assert status == 2
-    assert f"{tmp_path / 'out'}: holds the runs of {tmp_path.name}/moods.yaml; give another folder" in err
+    assert golden_in(err)
     assert yawbench(other, "out", "--fresh")[0] == 0
 
 
@@ -352,14 +351,14 @@ def test_a_line_that_a_kill_has_cut_off_is_dropped(tmp_path):
 
 def test_a_file_that_is_no_journal_is_one_sentence(tmp_path):
     (tmp_path / "runs.jsonl").write_text("nonsense\n")
-    with pytest.raises(ResultsError, match=r"runs\.jsonl: line 1 is damaged: is no JSON; --fresh begins"):
+    with refused(ResultsError, "results-unreadable"):
         Journal(tmp_path, "a/b.yaml")
     assert (tmp_path / "runs.jsonl").read_text() == "nonsense\n"
 
 
 def test_a_journal_without_checksums_is_of_an_earlier_version(tmp_path):
     (tmp_path / "runs.jsonl").write_text('{"sweep": "a/b.yaml", "format": 1}\n')
-    with pytest.raises(ResultsError, match="holds the runs of an earlier version of this program; give"):
+    with refused(ResultsError, "results-of-another"):
         Journal(tmp_path, "a/b.yaml")
 
 
@@ -407,7 +406,7 @@ def test_an_altered_line_of_a_journal_is_named_and_its_run_made_again(old, new, 
     with pytest.warns(RecordWarning) as told:
         again = Journal(tmp_path, "a/b.yaml")
     again.close()
-    assert [str(one.message) for one in told] == [f"{file}: line 2: {words}; its run is to be made again"]
+    assert golden([str(one.message) for one in told])
     assert again.records == {"two": RECORDS["two"]}
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -438,7 +437,7 @@ def test_a_sweep_file_that_is_wrong_makes_no_run(moods, yawbench, tmp_path):
     status, _, err = yawbench(file, "out")
     assert status == 2
     assert len(err.splitlines()) == 1
-    assert "axes.level: sweep controller.levle=10: " in err
+    assert golden_in(err)
     assert not (tmp_path / "out").exists()
 
 
@@ -454,12 +453,12 @@ def test_runs_that_were_never_made_are_not_called_failed(moods, yawbench, tmp_pa
     file = moods(1, 2, 20)
     status, out, said = yawbench(file, "out", "--no-run")
     assert status == 1
-    assert "6 of 6 runs not made yet" in said
+    assert golden_in(said)
     assert "failed" not in out + said
     assert "failed" not in (tmp_path / "out" / "table.csv").read_text()
     assert [row["status"] for row in csv.DictReader((tmp_path / "out/table.csv").open())] == ["not made"] * 6
     assert "1.00 (not made)" in out  # the limit's table: from where on nothing is known
-    assert "6 of 6 runs have not been made yet" in words_of(page_of(tmp_path / "out"))
+    assert golden_in(words_of(page_of(tmp_path / "out")))
     page = words_of(page_of(tmp_path / "out").body)
     assert "failed" not in page
     assert " ." not in page

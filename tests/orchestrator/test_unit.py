@@ -15,6 +15,7 @@ from orchestrator.master.isolation import Isolation
 from orchestrator.master.simulate import simulate
 from orchestrator.plan import Fmu, Instance, Plan, Variable, Wire
 from orchestrator.results.read import load_results
+from tests.sentences import golden, golden_in, refused
 
 HERE = Path(__file__).parent
 TYPES = ("Real", "Integer", "Boolean", "String")
@@ -89,9 +90,8 @@ def test_values_of_every_type_pass_through_a_foreign_fmu(fmu, held, algorithm, t
 def test_a_failed_instance_is_ended_as_the_standard_allows(fmu, held, answer, ended, tmp_path):
     with pytest.raises(SimulationError) as caught:
         simulate(chain(fmu, answer), tmp_path / "out")
-    assert str(caught.value) == (
-        "b: step failed at t = 0.25 s: valve 3 of b is 99.5% open, größer als gedacht"
-    )
+    assert caught.value.code == "fmu-call-failed"
+    assert golden(str(caught.value))
     assert counters(fmu) == ended
     results = load_results(tmp_path / "out")
     assert results.time[-1] == 0.25
@@ -102,9 +102,7 @@ def test_a_failed_instance_is_ended_as_the_standard_allows(fmu, held, answer, en
 
 def test_a_warning_with_printf_arguments_is_readable(fmu, held, tmp_path):
     info = simulate(chain(fmu, 1), tmp_path / "out")
-    assert [(m.instance, m.time, m.text) for m in info.warnings] == [
-        ("b", 0.25, "valve 3 of b is 99.5% open, größer als gedacht")
-    ]
+    assert golden([(m.instance, m.time, m.text) for m in info.warnings])
     assert counters(fmu) == [2, 2, 2]
 
 
@@ -114,7 +112,8 @@ def test_a_number_that_is_no_status_ends_the_run(fmu, answer, isolated, tmp_path
     plan = chain(fmu, answer)
     with Isolation(plan.instances) as isolation, pytest.raises(SimulationError) as caught:
         simulate(plan, tmp_path / "out", opener=isolation if isolated else open_unit)
-    assert "b: step failed at t = 0.25 s: " in str(caught.value)
+    assert caught.value.code == "fmu-call-failed"
+    assert golden_in(str(caught.value))
     assert load_results(tmp_path / "out").time[-1] == 0.25
 
 
@@ -123,7 +122,7 @@ def test_a_number_that_is_no_status_ends_the_run(fmu, answer, isolated, tmp_path
 )
 def test_an_instance_that_cannot_be_ended_is_reported(fmu, held, answer, word, ended, tmp_path):
     info = simulate(chain(fmu, AT_THE_END + answer), tmp_path / "out")
-    assert [(m.instance, m.text) for m in info.warnings] == [("b", f"fmi2Terminate returned {word}")]
+    assert golden([(m.instance, m.text) for m in info.warnings])
     assert counters(fmu) == ended  # after Fatal no function of any instance may be called
     assert load_results(tmp_path / "out").record.status == "completed"
 
@@ -131,9 +130,7 @@ def test_an_instance_that_cannot_be_ended_is_reported(fmu, held, answer, word, e
 def test_an_fmu_that_refuses_to_be_instantiated_says_why(fmu, held, tmp_path):
     plan = chain(fmu)
     refusing = replace(plan.instances[1], fmu=replace(fmu, guid="{refuse}"))
-    with pytest.raises(
-        SimulationError, match=r"^b: .*foreign\.fmu cannot be instantiated: no licence in the shop$"
-    ):
+    with refused(SimulationError, "fmu-not-loadable"):
         simulate(replace(plan, instances=(plan.instances[0], refusing)), tmp_path / "out")
     assert counters(fmu) == [1, 0, 1]
 
@@ -141,16 +138,14 @@ def test_an_fmu_that_refuses_to_be_instantiated_says_why(fmu, held, tmp_path):
 def test_an_fmu_for_other_platforms_only_is_refused(fmu, tmp_path):
     binaries = fmu.directory / "binaries"
     (binaries / fmpy.platform).rename(binaries / "win16")
-    with pytest.raises(
-        ModelDescriptionError, match=r"^a: .*no binary for this platform .*it has binaries for win16$"
-    ):
+    with refused(ModelDescriptionError, "fmu-not-loadable"):
         simulate(chain(fmu), tmp_path / "out")
 
 
 def test_a_library_that_is_none_is_refused(fmu, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (fmu.directory / "binaries" / fmpy.platform / "foreign.so").write_bytes(b"no library")
-    with pytest.raises(ModelDescriptionError, match=r"^a: .*its library cannot be loaded: "):
+    with refused(ModelDescriptionError, "fmu-not-loadable"):
         simulate(chain(fmu), "out")
     assert Path.cwd() == tmp_path
     assert load_results("out").record.status == "failed"
