@@ -6,6 +6,7 @@ import math
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ResultsError
@@ -13,7 +14,7 @@ from ..figures.plots import draw
 from ..figures.style import ROW, LabelledRun, frame, literal, new_figure, save
 from ..labels import changed
 from ..messages import counted
-from .axis_figures import FAILED, CurveDrawing, Drawing, GridLines, LimitDrawing, MapDrawing
+from .axis_figures import FAILED, Drawing
 from .experiment import FIGURES
 from .outcome import Each, ExperimentResult
 from .schema import FigureSpec
@@ -23,12 +24,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-KINDS: dict[str, type[Drawing]] = {
-    "curve": CurveDrawing,
-    "map": MapDrawing,
-    "limit": LimitDrawing,
-    "grid": GridLines,
-}
 PANELS_IN_A_ROW = 3
 
 
@@ -43,7 +38,7 @@ def draw_all(findings: ExperimentResult, out: Path, each: Each = map) -> tuple[d
     wanted: list[tuple[Any, FigureSpec, str, Path]] = []
     light = findings.light()
     for spec in findings.spec.figures:
-        shown = runs_of(findings, spec) if spec.kind == "overlay" else light
+        shown = runs_of(findings, spec) if spec.what.shows == "runs" else light
         wanted.append((shown, spec, title_of(findings, spec), out / FIGURES / spec.name))
     drawn, problems = {}, []
     for (_, spec, title, _), problem in zip(wanted, each(_draw, wanted), strict=True):
@@ -72,7 +67,7 @@ def _draw(wanted: tuple[Any, FigureSpec, str, Path]) -> str | None:
     if not shown:
         return "none of its runs has results"
     try:
-        overlay = spec.kind == "overlay"
+        overlay = spec.what.shows == "runs"
         save(draw(shown, spec.panels, title=title) if overlay else draw_over_axes(shown, spec), stem)
     except ResultsError as error:
         return str(error)
@@ -85,7 +80,7 @@ def draw_over_axes(findings: ExperimentResult, spec: FigureSpec) -> Figure:
     Raises:
         ResultsError: there is nothing to draw.
     """
-    drawing = KINDS[spec.kind](findings, spec)
+    drawing: Drawing = resolve_name(f"{__package__}.{spec.what.drawing}")(findings, spec)
     panels = drawing.panels()
     columns = min(len(panels), PANELS_IN_A_ROW)
     rows = math.ceil(len(panels) / columns)

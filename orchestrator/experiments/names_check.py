@@ -66,12 +66,12 @@ def check_names(experiment: LoadedExperiment, document: Document) -> None:
             document.report(
                 ("figures", i, "name"), f"there is already a figure {figure.name!r}", "name-duplicate"
             )
-        if figure.kind == "overlay" and spec.axes:
+        if figure.what.shows == "runs" and spec.axes:
             document.report(
                 ("figures", i, "kind"), "runs along axes are drawn as curve, map or limit", "figure-invalid"
             )
         _check_levels(spec, document, i, figure)
-        if figure.kind not in ("overlay", "grid"):
+        if figure.what.over_axes:
             _check_places(spec, document, i, figure)
 
 
@@ -195,7 +195,7 @@ def _check_places(spec: ExperimentSpec, document: Document, i: int, figure: Figu
     for name, axis in figure.axes.items():
         if axis in spec.repeats:
             document.report(("figures", i, name), f"numbers are means over {axis!r}", "figure-invalid")
-        if name in "xy" and axis in spec.axes and figure.kind == "map" and not spec.axes[axis].numeric:
+        if name in "xy" and axis in spec.axes and figure.what.upwards and not spec.axes[axis].numeric:
             document.report(("figures", i), f"the values of {axis!r} are no numbers", "figure-invalid")
     if figure.limit in spec.limits:
         of = spec.limits[figure.limit].of

@@ -130,13 +130,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
 from ..figures.plots import OVERVIEW
+from ..messages import listed
 from ..scenario.scenario_schema import Scalar
-from ..scenario.validation import StrictModel
+from ..scenario.validation import StrictModel, one_of
 from ..scenario.yaml_lines import KeyPath
 from .axes import MOST, AxisSpec, DesignAxisSpec, OverrideSpec, RegionSpec
 from .judged_schema import (
@@ -226,12 +228,36 @@ class TableSpec(StrictModel):
     metrics: list[str] = Field(description="Keys of `metrics`, one column each", min_length=1)
 
 
+@dataclass(frozen=True)
+class FigureKind:
+    """A kind of figure: what it shows, and what draws it."""
+
+    shows: Literal["runs", "metric", "limit", "grid"]  # the key that it needs
+    drawing: str = ""  # "module:class" in this package, an `axis_figures.Drawing`; "": runs are overlaid
+    upwards: bool = False  # whether a second axis points upwards (y), in place of lines
+
+    @property
+    def over_axes(self) -> bool:
+        """Whether it is drawn over axes of the experiment."""
+        return self.shows in ("metric", "limit")
+
+
+FIGURE_KINDS = {
+    "overlay": FigureKind("runs"),
+    "curve": FigureKind("metric", "axis_figures:CurveDrawing"),
+    "map": FigureKind("metric", "axis_figures:MapDrawing", upwards=True),
+    "limit": FigureKind("limit", "axis_figures:LimitDrawing"),
+    "grid": FigureKind("grid", "axis_figures:GridLines"),
+}
+"""Name -> kind of figure."""
+
+
 class FigureSpec(StrictModel):
     """A figure: overlaid runs, a metric or a limit over one or two axes, or a grid."""
 
     name: str = Field(description="Name of its files", pattern=r"^[\w.+-]+$")
     title: str = ""
-    kind: Literal["overlay", "curve", "map", "limit", "grid"] = "overlay"
+    kind: Annotated[str, one_of(FIGURE_KINDS)] = Field("overlay", description=listed(FIGURE_KINDS, last="or"))
     runs: list[str] = Field([], description="Of an overlay: names of runs, with `*` and `?` for many")
     panels: list[str] | str = Field(
         list(OVERVIEW),
@@ -250,6 +276,11 @@ class FigureSpec(StrictModel):
     mark: QuantityText | None = Field(None, description="A value of the metric to draw a line at")
 
     @property
+    def what(self) -> FigureKind:
+        """The kind."""
+        return FIGURE_KINDS[self.kind]
+
+    @property
     def panel_axis(self) -> str:
         """The axis with one panel per value; "" if there is none."""
         return self.panels if isinstance(self.panels, str) else ""
@@ -262,32 +293,33 @@ class FigureSpec(StrictModel):
 
     @model_validator(mode="after")
     def _complete(self) -> FigureSpec:
-        if self.kind == "overlay":
+        shows, upwards = self.what.shows, self.what.upwards
+        if shows == "runs":
             given = self.model_fields_set - {"name", "title", "kind", "runs", "panels"}
             if not self.runs or not isinstance(self.panels, list) or not self.panels or given:
                 also = f", no {min(given)}" if given else ""
                 raise ValueError(f"an overlay needs runs and a list of panels{also}; else give its kind")
             return self
-        if self.kind == "grid":
+        if shows == "grid":
             given = self.model_fields_set - {"name", "title", "kind", "grid", "scale", "largest", "mark"}
             if not self.grid or given:
                 raise ValueError(f"a grid needs grid{f' and no {min(given)}' if given else ''}")
             return self
         if self.runs or ("panels" in self.model_fields_set and not self.panel_axis):
             raise ValueError(f"a {self.kind} has no runs; its panels are those of one axis")
-        wanted, other = ("limit", "metric") if self.kind == "limit" else ("metric", "limit")
-        if not getattr(self, wanted) or getattr(self, other) or self.grid:
-            raise ValueError(f"a {self.kind} needs {wanted} and no {'grid' if self.grid else other}")
+        other = "metric" if shows == "limit" else "limit"
+        if not getattr(self, shows) or getattr(self, other) or self.grid:
+            raise ValueError(f"a {self.kind} needs {shows} and no {'grid' if self.grid else other}")
         if not self.x:
             raise ValueError(f"a {self.kind} needs x")
-        if (self.kind == "map") != bool(self.y):
-            raise ValueError("a map needs y" if self.kind == "map" else f"a {self.kind} has no y")
-        if self.kind == "map" and self.lines:
-            raise ValueError("a map has no lines; use panels")
+        if upwards != bool(self.y):
+            raise ValueError(f"a {self.kind} {'needs' if upwards else 'has no'} y")
+        if upwards and self.lines:
+            raise ValueError(f"a {self.kind} has no lines; use panels")
         if len(set(self.axes.values())) < len(self.axes):
             raise ValueError("x, y, lines and panels must be different axes")
-        if self.mark is not None and self.kind == "limit":
-            raise ValueError("a limit has no mark")
+        if self.mark is not None and shows == "limit":
+            raise ValueError(f"a {self.kind} has no mark")
         return self
 
 

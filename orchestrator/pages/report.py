@@ -248,7 +248,7 @@ def viewer_of(
         chapter: anchor of its chapter.
         views: of all runs, before those of the figures, of which the liveliest comes first.
     """
-    overlays = [spec for spec in findings.spec.figures if spec.kind == "overlay"]
+    overlays = [spec for spec in findings.spec.figures if spec.what.shows == "runs"]
     named: dict[str, LabelledRun] = {}
     wanted = [run.name for spec in overlays for run in findings.experiment.matching(spec.runs)]
     wanted += [name for one in findings.judgements for name in runs_of_claim(findings.experiment, one.said)]
@@ -293,7 +293,7 @@ def figure_files(findings: ExperimentResult, files: str) -> list[dict[str, str]]
     return [
         {"title": title_of(findings, spec), "file": f"{files}/{spec.name}"}
         for spec in findings.spec.figures
-        if spec.kind == "overlay" and runs_of(findings, spec)
+        if spec.what.shows == "runs" and runs_of(findings, spec)
     ]
 
 
@@ -302,7 +302,7 @@ def charts(findings: ExperimentResult, folder: Path) -> list[FigureImage]:
     found = []
     for spec in findings.spec.figures:
         file = folder / f"{spec.name}.svg"
-        if spec.kind != "overlay" and file.is_file():
+        if spec.what.shows != "runs" and file.is_file():
             found.append(image_of(file, title_of(findings, spec)))
     return found
 

@@ -17,6 +17,13 @@ from orchestrator.errors import ScenarioError
 from orchestrator.evaluation import judgement
 from orchestrator.evaluation.judgement import SeriesRun, evaluation
 from orchestrator.evaluation.standard_tests import DRIVEN, TESTS, StandardTest
+from orchestrator.experiments.axis_figures import MetricDrawing
+from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.figures import draw_all
+from orchestrator.experiments.jobs import Job, MeasuredRun
+from orchestrator.experiments.outcome import ExperimentResult
+from orchestrator.experiments.planning import PlannedExperiment
+from orchestrator.experiments.schema import FIGURE_KINDS, FigureKind
 from orchestrator.fault_kinds import KINDS, FaultKind
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.results import formats
@@ -137,3 +144,38 @@ def test_a_standard_test_with_its_series_is_a_module_and_an_entry(steered, monke
     assert found["series"] == {"runs": 2}
     assert [run["verdict"] for run in found["runs"]] == ["failed", "passed"]
     assert status_of("evaluate", "wiggle", "out/0.1", "--no-figures") == 0
+
+
+class BarDrawing(MetricDrawing):
+    """A bar per level of an axis."""
+
+    def fill(self, axes, runs):
+        values = [self.shown(self.value(run))[0] for run in runs]
+        axes.bar([self.place(self.at(run, self.spec.x), self.spec.x) for run in runs], values)
+
+
+SWEEP = """\
+title: Bars
+scenario: steered.yaml
+axes: {amplitude: {vary: driver.amplitude, values: [0.1, 0.2]}}
+metrics: {angle: {metric: peak(driver.steer_angle)}}
+figures: [{name: bars, kind: bar, metric: angle, x: amplitude}]
+"""
+
+
+def test_a_figure_on_the_report_is_a_drawing_and_an_entry(steered, monkeypatch):
+    module = ModuleType("orchestrator.experiments.bars")
+    module.BarDrawing = BarDrawing
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setitem(FIGURE_KINDS, "bar", FigureKind("metric", "bars:BarDrawing"))
+    Path("bars.yaml").write_text(SWEEP)
+    sweep = load_experiment(Path("bars.yaml"))
+    jobs = [Job("", Path(), Path(), plan=steered.plan(), key=f"{k:032}") for k in range(2)]
+    records = [MeasuredRun({"angle": (level.value, "rad")}) for (level,) in sweep.points]
+    planned = PlannedExperiment(sweep, jobs, {"amplitude": "rad"}, {"angle": "rad"}, {})
+    drawn, problems = draw_all(ExperimentResult(sweep, records, {}, planned), Path("out"))
+    assert (drawn, problems) == ({"bars": "Bars: bars"}, [])
+    assert Path("out/figures/bars.svg").is_file()
+    Path("bars.yaml").write_text(SWEEP.replace(", x: amplitude", ""))
+    with pytest.raises(ScenarioError, match="a bar needs x"):
+        load_experiment(Path("bars.yaml"))
