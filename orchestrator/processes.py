@@ -146,7 +146,6 @@ class ForkServer:
     """A process that imports modules and then copies itself on request; see `start`."""
 
     def __init__(self) -> None:
-        self._asking = threading.Lock()  # threads of a cluster's worker start runs
         self._socket, theirs = socket.socketpair()
         with theirs:
             self._process = subprocess.Popen(
@@ -171,7 +170,7 @@ class ForkServer:
         request = pickle.dumps(ForkRequest(module, tuple(preload), sys.path, folder, dict(os.environ)))
         reading, status = os.pipe()
         try:
-            with self._asking, _open_output() as output:
+            with _open_output() as output:
                 shared = [status, *output, *descriptors]
                 socket.send_fds(self._socket, [len(request).to_bytes(_SIZE, "little")], shared)
                 self._socket.sendall(request)
@@ -212,20 +211,22 @@ def _open_output() -> Iterator[list[int]]:
 
 
 _server: ForkServer | None = None
+_asking = threading.Lock()  # threads of a cluster's worker start runs
 
 
 def start(module: str, *descriptors: int, preload: Iterable[str] = ()) -> ServedChild:
     """Start a process by the fork server of this process, which starts when needed: `ForkServer.start`."""
     global _server
-    for again in (False, True):
-        if _server is None:
-            _server = ForkServer()
-        try:
-            return _server.start(module, *descriptors, preload=preload)
-        except OSError:
-            if again:
-                raise
-            _end_server(ForkServer.close)
+    with _asking:
+        for again in (False, True):
+            if _server is None:
+                _server = ForkServer()
+            try:
+                return _server.start(module, *descriptors, preload=preload)
+            except OSError:
+                if again:
+                    raise
+                _end_server(ForkServer.close)
     raise AssertionError
 
 
@@ -236,9 +237,15 @@ def _end_server(end: Callable[[ForkServer], None]) -> None:
         _server = None
 
 
+def _forget_server() -> None:
+    global _asking
+    _asking = threading.Lock()
+    _end_server(ForkServer.forget)
+
+
 atexit.register(_end_server, ForkServer.close)
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=lambda: _end_server(ForkServer.forget))
+    os.register_at_fork(after_in_child=_forget_server)
 
 
 def main(descriptor: str) -> None:

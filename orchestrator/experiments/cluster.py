@@ -1,8 +1,8 @@
 """Execution of runs on a Dask cluster; needs the package `distributed`.
 
 Workers only need the same version of this program: plans travel with their tasks, and every FMU is sent
-once to each worker, which unpacks it into its own cache. As with local runs, each run has its own
-process, so an FMU that crashes does not take the worker down.
+once to each worker, which unpacks it into its own cache. Runs travel in batches. As with local runs, they
+are made by processes that the worker starts (`execute`), so an FMU that crashes does not take it down.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import logging
 import os
 import platform
 import tempfile
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from importlib.metadata import version
@@ -33,7 +34,12 @@ from .jobs import Job, OnOutcome, Outcome, execute
 TIMEOUT = 10.0
 """Time limit for connecting to the scheduler [s]."""
 AHEAD = 4
-"""Runs submitted ahead of time per worker thread."""
+"""Batches of runs submitted ahead of time per worker thread."""
+BATCH_TIME = 2.0
+"""Time that a batch takes a worker [s]; chosen: long beside the scheduler's few milliseconds, short for a
+user who watches the progress."""
+LARGEST_BATCH = 200
+"""Largest number of runs in a batch."""
 
 _LOCAL: dict[str, Path] = {}
 """On a worker: SHA-256 of an FMU -> the folder it is unpacked in."""
@@ -56,55 +62,94 @@ def run_on_cluster(jobs: Sequence[Job], done: OnOutcome, *, scheduler: str) -> N
     with _connected(scheduler) as client, terminable():
         threads = _check_workers(client, scheduler)
         client.register_plugin(_Archives({digest: read_archive(fmu.path) for digest, fmu in fmus.items()}))
-        _submit_all(client, jobs, done, scheduler, AHEAD * threads)
+        _submit_all(client, jobs, done, scheduler, threads)
 
 
-def _submit_all(client: Any, jobs: Sequence[Job], done: OnOutcome, scheduler: str, ahead: int) -> None:
-    waiting = iter(jobs)
-    named: dict[str, Job] = {}
+class _Batches:
+    """The runs that are still to be submitted, in batches that keep a worker busy for `BATCH_TIME`."""
 
-    def submit(job: Job) -> Any:
-        future = client.submit(_make, job, key=f"yawbench-{os.getpid()}-{job.key}", pure=False, retries=0)
-        named[future.key] = job
-        return future
+    def __init__(self, jobs: Sequence[Job], threads: int) -> None:
+        self._waiting = deque(jobs)
+        self._alone: deque[Job] = deque()
+        self._threads = threads
+        self._seconds, self._runs = 0.0, 0  # of finished runs
 
-    futures = [submit(job) for job in itertools.islice(waiting, ahead)]
-    completed = distributed.as_completed(futures)
+    def next(self) -> list[Job]:
+        """Return the next batch; it is empty if there are no more."""
+        if self._alone:
+            return [self._alone.popleft()]
+        size = 1.0
+        if self._runs:
+            in_time = BATCH_TIME * self._runs / max(self._seconds, 1e-9)
+            share = len(self._waiting) / (AHEAD * self._threads)  # lest workers wait for one at the end
+            size = max(1.0, min(in_time, share, LARGEST_BATCH))
+        return [self._waiting.popleft() for _ in range(min(int(size), len(self._waiting)))]
+
+    def note(self, outcomes: Sequence[Outcome]) -> None:
+        """Learn how long runs take."""
+        self._seconds += sum(outcome.seconds for outcome in outcomes)
+        self._runs += len(outcomes)
+
+    def divide(self, batch: Sequence[Job]) -> None:
+        """Have each run of a batch submitted by itself, before all others."""
+        self._alone.extend(batch)
+
+
+def _submit_all(client: Any, jobs: Sequence[Job], done: OnOutcome, scheduler: str, threads: int) -> None:
+    batches = _Batches(jobs, threads)
+    submitted: dict[str, list[Job]] = {}
+    numbers = itertools.count()
+    completed = distributed.as_completed()
+
+    def submit() -> None:
+        while len(submitted) < AHEAD * threads and (batch := batches.next()):
+            key = f"yawbench-{os.getpid()}-{next(numbers)}-{batch[0].key}"
+            submitted[key] = batch
+            completed.add(client.submit(_make, batch, key=key, pure=False, retries=0))
+
+    submit()
     try:
         for future in completed:
-            done(_outcome(future, named.pop(future.key), scheduler))
+            batch = submitted.pop(future.key)
+            outcomes = _outcomes(future, batch, scheduler)
             future.release()
-            if (following := next(waiting, None)) is not None:
-                completed.add(submit(following))
+            if outcomes is None:
+                batches.divide(batch)
+            else:
+                batches.note(outcomes)
+                for outcome in outcomes:
+                    done(outcome)
+            submit()
     except KeyboardInterrupt:
         client.cancel(list(completed.futures))
         raise
 
 
-def _outcome(future: Any, job: Job, scheduler: str) -> Outcome:
-    """Return the outcome that a worker reported, or the reason why it reported none."""
+def _outcomes(future: Any, batch: Sequence[Job], scheduler: str) -> list[Outcome] | None:
+    """Return the outcomes that a worker reported; None if the workers died of one of several runs."""
     if future.status == "cancelled" or future.status == "lost":
         raise ResultsError(
             f"{scheduler}: the cluster was lost; what it had finished is kept.", code="runs-missing"
         )
     error = future.exception() if future.status == "error" else None
     if isinstance(error, distributed.KilledWorker):
+        if len(batch) > 1:
+            return None
         lost = Diagnostic("run-process-died", "the workers that made this run died")
-        return Outcome(job, (lost,), 1, died=True)
+        return [Outcome(batch[0], (lost,), 1, died=True)]
     if error is not None:
         text = " ".join(str(error).split())
         raise ResultsError(
             f"{scheduler}: a worker failed: {type(error).__name__}: {text}", code="runs-missing"
         )
-    return replace(future.result(), job=job)
+    return [replace(outcome, job=job) for outcome, job in zip(future.result(), batch, strict=True)]
 
 
-def _make(job: Job) -> Outcome:
-    """Execute a run on a worker, in a separate process."""
-    assert job.plan is not None
-    here = replace(job, plan=_unpacked_here(job.plan))
-    (outcome,) = execute([here], workers=1)
-    return replace(outcome, job=replace(job, plan=None))  # the caller has the plan: do not send it back
+def _make(batch: Sequence[Job]) -> list[Outcome]:
+    """Execute runs on a worker, one after the other in a process of theirs."""
+    here = [replace(job, plan=_unpacked_here(job.plan)) for job in batch if job.plan is not None]
+    # the caller has the plans: do not send them back
+    return [replace(outcome, job=replace(outcome.job, plan=None)) for outcome in execute(here, workers=1)]
 
 
 def _unpacked_here(plan: Plan) -> Plan:

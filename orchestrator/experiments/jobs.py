@@ -295,10 +295,10 @@ def execute(
 ) -> list[Outcome]:
     """Execute all jobs in worker processes and return their outcomes in order.
 
-    A worker keeps the instances of native FMUs for its next run, until a run fails or it has made `LASTING`;
-    other FMUs are loaded into a copy of it, or it is replaced after their run. A run whose process died is
-    executed again after the others, in a fresh worker that keeps nothing: the process may have been killed
-    from outside.
+    A worker keeps the instances of native FMUs for its next run, until a run fails or it has made `LASTING`.
+    Runs with other FMUs step in a process that it forks, or if they write no results, are the worker's
+    last. A run whose process died is executed again after the others, in a fresh worker that keeps nothing:
+    the process may have been killed from outside.
 
     Args:
         jobs: the runs.

@@ -273,14 +273,9 @@ def keep_instances() -> KeptInstances:
     return _kept
 
 
-def protected(plan: Plan) -> bool:
-    """Return whether a run must not load its FMUs into this process, which keeps instances for other runs."""
-    return _keeping() is not None and not all(is_native(unit.fmu.directory) for unit in plan.instances)
-
-
 def keeps(plan: Plan) -> bool:
     """Return whether this process keeps the instances of a run, all of which are native."""
-    return _keeping() is not None and not protected(plan)
+    return _keeping() is not None and all(is_native(unit.fmu.directory) for unit in plan.instances)
 
 
 def _keeping() -> KeptInstances | None:

@@ -31,7 +31,7 @@ from ..results.read import Results
 from ..results.recorder import Recorder
 from ..results.run_record import DiagnosticRecord, EndRecord, ErrorRecord, WarningRecord, run_record
 from .child_run import ChildRun, can_be_apart
-from .fmi import keeps, open_unit, protected
+from .fmi import keeps, open_unit
 from .log import STATUS, Log, Message
 from .run_loop import OpenInstance, RunLoop, RunProgress
 
@@ -123,8 +123,7 @@ def simulate_in_memory(
             code="results-too-large",
         )
     recorder = MemoryRecorder(*_columns(plan))
-    apart = opener is open_unit and protected(plan) and can_be_apart()
-    Simulation(plan, recorder, progress, apart=apart).make(opener)
+    Simulation(plan, recorder, progress, apart=False).make(opener)
     assert recorder.results is not None
     return recorder.results
 

@@ -154,24 +154,19 @@ def test_a_worker_resets_the_instances_that_it_keeps(kinds):
     assert again[2] == units + 1
 
 
-def test_other_fmus_are_not_loaded_into_a_worker_and_leave_it_as_it_is(kinds):
-    units = len(kinds[0].plan.instances)
-    for other in (9, 10, 11):
+def test_a_worker_is_replaced_when_another_fmu_was_loaded_into_it(kinds):
+    for other in (9, 11):
         assert not all(is_native(unit.fmu.directory) for unit in kinds[other].plan.instances)
+        (first, *_), (second, *_), (third, *_) = stories([kinds[0], kinds[other], kinds[0]])
+        assert first == second != third
+
+
+def test_an_fmu_in_a_process_of_its_own_leaves_the_worker_as_it_is(kinds):
+    units = len(kinds[0].plan.instances)
+    for other in (6, 10):
         first, second, third = stories([kinds[0], kinds[other], kinds[0]])
         assert first[0] == second[0] == third[0]
         assert (second[1:], third[1:]) == ((0, units), (0, units))
-
-
-def timed(job):
-    """Time the steps of the controller, which needs its instances in the worker."""
-    run_job(replace(job, timed="controller"))
-    return os.getpid()
-
-
-def test_a_worker_is_replaced_when_another_fmu_had_to_be_loaded_into_it(kinds):
-    first, second, third = (one.value for one in execute([kinds[9]] * 2 + [kinds[0]], workers=1, run=timed))
-    assert len({first, second, third}) == 3
 
 
 def test_a_worker_is_replaced_after_a_failed_run_and_after_so_many(kinds, monkeypatch):

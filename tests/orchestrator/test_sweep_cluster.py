@@ -8,17 +8,20 @@ import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from orchestrator.cli import main
 from orchestrator.experiments.execution import left_to_do
 from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.jobs import Job, Outcome
 from orchestrator.experiments.planning import plan_experiment
 
 from .test_sweep import UNITS, moods, rows, yawbench  # noqa: F401
 
 distributed = pytest.importorskip("distributed")
+from orchestrator.experiments.cluster import AHEAD, BATCH_TIME, _Batches  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +43,27 @@ def test_a_cluster_gives_the_table_of_this_machine_to_the_byte(moods, yawbench, 
         tmp_path / "there" / "table.parquet"
     ).read_bytes()
     assert "all finished before" in yawbench(file, "there", "--scheduler", cluster.scheduler_address)[2]
+
+
+def test_runs_travel_in_batches_as_long_as_workers_stay_busy_alike():
+    jobs = [Job(str(number), Path("made_up.yaml"), Path()) for number in range(1000)]
+    batches = _Batches(jobs, threads=2)
+    first = batches.next()
+    assert first == jobs[:1]  # nothing is known yet
+    batches.note([Outcome(first[0], seconds=BATCH_TIME / 50)])
+    assert batches.next() == jobs[1:51]
+    batches.note([Outcome(jobs[0], seconds=BATCH_TIME * 100)])
+    assert len(batches.next()) == 1
+    batches.divide(jobs[1:4])  # one of them has killed its worker: which?
+    assert [batches.next() for _ in range(3)] == [[job] for job in jobs[1:4]]
+    quick = _Batches(jobs, threads=2)
+    quick.note([Outcome(first[0], seconds=BATCH_TIME / 1000)])
+    sizes = []
+    while batch := quick.next():
+        sizes.append(len(batch))
+    assert sum(sizes) == len(jobs)
+    assert sizes[0] == len(jobs) // (AHEAD * 2)
+    assert sizes[-1] == 1
 
 
 @pytest.mark.exhaustive
