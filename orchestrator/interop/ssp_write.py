@@ -308,7 +308,7 @@ def _add_experiment(root: _Element, plan: Plan) -> None:
 
 def _recorded(plan: Plan) -> Iterable[str]:
     """Return the record list of the scenario, empty if it records all outputs."""
-    return () if plan.scenario.get("record") is None else (f"{unit}.{name}" for unit, name in plan.record)
+    return () if plan.scenario.get("record") is None else map(str, plan.record)
 
 
 def _annotation(above: _Element, kind: str) -> _Element:

@@ -131,7 +131,7 @@ def simulate_in_memory(
 def _columns(plan: Plan) -> tuple[list[str], list[bool], dict[str, str | None]]:
     """Return the names of the recorded columns, whether each is Real, and the units of measurement."""
     units = {unit.name: unit for unit in plan.instances}
-    recorded = {f"{unit}.{name}": units[unit].fmu.variables[name] for unit, name in plan.record}
+    recorded = {str(one): units[one.instance].fmu.variables[one.variable] for one in plan.record}
     units_of = {"time": "s", **{column: variable.unit for column, variable in recorded.items()}}
     return list(recorded), [variable.type == "Real" for variable in recorded.values()], units_of
 

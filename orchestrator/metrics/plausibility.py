@@ -92,7 +92,7 @@ class PlausibilityWatch:
     def __init__(self, plan: Plan, checks: Iterable[PlausibilityCheck] = CHECKS) -> None:
         results = results_to_be(plan)
         units = {unit.name: unit.fmu.variables for unit in plan.instances}
-        reals = [f"{unit}.{name}" for unit, name in plan.record if units[unit][name].type == "Real"]
+        reals = [str(one) for one in plan.record if units[one.instance][one.variable].type == "Real"]
         place = {column: 1 + k for k, column in enumerate(reals)}
         friction = _highest_friction(plan)
         self._seen: list[_CheckState] = []

@@ -275,7 +275,7 @@ def results_to_be(plan: Plan) -> Results:
     from ..results.run_record import FmuRecord, RunRecord, connections_of
 
     units = {unit.name: unit for unit in plan.instances}
-    variables = {f"{u}.{name}": units[u].fmu.variables[name] for u, name in plan.record}
+    variables = {str(one): units[one.instance].fmu.variables[one.variable] for one in plan.record}
     columns = {name: np.empty(0, float if v.type != "String" else str) for name, v in variables.items()}
     fmus = {name: FmuRecord(name=unit.fmu.name, role=unit.role) for name, unit in units.items()}
     run = RunRecord(fmus=fmus, connections=connections_of(plan))
@@ -298,7 +298,7 @@ def why_none(results: Results, one: Metric, window: TimeWindow | None, end: floa
     missing = [s for s in filter(None, (one.signal, one.other)) if not columns_of(results, s)]
     if missing:
         names = fold(list(dict.fromkeys(one.variable for one in results.names.values())))
-        whole = list(results) if "." in missing[0] else names
+        whole = list(results) if SignalName.parse(missing[0]).instance else names
         seen = [
             column
             for column, one in results.names.items()
@@ -407,7 +407,7 @@ def reference_of(results: Results, column: str) -> str | None:
     name = f"{variable_of(column)}_ref"
     if found := _column(results, name):
         return found
-    acting = {SignalName.parse(wire.source).instance for wire in results.record.connections}
+    acting = {wire.source.instance for wire in results.record.connections}
     having = [c for c, one in results.names.items() if one.variable == name and one.instance in acting]
     return having[0] if len(having) == 1 else None
 

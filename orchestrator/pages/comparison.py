@@ -142,8 +142,8 @@ def _together(one: SignalDifference, other: SignalDifference) -> SignalDifferenc
 
 def targets_of(record: RunRecord, signal: str) -> tuple[str, ...]:
     """Return the instances that a recorded signal is connected to, taken from the run record."""
-    fed = (SignalName.parse(wire.target) for wire in record.connections if wire.source == signal)
-    return tuple(dict.fromkeys(name.instance for name in fed))
+    name = SignalName.parse(signal)
+    return tuple(dict.fromkeys(wire.target.instance for wire in record.connections if wire.source == name))
 
 
 OF_RUN = ("status", "title", "algorithm", "step_size", "stop_time", "rows")

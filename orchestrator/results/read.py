@@ -219,10 +219,9 @@ class Results:
     def _feeding(self, variable: str) -> list[str]:
         """Return the columns that feed inputs of this name unchanged, apart from a conversion of units."""
         feeding = [
-            wire.source
+            str(wire.source)
             for wire in self.record.connections
-            if SignalName.parse(wire.target).variable == variable
-            and _is_the_same(wire, self.units.get(wire.source))
+            if wire.target.variable == variable and _is_the_same(wire, self.units.get(str(wire.source)))
         ]
         return [column for column in dict.fromkeys(feeding) if column in self.columns]
 

@@ -15,9 +15,18 @@ from datetime import datetime
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    NonNegativeInt,
+    PlainSerializer,
+    PlainValidator,
+    ValidationError,
+)
+from pydantic_core import PydanticKnownError
 
 from vocabulary.roles import role_of
 
@@ -27,6 +36,7 @@ from ..errors import Diagnostic, Location, ResultsError, Severity, warnings_in
 from ..files import read_bytes, reading, reason
 from ..fmu.native import runs_as
 from ..messages import short
+from ..names import SignalName
 from ..plan import DEFAULT, NEUTRAL, InputSeries, Instance, Override, Plan, ValueSource, Wire
 from .folder import FAILED, LARGEST, RUN_FILE, refuse_dead
 from .formats import FILES, RESULTS_FILE
@@ -106,11 +116,22 @@ class EndRecord(_Part):
     message: str = ""
 
 
+def _signal(value: object) -> SignalName:
+    if isinstance(value, SignalName):
+        return value
+    if not isinstance(value, str):
+        raise PydanticKnownError("string_type")
+    return SignalName.parse(value)
+
+
+RecordedName = Annotated[SignalName, PlainValidator(_signal), PlainSerializer(str)]
+
+
 class ConnectionRecord(_Part):
     """A wire; `gain`, `offset` and the resulting unit only if it converts."""
 
-    source: str = Field("", validation_alias="from", serialization_alias="from")
-    target: str = Field("", validation_alias="to", serialization_alias="to")
+    source: RecordedName = Field(SignalName("", ""), validation_alias="from", serialization_alias="from")
+    target: RecordedName = Field(SignalName("", ""), validation_alias="to", serialization_alias="to")
     gain: float | None = None
     offset: float = 0.0
     unit: str | None = None
@@ -347,7 +368,7 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> RunRecord:
         ended=None,
         evaluation_order=list(units),
         units=units_of(plan),
-        texts=[f"{u}.{name}" for u, name in plan.record if units[u].fmu.variables[name].type == "String"],
+        texts=[str(n) for n in plan.record if units[n.instance].fmu.variables[n.variable].type == "String"],
         fmus={name: _fmu(unit, plan, sources) for name, unit in units.items()},
         sources=[SourceRecord(**asdict(source)) for source in sources],
         changes=[OverrideRecord.model_validate(change.record) for change in plan.changes],
@@ -364,7 +385,7 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> RunRecord:
 def units_of(plan: Plan) -> dict[str, str | None]:
     """Return the units of time and of all recorded columns."""
     units = {unit.name: unit for unit in plan.instances}
-    columns = {f"{u}.{name}": units[u].fmu.variables[name].unit for u, name in plan.record}
+    columns = {str(one): units[one.instance].fmu.variables[one.variable].unit for one in plan.record}
     return {"time": "s", **columns}
 
 
@@ -386,7 +407,9 @@ def faults_of(plan: Plan) -> list[FaultRecord]:
 
 
 def _connection(wire: Wire, units: Mapping[str, Instance]) -> ConnectionRecord:
-    ends = ConnectionRecord(source=f"{wire.source}.{wire.output}", target=f"{wire.target}.{wire.input}")
+    ends = ConnectionRecord(
+        source=SignalName(wire.source, wire.output), target=SignalName(wire.target, wire.input)
+    )
     if wire.converts:
         ends.gain, ends.offset = wire.gain, wire.offset
         if unit := units[wire.target].fmu.variables[wire.input].unit:

@@ -10,6 +10,7 @@ from typing import Any
 from orchestrator.fault_kinds import FaultySignal
 from orchestrator.master.instance import ExperimentSetup, FmuInstance, StepCalls
 from orchestrator.master.log import ERROR, OK, Log
+from orchestrator.names import SignalName
 from orchestrator.plan import Fmu, Instance, Plan, ValueRef, Variable, Wire
 
 
@@ -169,7 +170,7 @@ def make_plan(
     return Plan(
         made,
         tuple(pairs),
-        tuple((name.split(".")[0], name.split(".")[1]) for name in recorded),
+        tuple(map(SignalName.parse, recorded)),
         Fraction(step),
         n_steps,
         algorithm,

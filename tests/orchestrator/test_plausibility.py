@@ -13,6 +13,7 @@ import pytest
 from orchestrator.errors import Diagnostic, Location, warnings_in
 from orchestrator.experiments.tables import MARK, marked, remarks
 from orchestrator.metrics.plausibility import CHECKS, PlausibilityWatch
+from orchestrator.names import SignalName
 from orchestrator.plan import Fmu, Instance, Plan, Variable, Wire
 from orchestrator.results.run_record import RunRecord
 from tests.sentences import golden
@@ -31,7 +32,7 @@ def plan(**outputs):
     fmu = Fmu("plant_x", Path("x.fmu"), Path("x"), "", "", "x", "", variables)
     tyre = replace(fmu, name="tyre_x", variables={"friction_fl": variable("friction_fl", "input")})
     units = (Instance("plant", fmu, 1, {}, {}), Instance("tyre", tyre, 1, {}, {"friction_fl": 0.5}))
-    record = tuple(("plant", name) for name in outputs)
+    record = tuple(SignalName("plant", name) for name in outputs)
     return Plan(units, (), record, Fraction(1, 100), 100, "jacobi")
 
 

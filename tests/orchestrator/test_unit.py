@@ -13,6 +13,7 @@ from orchestrator.errors import ModelDescriptionError, SimulationError
 from orchestrator.master.fmi import open_unit
 from orchestrator.master.isolation import Isolation
 from orchestrator.master.simulate import simulate
+from orchestrator.names import SignalName
 from orchestrator.plan import Fmu, Instance, Plan, Variable, Wire
 from orchestrator.results.read import load_results
 from tests.sentences import golden, golden_in, refused
@@ -57,7 +58,7 @@ def chain(fmu, answer=0, algorithm="extrapolated"):
         Instance("b", fmu, 1, {"answer": answer}, {}),
     )
     wires = tuple(Wire("a", f"{kind}_out", "b", f"{kind}_in") for kind in TYPES)
-    record = tuple((unit, f"{kind}_out") for unit in "ab" for kind in TYPES)
+    record = tuple(SignalName(unit, f"{kind}_out") for unit in "ab" for kind in TYPES)
     return Plan(units, wires, record, Fraction(1, 20), 10, algorithm)
 
 
