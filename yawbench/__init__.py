@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from ._ranking import Ranking, rank
     from ._run import Run, open
     from ._scenario import Scenario, load
+    from ._view import View, view
 
 __all__ = [
     "BuildError",
@@ -71,6 +72,7 @@ __all__ = [
     "Scenario",
     "ScenarioError",
     "SimulationError",
+    "View",
     "WiringError",
     "YawbenchError",
     "YawbenchWarning",
@@ -81,6 +83,7 @@ __all__ = [
     "parameter",
     "rank",
     "signal",
+    "view",
 ]
 
 _PACKAGES = ("components", "fmus", "orchestrator", "scenarios", "vocabulary")
@@ -90,6 +93,7 @@ _MODULES = {
     "yawbench._ranking": ("Ranking", "rank"),
     "yawbench._run": ("Run", "open"),
     "yawbench._scenario": ("Scenario", "load"),
+    "yawbench._view": ("View", "view"),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 """Where the public names are defined; all others are in `orchestrator.errors`."""

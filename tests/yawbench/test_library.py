@@ -1,6 +1,7 @@
 """The Python library: scenarios as values, runs in memory, units in plain Python."""
 
 import json
+import re
 import warnings
 from html import escape
 from pathlib import Path
@@ -353,3 +354,35 @@ def test_a_run_that_fails_warns_of_what_was_remarkable_before(base):
 
     with pytest.warns(yb.YawbenchWarning, match="did you mean '300 km/h'"), pytest.raises(yb.SimulationError):
         base.swap(controller=giving_up).set({"speed": 300}).run()
+
+
+def test_a_viewer_shows_runs_by_their_labels(base, run, tmp_path):
+    free = base.swap(controller="controller_off").run()
+    shown = yb.view(
+        {"free": free, "held": run}, "yaw_rate", "plant.sideslip - reference.sideslip_ref", height=500
+    )
+    data = json.loads(re.findall(r'application/json">(.*?)</script>', shown.html, re.DOTALL)[0])
+    assert [one["label"] for one in data["runs"]] == ["free", "held"] == list(shown.labels)
+    assert data["views"][0]["panels"] == [
+        "plant.yaw_rate,reference.yaw_rate_ref", "plant.sideslip - reference.sideslip_ref",
+    ]  # fmt: skip
+    assert shown.save(tmp_path / "v.html").read_text(encoding="utf-8") == shown.html
+    frame = shown._repr_html_()
+    assert escape(shown.html) in frame and "height: 500px" in frame
+    assert repr(yb.view([run, run])) == f"<View of 1: {run.title} and 2: {run.title}>"
+    assert yb.view(run).labels == (run.title,)
+
+
+def test_a_viewer_refuses_what_it_cannot_show(run, tmp_path):
+    with pytest.raises(yb.ResultsError) as refused:
+        yb.view(run, "plant.nothing")
+    assert "'plant.nothing'" in str(refused.value)
+    with pytest.raises(yb.ResultsError):
+        yb.view([])
+    for wrong in (7, "run", [run, 7], {"a": None}, {7: run}):
+        with pytest.raises(TypeError):
+            yb.view(wrong)
+    with pytest.raises(ValueError):
+        yb.view(run, height=5)
+    with pytest.raises(yb.ResultsError):
+        yb.view(run).save(tmp_path)

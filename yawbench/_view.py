@@ -1,0 +1,125 @@
+"""Interactive viewer of runs, in notebooks and as a page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from orchestrator.errors import ResultsError
+from orchestrator.figures.style import LabelledRun
+from orchestrator.files import reason, write_whole
+from orchestrator.messages import counted, listed
+from orchestrator.metrics.run_metrics import columns_of
+from orchestrator.pages.viewer import SETTINGS, Settings, page
+from orchestrator.pages.viewer import View as Selection
+
+from . import arguments
+from ._run import Run
+
+HEIGHT = 860
+"""Default height of a viewer in a notebook [px]. Chosen: five panels with their table."""
+
+
+def view(
+    runs: Run | Iterable[Run] | Mapping[str, Run],
+    *panels: str,
+    title: str = "",
+    height: int = HEIGHT,
+) -> View:
+    """Return an interactive viewer of runs, which a notebook shows.
+
+        >>> free = base.swap(controller="controller_off").run()
+        >>> shown = yb.view({"no control": free, "network": base.run()})
+        >>> shown
+        <View of no control and network>
+        >>> shown.save("compared.html").name
+        'compared.html'
+
+    Args:
+        runs: a run, several, or a mapping of labels to runs; the first is the baseline.
+        panels: signals shown at first, such as "yaw_rate" or "plant.sideslip - reference.sideslip_ref";
+            default: what all papers draw.
+        title: of the page; default: the labels.
+        height: in a notebook [px].
+
+    Raises:
+        ResultsError: there are no runs, too many, or none has recorded a panel's signal.
+    """
+    labelled = _labelled(runs)
+    wanted = [arguments.text(one, f"panels[{k}]") for k, one in enumerate(panels)]
+    for name in wanted:
+        parts = [part.strip().removesuffix("_error") for one in name.split(",") for part in one.split(" - ")]
+        for part in parts:
+            if not any(columns_of(run.results, part) for run in labelled):
+                raise ResultsError(f"panel {name!r}: no run has recorded {part!r}.")
+    settings = Settings((Selection(panels=wanted),)) if wanted else SETTINGS
+    title = arguments.text(title, "title", empty=True)
+    names = tuple(run.label for run in labelled)
+    html = page(labelled, settings, title=title or listed(names, last="and"))
+    return View(names, html, arguments.count(height, "height", least=100, most=10_000))
+
+
+def _labelled(runs: Any) -> list[LabelledRun]:
+    """Return runs with labels: those of a mapping, else their titles, numbered if equal."""
+    if arguments.is_a(runs, Run):
+        runs = [runs]
+    if arguments.is_a(runs, Mapping):
+        named = arguments.mapping(runs, "runs", "a mapping of labels to runs")
+    else:
+        several = arguments.items(runs, "runs", "a run, a list of runs, or a mapping of labels to runs")
+        titles = [one.title if arguments.is_a(one, Run) else "" for one in several]
+        numbered = len(set(titles)) < len(titles)
+        named = {
+            f"{k + 1}: {title}" if numbered else title: one
+            for k, (title, one) in enumerate(zip(titles, several, strict=True))
+        }
+    return [
+        LabelledRun(label, arguments.instance(one, f"runs[{label!r}]", Run, "Scenario.run").results)
+        for label, one in named.items()
+    ]
+
+
+@dataclass(frozen=True, repr=False)
+class View:
+    """An interactive viewer; made by `view`.
+
+    >>> yb.view(run, "sideslip")
+    <View of Sideslip tracking at 25 m/s, mu 0.65>
+
+    Attributes:
+        labels: of the runs.
+        html: a whole page, which needs no network.
+        height: in a notebook [px].
+    """
+
+    __module__ = "yawbench"
+
+    labels: tuple[str, ...]
+    html: str
+    height: int = HEIGHT
+
+    def save(self, file: str | Path) -> Path:
+        """Write the page and return its path.
+
+        Raises:
+            ResultsError: it cannot be written.
+        """
+        path = arguments.path(file, "file")
+        try:
+            write_whole(path, self.html, named=True)
+        except OSError as error:
+            raise ResultsError(f"{path}: the page cannot be written: {reason(error)}.") from None
+        return path
+
+    def __repr__(self) -> str:
+        shown = listed(self.labels, last="and") if len(self.labels) <= 4 else counted(len(self.labels), "run")
+        return f"<View of {shown}>"
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe srcdoc="{escape(self.html)}" style="width: 100%; height: {self.height}px; border: 0" '
+            f'title="Viewer of {escape(listed(self.labels, last="and"))}"></iframe>'
+        )
