@@ -12,6 +12,7 @@ import pytest
 
 from fmus.build import build_component
 from fmus.compiler import compiler_command
+from orchestrator.commands.new import begin
 from orchestrator.fmu.native import REASON, runs_as
 
 LAW = '''"""A law."""
@@ -103,6 +104,16 @@ def test_what_is_not_translated_runs_in_python_and_says_why(tmp_path):
     assert zipfile.ZipFile(made).read(REASON).decode() == why
     assert runs_as(made) == f"Python: {why}"
     assert asked(made)[1:] == [False, True]
+
+
+@pytest.mark.parametrize("kind", ["controller", "driver", "plant", "reference", "road", "tyre"])
+@pytest.mark.sampled(2)
+def test_what_yawbench_new_writes_is_native(kind, tmp_path):
+    for path, text in begin(kind, "idea", in_checkout=False).files.items():
+        file = tmp_path / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+    assert runs_as(build_component(tmp_path / f"{kind}s" / "idea.py", tmp_path / "out")) == "native"
 
 
 def test_the_native_library_needs_libm_and_libc_alone(law, tmp_path):
