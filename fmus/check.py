@@ -19,7 +19,7 @@ from typing import IO, Any
 
 from orchestrator.processes import die_with_parent, how_it_ended, python
 
-_checker: subprocess.Popen | None = None
+_checker: subprocess.Popen[str] | None = None
 
 
 def defects(fmu: Path, *modules: str) -> list[str]:
@@ -57,7 +57,7 @@ def _ask(what: str, *arguments: object) -> Any:
     return json.loads(answer) if answer else how_it_ended(_checker.wait())
 
 
-def _end(checker: subprocess.Popen) -> None:
+def _end(checker: subprocess.Popen[str]) -> None:
     checker.kill()
     checker.communicate()
 
@@ -113,7 +113,7 @@ def _load(description: Any, folder: str) -> list[str]:
     try:
         unit = instantiate_fmu(folder, description, "CoSimulation", logger=log)
         unit.setupExperiment()
-        getters: dict[str, tuple[Callable, Callable]] = {
+        getters: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {
             "Real": (unit.getReal, float),
             "Integer": (unit.getInteger, int),
             "Boolean": (unit.getBoolean, lambda text: text == "true"),

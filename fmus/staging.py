@@ -124,7 +124,9 @@ class StagingFolder:
         if len(final) != 1:
             names = ", ".join(c.__name__ for c in final)
             raise BuildError(f"defines {'components ' + names if names else 'no component'}; one is right")
-        return final[0]
+        (component,) = final
+        assert isinstance(component, type)
+        return component
 
     def description(self, component: type[Any]) -> Element:
         """Return the model description of a component.

@@ -82,7 +82,8 @@ class FmuUpdater:
         about = asdict(replace(mark, key=""))
         record = json.loads(recall(KEYS, entry) or b"{}")
         if record.get("of") == about and self._looks.confirm(record["evidence"]):
-            return record["key"]
+            known: str | None = record["key"]
+            return known
         try:
             recipe = self._recipe(archive, mark)
             if recipe is None:
@@ -109,7 +110,8 @@ class FmuUpdater:
         return recipe_of(source, role=mark.role or None, name=mark.name, defaults=mark.defaults)
 
     def _build(self, archive: Path, mark: BuildStamp) -> tuple[Path, BuildInfo]:
-        from .build import LATER, bring_up_to_date, component_mark
+        from .build import bring_up_to_date, component_mark
+        from .native.build import LATER
 
         target = place_of(archive.parent) / archive.name
         recipe = self._recipe(archive, mark)

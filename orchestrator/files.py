@@ -170,7 +170,7 @@ def reads(
         function: Callable[Concatenate[Path | str, P], R],
     ) -> Callable[Concatenate[Path | str, P], R]:
         @functools.wraps(function)
-        def wrapper(path: Path | str, *args: P.args, **kwargs: P.kwargs) -> R:
+        def wrapper(path: Path | str, /, *args: P.args, **kwargs: P.kwargs) -> R:
             with reading(what, path, error):
                 return function(path, *args, **kwargs)
 
@@ -188,7 +188,7 @@ def reason(error: Exception) -> str:
 
 
 try:
-    import fcntl
+    import fcntl as fcntl
 except ImportError:  # Windows, where an open file cannot be replaced anyway
     fcntl = None  # type: ignore[assignment]
 

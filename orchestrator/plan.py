@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
     import numpy as np
@@ -152,7 +152,8 @@ class InputSeries:
         import numpy as np
 
         if not self.held:
-            return np.interp(times, self.times, self.values)
+            values: np.ndarray = np.interp(times, self.times, self.values)
+            return values
         indices = np.searchsorted(self.times, times, side="right") - 1
         return self.values[np.clip(indices, 0, None)]
 
@@ -160,7 +161,8 @@ class InputSeries:
         """Return the value at the start time [s] of a run."""
         import numpy as np
 
-        return self.at(np.array([time])).tolist()[0]
+        value: Value = self.at(np.array([time])).tolist()[0]
+        return value
 
 
 PAPER, LITERATURE, CHOSEN, ERRATUM, VARIED, NEUTRAL = (
@@ -323,7 +325,7 @@ class Plan:
     algorithm: str  # of `coupling.ALGORITHMS`
     start: Fraction = Fraction(0)  # time of communication point 0 [s]
     title: str = ""
-    scenario: dict = field(default_factory=dict)  # as run, for run.json
+    scenario: dict[str, Any] = field(default_factory=dict)  # as run, for run.json
     changes: tuple[Override, ...] = ()  # of the scenario file
     diagnostics: tuple[Diagnostic, ...] = ()  # what was left out or assumed, and warnings about values
     faults: tuple[FaultySignal, ...] = ()  # those of one variable in the order in which they act

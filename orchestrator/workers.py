@@ -18,8 +18,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
-from .checksums import RecordWarning
-from .errors import YawbenchError
+from .errors import RecordWarning, YawbenchError
 from .processes import ServedChild, start
 from .supervisor import LOOK_EVERY, REPLY, REQUEST, PipeChannel, ProcessLost, SupervisedProcess
 

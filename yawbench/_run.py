@@ -197,10 +197,11 @@ class Run:
         """
         from orchestrator.figures import panels as drawing
         from orchestrator.figures.plots import OVERVIEW, draw
+        from orchestrator.figures.style import LabelledRun
 
         wanted = [arguments.text(one, f"panels[{k}]") for k, one in enumerate(panels)]
         title = None if title is None else arguments.text(title, "title")
-        runs = [drawing.LabelledRun(self.title, self.results)]
+        runs = [LabelledRun(self.title, self.results)]
         drawing.check_panels(runs, wanted, option="panel ")
         return shown_in_notebooks(draw(runs, wanted or OVERVIEW, title=title))
 

@@ -174,7 +174,7 @@ class Calling(BuiltIn):
         if issubclass(cls, (tuple, list, dict, int, float, str)):
             raise Refused(f"making a {cls.__name__}")
         made = Instance(cls)
-        init = cls.__dict__.get("__init__") or cls.__init__  # type: ignore[misc]
+        init = cls.__dict__.get("__init__") or cls.__init__
         own = isinstance(init, types.FunctionType) and self.sources.contains(init)
         if dataclasses.is_dataclass(cls) and not own:
             self._fill(made, cls, args, named)
@@ -183,7 +183,7 @@ class Calling(BuiltIn):
         return made
 
     def _fill(self, made: Instance, cls: type, args: list[Any], named: dict[str, Any]) -> None:
-        fields = [f for f in dataclasses.fields(cls) if f.init]  # type: ignore[arg-type]
+        fields = [f for f in dataclasses.fields(cls) if f.init]
         given = dict(zip([f.name for f in fields], args, strict=False)) | named
         for f in fields:
             if f.name in given:

@@ -131,7 +131,7 @@ class Twin:
                 said.append(text)
 
         component.log = log
-        self._make = lambda: component(instance_name="gate", resources=str(resources))
+        self._make: Callable[[], Any] = lambda: component(instance_name="gate", resources=str(resources))
         self.unit = self._make()
 
     def _answer(self, succeeded: Any = True, values: Sequence[float] = ()) -> Answer:

@@ -98,7 +98,7 @@ class Facts:
         if kind == "is":
             tag, number = of
             if tag in self.numbers:
-                return self.numbers[tag] == number
+                return bool(self.numbers[tag] == number)
             if number in self.others.get(tag, ()):
                 return False
             left = self.left(tag)

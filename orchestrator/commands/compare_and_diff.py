@@ -111,7 +111,7 @@ def converge(
         scenario,
         halvings=halvings,
         signal=signal,
-        algorithms=algorithm or (),  # type: ignore[arg-type]
+        algorithms=algorithm or (),
         changes=wishes.changes,
     )
     findings = conduct(experiment, folder, wishes, each, record=(signal,))

@@ -191,7 +191,7 @@ def write_new(files: dict[PurePosixPath, str], folder: Path, *, also: Iterable[P
 
 
 NewKind = Literal[KINDS]  # type: ignore[valid-type]
-NewKindArgument = Annotated[NewKind, typer.Argument(help="What to write.", metavar="KIND")]  # type: ignore[valid-type]
+NewKindArgument = Annotated[NewKind, typer.Argument(help="What to write.", metavar="KIND")]
 NewName = Annotated[str, typer.Argument(help="Its name: lower-case letters, digits and _.", metavar="NAME")]
 Written = Annotated[Literal["python", "c"], typer.Option("--language", help="Language of a controller.")]
 Project = Annotated[

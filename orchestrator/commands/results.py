@@ -127,9 +127,9 @@ def plot(
     several into the folder that holds them all.
     """
     from ..experiments.comparison import FIGURES
-    from ..figures.panels import LabelledRun, check_panels, shown_by
+    from ..figures.panels import check_panels, shown_by
     from ..figures.plots import OVERVIEW, draw
-    from ..figures.style import save
+    from ..figures.style import LabelledRun, save
     from ..results.read import load_results
     from .progress import say
 
@@ -182,7 +182,7 @@ def write_view(
         ResultsError: a run cannot be read, or the page cannot be written.
     """
     from ..errors import ResultsError
-    from ..figures.panels import LabelledRun
+    from ..figures.style import LabelledRun
     from ..files import write_whole
     from ..labels import changed_each
     from ..pages.viewer import SETTINGS, Settings, View, page

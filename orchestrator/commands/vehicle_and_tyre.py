@@ -10,7 +10,9 @@ import typer
 from .options import RunOptions, takes
 
 if TYPE_CHECKING:
-    from ..experiments.tables import Table
+    from collections.abc import Callable
+
+    from ..experiments.tables import Cell, Table
     from ..vehicles.handling_and_braking import Handling
 
 
@@ -117,7 +119,7 @@ def _tables(cars: list[Handling]) -> list[Table]:
     for a_y in (0.0, *LEVELS):
         label = f"{a_y:g} m/s²" if a_y else "linear range"
         turn.rows.append([label, *(_told(car.steering.get(a_y), per_g, "°/g") for car in cars)])
-    over_speed = [
+    over_speed: list[tuple[str, Callable[[Handling, float], Cell]]] = [
         ("Steady yaw gain", lambda car, v: _told(car.gains.get(v), 1.0, "1/s")),
         ("Yaw mode: natural frequency", lambda car, v: _mode(car.yaw.get(v), "frequency")),
         ("Yaw mode: damping ratio", lambda car, v: _mode(car.yaw.get(v), "damping")),

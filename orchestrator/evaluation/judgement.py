@@ -108,7 +108,7 @@ def evaluation(
     """
 
     @wraps(fill)
-    def evaluate(trace: Trace, *args: P.args, **kwargs: P.kwargs) -> Evaluation:
+    def evaluate(trace: Trace, /, *args: P.args, **kwargs: P.kwargs) -> Evaluation:
         judged = Evaluation(trace.label)
         try:
             fill(judged, trace, *args, **kwargs)

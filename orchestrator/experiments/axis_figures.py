@@ -154,7 +154,7 @@ def _in_words(target: Target) -> str:
 def set_scale(axes: Axes, which: Literal["x", "y"], scale: str) -> None:
     """Set the scale of an axis; logarithmic axes get plain numbers instead of powers of ten."""
     if scale == "log":
-        axes.set(**{f"{which}scale": "log"})  # type: ignore[arg-type]
+        axes.set(**{f"{which}scale": "log"})
         getattr(axes, f"{which}axis").set_major_formatter("{x:g}")
 
 

@@ -203,7 +203,7 @@ def _connected(address: str) -> Iterator[Any]:
 
 def _check_workers(client: Any, address: str) -> int:
     """Check that all workers are compatible and return their number of threads."""
-    threads = sum(client.nthreads().values())
+    threads: int = sum(client.nthreads().values())
     if not threads:
         raise ScenarioError(
             f"--scheduler {address}: this scheduler has no workers", code="cluster-unavailable"

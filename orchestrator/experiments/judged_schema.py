@@ -143,7 +143,8 @@ def ranks(x: Sequence[float]) -> np.ndarray:
     array = np.asarray(x, dtype=float)
     below = (array[:, None] > array[None, :]).sum(axis=1)
     equal = (array[:, None] == array[None, :]).sum(axis=1)
-    return below + (equal + 1) / 2
+    found: np.ndarray = below + (equal + 1) / 2
+    return found
 
 
 def rank_correlation(x: Sequence[float], y: Sequence[float]) -> float | None:

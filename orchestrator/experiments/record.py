@@ -159,7 +159,8 @@ def _parquet(findings: ExperimentResult, columns: Sequence[TableColumn]) -> byte
     arrays = [pa.array(map(_encodable, c.values), type=f.type) for c, f in zip(columns, fields, strict=True)]
     content = pa.BufferOutputStream()
     pq.write_table(pa.Table.from_arrays(arrays, schema=schema), content, compression="zstd")
-    return content.getvalue().to_pybytes()
+    written: bytes = content.getvalue().to_pybytes()
+    return written
 
 
 def _encodable(value: Any) -> Any:

@@ -250,7 +250,8 @@ def _error(run: LabelledRun, signal: str) -> np.ndarray | None:
     if not reference or _peak(run.results[reference]) == 0:
         return None
     wanted = run.results[reference]
-    return (run.results[columns[0]] - wanted) / _peak(wanted)
+    error: np.ndarray = (run.results[columns[0]] - wanted) / _peak(wanted)
+    return error
 
 
 def _draw_wheels(axes: Axes, run: LabelledRun, name: str) -> None:

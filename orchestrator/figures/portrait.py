@@ -65,7 +65,9 @@ def curves_of(runs: Sequence[LabelledRun], x: str, y: str) -> list[PortraitCurve
 
 
 def _shown(results: Results, column: str) -> np.ndarray:
-    return results[column][spread_rows(results, POINTS)] * shown_unit(results.units[column])[1]
+    factor = shown_unit(results.units[column])[1]
+    values: np.ndarray = results[column][spread_rows(results, POINTS)] * factor
+    return values
 
 
 def spread_rows(results: Results, most: int) -> np.ndarray:

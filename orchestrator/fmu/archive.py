@@ -29,6 +29,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from ..cache import KEEP_DAYS, cache_folders, content_of, hold
 from ..errors import ModelDescriptionError
@@ -145,10 +146,10 @@ def _load(entry: Path, path: Path) -> Fmu | None:
     return fmu
 
 
-def whole_entry(entry: Path) -> dict | None:
+def whole_entry(entry: Path) -> dict[str, Any] | None:
     """Return the record of a cache entry, None if one of its files is missing or has changed."""
     try:
-        record = json.loads((entry / "description.json").read_bytes())
+        record: dict[str, Any] = json.loads((entry / "description.json").read_bytes())
         for name, digest in record["files"].items():
             with open(f"{entry}/fmu/{name}", "rb", buffering=0) as file:
                 if hashlib.sha256(file.read()).hexdigest() != digest:

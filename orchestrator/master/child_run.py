@@ -79,7 +79,7 @@ class SharedProgress:
         return [json.loads(slot) for slot in itertools.takewhile(bool, slots)]
 
 
-class _Others(list):
+class _Others(list[list[Value]]):
     """Non-Real values, one list per row, also stored in shared memory in case the process dies."""
 
     def __init__(self, shared: SharedProgress) -> None:
@@ -199,15 +199,15 @@ def _tell_where(channel: PipeChannel, asking: int, stop: StopFlag) -> None:
 
     threading.Thread(target=answer, daemon=True).start()
 
-    @ctypes.CFUNCTYPE(None, ctypes.c_int, ctypes.c_void_p)
     def at_exit(status: int, _: int | None) -> None:
         if os.getpid() == process:
             with contextlib.suppress(OSError):
                 channel.send(WHERE, _whereabouts(stepping))
         os._exit(status)
 
-    _kept.append(at_exit)
-    ctypes.CDLL(None).on_exit(at_exit, None)
+    callback = ctypes.CFUNCTYPE(None, ctypes.c_int, ctypes.c_void_p)(at_exit)
+    _kept.append(callback)
+    ctypes.CDLL(None).on_exit(callback, None)
 
 
 _kept: list[Any] = []

@@ -147,17 +147,20 @@ class CompiledLoop:
     @property
     def k(self) -> int:
         """The communication point being stepped to."""
-        return self._run.k
+        k: int = self._run.k
+        return k
 
     @property
     def at(self) -> int:
         """Index of the current operation in the program of the step to `k`; negative between two steps."""
-        return self._run.at
+        at: int = self._run.at
+        return at
 
     @property
     def status(self) -> int:
         """Status that the current operation has returned."""
-        return self._run.status
+        status: int = self._run.status
+        return status
 
     def expect(self, outputs: np.ndarray) -> None:
         """Have the outputs with these indices checked to be finite."""

@@ -52,7 +52,7 @@ class Fmi2Instance(CtypesInstance):
         callbacks.componentEnvironment = self._listener = listen(self._log, unit.name, callbacks)
         instantiate = self._function("Instantiate")
         instantiate.restype = ctypes.c_void_p
-        return instantiate(
+        component: int | None = instantiate(
             unit.name.encode(),
             fmi2CoSimulation,
             unit.fmu.guid.encode(),
@@ -61,6 +61,7 @@ class Fmi2Instance(CtypesInstance):
             False,
             True,  # logging on: otherwise PythonFMU passes on no messages at all
         )
+        return component
 
     def _stepping(self, time: ctypes.c_double, step: ctypes.c_double) -> Callable[[], Status]:
         component = ctypes.c_void_p(self._component)
@@ -86,11 +87,15 @@ class Fmi2Instance(CtypesInstance):
         return last.value
 
 
-def _log_fmi2(environment, instance, status, category, text):
+def _log_fmi2(
+    environment: int, instance: bytes, status: int, category: bytes | None, text: bytes | None
+) -> None:
     receive(environment, status, category, text)
 
 
-def _log_unformatted(environment, instance, status, category, text):
+def _log_unformatted(
+    environment: int, instance: bytes, status: int, category: bytes | None, text: bytes | None
+) -> None:
     receive(environment, status, category, (text or b"").replace(b"%%", b"%"))
 
 
@@ -155,7 +160,7 @@ class Fmi3Instance(CtypesInstance):
         no, yes = False, True
         instantiate = self._function("InstantiateCoSimulation")
         instantiate.restype = ctypes.c_void_p
-        return instantiate(
+        component: int | None = instantiate(
             unit.name.encode(),
             unit.fmu.guid.encode(),
             resources.encode(),
@@ -169,6 +174,7 @@ class Fmi3Instance(CtypesInstance):
             _logger_fmi3,
             fmi3IntermediateUpdateCallback(),
         )
+        return component
 
     def _stepping(self, time: ctypes.c_double, step: ctypes.c_double) -> Callable[[], Status]:
         return _Fmi3Step(self, time, step)
@@ -218,7 +224,7 @@ class _Fmi3Step(PlainCall):
         return status
 
 
-def _log_fmi3(environment, status, category, text):
+def _log_fmi3(environment: int, status: int, category: bytes | None, text: bytes | None) -> None:
     receive(environment, status, category, text)
 
 

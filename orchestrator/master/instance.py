@@ -50,7 +50,7 @@ class PlainCall:
         return status
 
 
-class BoundCall(functools.partial, PlainCall):
+class BoundCall(functools.partial[Status], PlainCall):
     """A C function with its arguments bound."""
 
 
@@ -292,7 +292,8 @@ class CtypesInstance(FmuInstance, ABC):
 
     def _do(self, name: str, *arguments: Any) -> Status:
         """Call a C function with the instance as its first argument."""
-        return self._function(name)(ctypes.c_void_p(self._component), *arguments)
+        status: Status = self._function(name)(ctypes.c_void_p(self._component), *arguments)
+        return status
 
     def _announce(self, name: str, experiment: ExperimentSetup) -> Status:
         """Call the C function that takes start time, stop time and tolerance."""

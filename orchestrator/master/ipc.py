@@ -73,7 +73,9 @@ def told(error: YawbenchError | Interrupted) -> dict[str, Any]:
 def rebuilt(told: dict[str, Any]) -> YawbenchError | Interrupted:
     """Return the error that `told` has described in another process."""
     kinds = {kind.__name__: kind for kind in (*YawbenchError.__subclasses__(), Interrupted)}
-    return kinds.get(told["kind"], YawbenchError)(map(Diagnostic.of, told["diagnostics"]), **told["where"])
+    kind = kinds.get(told["kind"], YawbenchError)
+    error: YawbenchError | Interrupted = kind(map(Diagnostic.of, told["diagnostics"]), **told["where"])
+    return error
 
 
 class LogRelay(Log):

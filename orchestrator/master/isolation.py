@@ -18,20 +18,22 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from ..errors import SimulationError, YawbenchError
 from ..interrupts import stop_requested_at
 from ..plan import Instance, Plan, Value, ValueRef
 from ..processes import start
-from ..supervisor import ANSWER, FAILED, REPLY, REQUEST, PipeChannel, ProcessLost
+from ..supervisor import ANSWER, FAILED, LOG, REPLY, REQUEST, PipeChannel, ProcessLost
 from .fmi import SLAVES, open_unit
 from .guardian import stand_guard
 from .instance import Buffers, CtypesInstance, ExperimentSetup, FmuInstance, Status, StepCalls
-from .ipc import GET, LOG, SET, STEP, FmuProcess, LogRelay, SharedBuffer, rebuilt, shared_memory, told
+from .ipc import GET, SET, STEP, FmuProcess, LogRelay, SharedBuffer, rebuilt, shared_memory, told
 from .log import FATAL, OK, PROCESS, WARNING, Log, known
 from .process_state import ProcessState, flush_output
 from .step_program import copying
+
+T = TypeVar("T")
 
 CALL_LIMIT = 10.0
 """Time that a call of an FMU may take [s]; chosen: ten thousand times the length of a step, and still a
@@ -78,7 +80,8 @@ class InstanceProcess(FmuProcess):
         """Have it do parts of a step; return the result (see `InstanceServer.exchange`)."""
         with contextlib.suppress(BrokenPipeError):
             self._channel.say(parts)
-        return self.answer(self._limit, ANSWER)
+        result: int = self.answer(self._limit, ANSWER)
+        return result
 
     def answer(self, limit: float, wanted: int) -> Any:
         """Return its answer, which may take a time `limit` [s]."""
@@ -231,13 +234,14 @@ class IsolatedInstance:
     def note(self, status: Status) -> Status:
         return self._ask("", known(status), "note", status)
 
-    def _ask(self, function: str, failed: Any, request: str, *arguments: Any) -> Any:
+    def _ask(self, function: str, failed: T, request: str, *arguments: Any) -> T:
         """Return the answer to a request, or `failed` if the process died."""
         if self._process is None:
             return failed
         self._part = ""
         try:
-            return self._process.ask(request, *arguments)
+            answer: T = self._process.ask(request, *arguments)
+            return answer
         except ProcessLost as lost:
             self._lose(lost, function)
             return failed

@@ -133,7 +133,7 @@ class SignalPool:
 
     def taken(self, s: InstanceSlot) -> np.ndarray:
         """Return the Real inputs of an instance, computed from the current outputs, at initialization."""
-        values = self.pool[s.sources]
+        values: np.ndarray = self.pool[s.sources]
         values = values if s.scale is None else values * s.scale[0] + s.scale[1]
         if s.input_faults is not None:
             s.input_faults.begin(values)

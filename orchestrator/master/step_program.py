@@ -116,7 +116,7 @@ class StepProgram:
         self._algorithm = ALGORITHMS[memory.plan.algorithm]
         self.cycle = math.lcm(*(s.instance.period for s in memory.stations))
         self._made: dict[int, list[Operation]] = {}
-        self._gathers: dict[tuple, list[Operation]] = {}
+        self._gathers: dict[tuple[Any, ...], list[Operation]] = {}
         feeds = {s.name: SeriesFeed(memory, s) for s in memory.stations if s.instance.series}
         self._feeds = {name: Operation(name, "gather", feed, feed.data) for name, feed in feeds.items()}
         self._of_outputs = {s.name: _acting(s, s.output_faults, s.y) for s in memory.stations}
@@ -293,7 +293,7 @@ def _setting(m: SignalPool, s: InstanceSlot) -> list[Operation]:
     for chosen in by_type(v for v, _ in s.other_inputs if v.place[:2] in driven):
         places, ends = [v.place for v in chosen], [((s.name, v.name), wires[v.name]) for v in chosen]
 
-        def put(places: list[ValueRef] = places, ends: list = ends) -> Status:
+        def put(places: list[ValueRef] = places, ends: list[Any] = ends) -> Status:
             values = [m.others[key] if wire is None else m.other(wire) for key, wire in ends]
             return s.slave.put(places, values)
 
@@ -309,7 +309,7 @@ def getting(m: SignalPool, s: InstanceSlot) -> list[Operation]:
     for chosen in by_type(s.other_outputs):
         places, keys = [v.place for v in chosen], [(s.name, v.name) for v in chosen]
 
-        def fetch(places: list[ValueRef] = places, keys: list = keys) -> Status:
+        def fetch(places: list[ValueRef] = places, keys: list[tuple[str, str]] = keys) -> Status:
             status, values = s.slave.fetch(places)
             m.others.update(zip(keys, values, strict=True))
             return status

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -41,6 +41,7 @@ JERK_WINDOW = 0.1
 acceleration is the jump at a controller's samples; people feel some 10 Hz at most."""
 
 Function = Callable[..., Any]
+F = TypeVar("F", bound=Function)
 
 
 @dataclass(frozen=True)
@@ -83,10 +84,10 @@ MEASURES: dict[str, Measure] = {}
 
 def measure(
     formula: str, definition: str, unit: str, *, signal_unit: str | None = None, name: str = ""
-) -> Callable[[Function], Function]:
+) -> Callable[[F], F]:
     """Return a decorator that registers a function in the table, by default under its own name."""
 
-    def enter(function: Function) -> Function:
+    def enter(function: F) -> F:
         takes = tuple(inspect.signature(function).parameters)[1:]
         row = Measure(function, formula, definition, unit, takes, signal_unit)
         MEASURES[name or function.__name__] = row
@@ -124,7 +125,7 @@ def peak_error(t: np.ndarray, x: np.ndarray, x_ref: np.ndarray) -> float:
     return peak(t, x - x_ref)
 
 
-def _relative(error: str) -> Function:
+def _relative(error: str) -> Callable[[np.ndarray, np.ndarray, np.ndarray], float]:
     """Register an error divided by the reference's peak; it is NaN for a reference of zero."""
     absolute = MEASURES[error]
 

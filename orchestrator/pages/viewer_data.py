@@ -176,4 +176,5 @@ def _float_planes(values: np.ndarray) -> bytes:
     with np.errstate(over="ignore"):
         bits = np.ascontiguousarray(values, "<f4").view("<u4").astype(np.int64)
     steps = (np.diff(bits, prepend=0) & 0xFFFFFFFF).astype("<u4")
-    return steps.view(np.uint8).reshape(-1, 4).T.tobytes()
+    planes: np.ndarray = steps.view(np.uint8).reshape(-1, 4).T
+    return planes.tobytes()

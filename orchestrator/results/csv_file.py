@@ -44,7 +44,8 @@ def values_of(column: pa.Array) -> np.ndarray:
     import pyarrow as pa
 
     if column.type != pa.float64() or column.null_count or not len(column):
-        return column.to_numpy(zero_copy_only=False)
+        copied: np.ndarray = column.to_numpy(zero_copy_only=False)
+        return copied
     _, memory = column.buffers()
     return np.frombuffer(memory, REAL, len(column), REAL.itemsize * column.offset)
 
@@ -91,10 +92,11 @@ def _writer() -> Callable[[np.ndarray], bytes] | None:
 
 def _power(k: int) -> int:
     """Return 10^k times a power of two that makes it a number of 128 bits, rounded up."""
+    power: int = 10 ** abs(k)
     if k >= 0:
-        bits = (10**k).bit_length() - 128
-        return 10**k << -bits if bits <= 0 else -(-(10**k) >> bits)
-    return -(-(1 << (10**-k).bit_length() + 127) // 10**-k)
+        bits = power.bit_length() - 128
+        return power << -bits if bits <= 0 else -(-power >> bits)
+    return -(-(1 << power.bit_length() + 127) // power)
 
 
 class CsvFile:

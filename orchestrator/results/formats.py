@@ -85,7 +85,8 @@ def check_format(name: str) -> str:
 
 def recorder_of(name: str) -> type[Recorder]:
     """Return the recorder class of a format, a subclass of `Recorder`."""
-    return _class(FORMATS[check_format(name)].recorder)
+    recorder: type[Recorder] = _class(FORMATS[check_format(name)].recorder)
+    return recorder
 
 
 def source_of(path: Path, texts: Sequence[str] | None = None) -> ResultsSource:
@@ -100,7 +101,8 @@ def source_of(path: Path, texts: Sequence[str] | None = None) -> ResultsSource:
         ResultsError: a package that the format needs is missing.
     """
     (source,) = (one.source for one in FORMATS.values() if one.file == path.name)
-    return _class(source)(path, texts)
+    opened: ResultsSource = _class(source)(path, texts)
+    return opened
 
 
 def _class(place: str) -> Any:

@@ -168,7 +168,7 @@ def _title(root: _Element) -> str:
     """Return the title from our annotation, else the name of the structure, which is only an identifier."""
     own = root.find(f".//{{{OWN}}}Scenario")
     name = root.get("name", "")
-    return name if own is None else own.get("title", name)
+    return str(name if own is None else own.get("title", name))
 
 
 def _unit_names(structure: SspStructure, document: Document) -> dict[ElementPath, str]:

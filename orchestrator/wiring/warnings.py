@@ -297,7 +297,7 @@ def _constants(units: Iterable[Instance]) -> Iterator[GivenValue]:
 def _values_differ(name: str, told: list[GivenValue], way_out: str) -> Diagnostic:
     alike: dict[tuple[float, str], list[GivenValue]] = {}
     for one in told:
-        alike.setdefault((float(one.value), one.origin), []).append(one)  # type: ignore[arg-type]
+        alike.setdefault((float(one.value), one.origin), []).append(one)
     parts = []
     for (value, origin), some in alike.items():
         names = fold([f"{one.instance}.{one.name}" for one in some])
@@ -305,7 +305,7 @@ def _values_differ(name: str, told: list[GivenValue], way_out: str) -> Diagnosti
     by_change = (one for one in told if one.origin not in OF_FILES)
     first = next(by_change, told[0])
     says = f"{name} has two values: {', '.join(parts)}; {way_out}"
-    return _warning("values-differ", f"{first.instance}.{first.name}", says, float(first.value))  # type: ignore[arg-type]
+    return _warning("values-differ", f"{first.instance}.{first.name}", says, float(first.value))
 
 
 def _warning(code: str, signal: str, says: str, value: float | None = None) -> Diagnostic:
