@@ -50,7 +50,7 @@ def presented(
     for key, value in {**credits, **generated}.items():
         if key in generated or not root.get(key):
             root.set(key, value)
-    SubElement(_annotation(root), "role", name=role)
+    _declare_role(root, role)
     shown = {
         DESCRIPTION: ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n",
         "documentation/index.html": _page(root, sources, files).encode(),
@@ -60,14 +60,13 @@ def presented(
     return {**files, **shown}
 
 
-def _annotation(root: Element) -> Element:
-    """Return yawbench's own annotation in a model description, added where the standard wants it."""
+def _declare_role(root: Element, role: str) -> None:
+    """Add the role to a model description, in an annotation of its own: each may hold one element."""
     annotations = root.find("VendorAnnotations")
     if annotations is None:
         annotations = Element("VendorAnnotations")
         root.insert([child.tag for child in root].index("ModelVariables"), annotations)
-    tool = annotations.find("Tool[@name='yawbench']")
-    return SubElement(annotations, "Tool", name="yawbench") if tool is None else tool
+    SubElement(SubElement(annotations, "Tool", name="yawbench"), "role", name=role)
 
 
 def icon(role: str) -> list[Path]:

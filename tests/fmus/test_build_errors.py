@@ -137,7 +137,9 @@ def test_a_package_that_the_component_declares_may_be_imported(tmp_path, unpack)
     opener = Opener()
     opened = opener.open(opener.bring(fmu))
     assert opened.host_packages == ("numpy",)
-    assert host_needs([opened]) == ["controller_idea needs numpy in the Python of every host"]
+    assert [one.message for one in host_needs([opened])] == [
+        "controller_idea needs numpy in the Python of every host"
+    ]
     assert (
         "The host's Python must have: numpy." in (opened.directory / "documentation/index.html").read_text()
     )
