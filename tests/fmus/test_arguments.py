@@ -5,24 +5,20 @@ from __future__ import annotations
 import ctypes
 
 from tests.fmus.bare import DISCARD, ERROR, FATAL, OK, Unit
+from tests.sentences import golden
 
 
 def test_log_text_is_safe_to_print_and_warnings_are_no_errors(sample):
     unit = Unit(sample("controllers/talking.py"), logging_on=True)
     unit.start()
-    assert unit.log == [
-        (0, "logAll", "42"),
-        (0, "logAll", "100 %s of nothing"),
-        (0, "logAll", r"a \ud800 and a \0"),
-        (1, "logStatusWarning", "grip is 5 % short"),
-    ]
+    assert golden(unit.log)
     unit.free()
 
 
 def test_without_debug_logging_only_warnings_and_errors_are_sent(sample):
     unit = Unit(sample("controllers/talking.py"))
     unit.start()
-    assert unit.messages == ["grip is 5 % short"]
+    assert golden(unit.messages)
     unit.free()
 
 

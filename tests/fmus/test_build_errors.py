@@ -17,7 +17,7 @@ from orchestrator.errors import BuildError, ModelDescriptionError
 from orchestrator.fmu.opener import Opener, host_needs
 from tests.fmus.bare import Fmu, Unit
 from tests.orchestrator.fake_fmus import make_fmu
-from tests.sentences import texts_of
+from tests.sentences import golden, golden_in, refused, texts_of
 
 GOOD = '''"""A controller."""
 
@@ -72,43 +72,33 @@ def attempt(tmp_path):
 
 def test_a_syntax_error_names_file_and_line(attempt):
     (problem,) = attempt(("return (-self.p.gain * u[0],)", "return (-self.p.gain * u[0],"))
-    assert problem.startswith("controller_idea: controllers/idea.py:28: SyntaxError: ")
+    assert golden(problem)
 
 
 def test_an_unknown_unit_lists_the_known_ones(attempt):
     (problem,) = attempt(('"N.m.s/rad"', '"Nms"'))
-    assert problem.startswith(
-        "controller_idea: DeclarationError: Parameters.gain: unknown unit 'Nms'; known: 1, s,"
-    )
+    assert golden(problem)
     assert problem.endswith("(controllers/idea.py:19)")
 
 
 def test_an_unknown_signal_is_named(attempt):
     (problem,) = attempt(('inputs = ("yaw_rate",)', 'inputs = ("yawrate",)'))
-    assert "signal 'yawrate' is not in the signal dictionary: give its unit and description" in problem
+    assert golden_in(problem)
 
 
 def test_a_signal_that_the_role_demands_is_named(attempt):
     problems = attempt(('"yaw_moment"', '"drive_force"'))
-    assert problems == ["controller_idea: a controller must declare the output yaw_moment"]
+    assert golden(problems)
 
 
 def test_every_missing_signal_of_the_role_is_named(attempt):
     problems = attempt(('"yaw_moment"', '"wheel_torque_fl", "wheel_torque_fr"'), role="actuators")
-    assert problems == [
-        "actuator_idea: an actuator must declare the input torque_request_*",
-        "actuator_idea: an actuator must declare the output wheel_torque_rl, wheel_torque_rr",
-    ]
+    assert golden(problems)
 
 
 def test_an_import_from_outside_the_standard_library_is_refused(attempt):
     (problem,) = attempt(("from dataclasses import", "import numpy\nfrom dataclasses import"))
-    assert problem == (
-        "controller_idea: controllers/idea.py:5: imports numpy, which is outside the standard library; "
-        'an FMU must run in a Python that has nothing else installed. Declare host_packages = ("numpy",) in '
-        "the component if every host's Python has it, take an FMU from elsewhere, or run the controller as "
-        "plain Python with the library `yawbench`"
-    )
+    assert golden(problem)
 
 
 NEEDY = (
@@ -199,32 +189,32 @@ def test_an_import_of_the_whole_package_says_how_to_write_it(attempt):
     (problem,) = attempt(
         ("from components.fmi.component import Component", "import components.fmi.component")
     )
-    assert problem.endswith("idea.py:7: write 'from components.fmi.component import ...'")
+    assert golden(problem)
 
 
 def test_a_module_that_does_not_exist_is_named_with_the_line(attempt):
     (problem,) = attempt(("components.fmi.variables", "components.fmi.variable"))
-    assert problem.startswith("controller_idea: controllers/idea.py:8: there is no module fmi.variable in ")
+    assert golden(problem)
 
 
 def test_a_module_that_stands_in_another_room_is_pointed_to(attempt):
     (problem,) = attempt(("components.fmi.variables", "components.core.variables"))
-    assert problem.endswith("; did you mean components.fmi.variables?")
+    assert golden(problem)
 
 
 def test_an_import_beyond_the_package_is_refused(attempt):
     (problem,) = attempt(("from components.fmi.component", "from ....fmi.component"))
-    assert problem.endswith("idea.py:7: the relative import goes beyond the package of the components")
+    assert golden(problem)
 
 
 def test_a_file_without_a_component_is_refused(attempt):
     (problem,) = attempt(("class Idea(Component)", "class Idea"))
-    assert problem == "controller_idea: defines no component; one is right"
+    assert golden(problem)
 
 
 def test_a_file_with_two_components_is_refused(attempt):
     (problem,) = attempt(("class Idea(", "class First(Component):\n    pass\n\n\nclass Idea("))
-    assert problem == "controller_idea: defines components First, Idea; one is right"
+    assert golden(problem)
 
 
 def test_a_component_may_build_on_another_in_the_same_file(tmp_path):
@@ -238,12 +228,12 @@ def test_a_component_may_build_on_another_in_the_same_file(tmp_path):
 
 def test_an_exception_while_importing_names_file_and_line(attempt):
     (problem,) = attempt(("class Idea", "LIMIT = 1 / 0\n\n\nclass Idea"))
-    assert problem == "controller_idea: ZeroDivisionError: division by zero (controllers/idea.py:19)"
+    assert golden(problem)
 
 
 def test_leaving_the_interpreter_while_importing_is_an_error(attempt):
     (problem,) = attempt(("class Idea", "raise SystemExit(0)\n\n\nclass Idea"))
-    assert problem == "controller_idea: SystemExit: 0 (controllers/idea.py:19)"
+    assert golden(problem)
 
 
 def test_a_unit_that_cannot_be_instantiated_is_an_error(attempt):
@@ -254,7 +244,7 @@ def test_a_unit_that_cannot_be_instantiated_is_an_error(attempt):
             '        if "logger" in kwargs:\n            raise OSError("100 % stillborn")\n\n    def output',
         )
     )
-    assert problem.startswith("controller_idea: does not load: Fatal py exception encountered")
+    assert golden(problem)
     assert "OSError('100 % stillborn')" in problem
 
 
@@ -263,7 +253,7 @@ def test_a_name_that_is_no_identifier_is_an_error(attempt):
         ('"yaw_moment",', '"yaw_moment", signal("Gier winkel", "rad", "text"),'),
         ("import parameter", "import parameter, signal"),
     )
-    assert "signal 'Gier winkel': a name is made of lower-case letters, digits and _ (contr" in problem
+    assert golden_in(problem)
 
 
 def test_what_fmpy_finds_in_the_model_description_is_an_error(attempt):
@@ -275,7 +265,7 @@ def test_what_fmpy_finds_in_the_model_description_is_an_error(attempt):
 
     def output"""
     (problem,) = attempt(("    def output", spoilt))
-    assert problem.startswith("controller_idea: model description: ")
+    assert golden(problem)
     assert "InitialUnknowns" in problem
 
 
@@ -295,15 +285,13 @@ def test_other_defaults_must_fit_the_parameters(attempt, defaults, message):
 
 
 def test_a_file_without_a_role_or_that_does_not_exist_is_an_error(tmp_path):
-    with pytest.raises(BuildError, match="there is no such file"):
+    with refused(BuildError, "component-unreadable"):
         build_component(tmp_path / "controllers" / "none.py", tmp_path)
     (tmp_path / "idea.py").write_text(GOOD)
-    with pytest.raises(
-        BuildError, match=r"which role\? Put it into a folder called one of: drivers, references"
-    ):
+    with refused(BuildError, "component-without-role"):
         build_component(tmp_path / "idea.py", tmp_path)
     (tmp_path / "own-idea.py").write_text(GOOD)
-    with pytest.raises(BuildError, match="the name of an FMU is made of letters, digits and _"):
+    with refused(BuildError, "component-invalid"):
         build_component(tmp_path / "own-idea.py", tmp_path, role="controllers")
 
 

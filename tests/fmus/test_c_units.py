@@ -17,6 +17,7 @@ from orchestrator.commands.new import begin
 from orchestrator.errors import BuildError
 from tests.fmus.bare import ERROR, OK, Fmu, Refused, Unit
 from tests.fmus.programs import in_windows, in_wine, run, ten_steps
+from tests.sentences import golden, golden_in, refused
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 
@@ -75,7 +76,7 @@ def test_an_fmu_whose_sources_are_broken_stays_and_one_whose_sources_are_gone_is
     target = tmp_path / "out" / "controller_idea.fmu"
     build_all(tmp_path / "out", root=root)
     edited(folder / "idea.c", "s->x = 0.0;", "s->x = nothing;")
-    with pytest.raises(BuildError, match=r"controller_idea: idea\.c:.*nothing"):
+    with refused(BuildError, "compiler-failed"):
         build_all(tmp_path / "out", root=root)
     assert target.exists()
     edited(folder / "idea.c", "nothing", "0.0")
@@ -109,16 +110,16 @@ def test_what_is_missing_is_named(folder, root, monkeypatch):
     edited(folder / "idea.c", "fabs(law(s, v))", "strange(law(s, v))")
     assert "strange" in problems(folder)
     (folder / "idea.c").unlink()
-    assert problems(folder).endswith("holds no C file")
+    assert golden(problems(folder))
     (root / "controllers" / "idea.py").touch()
-    assert "there are both idea.py and idea/" in problems(folder)
+    assert golden_in(problems(folder))
     monkeypatch.setenv("CC", "no-such-compiler")
     (root / "controllers" / "idea.py").unlink()
-    assert "there is no C compiler (no-such-compiler)" in problems(folder)
+    assert golden_in(problems(folder))
 
 
 def test_a_folder_without_a_role_or_a_model_description_is_refused(folder, tmp_path):
-    with pytest.raises(BuildError, match=r"holds no modelDescription\.xml"):
+    with refused(BuildError, "component-invalid"):
         build_component(tmp_path, tmp_path / "out")
     moved = shutil.copytree(folder, tmp_path / "idea")
     with pytest.raises(BuildError, match="which role"):
@@ -137,7 +138,7 @@ def test_a_parameter_out_of_its_range_is_refused_in_one_sentence(unit):
     unit.set(proportional_gain=-1.0)
     with pytest.raises(Refused):
         unit.start()
-    assert unit.messages == ["proportional_gain must be at least 0 (got -1)"]
+    assert golden(unit.messages)
 
 
 def test_a_parameter_cannot_be_set_later_and_an_output_never(unit):
@@ -146,7 +147,7 @@ def test_a_parameter_cannot_be_set_later_and_an_output_never(unit):
     unit.start()
     with pytest.raises(Refused):
         unit.set(integral_gain=1.0)
-    assert unit.messages[-1] == "integral_gain cannot be set after initialization"
+    assert golden(unit.messages[-1])
 
 
 def test_a_restored_state_goes_on_as_the_first_time(unit):
@@ -165,7 +166,7 @@ def test_a_restored_state_goes_on_as_the_first_time(unit):
 
 def test_what_it_cannot_do_is_an_error_with_a_message_not_a_crash(unit):
     assert unit.call("fmi2CancelStep") == ERROR
-    assert unit.messages[-1] == "fmi2CancelStep is not supported"
+    assert golden(unit.messages[-1])
     assert unit.call("fmi2GetInteger", None, 0, None) == OK
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from tests.fmus.bare import ERROR, FATAL, OK, Refused, Unit
 from tests.fmus.samples.controllers.failing import Failing
+from tests.sentences import golden, refused
 
 DITCH = "ValueError: 50 % of the wheels (100%s, %n) are in the Gräben: größer als 1 µm"
 
@@ -32,15 +33,14 @@ def failing(sample):
 def test_an_exception_in_configure_makes_entering_initialization_an_error(failing):
     unit = failing(where="configure")
     assert unit.call("fmi2EnterInitializationMode") == ERROR
-    assert unit.messages[0].startswith(f"initialization failed at t = 0 s: {DITCH} (controllers/failing.py:")
+    assert golden(unit.messages[0])
 
 
 def test_an_exception_in_start_makes_leaving_initialization_an_error(failing):
     unit = failing(where="start", yaw_rate=0.25)
     assert unit.call("fmi2EnterInitializationMode") == OK
     assert unit.call("fmi2ExitInitializationMode") == ERROR
-    assert unit.messages[0].startswith(f"initialization failed at t = 0 s: {DITCH}")
-    assert unit.messages[0].endswith("; inputs: yaw_rate = 0.25")
+    assert golden(unit.messages[0])
 
 
 def test_an_exception_in_start_makes_reading_an_output_during_initialization_an_error(failing):
@@ -59,8 +59,7 @@ def test_an_exception_in_a_step_names_time_place_and_inputs(failing, where):
     first = 2 if where == "advance" else 1
     assert steps == [OK] * first + [ERROR] * (4 - first)
     sentence = unit.messages[0]
-    assert sentence.startswith(f"step failed at t = {first * 0.001:g} s: {DITCH} (controllers/failing.py:")
-    assert sentence.endswith("; inputs: yaw_rate = 0.5")
+    assert golden(sentence)
 
 
 def test_the_traceback_is_logged_for_those_who_ask(failing, sample):
@@ -69,7 +68,7 @@ def test_the_traceback_is_logged_for_those_who_ask(failing, sample):
         assert unit.call("fmi2EnterInitializationMode") == ERROR
     assert [category for _, category, _ in quiet.log] == ["logStatusError"]
     assert [category for _, category, _ in curious.log] == ["logStatusError", "traceback"]
-    assert curious.messages[1].startswith("Traceback (most recent call last):")
+    assert golden(curious.messages[1])
     assert "in configure" in curious.messages[1]
 
 
@@ -112,27 +111,27 @@ def test_a_nan_is_handed_to_the_host_as_it_is(failing):
 
 def test_a_parameter_out_of_range_is_named_with_what_is_allowed(failing):
     unit = failing(when=-1.0)
-    with pytest.raises(Refused, match=r"ValueError: when must be at least 0 \(got -1.0\); inputs"):
+    with refused(Refused):
         unit.start()
     unit = failing(how="quietly")
-    with pytest.raises(Refused, match=r"how must be one of exception, interrupt, .* \(got 'quietly'\)"):
+    with refused(Refused):
         unit.start()
     unit = failing(when=math.nan)
-    with pytest.raises(Refused, match=r"when must be a finite number \(got nan\)"):
+    with refused(Refused):
         unit.start()
 
 
 def test_what_cannot_be_set_is_refused_by_name(failing):
     unit = failing()
-    with pytest.raises(Refused, match="yaw_moment cannot be set"):
+    with refused(Refused):
         unit.set(yaw_moment=1.0)
     unit = failing()
     unit.start()
-    with pytest.raises(Refused, match="when cannot be set after initialization"):
+    with refused(Refused):
         unit.set(when=1.0)
     unit = failing()
     unit.start()
-    with pytest.raises(Refused, match="how cannot be set after initialization"):
+    with refused(Refused):
         unit.set(how="exit")
 
 
@@ -175,7 +174,7 @@ def test_a_state_from_before_the_failure_makes_the_unit_work_again(failing):
 def test_a_state_that_cannot_be_saved_is_an_error(failing):
     unit = failing(unsavable=True)
     unit.start()
-    with pytest.raises(Refused, match=r"saving the state failed .* cannot pickle"):
+    with refused(Refused):
         unit.save()
 
 
@@ -183,7 +182,7 @@ def test_a_state_that_cannot_be_saved_is_an_error(failing):
 def test_bytes_that_are_no_state_are_refused(failing, content):
     unit = failing()
     unit.start()
-    with pytest.raises(Refused, match="these bytes are no state of this FMU"):
+    with refused(Refused):
         unit.from_bytes(content)
     unit.step(0.0)
 

@@ -638,7 +638,6 @@ def test_a_loop_through_an_fmu_that_says_nothing_is_a_note(folder: Path) -> None
     )
     (note,) = texts_of(plan(scenario(UNITS.replace("plant_seven_dof", "plant_silent"), CONSTANTS)))
     assert golden(note)
-    assert golden(note)
 
 
 # Constants

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import yawbench as yb
+from tests.sentences import golden_in, refused
 
 
 class Proportional:
@@ -55,9 +56,9 @@ def test_every_row_is_what_the_run_alone_comes_to(base, runs):
 def test_a_metric_is_drawn_over_an_axis_with_a_line_per_level(runs):
     (axes,) = runs.plot("peak(sideslip)", x="plant.initial_speed", lines="controller").axes
     assert [line.get_xdata().tolist() for line in axes.get_lines()] == [[54.0, 90.0], [54.0, 90.0]]
-    with pytest.raises(yb.ScenarioError, match="the axis 'controller' has no place in this figure"):
+    with refused(yb.ScenarioError, "argument-invalid"):
         runs.plot("peak(sideslip)", x="plant.initial_speed")
-    with pytest.raises(yb.ScenarioError, match=r"did you mean 'peak\(sideslip\)'"):
+    with refused(yb.ScenarioError, "metric-unknown"):
         runs.plot("peak(sideslp)", x="plant.initial_speed", lines="controller")
 
 
@@ -81,7 +82,7 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_others_are_made(base)
 
     made = yb.experiment(base, {"controller": [careless, "controller_off"]}).run(workers=1, keep=False)
     assert made.table["status"].tolist() == ["failed", "completed"]
-    assert "float division by zero" in made.table["reason"][0]
+    assert golden_in(made.table["reason"][0])
     assert made.runs is None
 
 
@@ -106,9 +107,9 @@ def test_what_is_wrong_is_said_before_any_run_is_made(base, axes, said):
 
 
 def test_levels_without_end_and_workers_that_are_no_number_are_refused(base):
-    with pytest.raises(yb.ScenarioError, match=r"driver.amplitude: gives more than 100,000 items"):
+    with refused(yb.ScenarioError, "argument-invalid"):
         yb.experiment(base, {"driver.amplitude": itertools.count(0.01, 0.01)})
-    with pytest.raises(TypeError, match="workers: must be a whole number"):
+    with refused(TypeError):
         yb.experiment(base, {"driver.amplitude": [0.02]}).run(workers="x")
 
 

@@ -13,7 +13,7 @@ import yawbench as yb
 from components.controllers.fnn import Fnn
 from orchestrator.cli import main
 from orchestrator.errors import warnings_in
-from tests.sentences import texts_of
+from tests.sentences import golden, golden_in, refused, texts_of
 
 SCENARIO = "fnn_sideslip/25mps"
 ROOT = Path(__file__).parents[2]
@@ -101,7 +101,7 @@ def test_names_of_signals_and_columns_give_the_same_arrays(run):
     assert run.time.shape == run["sideslip"].shape == (len(run),)
     assert run.unit_of("sideslip") == "rad"
     assert "plant.sideslip" in run
-    with pytest.raises(yb.ResultsError, match=f"^{run.title}: no column 'yawrate' .*did you mean 'yaw_rate'"):
+    with refused(yb.ResultsError, "signal-unknown"):
         run["yawrate"]
 
 
@@ -117,11 +117,11 @@ def test_metrics_are_those_of_the_command_line(run):
     assert run.metric("peak(sideslip)") == np.max(np.abs(run["sideslip"]))
     late = run.time >= 1.2
     assert run.metric("peak(sideslip)", window=(1.2, 1.6)) == np.max(np.abs(run["sideslip"][late]))
-    with pytest.raises(yb.ResultsError, match=r"peak\(sideslip\): the run lasts from 0 to 1.6 s"):
+    with refused(yb.ResultsError, "signal-unknown"):
         run.metric("peak(sideslip)", window=(1, 60))
-    with pytest.raises(yb.ResultsError, match=r"no 'sidslip' is recorded; did you mean 'sideslip'"):
+    with refused(yb.ResultsError, "signal-unknown"):
         run.metric("peak(sidslip)")
-    with pytest.raises(yb.ScenarioError, match=r"did you mean 'peak'"):
+    with refused(yb.ScenarioError, "metric-unknown"):
         run.metric("peek(sideslip)")
 
 
@@ -155,7 +155,7 @@ def test_a_component_class_gives_the_bits_of_its_fmu(base, run):
 
 def test_a_run_without_an_fmu_says_so(base):
     run = base.swap(controller=proportional).run()
-    assert run.record["fmus"]["controller"]["generation_tool"] == "Python, no FMU"
+    assert golden(run.record["fmus"]["controller"]["generation_tool"])
     (note,) = (one for one in run.diagnostics if one.code == "instance-in-python")
     assert note.severity == "info" and note.message.startswith("controller: ")
 
@@ -208,17 +208,17 @@ def test_what_cannot_stand_for_a_controller_is_refused_in_a_sentence(base, given
 
 
 def test_unknown_units_places_and_scenarios_are_refused_with_a_guess(base):
-    with pytest.raises(yb.ScenarioError, match="did you mean 'controller'") as caught:
+    with refused(yb.ScenarioError, "instance-unknown") as caught:
         base.swap(controler="controller_off")
     assert (caught.value.file, caught.value.line) == (base.path, None)
-    with pytest.raises(yb.YawbenchError, match="did you mean 'mass'"):
+    with refused(yb.YawbenchError, "parameter-unknown"):
         base.set({"plant.mas": 3}).plan()
-    with pytest.raises(yb.ScenarioError, match="did you mean 'fnn_sideslip/25mps'"):
+    with refused(yb.ScenarioError, "scenario-unknown"):
         yb.load("fnn_sideslip/25mp")
 
 
 def test_an_output_of_the_wrong_length_ends_the_run_with_a_sentence(base):
-    with pytest.raises(yb.SimulationError, match="gave 2 values for 1 output"):
+    with refused(yb.SimulationError, "fmu-call-failed"):
         base.swap(controller=lambda yaw_rate: (yaw_rate, 1.0)).run()
 
 
@@ -309,7 +309,7 @@ def test_what_a_controller_must_not_return_ends_the_run_with_a_sentence(base, re
 def test_an_error_is_at_the_file_and_line_of_its_first_problem(tmp_path):
     file = tmp_path / "mine.yaml"
     file.write_text("stop_time: 1\nstep_size: 0.001\nunits:\n  plant: {fmu: plant_seven_dof, setp_size: 1}\n")
-    with pytest.raises(yb.ScenarioError, match="did you mean 'step_size'") as caught:
+    with refused(yb.ScenarioError, "key-unknown") as caught:
         yb.load(file)
     assert (caught.value.file, caught.value.line) == (file, 4)
 
@@ -341,9 +341,9 @@ def test_an_experiment_warns_once_and_says_in_how_many_runs(base):
         runs = made.run(workers=1)
     assert len(warned) == 1
     assert warned[0].filename == __file__
-    assert "did you mean '300 km/h'?" in str(warned[0].message)
-    assert "speed-implausible in 1 of 2 runs" in str(warned[0].message)
-    assert "speed-implausible in 1 of 2 runs" in repr(runs)
+    assert golden_in(str(warned[0].message))
+    assert golden_in(str(warned[0].message))
+    assert golden_in(repr(runs))
 
 
 def test_a_run_that_fails_warns_of_what_was_remarkable_before(base):

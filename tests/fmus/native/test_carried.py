@@ -14,6 +14,7 @@ from fmus.build import build_component
 from fmus.compiler import compiler_command
 from orchestrator.commands.new import begin
 from orchestrator.fmu.native import REASON, runs_as
+from tests.sentences import golden
 
 LAW = '''"""A law."""
 
@@ -90,7 +91,7 @@ def test_the_launcher_opens_the_native_library_and_python_on_request(law, monkey
     assert native[1:] == [True, False] and python[1:] == [False, True]
     assert native[0] == python[0] == 2000.0 * (0.3 - 0.1)
     monkeypatch.setenv("YAWBENCH_UNITS", "python")
-    assert runs_as(law) == "Python: YAWBENCH_UNITS asks for it"
+    assert golden(runs_as(law))
 
 
 def test_what_is_not_translated_runs_in_python_and_says_why(tmp_path):
@@ -133,4 +134,4 @@ def test_without_compiler_a_unit_runs_in_python(tmp_path, monkeypatch):
     file.write_text(LAW.replace("BODY", "self.p.gain * (u[0] - u[1])"))
     made = build_component(file, folder)
     assert compiler_command() == ["no-such-compiler"]
-    assert runs_as(made) == "Python: there is no C compiler (no-such-compiler); CC can name one"
+    assert golden(runs_as(made))
