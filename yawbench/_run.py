@@ -170,7 +170,7 @@ class Run:
                 f"there is no test {test!r}{hint(test, TESTS, lead='known')}", code="test-unknown"
             )
         if angle is not None and not TESTS[test].needs_angle:
-            raise ScenarioError(f"{test} needs no angle: leave it away", code="option-invalid")
+            raise ScenarioError(f"{test} takes no angle: omit it", code="option-invalid")
         if angle is not None:
             with arguments.as_scenario_errors():
                 given = arguments.number(angle, "angle")

@@ -87,7 +87,7 @@ def drive(
     folder = wishes.out or default_folder(one_run, changes, suffix="_series")
     execute = executor_of(folder, str(one_run), wishes, format="parquet")
     if (angle or slow_steer) and not chosen.needs_angle:
-        raise ScenarioError(f"{test} needs no A: leave --angle and --slow-steer away", code="option-invalid")
+        raise ScenarioError(f"{test} takes no A: omit --angle and --slow-steer", code="option-invalid")
     for change in changes:
         if str(change.target) in chosen.varies:
             why = "the series itself says what is driven"
@@ -346,9 +346,7 @@ def _angle(
             "--angle and --slow-steer both say what A is: give one of them", code="option-invalid"
         )
     if (given or slow_steer) and not test.needs_angle:
-        raise ScenarioError(
-            f"{test.name} needs no A: leave --angle and --slow-steer away", code="option-invalid"
-        )
+        raise ScenarioError(f"{test.name} takes no A: omit --angle and --slow-steer", code="option-invalid")
     if not slow_steer:
         return angle_of(given)
     places = [place for source in slow_steer for place in _runs(source, mapping)]

@@ -177,7 +177,7 @@ def metric(name: str) -> Metric:
         likely = max(meant, key=lambda one: one.index("("), default=closest(name, STANDARD))
         guess = f"did you mean {likely!r}? " if likely else ""
         raise ScenarioError(
-            f"{short(name)} is no metric; {guess}write measure(signal), for example {STANDARD[0]}.",
+            f"{short(name)} is not a metric; {guess}write measure(signal), for example {STANDARD[0]}.",
             code="metric-unknown",
         )
     measure, signal, between, other, rest = match.groups()

@@ -270,7 +270,7 @@ class Connector:
         if variable is not None:
             self._report(
                 key,
-                f"{instance}.{pattern} is no {kind}: its causality is {variable.causality}",
+                f"{instance}.{pattern} is not an {kind}: its causality is {variable.causality}",
                 "variable-wrong-kind",
             )
             return

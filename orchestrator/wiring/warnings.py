@@ -348,7 +348,8 @@ def _slips(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[
     for one in _constants(units.values()):
         if one.name in FACTS["friction"].inputs and isinstance(one.value, float) and one.value > 2.0:
             place = f"{one.instance}.{one.name}"
-            says = f"{place}: a friction of {one.value:g} is no road's; did you mean '{one.value:g} %'?"
+            number = f"{one.value:g}"
+            says = f"{place}: a friction of {number} is implausible for a road; did you mean '{number} %'?"
             yield _warning("unit-suspicious", place, says, one.value)
             return
 

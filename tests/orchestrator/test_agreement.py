@@ -175,7 +175,10 @@ def test_another_cars_steering_ratio_is_named():
     [
         ("plant.initial_speed=90", "plant.initial_speed: 90 m/s is 324 km/h; did you mean '90 km/h'?"),
         ("driver.amplitude=30", "driver.amplitude: 30 rad is 1719 deg; did you mean '30 deg'?"),
-        ("friction=65", "reference.friction: a friction of 65 is no road's; did you mean '65 %'?"),
+        (
+            "friction=65",
+            "reference.friction: a friction of 65 is implausible for a road; did you mean '65 %'?",
+        ),
     ],
 )
 def test_a_number_that_was_meant_in_another_unit_is_named(setting, sentence):

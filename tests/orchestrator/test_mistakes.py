@@ -62,7 +62,7 @@ def in_one_sentence(said, arguments, words):
         ((*RUN, "--set", "friction=-0.3"), ["--set friction=-0.3: must be at least 0 (got -0.3)"]),
         ((*RUN, "--set", "step_size=1 s"), ["no integer multiple of the communication step 1 s", "1 s"]),
         ((*RUN, "--set", "controller.step_size=0.0015"), ["nearest allowed: 0.001 s or 0.002 s"]),
-        ((*RUN, "--metric", "peak_sideslp"), ["'peak_sideslp' is no metric"]),
+        ((*RUN, "--metric", "peak_sideslp"), ["'peak_sideslp' is not a metric"]),
         ((*RUN, "--metric", "peek(sideslip)"), [f"there is no measure 'peek'; {KNOWN} 'peak'?"]),
         ((*RUN, "--swap", "controler=controller_off"), [f"no unit 'controler'; {KNOWN} 'controller'?"]),
         ((*RUN, "--swap", "controller=controller_of"), [f"{KNOWN} 'controller_off'?"]),
@@ -101,7 +101,7 @@ def test_a_mistake_on_the_command_line_is_answered_by_what_to_do(said, arguments
         ("units:", "record: [plant.yawrate]\nunits:", [f"no variable 'yawrate' to record; {KNOWN}"]),
         (
             "units:", "connections: [{from: plant.steer_angle, to: driver.steer_angle}]\nunits:",
-            ["plant.steer_angle is no output: its causality is input"],
+            ["plant.steer_angle is not an output: its causality is input"],
         ),
         (
             "units:", "connections: [{form: driver.steer_angle, to: plant.steer_angle}]\nunits:",

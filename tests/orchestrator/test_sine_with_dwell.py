@@ -520,7 +520,7 @@ def test_what_a_series_cannot_be_driven_with_is_said_before_any_run(options, sen
 @pytest.mark.parametrize(
     "options, sentence",
     [
-        (("--angle", "40 deg"), "iso-3888-2 needs no A: leave --angle and --slow-steer away"),
+        (("--angle", "40 deg"), "iso-3888-2 takes no A: omit --angle and --slow-steer"),
         (("--set", "speed=70km/h"), "speed: the series itself says what is driven"),
     ],
 )

@@ -442,7 +442,7 @@ def test_more_than_one_output_of_a_name_is_said_and_a_connection_settles_it() ->
         ),
         (
             "{from: controller.yaw_rate, to: plant.wheel_torque_*}",
-            "connections[0].from: controller.yaw_rate is no output: its causality is input",
+            "connections[0].from: controller.yaw_rate is not an output: its causality is input",
         ),
         (
             "{from: controller.torque_request_*, to: plant.wheel_torque_fl}",

@@ -236,7 +236,7 @@ def test_a_run_can_be_saved_again_into_the_same_folder(run, tmp_path):
         ("sine-with-dwell", -0.6, "angle: must be a number between 0 and 2 pi rad (got -0.6)"),
         ("sine-with-dwell", float("nan"), "angle: must be a finite number (got nan)"),
         ("sine-with-dwell", "36 deg", "angle: must be a number (got '36 deg')"),
-        ("step-steer", 0.6, "step-steer needs no angle: leave it away"),
+        ("step-steer", 0.6, "step-steer takes no angle: omit it"),
     ],
 )
 def test_what_a_run_cannot_be_evaluated_with_is_said_in_a_sentence(run, test, angle, sentence):

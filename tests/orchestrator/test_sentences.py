@@ -1,0 +1,57 @@
+"""The golden sentences themselves: what they refuse, and what rewriting keeps."""
+
+from __future__ import annotations
+
+import pytest
+
+from orchestrator.errors import ScenarioError
+from tests import sentences
+from tests.sentences import golden, golden_in, refused
+
+
+@pytest.fixture
+def own(monkeypatch):
+    """Sentences of a test of its own."""
+    made = sentences._Sentences()
+    made.of, made.test = {"t": ["mass must be above 0", "the second"]}, "t"
+    monkeypatch.setattr(sentences, "_sentences", made)
+    yield made
+    made.of = {}
+
+
+def test_another_text_than_the_golden_is_refused(own):
+    assert golden("mass must be above 0")
+    with pytest.raises(AssertionError, match="not as in"):
+        golden("the second, reworded")
+    with pytest.raises(AssertionError, match="no sentence is known"):
+        golden("a third")
+
+
+def test_a_text_without_the_sentence_is_refused(own):
+    assert golden_in("a.yaml:3: mass must be above 0 (got -1)")
+    with pytest.raises(AssertionError, match="is not in the text"):
+        golden_in(["the first", "the third"])
+
+
+def test_another_code_is_refused(own):
+    with pytest.raises(AssertionError), refused(ScenarioError, "axis-unknown"):
+        raise ScenarioError("mass must be above 0", code="value-invalid")
+    with refused(ScenarioError, "axis-unknown", "value-invalid"):
+        raise ScenarioError("mass must be above 0", code="value-invalid")
+    own.given = own.of["t"]
+
+
+def test_a_sentence_that_is_not_asked_for_is_an_error(own):
+    assert golden("mass must be above 0")
+    with pytest.raises(AssertionError, match="the second"):
+        own.end()
+    own.of = {}
+
+
+def test_rewriting_keeps_a_sentence_that_holds_and_takes_the_line_most_like_one_that_does_not(own):
+    own.rewriting = True
+    assert golden_in("a.yaml:3: mass must be above 0 (got -1)")
+    assert golden_in("other\nthe very second\n")
+    own.end()
+    assert own.of["t"] == ["mass must be above 0", "the very second"]
+    own.rewriting = False
