@@ -60,6 +60,7 @@ class _Sentences:
             (r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\+\d\d:\d\d)?", "<time>"),
             (r"\bprocess \d+", "process <id>"),
         ]
+        names += [(r"\b(?=\w*\d)[0-9a-f]{12}\b", "<hash>")]
         self.volatile = [(re.compile(pattern), name) for pattern, name in names]
         self.test, self.given = item.nodeid, []
 
