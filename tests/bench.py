@@ -180,7 +180,7 @@ def masters(path: Path) -> None:
         if "theirs on one core" in times:
             theirs_1, ours_1 = times["theirs on one core"][0], times["ours on one core"][0]
             line += f" {theirs_1:10.0f}{ours_1:7.0f}{ours_1 / theirs_1:7.2f}"
-        print(line + ("   one step for all units" if runs[0][k].one_step else ""))
+        print(line + ("   one step for all instances" if runs[0][k].one_step else ""))
     print()
 
 

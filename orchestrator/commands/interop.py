@@ -61,7 +61,7 @@ def second_opinion(
                 Path(folder),
                 masters=chosen,
                 pinned=one_core,
-                said=lambda text: say(f"running in {text}"),
+                progress=lambda text: say(f"running in {text}"),
             )
         except RuntimeError as error:
             raise SimulationError(str(error), instance=None, time=0.0) from None

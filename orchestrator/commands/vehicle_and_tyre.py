@@ -176,7 +176,7 @@ def tyre(
     from .progress import save_figure, say
 
     stand = put_on_stand(source, friction=friction, fmus=wishes.fmus, build=wishes.build)
-    name, fmu = Path(source).name, stand.unit.fmu
+    name, fmu = Path(source).name, stand.instance.fmu
     kind, side = "", ""
     if file := stand.plan.scenario.get("tyre_files", {}).get("front"):
         kind, side = f", {file['kind']}", f", {file['side'].lower()} side"

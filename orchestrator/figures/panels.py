@@ -1,6 +1,6 @@
 """Panels of figures: what one pair of axes shows, of one run or of several overlaid.
 
-The name of a panel says what it shows: a signal (over its reference, where the run recorded one),
+The name of a panel selects what it shows: a signal (over its reference, where the run recorded one),
 `<signal>_error`, `path`, one signal over another (`yaw_rate(sideslip)`), or a signal of four wheels
 (`wheel_torque_*`: one panel with four lines for one run, four panels for several). Panels whose signals no
 run has are omitted. Times in which faults act are coloured spans behind the lines.
@@ -53,12 +53,12 @@ class FaultSpan(NamedTuple):
 
     begin: float
     end: float
-    says: str
+    label: str
 
 
 def spans_of(runs: Sequence[LabelledRun]) -> list[FaultSpan]:
     """Return the faults of runs, each once; a fault that not all runs have names its run."""
-    found: dict[FaultSpan, list[str]] = {}
+    labels_of: dict[FaultSpan, list[str]] = {}
     for label, results in runs:
         for fault in results.record.faults if results.time.size else ():
             begin, end = fault.begin, fault.until
@@ -69,10 +69,10 @@ def spans_of(runs: Sequence[LabelledRun]) -> list[FaultSpan]:
                 fault.words,
             )
             if span.begin < span.end:
-                found.setdefault(span, []).append(label)
+                labels_of.setdefault(span, []).append(label)
     return [
-        span if len(labels) == len(runs) else span._replace(says=f"{', '.join(labels)}: {span.says}")
-        for span, labels in found.items()
+        span if len(labels) == len(runs) else span._replace(label=f"{', '.join(labels)}: {span.label}")
+        for span, labels in labels_of.items()
     ]
 
 
@@ -88,7 +88,7 @@ def in_legend(spans: Sequence[FaultSpan]) -> list[str]:
     """Return the legend entries of spans."""
     if len(spans) > NAMED:
         return [f"{len(spans)} faults"]
-    return [span.says for span in spans]
+    return [span.label for span in spans]
 
 
 POINTS = 1500

@@ -56,13 +56,13 @@ def draw(
 
     if early := [run for run in runs if run.results.time.size < 2]:
         raise ResultsError(nothing_recorded(early[0]), code="nothing-to-draw")
-    found = shown_by(runs, panels)
-    if not found:
+    selected = shown_by(runs, panels)
+    if not selected:
         where = ", ".join(run.results.where for run in runs)
         raise ResultsError(
             f"{where}: nothing to draw, no run recorded any of {', '.join(panels)}.", code="nothing-to-draw"
         )
-    rows = _rows(found)
+    rows = _rows(selected)
     with new_figure() as figure:
         heights = [max(panel.rows for panel in row) for row in rows]
         grid = figure.add_gridspec(len(rows), 2, height_ratios=heights)
@@ -79,13 +79,13 @@ def draw(
                 below = rows[i + 1] if i + 1 < len(rows) else []
                 if panel.over_time and below and below[0].over_time:
                     axes.set_xlabel("")  # the panel below has the same time axis
-        said = changes_of(runs) if changed is None else changed
+        overrides = changes_of(runs) if changed is None else changed
         foot = provenance(runs) if note is None else note
-        if title is not None and changed is None and said:
-            foot, said = f"{foot} · changed: {said}", ""
+        if title is not None and changed is None and overrides:
+            foot, overrides = f"{foot} · changed: {overrides}", ""
         legend = legend_of(runs, figure.axes)
         handles = [Line2D([], [], label=label, **style) for label, style in legend]
-        frame(figure, ROW * sum(heights), handles, title or title_of(runs), foot, said)
+        frame(figure, ROW * sum(heights), handles, title or title_of(runs), foot, overrides)
     return figure
 
 
@@ -114,9 +114,9 @@ def _pair(left: Panel, right: Panel) -> bool:
 def legend_of(runs: Sequence[LabelledRun], drawn: Iterable[Axes]) -> list[tuple[str, dict[str, Any]]]:
     """Return labels and line styles of a legend: runs if there are several, reference lines, fault spans."""
     styles = [(run.label, line_style(k)) for k, run in enumerate(runs) if len(runs) > 1]
-    if says := reference_words(line for axes in drawn for line in axes.get_lines()):
-        styles.append((says, REFERENCE))
-    return styles + [(says, SPAN) for says in in_legend(spans_of(runs))]
+    if label := reference_words(line for axes in drawn for line in axes.get_lines()):
+        styles.append((label, REFERENCE))
+    return styles + [(label, SPAN) for label in in_legend(spans_of(runs))]
 
 
 def title_of(runs: Sequence[LabelledRun]) -> str:

@@ -1,7 +1,7 @@
 """Phase portraits: one signal over another, written `yaw_rate(sideslip)` for yaw rate over sideslip.
 
 Every run is a curve with a dot at its end, over the curve of the references where both signals have
-one. A curve that goes much further than the others may leave the axes; a note then says how far it goes.
+one. A curve that goes much further than the others may leave the axes; a note then gives how far it goes.
 """
 
 from __future__ import annotations

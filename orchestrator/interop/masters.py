@@ -107,8 +107,8 @@ def run_own(request: Request) -> Recording:
     plan = replace(plan, record=tuple(SignalName(*column) for column in request.columns))
     rows = np.zeros((request.n_steps + 1, 1 + len(request.columns)))
     try:
-        for unit in plan.instances:
-            slaves[unit.name] = open_unit(unit, log, set())
+        for instance in plan.instances:
+            slaves[instance.name] = open_unit(instance, log, set())
         master = Master(plan, slaves, log, StopFlag())
         master.initialize(rows[0], [])
         begin = time.perf_counter()

@@ -5,7 +5,7 @@ hang costs only an error message. Samples are counted, not matched by time label
 steps, whatever a program calls that time. The algorithm compared is `jacobi`, which all of them have; a
 difference is relative to the signal's range in our run.
 
-A master that cannot give an instance a step of its own gets the system with one step for all, and is compared
+A master that cannot give an instance its own step gets the system with one step for all, and is compared
 with our run of that system.
 """
 
@@ -54,15 +54,15 @@ MASTERS = (
         "ecos",
         "ecospy",
         True,
-        "it calls a unit with a longer step less often, but only for one communication step",
+        "it calls an instance with a longer step less often, but only for one communication step",
     ),
     OtherMaster(
         "fmpy",
         "fmpy_ssp",
         "fmpy",
         True,
-        "its SSP simulation steps all units alike, exchanges nothing before the first step (all inputs "
-        "are 0 in it) and sets no texts, so it starts elsewhere and its differences stay",
+        "its SSP simulation has one step for all instances, exchanges nothing before the first step (all "
+        "inputs are 0 in it) and sets no texts, so it starts from other values and stays different",
     ),
 )
 
@@ -102,7 +102,7 @@ def second_opinion(
     *,
     masters: Sequence[OtherMaster] = MASTERS,
     pinned: bool = True,
-    said: Callable[[str], None] = lambda text: None,
+    progress: Callable[[str], None] = lambda text: None,
 ) -> list[SecondOpinion]:
     """Run a plan in other masters and compare the results with ours.
 
@@ -111,7 +111,7 @@ def second_opinion(
         folder: for archives and recordings.
         masters: to compare with; those not installed are reported as such.
         pinned: also measure every master on one processor core.
-        said: called with the name of the master about to run.
+        progress: called with the name of the master about to run.
 
     Raises:
         WiringError: no output of type Real is recorded, or the run does not begin at 0 s.
@@ -125,7 +125,7 @@ def second_opinion(
         )
     if plan.start:
         raise WiringError(
-            "a second opinion is of runs that begin at 0 s: leave start_time out", code="option-invalid"
+            "start_time: a second opinion needs a run that begins at 0 s: omit it", code="option-invalid"
         )
     ours: dict[bool, tuple[Request, dict[str, Recording]]] = {}
     opinions = []
@@ -137,13 +137,13 @@ def second_opinion(
             continue
         if one_step not in ours:
             request = _request(plan, one_step, folder)
-            said(f"yawbench{', one step for all units' if one_step else ''}")
+            progress(f"yawbench{', one step for all instances' if one_step else ''}")
             result = _recordings("own", request, pinned, folder)
             if isinstance(result, str):
-                raise RuntimeError(f"our own run of the archive has failed: {result}")
+                raise RuntimeError(f"our own run of the archive failed: {result}")
             ours[one_step] = request, result
         request, own = ours[one_step]
-        said(master.title)
+        progress(master.title)
         theirs = _recordings(master.module, request, pinned, folder)
         if isinstance(theirs, str):
             opinions.append(SecondOpinion(master, one_step, theirs))
@@ -200,9 +200,9 @@ def _run(module: str, request: Request, folder: Path) -> Recording | str:
         return Recording.read(recording_file)
     lines = done.stderr.decode(errors="replace").strip().splitlines()
     if done.returncode < 0:
-        before = f"; before that it said: {' '.join(lines[-2:])}" if lines else ""
-        return f"it {how_it_ended(done.returncode)}{before}"
-    return lines[-1] if lines else f"it ended without a word, exit status {done.returncode}"
+        output = f"; its last output: {' '.join(lines[-2:])}" if lines else ""
+        return f"it {how_it_ended(done.returncode)}{output}"
+    return lines[-1] if lines else f"it ended without a message, exit status {done.returncode}"
 
 
 def differences(request: Request, own: np.ndarray, other: np.ndarray) -> dict[str, float]:

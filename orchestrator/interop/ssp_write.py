@@ -2,7 +2,7 @@
 
 SSP has no elements for the communication step, the instances' own steps and the algorithm. They are written
 as annotations: the steps in those of the Open Simulation Platform, which libcosim understands, and of
-OMSimulator; everything else that `yawbench run` needs in one of our own. The latter also has the title,
+OMSimulator; everything else that `yawbench run` needs in our own annotation, which also has the title,
 because the name of a structure is an identifier to other programs.
 
 Only connected inputs have a connector. A constant is a parameter value with the name of its input: libcosim
@@ -71,7 +71,7 @@ def write_ssp(plan: Plan, path: Path, standard: Version = "1.0", *, named: bool 
     series = [f"{unit.name}.{name}" for unit in plan.instances for name in unit.series]
     if series:
         raise ResultsError(
-            f"{path}: an archive has no place for the time series of {listed(fold(series))}",
+            f"{path}: an SSP archive cannot contain the time series of {listed(fold(series))}",
             code="ssp-unsupported",
         )
     sources = _sources(plan)
@@ -323,7 +323,7 @@ def _decimal(seconds: Fraction) -> str:
     """Return a time as the shortest decimal that equals the fraction exactly."""
     text = repr(float(seconds))
     if Fraction(text) != seconds:
-        raise ValueError(f"a step of {text} s that has more digits is not the same in other programs")
+        raise ValueError(f"the step, {text} s when rounded, has more digits than other programs read")
     return text
 
 
@@ -345,8 +345,8 @@ def for_omsimulator(plan: Plan) -> tuple[Plan, list[str]]:
         return not wire.converts or (known and conversion_between(source, target) == (wire.gain, wire.offset))
 
     problems = [
-        f"{wire.source}.{wire.output} to {wire.target}.{wire.input}: OMSimulator knows no gain and offset "
-        "of a connection, only the units of its ends"
+        f"{wire.source}.{wire.output} to {wire.target}.{wire.input}: OMSimulator applies no gain and "
+        "offset to a connection, it only converts units"
         for wire in plan.wires
         if not by_units(wire)
     ]
@@ -355,10 +355,10 @@ def for_omsimulator(plan: Plan) -> tuple[Plan, list[str]]:
     notes = []
     slow = [unit.name for unit in plan.instances if unit.period > 1]
     if slow:
-        notes.append(f"OMSimulator steps all units alike: the steps of {listed(slow)} are left out")
+        notes.append(f"OMSimulator has one step for all instances: the steps of {listed(slow)} are omitted")
     texts = [f"{i.name}.{name} = {text!r}" for i in plan.instances for name, text in _texts(i).items()]
     if texts:
-        notes.append(f"OMSimulator takes no texts from an archive; set there: {listed(texts)}")
+        notes.append(f"OMSimulator reads no texts from an archive; set them there: {listed(texts)}")
     wires = tuple(replace(wire, gain=1.0, offset=0.0) for wire in plan.wires)
     units = tuple(_without_texts(unit) for unit in plan.instances)
     return replace(plan, instances=units, wires=wires), notes

@@ -28,14 +28,14 @@ SignalArrays = Sequence[np.ndarray]
 class PlausibilityCheck:
     """A limit of signals beyond which a warning is given.
 
-    `says` may contain `{limit}`, `{value}`, `{size}` (absolute value), `{time}`, `{column}` and `{wheel}`.
+    `message` may contain `{limit}`, `{value}`, `{size}` (absolute value), `{time}`, `{column}` and `{wheel}`.
     """
 
     code: str
     signals: tuple[str, ...]  # in the vocabulary; with `*`, every wheel is checked separately
     value: Callable[[SignalArrays], np.ndarray]
-    limit: float  # values above it give a warning; in the unit that `says` uses
-    says: str
+    limit: float  # values above it give a warning; in the unit that `message` uses
+    message: str
     why: str  # source of the limit
     below: bool = False  # warn of values below the limit instead
     over_friction: bool = False  # the value is divided by the highest friction of the road
@@ -80,7 +80,7 @@ CHECKS: tuple[PlausibilityCheck, ...] = (
     PlausibilityCheck(
         "acceleration-implausible", ("acceleration_x", "acceleration_y"), lambda x: np.hypot(*x) / G, 1.5,
         "the car accelerates by {value} times what the road's friction gives, from {time} s beyond {limit}",
-        "chosen: tyres of the catalogue reach 1.2 of the friction they are told", over_friction=True,
+        "chosen: tyres of the catalogue reach 1.2 times the friction of the road", over_friction=True,
     ),
 )  # fmt: skip
 """The checks made in every run."""
@@ -92,31 +92,35 @@ class PlausibilityWatch:
     def __init__(self, plan: Plan, checks: Iterable[PlausibilityCheck] = CHECKS) -> None:
         results = results_to_be(plan)
         units = {unit.name: unit.fmu.variables for unit in plan.instances}
-        reals = [str(one) for one in plan.record if units[one.instance][one.variable].type == "Real"]
+        reals = [
+            str(signal_name)
+            for signal_name in plan.record
+            if units[signal_name.instance][signal_name.variable].type == "Real"
+        ]
         place = {column: 1 + k for k, column in enumerate(reals)}
         friction = _highest_friction(plan)
-        self._seen: list[_CheckState] = []
+        self._states: list[_CheckState] = []
         for check in (*checks, *_ranges(plan)):
             if check.over_friction and not friction:
                 continue
             scale = 1 / friction if check.over_friction and friction else 1.0
-            found = [columns_of(results, signal) for signal in check.signals]
-            for columns in zip(*found, strict=False):
+            per_signal = [columns_of(results, signal) for signal in check.signals]
+            for columns in zip(*per_signal, strict=False):
                 if all(column in place for column in columns):
-                    self._seen.append(_CheckState(check, columns, [place[c] for c in columns], scale))
+                    self._states.append(_CheckState(check, columns, [place[c] for c in columns], scale))
 
     def look(self, rows: np.ndarray) -> None:
         """Check rows: shape (n, 1 + Real columns), time first."""
-        for one in self._seen:
-            one.look(rows)
+        for state in self._states:
+            state.look(rows)
 
     def warnings(self) -> tuple[Diagnostic, ...]:
         """Return the warnings so far, in the order of the checks."""
-        return tuple(filter(None, (one.warning() for one in self._seen)))
+        return tuple(filter(None, (state.warning() for state in self._states)))
 
 
 class _CheckState:
-    """The state of one check: what it has found so far in its columns."""
+    """The state of one check: the columns it looks at, and the largest value so far."""
 
     def __init__(
         self, check: PlausibilityCheck, columns: Sequence[str], places: list[int], scale: float
@@ -142,7 +146,7 @@ class _CheckState:
         if self._time is None:
             return None
         value, column = self._sign * self._most, self.columns[0]
-        says = self.check.says.format(
+        message = self.check.message.format(
             limit=f"{self.check.limit:g}",
             value=f"{value:.3g}",
             size=f"{abs(value):.3g}",
@@ -151,7 +155,7 @@ class _CheckState:
             column=column,
         )
         where = Location(signal=column, time=self._time)
-        return Diagnostic(self.check.code, says, "warning", where, value)
+        return Diagnostic(self.check.code, message, "warning", where, value)
 
 
 def _ranges(plan: Plan) -> Iterator[PlausibilityCheck]:
@@ -167,16 +171,16 @@ def _ranges(plan: Plan) -> Iterator[PlausibilityCheck]:
         highest = min((v.maximum for v in variables if v.maximum is not None), default=None)
         for limit, below in ((lowest, True), (highest, False)):
             if limit is not None:
-                says = "{column} is {value} at {time} s, beyond the {limit} that its model is valid for"
+                message = "{column} is {value} at {time} s, beyond the {limit} that its model is valid for"
                 # tolerate rounding
                 margin = 1e-9 * max(1.0, abs(limit)) * (-1 if below else 1)
                 yield PlausibilityCheck(
-                    "range-left", (f"{unit}.{name}",), itemgetter(0), limit + margin, says, why, below
+                    "range-left", (f"{unit}.{name}",), itemgetter(0), limit + margin, message, why, below
                 )
 
 
 def _highest_friction(plan: Plan) -> float | None:
-    """Return the highest friction given to any instance; None if it is not constant or not given."""
+    """Return the highest constant friction of any instance; None if there is none, or if friction varies."""
     known = [
         float(value)
         for unit in plan.instances

@@ -150,9 +150,9 @@ def window_of(text: str) -> TimeWindow:
     """
     match = re.fullmatch(r"at\s+(.+)|(?:from\s+)?(.+?)\s+to\s+(.+)", text.strip())
     if match is None:
-        raise ValueError(f"{short(text)} is no window: write from 1 s to 3 s, or at 2 s")
+        raise ValueError(f"{short(text)} is not a window: write from 1 s to 3 s, or at 2 s")
     at, begin, end = match.groups()
-    first, last = (_time(one) for one in ((at, at) if at else (begin, end)))
+    first, last = (_time(time) for time in ((at, at) if at else (begin, end)))
     if at is None and not first < last:
         raise ValueError(f"{short(text)} ends before it begins")
     return first, last
@@ -173,8 +173,8 @@ def metric(name: str) -> Metric:
     """
     match = _METRIC.fullmatch(name)
     if match is None:
-        meant = [f"{one}({name[len(one) + 1 :]})" for one in MEASURES if name.startswith(f"{one}_")]
-        likely = max(meant, key=lambda one: one.index("("), default=closest(name, STANDARD))
+        meant = [f"{m}({name[len(m) + 1 :]})" for m in MEASURES if name.startswith(f"{m}_")]
+        likely = max(meant, key=lambda text: text.index("("), default=closest(name, STANDARD))
         guess = f"did you mean {likely!r}? " if likely else ""
         raise ScenarioError(
             f"{short(name)} is not a metric; {guess}write measure(signal), for example {STANDARD[0]}.",
@@ -192,12 +192,14 @@ def metric(name: str) -> Metric:
         raise ScenarioError(f"{short(name)}: {error}", code="metric-invalid") from None
     point = window is not None and window[0] == window[1]
     if point != (measure == AT_A_TIME):
-        allowed = f"{AT_A_TIME}({signal}) at 2 s is of a point of time, all other measures of a stretch"
+        allowed = (
+            f"{AT_A_TIME}({signal}) takes a point in time, as at 2 s; all other measures take a time span"
+        )
         raise ScenarioError(f"{short(name)}: {allowed}", code="metric-invalid")
     needs = MEASURES[measure].needs_reference
     if between and (between == ",") != needs:
         right = f"{measure}({signal}{', ' if needs else ' - '}{other})"
-        why = "is against a reference" if needs else "needs no reference, but may be of a difference"
+        why = "compares with a reference" if needs else "takes a difference, not a reference"
         raise ScenarioError(f"{short(name)}: {measure} {why}: write {right}", code="metric-invalid")
     written = f"{measure}({signal})"
     if between:
@@ -217,22 +219,28 @@ def columns_of(results: Results, signal: str) -> list[str]:
     estimator. A bare name never means a measured or estimated signal, even if nothing else is recorded.
     """
     names = wheels(signal)
-    found = [column for name in names if (column := _column(results, name)) is not None]
-    return found if len(found) == len(names) else []
+    columns = [column for name in names if (column := _column(results, name)) is not None]
+    return columns if len(columns) == len(names) else []
 
 
 def _column(results: Results, name: str) -> str | None:
     for role in (None, "plant"):
-        found = results.candidates(name, role=role)
-        if len(found) == 1:
-            meant = found[0] == name or not _is_measured_or_estimated(results, found[0])
-            return found[0] if meant and np.issubdtype(results.columns[found[0]].dtype, np.number) else None
-    found = [
+        matches = results.candidates(name, role=role)
+        if len(matches) == 1:
+            meant = matches[0] == name or not _is_measured_or_estimated(results, matches[0])
+            return (
+                matches[0] if meant and np.issubdtype(results.columns[matches[0]].dtype, np.number) else None
+            )
+    matches = [
         column
-        for column, one in results.names.items()
-        if one.variable == name and not _is_measured_or_estimated(results, column)
+        for column, signal in results.names.items()
+        if signal.variable == name and not _is_measured_or_estimated(results, column)
     ]
-    return found[0] if len(found) == 1 and np.issubdtype(results.columns[found[0]].dtype, np.number) else None
+    return (
+        matches[0]
+        if len(matches) == 1 and np.issubdtype(results.columns[matches[0]].dtype, np.number)
+        else None
+    )
 
 
 def evaluate(results: Results, chosen: Metric, window: TimeWindow | None = None) -> MetricValue | None:
@@ -275,7 +283,7 @@ def results_to_be(plan: Plan) -> Results:
     from ..results.run_record import FmuRecord, RunRecord, connections_of
 
     units = {unit.name: unit for unit in plan.instances}
-    variables = {str(one): units[one.instance].fmu.variables[one.variable] for one in plan.record}
+    variables = {str(signal): units[signal.instance].fmu.variables[signal.variable] for signal in plan.record}
     columns = {name: np.empty(0, float if v.type != "String" else str) for name, v in variables.items()}
     fmus = {name: FmuRecord(name=unit.fmu.name, role=unit.role) for name, unit in units.items()}
     run = RunRecord(fmus=fmus, connections=connections_of(plan))
@@ -289,46 +297,46 @@ def check_metrics(plan: Plan, chosen: Iterable[Metric]) -> None:
         ScenarioError: with a sentence for each metric that cannot be computed.
     """
     results, end = results_to_be(plan), plan.time(plan.n_steps)
-    if problems := [why for one in chosen if (why := why_none(results, one, one.window, end))]:
+    if problems := [why for m in chosen if (why := why_none(results, m, m.window, end))]:
         raise ScenarioError(problems, code="metric-unavailable")
 
 
-def why_none(results: Results, one: Metric, window: TimeWindow | None, end: float) -> str:
-    """Return why a metric has no value in a run that ends at `end` [s], "" if it has one."""
-    missing = [s for s in filter(None, (one.signal, one.other)) if not columns_of(results, s)]
+def why_none(results: Results, chosen: Metric, window: TimeWindow | None, end: float) -> str:
+    """Return why a metric has no value in a run that ends at `end` [s], "" if it has a value."""
+    missing = [s for s in filter(None, (chosen.signal, chosen.other)) if not columns_of(results, s)]
     if missing:
-        names = fold(list(dict.fromkeys(one.variable for one in results.names.values())))
+        names = fold(list(dict.fromkeys(signal.variable for signal in results.names.values())))
         whole = list(results) if SignalName.parse(missing[0]).instance else names
-        seen = [
+        indirect = [
             column
-            for column, one in results.names.items()
-            if one.variable in wheels(missing[0]) and _is_measured_or_estimated(results, column)
+            for column, signal in results.names.items()
+            if signal.variable in wheels(missing[0]) and _is_measured_or_estimated(results, column)
         ]
-        if seen:
-            named = listed(fold(seen), last="or")
-            return f"{one.name}: {missing[0]} is recorded only as it is seen, name it so: {named}"
-        return f"{one.name}: no {missing[0]!r} is recorded{hint(missing[0], whole, lead='there are')}"
-    if unit_in(results, one) is None:
-        return f"{one.name}: {_unfit(results, one)}"
+        if indirect:
+            named = listed(fold(indirect), last="or")
+            return f"{chosen.name}: {missing[0]} is recorded only as measured or estimated: write {named}"
+        return f"{chosen.name}: {missing[0]!r} is not recorded{hint(missing[0], whole, lead='there are')}"
+    if unit_in(results, chosen) is None:
+        return f"{chosen.name}: {_unfit(results, chosen)}"
     if window is not None and not 0.0 <= window[0] <= window[1] <= end:
-        return f"{one.name}: the run lasts from 0 to {end:g} s"
+        return f"{chosen.name}: the window is not within the run, 0 to {end:g} s"
     return ""
 
 
-def _unfit(results: Results, one: Metric) -> str:
+def _unfit(results: Results, chosen: Metric) -> str:
     """Return why a metric cannot be computed although all its signals were recorded, "" if it can."""
-    wanted = f"{variable_of(one.signal)}_ref"
+    wanted = f"{variable_of(chosen.signal)}_ref"
     having = [column for column, name in results.names.items() if name.variable == wanted]
-    if one.other:
-        columns = (columns_of(results, name)[0] for name in (one.signal, one.other))
+    if chosen.other:
+        columns = (columns_of(results, name)[0] for name in (chosen.signal, chosen.other))
         units = listed(f"{column} [{results.units[column] or '1'}]" for column in columns)
         return f"{units} cannot be compared"
-    if one.measure.needs_reference and len(having) > 1:
-        example = f"{one.name.partition('(')[0]}({one.signal}, {having[0]})"
+    if chosen.measure.needs_reference and len(having) > 1:
+        example = f"{chosen.name.partition('(')[0]}({chosen.signal}, {having[0]})"
         return f"{listed(having)} are recorded: name one of them, as in {example}"
-    if one.measure.signal:
-        return f"is of {one.measure.signal} where {listed(one.measure.beside)} are recorded, too"
-    return f"{one.signal} has no reference or not the right unit"
+    if chosen.measure.signal:
+        return f"is defined for {chosen.measure.signal}, and needs {listed(chosen.measure.beside)}"
+    return f"{chosen.signal} has no reference or not the right unit"
 
 
 def unit_in(results: Results, chosen: Metric) -> str | None:
@@ -379,8 +387,8 @@ def _beside(results: Results, column: str, measure: Measure) -> list[str]:
     wheel = name[len(signal) :]
     if not name.startswith(signal) or (wheel and wheel[1:] not in WHEELS):
         return []
-    found = [_column(results, f"{other}{wheel}") for other in measure.beside]
-    return [one for one in found if one] if all(found) else []
+    columns = [_column(results, f"{other}{wheel}") for other in measure.beside]
+    return [column for column in columns if column] if all(columns) else []
 
 
 def _rate_of(results: Results, column: str) -> str | None:
@@ -405,10 +413,12 @@ def reference_of(results: Results, column: str) -> str | None:
     If several instances have one, it is that of the instance whose output is connected; others only observe.
     """
     name = f"{variable_of(column)}_ref"
-    if found := _column(results, name):
-        return found
+    if reference := _column(results, name):
+        return reference
     acting = {wire.source.instance for wire in results.record.connections}
-    having = [c for c, one in results.names.items() if one.variable == name and one.instance in acting]
+    having = [
+        c for c, signal in results.names.items() if signal.variable == name and signal.instance in acting
+    ]
     return having[0] if len(having) == 1 else None
 
 

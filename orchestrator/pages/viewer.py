@@ -162,7 +162,7 @@ def viewer(
         "runs": [
             {
                 "label": run.label,
-                "faults": [[span.begin, span.end, span.says] for span in spans_of([run])],
+                "faults": [[span.begin, span.end, span.label] for span in spans_of([run])],
                 "notes": _notes(run.results, road),
                 "road": road,
                 **block.header,

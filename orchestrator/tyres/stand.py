@@ -59,15 +59,15 @@ class TyreStand:
     wheel: str = WHEEL
 
     @property
-    def unit(self) -> Instance:
+    def instance(self) -> Instance:
         """The tyre instance."""
         return self.plan.instances[0]
 
     @property
     def nominal_load(self) -> float:
         """The tyre's nominal load [N], or that of a passenger car's tyre."""
-        given = self.unit.parameter("fnomin_front") or self.unit.parameter("nominal_load")
-        return float(given) if given else 4000.0
+        load = self.instance.parameter("fnomin_front") or self.instance.parameter("nominal_load")
+        return float(load) if load else 4000.0
 
     def measure(self, states: Sequence[WheelState]) -> dict[str, np.ndarray]:
         """Return every output of the wheel, by its name without the wheel; shape (n,), SI.
@@ -79,9 +79,9 @@ class TyreStand:
         """
         alpha, kappa, load = (np.array(column, float) for column in zip(*states, strict=True))
         v = SPEED * np.cos(alpha)
-        radius = self.unit.parameter("wheel_radius")
+        radius = self.instance.parameter("wheel_radius")
         rolling = np.where(kappa > 0.0, v / (1.0 - np.minimum(kappa, 0.999)), v * (1.0 + kappa))
-        given = {
+        inputs = {
             "slip_angle": alpha,
             "slip_ratio": kappa,
             "vertical_load": load,
@@ -91,12 +91,12 @@ class TyreStand:
         times = 2.0 * np.arange(len(states))
         series = {
             f"{name}_{self.wheel}": InputSeries("stand", name, "", True, times, values)
-            for name, values in given.items()
-            if f"{name}_{self.wheel}" in self.unit.constants
+            for name, values in inputs.items()
+            if f"{name}_{self.wheel}" in self.instance.constants
         }
-        unit = replace(self.unit, series=series)
-        results = simulate_in_memory(replace(self.plan, instances=(unit,), n_steps=2 * len(states)))
-        names = (SignalName(unit.name, v.name) for v in unit.fmu.of("output"))
+        instance = replace(self.instance, series=series)
+        results = simulate_in_memory(replace(self.plan, instances=(instance,), n_steps=2 * len(states)))
+        names = (SignalName(instance.name, v.name) for v in instance.fmu.of("output"))
         at_end = slice(2, None, 2)  # the second of two steps in each state
         return {
             name.variable.removesuffix(f"_{self.wheel}"): results[str(name)][at_end]
@@ -112,8 +112,8 @@ def stiffnesses(stand: TyreStand, loads: Sequence[float]) -> tuple[np.ndarray, n
         ("tyre_force_x", 1.0, [WheelState(0.0, k, load) for load in loads for k in (-SMALL, SMALL)]),
         ("tyre_force_y", -1.0, [WheelState(a, 0.0, load) for load in loads for a in (-SMALL, SMALL)]),
     ):
-        found = stand.measure(states)[force].reshape(-1, 2)
-        slopes.append(sign * (found[:, 1] - found[:, 0]) / (2.0 * SMALL))
+        forces = stand.measure(states)[force].reshape(-1, 2)
+        slopes.append(sign * (forces[:, 1] - forces[:, 0]) / (2.0 * SMALL))
     return slopes[0], slopes[1]
 
 
@@ -132,7 +132,7 @@ def put_on_stand(source: str, *, friction: float, fmus: Path | None, build: bool
     file = source.lower().endswith(".tir")
     place = Path(source).parent / "stand"
     opener = Opener(build=build)
-    fmu = open_given(FOR_FILES if file else source, "tyre", KNOWN_BY, place=place, fmus=fmus, opener=opener)
+    fmu = open_role(FOR_FILES if file else source, "tyre", KNOWN_BY, place=place, fmus=fmus, opener=opener)
     inputs = [variable.name for variable in fmu.of("input")]
     data = {
         "title": Path(source).name,
@@ -146,10 +146,10 @@ def put_on_stand(source: str, *, friction: float, fmus: Path | None, build: bool
     return TyreStand(make_plan(load_scenario(place, data=data), opener=opener))
 
 
-def open_given(
+def open_role(
     fmu: str, role: str, known_by: Iterable[str], *, place: Path, fmus: Path | None, opener: Opener
 ) -> Fmu:
-    """Open the FMU that a user names for a role, by a path or by its name in a folder.
+    """Open an FMU given by path or by its name in a folder, and check its role.
 
     Args:
         fmu: path or name.
@@ -165,10 +165,10 @@ def open_given(
     path = is_path(fmu)
     folder = Path() if path else fmus or find_folder(place, opener=opener)
     name = os.path.abspath(fmu) if path else fmu
-    found = opener.open(find_fmu(name, scenario=place, fmus=folder, opener=opener))
-    if missing := [variable for variable in known_by if variable not in found.variables]:
-        raise ScenarioError(f"{fmu}: this is no {role}: it has no {listed(missing)}", code="fmu-wrong-kind")
-    return found
+    opened = opener.open(find_fmu(name, scenario=place, fmus=folder, opener=opener))
+    if missing := [variable for variable in known_by if variable not in opened.variables]:
+        raise ScenarioError(f"{fmu}: not a {role} FMU: it has no {listed(missing)}", code="fmu-wrong-kind")
+    return opened
 
 
 def cornering_stiffness(tyres: Instance, loads: Mapping[str, float]) -> dict[str, float]:
@@ -188,9 +188,9 @@ def cornering_stiffness(tyres: Instance, loads: Mapping[str, float]) -> dict[str
     inputs: dict[str, Value] = {
         v.name: 1.0 if v.name.startswith("friction") else 0.0 for v in tyres.fmu.of("input")
     }
-    unit = replace(tyres, constants=inputs | tyres.constants, series={}, period=1)
-    record = tuple(SignalName(unit.name, v.name) for v in unit.fmu.of("output"))
-    plan = Plan((unit,), (), record, Fraction(1), 1, "jacobi", title=unit.name)
+    instance = replace(tyres, constants=inputs | tyres.constants, series={}, period=1)
+    record = tuple(SignalName(instance.name, v.name) for v in instance.fmu.of("output"))
+    plan = Plan((instance,), (), record, Fraction(1), 1, "jacobi", title=instance.name)
     return {wheel: float(stiffnesses(TyreStand(plan, wheel), [load])[1][0]) for wheel, load in loads.items()}
 
 
@@ -228,7 +228,7 @@ def draw_tyre(stand: TyreStand, title: str, note: str) -> Figure:
         if "aligning_moment" in over_angle[0]:
             _curves(axes[1], degrees, [y["aligning_moment"] for y in over_angle], names)
         else:
-            _nothing(axes[1], "this tyre tells no aligning moment")
+            _nothing(axes[1], "this tyre has no aligning moment")
         axes[1].set(title="Aligning moment", xlabel="slip angle [°]", ylabel="M_z [N·m]")
         _curves(axes[2], slips, [y["tyre_force_x"] / 1e3 for y in over_slip], names)
         axes[2].set(title="Longitudinal force", xlabel="slip κ [1]", ylabel="F_x [kN]")

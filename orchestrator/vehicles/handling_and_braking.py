@@ -37,7 +37,7 @@ from ..planner import Planner
 from ..results.read import Results
 from ..scenario import yaml_lines
 from ..scenario.overrides import is_path
-from ..tyres.stand import KNOWN_BY, open_given
+from ..tyres.stand import KNOWN_BY, open_role
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -81,7 +81,7 @@ class TestTrack:
     @cached_property
     def plant_fmu(self) -> Fmu:
         """The plant's FMU."""
-        return open_given(
+        return open_role(
             self.plant, "plant", PLANT_KNOWN_BY, place=self.place, fmus=self.fmus, opener=self.planner.opener
         )
 
@@ -91,12 +91,12 @@ class TestTrack:
 
     @cached_property
     def tyres(self) -> str:
-        """The tyres' FMU: as given, or the one that takes the file's tyre property files or stiffness."""
+        """The tyres' FMU: as given, or the FMU that takes the file's tyre property files or stiffness."""
         data = yaml_lines.read(self.vehicle, what="vehicle file").data
-        given = data if isinstance(data, dict) else {}
-        if self.tyre or given.get("tyres"):
+        content = data if isinstance(data, dict) else {}
+        if self.tyre or content.get("tyres"):
             return self.tyre or "tyre_magic_formula_62"
-        no_load = "cornering_stiffness" in (given.get("parameters") or {})
+        no_load = "cornering_stiffness" in (content.get("parameters") or {})
         return "tyre_dugoff" if no_load else "tyre_magic_formula"
 
     def plan(self, driver: Mapping[str, Any], speed: float, stop_time: float, **of_plant: float) -> Plan:
@@ -111,7 +111,7 @@ class TestTrack:
         Raises:
             YawbenchError: the file, the plant or the tyres are invalid, or do not fit together.
         """
-        open_given(self.tyres, "tyre", KNOWN_BY, place=self.place, fmus=self.fmus, opener=self.planner.opener)
+        open_role(self.tyres, "tyre", KNOWN_BY, place=self.place, fmus=self.fmus, opener=self.planner.opener)
         units: dict[str, Any] = {"driver": dict(driver)}
         plant: dict[str, Any] = {"fmu": self._named(self.plant), "parameters": of_plant}
         inputs: dict[str, Any] = {}
@@ -166,7 +166,7 @@ def plants_in(fmus: Path | None, scenario: Path, planner: Planner) -> list[str]:
                 fmu = opener.open(find_fmu(name, scenario=scenario, fmus=folder, opener=opener))
                 parameters[name] = len(fmu.of("parameter"))
     if not parameters:
-        raise ModelDescriptionError(f"{folder}: holds no plant")
+        raise ModelDescriptionError(f"{folder}: contains no plant")
     return sorted(parameters, key=lambda name: (-parameters[name], name))
 
 
@@ -174,7 +174,7 @@ def fitting_plant(vehicle: Path, tyre: str, fmus: Path | None, planner: Planner)
     """Return the most detailed plant that a vehicle file has the values for (see `plants_in`).
 
     Raises:
-        YawbenchError: there is none; says why not for the simplest plant.
+        YawbenchError: there is none; the message gives the reason for the simplest plant.
     """
     steer = {"fmu": "driver_sine"}
     *detailed, simplest = plants_in(fmus, vehicle, planner)
@@ -248,27 +248,27 @@ def handling_of(track: TestTrack) -> Handling:
     Raises:
         YawbenchError: the file, the plant or the tyres are invalid, or do not fit together.
     """
-    found = Handling(track.plant)
+    handling = Handling(track.plant)
     plan = track.plan({"fmu": "driver_sine"}, TURN_SPEED, STEP)
-    known = next(unit for unit in plan.instances if unit.name == "plant")
+    plant = next(instance for instance in plan.instances if instance.name == "plant")
     axles = ("cg_to_front_axle", "cg_to_rear_axle")
-    found.wheelbase = sum(float(known.parameter(name) or 0.0) for name in axles)
+    handling.wheelbase = sum(float(plant.parameter(name) or 0.0) for name in axles)
     for number, measure in enumerate((_modes, _turn, _bounce, _stop)):
         try:
-            measure(track, found)
-        except SimulationError as error:  # noqa: PERF203 - what others tell stands
+            measure(track, handling)
+        except SimulationError as error:  # noqa: PERF203 - keep the other figures
             if number == 0:
                 raise
-            found.failed.append(str(error))
-    return found
+            handling.failed.append(str(error))
+    return handling
 
 
-def _modes(track: TestTrack, found: Handling) -> None:
+def _modes(track: TestTrack, handling: Handling) -> None:
     """Add loads at rest, steady gains and yaw modes over speed."""
     names = ["velocity_y", "yaw_rate", *(BODY if track.has(BODY[0]) else ())]
     every = round(SAMPLE / STEP)
     for speed in SPEEDS:
-        angle = SMALL * (found.wheelbase / speed**2 + 0.005)
+        angle = SMALL * (handling.wheelbase / speed**2 + 0.005)
         of_sine = {
             "amplitude": angle,
             "frequency": 1.0,
@@ -277,16 +277,16 @@ def _modes(track: TestTrack, found: Handling) -> None:
             "steering_ratio": 1,
         }
         results = track.drive({"fmu": "driver_sine", "parameters": of_sine}, speed, 2.0)
-        found.loads = tuple(float(results[f"plant.vertical_load_{w}"][0]) for w in WHEELS)
+        handling.loads = tuple(float(results[f"plant.vertical_load_{w}"][0]) for w in WHEELS)
         states = np.column_stack([results[f"plant.{name}"][::every] for name in names])
         steer = results["driver.steer_angle"][::every]
         transition, drive = fit(states, steer)
         yaw, roll = modes_of(transition)
-        found.yaw[speed] = yaw
+        handling.yaw[speed] = yaw
         if speed == TURN_SPEED:
-            found.roll_mode = roll
+            handling.roll_mode = roll
         still = np.linalg.solve(np.eye(len(names)) - transition, drive.sum(axis=1))
-        found.gains[speed] = float(still[1])
+        handling.gains[speed] = float(still[1])
 
 
 def fit(states: np.ndarray, steer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -319,9 +319,9 @@ def _mode(rates: np.ndarray) -> Mode:
     return Mode(omega / (2.0 * pi), float(-(rates[0] + rates[1]).real) / (2.0 * omega))
 
 
-def _turn(track: TestTrack, found: Handling) -> None:
+def _turn(track: TestTrack, handling: Handling) -> None:
     """Add understeer and roll over lateral acceleration."""
-    last = WANTED / (found.gains[TURN_SPEED] * TURN_SPEED)
+    last = WANTED / (handling.gains[TURN_SPEED] * TURN_SPEED)
     ratio = 17.0  # cancels: the hand wheel turns so much faster than the road wheels
     duration = max(last * ratio / HAND_RATE, 2.0)
     of_ramp = {
@@ -336,16 +336,16 @@ def _turn(track: TestTrack, found: Handling) -> None:
     after = (results.time > 1.0) & (np.arange(len(a_y)) <= np.argmax(a_y))
     a_y = a_y[after]
     rate, speed = results["plant.yaw_rate"][after], results["plant.velocity_x"][after]
-    extra = results["driver.steer_angle"][after] - found.wheelbase * rate / speed
-    found.curve = a_y, extra
-    found.steering = {level: one for level, one in gradients(a_y, extra).items() if one is not None}
+    extra = results["driver.steer_angle"][after] - handling.wheelbase * rate / speed
+    handling.curve = a_y, extra
+    handling.steering = {level: k for level, k in gradients(a_y, extra).items() if k is not None}
     if track.has(BODY[0]):
-        found.roll = roll = results["plant.roll_angle"][after]
+        handling.roll = roll = results["plant.roll_angle"][after]
         low = a_y < 4.0
-        found.roll_gradient = float(np.polyfit(a_y[low], roll[low], 1)[0])
+        handling.roll_gradient = float(np.polyfit(a_y[low], roll[low], 1)[0])
 
 
-def _bounce(track: TestTrack, found: Handling) -> None:
+def _bounce(track: TestTrack, handling: Handling) -> None:
     """Add the bounce modes of the body, released a centimetre above its rest position."""
     if not (track.has("heave") and track.has("initial_heave")):
         return
@@ -357,10 +357,10 @@ def _bounce(track: TestTrack, found: Handling) -> None:
     rates = np.log(np.roots([1.0, *-order]).astype(complex)) / SAMPLE
     swinging = sorted((rate for rate in rates if rate.imag > 0.0), key=abs)
     if swinging:
-        found.heave = _mode(np.array([swinging[0], swinging[0].conjugate()]))
+        handling.heave = _mode(np.array([swinging[0], swinging[0].conjugate()]))
 
 
-def _stop(track: TestTrack, found: Handling) -> None:
+def _stop(track: TestTrack, handling: Handling) -> None:
     """Add the distance from the instant at which the pedal is pressed until the car stops."""
     if not track.has(TORQUES):
         return
@@ -369,7 +369,7 @@ def _stop(track: TestTrack, found: Handling) -> None:
     x, v = results["plant.position_x"], results["plant.velocity_x"]
     if v[-1] < 0.1:
         pressed = np.searchsorted(results.time, 0.1)
-        found.stopping_distance = float(x[-1] - x[pressed])
+        handling.stopping_distance = float(x[-1] - x[pressed])
 
 
 def draw_cars(cars: Sequence[Handling], title: str, note: str) -> Figure:
@@ -393,16 +393,14 @@ def draw_cars(cars: Sequence[Handling], title: str, note: str) -> Figure:
         axes[1].set(title="Steady yaw gain", xlabel="speed [km/h]", ylabel="r / δ [1/s]")
         axes[2].set(title="Roll at 80 km/h", xlabel="a_y [m/s²]", ylabel="φ [°]")
         if not axes[2].get_lines():
-            axes[2].text(
-                0.5, 0.5, "no roll angle here", transform=axes[2].transAxes, ha="center", color=QUIET
-            )
+            axes[2].text(0.5, 0.5, "no roll angle", transform=axes[2].transAxes, ha="center", color=QUIET)
         axes[3].set(
             title="Yaw mode: natural frequency, damping ratio (pale)",
             xlabel="speed [km/h]",
             ylabel="f_n [Hz], ζ [1]",
         )
-        for one in axes:
-            one.set_ylim(bottom=0.0)
+        for panel in axes:
+            panel.set_ylim(bottom=0.0)
         handles = [axes[0].plot([], [], **line_style(i), label=car.plant)[0] for i, car in enumerate(cars)]
         frame(figure, 2 * 1.4 * ROW, handles, title, note)
     return figure

@@ -277,7 +277,7 @@ def test_run_writes_the_format_it_is_told_and_prints_metrics(driver, tmp_path, c
         ),
         (
             ["--metric", "peak(steer_angel)", "--metric", "standard"],
-            "peak(steer_angel): no 'steer_angel' is recorded; did you mean 'steer_angle'?",
+            "peak(steer_angel): 'steer_angel' is not recorded; did you mean 'steer_angle'?",
         ),
         (
             ["--metric", "rms_error(steer_angle)"],
@@ -285,7 +285,7 @@ def test_run_writes_the_format_it_is_told_and_prints_metrics(driver, tmp_path, c
         ),
         (
             ["--metric", "rms(steer_angle - driver.steer)"],
-            "rms(steer_angle - driver.steer): no 'driver.steer' is recorded; did you mean "
+            "rms(steer_angle - driver.steer): 'driver.steer' is not recorded; did you mean "
             "'driver.steer_angle'?",
         ),
     ],

@@ -359,8 +359,8 @@ def test_wheels_are_compared_in_pairs_and_units_converted():
 @pytest.mark.parametrize(
     ("name", "sentence"),
     [
-        ("rms_error(x - y)", r"is against a reference: write rms_error\(x, y\)"),
-        ("rms(x, y)", r"needs no reference, but may be of a difference: write rms\(x - y\)"),
+        ("rms_error(x - y)", r"compares with a reference: write rms_error\(x, y\)"),
+        ("rms(x, y)", r"takes a difference, not a reference: write rms\(x - y\)"),
     ],
 )
 def test_two_columns_that_are_not_compared_so_are_an_error(name, sentence):
@@ -431,10 +431,10 @@ def test_a_value_may_be_of_a_point_of_time():
 @pytest.mark.parametrize(
     ("name", "sentence"),
     [
-        ("peak(sideslip) at 2 s", "at 2 s is of a point of time, all other measures of a stretch"),
-        ("value(sideslip)", "at 2 s is of a point of time"),
+        ("peak(sideslip) at 2 s", "takes a point in time, as at 2 s; all other measures take a time span"),
+        ("value(sideslip)", r"value\(sideslip\) takes a point in time"),
         ("peak(sideslip) from 3 s to 1 s", "ends before it begins"),
-        ("peak(sideslip) during 3 s", "is no window: write from 1 s to 3 s, or at 2 s"),
+        ("peak(sideslip) during 3 s", "is not a window: write from 1 s to 3 s, or at 2 s"),
         ("peak(sideslip) from 1 kg to 3 s", "'1 kg' is not a value in s"),
     ],
 )

@@ -84,7 +84,7 @@ def test_the_command_writes_one_figure_and_tells_warnings(tmp_path, fmus, capsys
     [
         ("none.tir", "none.tir: no such tyre property file"),
         ("tyre_brush", "tyre_brush"),
-        ("controller_off", "controller_off: this is no tyre: it has no tyre_force_x_fl"),
+        ("controller_off", "controller_off: not a tyre FMU: it has no tyre_force_x_fl"),
     ],
 )
 def test_what_is_no_tyre_is_refused_in_a_sentence(tmp_path, fmus, capsys, monkeypatch, source, says):

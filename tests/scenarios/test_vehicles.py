@@ -213,11 +213,11 @@ def test_the_command_prints_tables_and_draws_one_figure(fmus, tmp_path, capsys):
         ((str(file("mid_size")), "--plant", "plant_nine_dof"), "no FMU 'plant_nine_dof'"),
         (
             (str(file("mid_size")), "--plant", "tyre_dugoff"),
-            "tyre_dugoff: this is no plant: it has no velocity_y",
+            "tyre_dugoff: not a plant FMU: it has no velocity_y",
         ),
         (
             (str(file("mid_size")), "--tyre", "driver_sine"),
-            "driver_sine: this is no tyre: it has no tyre_force_x_fl",
+            "driver_sine: not a tyre FMU: it has no tyre_force_x_fl",
         ),
         (
             (str(file("esp_saloon")), "--plant", "plant_fourteen_dof"),
