@@ -22,6 +22,9 @@ from ._run import Run
 HEIGHT = 860
 """Default height of a viewer in a notebook [px]. Chosen: five panels with their table."""
 
+LEAST, MOST = 100, 10_000
+"""Limits of that height [px]. Chosen: a table of runs, and more than any screen."""
+
 
 def view(
     runs: Run | Iterable[Run] | Mapping[str, Run],
@@ -59,7 +62,7 @@ def view(
     title = arguments.text(title, "title", empty=True)
     names = tuple(run.label for run in labelled)
     html = page(labelled, settings, title=title or listed(names, last="and"))
-    return View(names, html, arguments.count(height, "height", least=100, most=10_000))
+    return View(names, html, arguments.count(height, "height", least=LEAST, most=MOST))
 
 
 def _labelled(runs: Any) -> list[LabelledRun]:
@@ -100,6 +103,13 @@ class View:
     labels: tuple[str, ...]
     html: str
     height: int = HEIGHT
+
+    def __post_init__(self) -> None:
+        if not arguments.is_a(self.labels, tuple) or not all(arguments.is_a(one, str) for one in self.labels):
+            arguments.refuse("labels", "labels as `view` makes them", self.labels)
+        if not arguments.is_a(self.html, str):
+            arguments.refuse("html", "a page as `view` makes it", self.html)
+        arguments.count(self.height, "height", least=LEAST, most=MOST)
 
     def save(self, file: str | Path) -> Path:
         """Write the page and return its path.

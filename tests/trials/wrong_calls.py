@@ -90,6 +90,10 @@ class Bench:
         return self.base.run()
 
     @cached_property
+    def view(self) -> yb.View:
+        return yb.view(self.run)
+
+    @cached_property
     def experiment(self) -> yb.Experiment:
         axes = {"controller": [Law()], "driver.amplitude": [0.02, 0.03]}
         return yb.experiment(self.base, axes, metrics="peak(sideslip)")
@@ -222,6 +226,17 @@ def _parameters() -> Iterator[Parameter]:
              right={"number as text", "path", "link to a folder", "point"},
              may={*PRINTABLE, "link to nothing", "link to itself", "device", *COLOURED})  # fmt: skip
     yield of("Run.save.format", lambda x: b.run.save("saved", format=x))
+    yield of("view.runs", lambda x: yb.view(x), "runs", "a viewer shows")
+    yield of("view.runs [run]", lambda x: yb.view({"a": x}), "runs")
+    yield of("view.panels", lambda x: yb.view(b.run, x), "panel")
+    yield of("view.title", lambda x: yb.view(b.run, title=x), right={*PRINTABLE, *EMPTY}, may=COLOURED)
+    yield of("view.height", lambda x: yb.view(b.run, height=x), right={"numpy uint8"})
+    yield of("View.labels", lambda x: yb.View(x, ""), may={"tuple", "pair turned around", "pair of texts"})
+    yield of("View.html", lambda x: yb.View((), x), right={*PRINTABLE, *EMPTY}, may=set(TEXTS))
+    yield of("View.height", lambda x: yb.View((), "", x), right={"numpy uint8"})
+    yield of("View.save.file", lambda x: b.view.save(x), "file", "page", skip={"root", "path upwards"},
+             right={"number as text", "path"},
+             may={*PRINTABLE, *PATHS, *COLOURED, "point"})  # fmt: skip
     # Experiments.
     speeds = {"driver.amplitude": [0.02]}
     yield of("experiment.base", lambda x: yb.experiment(x, speeds))
