@@ -21,7 +21,7 @@ from typing import Any
 
 from orchestrator.errors import BuildError, Diagnostic
 from orchestrator.files import draft_of, remove_draft
-from orchestrator.fmu.native import NATIVE, REASON, runs_as
+from orchestrator.fmu.binary import NATIVE, REASON, runs_as
 from orchestrator.workers import Pool
 from vocabulary.roles import ROLES
 

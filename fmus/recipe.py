@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import BuildError
-from orchestrator.fmu.native import REASON
+from orchestrator.fmu.binary import REASON
 from vocabulary.roles import ROLES
 
 from .closure import Parts, Sources

@@ -17,7 +17,7 @@ from vocabulary.wheels import WHEELS
 from ..errors import Diagnostic, ModelDescriptionError, ScenarioError, text_of
 from ..figures.style import shown
 from ..fmu.archive import open_fmu
-from ..fmu.native import runs_as
+from ..fmu.binary import runs_as
 from ..labels import changed, with_changes
 from ..messages import printable, star
 from ..metrics.measures import catalogue as measures

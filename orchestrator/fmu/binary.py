@@ -1,10 +1,14 @@
-"""The shared library in an FMU: its path for this platform, and the FMI functions that it exports."""
+"""The shared library in an FMU: its path for this platform, its functions, whether it is native or Python."""
 
 from __future__ import annotations
 
+import os
 import platform as machine
 import re
 import sys
+import zipfile
+from functools import lru_cache
+from pathlib import Path
 
 from ..messages import listed, short
 from ..plan import Fmu
@@ -82,3 +86,44 @@ def lacking(library: bytes | None, fmi: int) -> tuple[str, ...]:
     named = {name: f"fmi{fmi}{name}" for name in (*CORE[fmi], *access)}
     missing = [name for name, full in named.items() if f"{full}\0".encode() not in (library or b"")]
     return () if len(missing) == len(named) else tuple(named[name] for name in missing)
+
+
+REASON = "extra/org.yawbench.native/native.txt"
+"""Path in an archive of why it has no native library; empty if it has one."""
+WANTED = "YAWBENCH_UNITS"
+"""Environment variable: `python` asks for units in Python at run time."""
+NATIVE = "native"
+
+
+def runs_as(archive: Path) -> str | None:
+    """Return "native", or "Python: " and why; None for an FMU that was not built from Python here."""
+    try:
+        reason = _reason(str(archive), os.stat(archive).st_mtime_ns)
+    except OSError:
+        return None
+    if reason is None:
+        return None
+    if reason:
+        return f"Python: {reason}"
+    if os.environ.get(WANTED) == "python":
+        return f"Python: {WANTED} asks for it"
+    return NATIVE if sys.platform == "linux" else "Python: the native library is for Linux"
+
+
+def is_native(directory: Path) -> bool:
+    """Return whether the FMU unpacked in a folder was built here and runs natively in this process."""
+    if sys.platform != "linux" or os.environ.get(WANTED) == "python":
+        return False
+    try:
+        return (directory / REASON).stat().st_size == 0
+    except OSError:
+        return False
+
+
+@lru_cache(maxsize=1024)
+def _reason(archive: str, changed: int) -> str | None:
+    try:
+        with zipfile.ZipFile(archive) as opened:
+            return opened.read(REASON).decode("utf-8", "replace")
+    except (KeyError, zipfile.BadZipFile):
+        return None

@@ -34,7 +34,7 @@ from .. import checksums
 from ..cache import OF_RESULTS, sources_hash
 from ..errors import Diagnostic, Location, ResultsError, Severity, warnings_in
 from ..files import read_bytes, reading, reason
-from ..fmu.native import runs_as
+from ..fmu.binary import runs_as
 from ..messages import short
 from ..names import SignalName
 from ..plan import DEFAULT, NEUTRAL, InputSeries, Instance, Override, Plan, ValueSource, Wire
@@ -83,7 +83,7 @@ class FmuRecord(_Part):
     generation_tool: str | None = None
     fmi_version: str = ""
     built: dict[str, Any] | None = None
-    runs_as: str | None = None  # see `fmu.native.runs_as`
+    runs_as: str | None = None  # see `fmu.binary.runs_as`
     step_size: float | None = None
     tolerance: float | None = None
     parameters: dict[str, Any] = {}

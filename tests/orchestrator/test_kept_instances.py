@@ -17,7 +17,7 @@ from fmus.build import build_component
 from orchestrator.commands.new import begin
 from orchestrator.experiments import jobs as jobs_module
 from orchestrator.experiments.jobs import Job, execute, keyed, ready, run_job
-from orchestrator.fmu.native import WANTED, is_native
+from orchestrator.fmu.binary import WANTED, is_native
 from orchestrator.master import fmi
 from orchestrator.master.log import Log
 from orchestrator.results.folder import RUN_FILE

@@ -12,7 +12,7 @@ import pytest
 
 from fmus.build import HERE as FMUS
 from fmus.build import build_all, find_components
-from orchestrator.fmu.native import NATIVE, runs_as
+from orchestrator.fmu.binary import NATIVE, runs_as
 from orchestrator.scenario.catalogue import names
 
 SHORT = ("--set", "stop_time=1.2")

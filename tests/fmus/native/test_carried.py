@@ -13,7 +13,7 @@ import pytest
 from fmus.build import build_component
 from fmus.compiler import compiler_command
 from orchestrator.commands.new import begin
-from orchestrator.fmu.native import REASON, runs_as
+from orchestrator.fmu.binary import REASON, runs_as
 from tests.sentences import golden
 
 LAW = '''"""A law."""

@@ -12,7 +12,7 @@ import pytest
 
 from fmus.build import HERE as FMUS
 from fmus.build import find_components
-from orchestrator.fmu.native import NATIVE, runs_as
+from orchestrator.fmu.binary import NATIVE, runs_as
 from tests.fmus.bare import Fmu
 from tests.fmus.programs import (
     expected_outputs,
