@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from orchestrator.errors import Diagnostic, ResultsError, ScenarioError, warnings_in
-from orchestrator.evaluation.judgement import Evaluation
-from orchestrator.evaluation.standard_tests import TESTS
+from orchestrator.evaluation.standard_tests import TESTS, Evaluation
 from orchestrator.evaluation.trace import trace_of
 from orchestrator.messages import hint, short
 from orchestrator.metrics.run_metrics import STANDARD, MetricValue, evaluate, evaluate_all, metric, why_none

@@ -11,13 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from ..evaluation.standard_tests import DRIVEN, TESTS
+from ..evaluation.standard_tests import DRIVEN, TESTS, Evaluation, NotJudged, StandardTest, TestSeries
 from .options import CHANGES, MAKING, RunOptions, takes
 from .progress import executor_of, hold, say, stoppable
 
 if TYPE_CHECKING:
-    from ..evaluation.judgement import Evaluation, TestSeries
-    from ..evaluation.standard_tests import StandardTest
     from ..evaluation.trace import MappingSpec, Trace
     from ..experiments.execution import Executor
     from ..experiments.experiment import NamedRun
@@ -116,7 +114,6 @@ def _angle_driven(scenario: Path, changes: Sequence[Override], execute: Executor
         typer.Exit: one of them has failed.
     """
     from ..errors import ResultsError
-    from ..evaluation.judgement import NotJudged
     from ..evaluation.steering_tests import characteristic_angle, evaluate_slow_steer
     from ..experiments.standard_test_runs import slow_steer_runs, traces
 
@@ -336,7 +333,6 @@ def _angle(
 ) -> float | None:
     """Return A [rad], None if it is neither given nor needed."""
     from ..errors import ResultsError, ScenarioError
-    from ..evaluation.judgement import NotJudged
     from ..evaluation.steering_tests import characteristic_angle, evaluate_slow_steer
     from ..evaluation.trace import load_trace
     from .progress import say

@@ -56,7 +56,7 @@ import math
 import numpy as np
 
 from ..metrics.measures import running_integral
-from .judgement import Evaluation, NotJudged, evaluation
+from .standard_tests import Evaluation, NotJudged, evaluation
 from .trace import Trace, at, first_crossing, refuse_opposed, running_mean
 
 BRAKED = 1.0

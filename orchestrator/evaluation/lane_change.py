@@ -22,8 +22,8 @@ import numpy as np
 from vocabulary.lane_change import Lane, lanes_of
 
 from ..figures.style import CHANGED, QUIET, frame, line_style, new_figure
-from .judgement import Evaluation, SeriesDriver, SeriesRun, TestSeries, Verdict, evaluation
 from .sine_with_dwell_figures import MARKS
+from .standard_tests import Evaluation, SeriesDriver, SeriesRun, TestSeries, Verdict, evaluation
 from .trace import Trace, at, first_crossing
 
 if TYPE_CHECKING:

@@ -38,7 +38,7 @@ import numpy as np
 
 from ..figures.style import shown
 from ..metrics.measures import running_integral
-from .judgement import (
+from .standard_tests import (
     CriterionResult,
     Evaluation,
     NotJudged,

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..figures.style import CHANGED, QUIET, frame, line_style, new_figure
-from .judgement import Evaluation, NotJudged, TestSeries, Verdict
 from .sine_with_dwell import AT, FAR, FAR_HEAVY, HEAVY, RATIOS, DwellCourse, course_of, percent
+from .standard_tests import Evaluation, NotJudged, TestSeries, Verdict
 from .trace import Trace, at
 
 if TYPE_CHECKING:

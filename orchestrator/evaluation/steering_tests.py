@@ -57,7 +57,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .judgement import Evaluation, NotJudged, evaluation
+from .standard_tests import Evaluation, NotJudged, evaluation
 from .trace import SLOWEST, Trace, at, first_crossing, opposed, prepared, refuse_opposed
 
 FIT_RANGE = (0.5, 2.0)

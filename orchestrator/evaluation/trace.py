@@ -49,7 +49,7 @@ from ..scenario import yaml_lines
 from ..scenario.quantities import convert, meant_unit, measure_of, parse_unit, spellings
 from ..scenario.validation import StrictModel, validate
 from ..wiring.series import SECOND, SeriesFile, numbers_in, reading_series
-from .judgement import NotJudged
+from .standard_tests import NotJudged
 
 ORDER = 6
 CUT_OFF = {"steering_wheel_angle": 10.0, "yaw_rate": 6.0, "acceleration_y": 6.0}

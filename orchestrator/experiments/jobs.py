@@ -252,8 +252,7 @@ def measured(results: Results, metrics: MetricRequests, test: TestRequest | None
 
 
 def _judged(results: Results, name: str, angle: float | None) -> MetricValues:
-    from ..evaluation.judgement import Verdict
-    from ..evaluation.standard_tests import TESTS
+    from ..evaluation.standard_tests import TESTS, Verdict
     from ..evaluation.trace import trace_of
 
     judged = TESTS[name].evaluate(trace_of(results, name), angle)

@@ -36,8 +36,8 @@ from pydantic import Field, field_validator, model_validator
 
 from .. import checksums
 from ..errors import ResultsError, ScenarioError
-from ..evaluation.judgement import Evaluation, NotJudged
 from ..evaluation.sine_with_dwell import AMPLITUDE, SIDES, amplitudes
+from ..evaluation.standard_tests import Evaluation, NotJudged
 from ..evaluation.steering_tests import characteristic_angle
 from ..files import reads
 from ..messages import hint

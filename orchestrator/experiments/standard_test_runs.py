@@ -8,9 +8,8 @@ from functools import cached_property
 from pathlib import Path
 
 from ..errors import ScenarioError
-from ..evaluation.judgement import Evaluation, SeriesRun
 from ..evaluation.sine_with_dwell import AMPLITUDE, SIDES
-from ..evaluation.standard_tests import StandardTest
+from ..evaluation.standard_tests import Evaluation, SeriesRun, StandardTest
 from ..evaluation.trace import Trace, trace_of
 from ..names import Target
 from ..plan import Override, Plan
@@ -29,7 +28,7 @@ STEERED = "slowly increasing steer"
 
 @dataclass
 class TestDriver:
-    """Drives the series of a standard test as named runs (see `evaluation.judgement.SeriesDriver`).
+    """Drives the series of a standard test as named runs (see `evaluation.standard_tests.SeriesDriver`).
 
     Args:
         test: evaluates the runs.

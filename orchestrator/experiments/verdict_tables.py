@@ -8,9 +8,8 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-from ..evaluation.judgement import Evaluation, TestQuantity, TestSeries
+from ..evaluation.standard_tests import Evaluation, StandardTest, TestQuantity, TestSeries
 from ..figures.style import shown
 from ..labels import changed
 from ..metrics.run_metrics import MetricValue, metric
@@ -23,10 +22,6 @@ from .judging import ClaimResult
 from .outcome import ExperimentResult, limit_table
 from .schema import TableSpec
 from .tables import Cell, Table, marked, remarks
-
-if TYPE_CHECKING:
-    from ..evaluation.standard_tests import StandardTest
-
 
 HOLDS, UNDECIDED, NOT_JUDGED = "holds", "undecided", "not judged"
 CARRIES = ("margin", "region", "nearest flip")

@@ -14,9 +14,8 @@ import pytest
 import yawbench as yb
 from orchestrator.coupling import ALGORITHMS, CouplingAlgorithm, CouplingWeights
 from orchestrator.errors import ScenarioError
-from orchestrator.evaluation import judgement
-from orchestrator.evaluation.judgement import SeriesRun, evaluation
-from orchestrator.evaluation.standard_tests import DRIVEN, TESTS, StandardTest
+from orchestrator.evaluation import standard_tests
+from orchestrator.evaluation.standard_tests import DRIVEN, TESTS, SeriesRun, StandardTest, evaluation
 from orchestrator.experiments.axis_figures import MetricDrawing
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.figures import draw_all
@@ -126,7 +125,7 @@ def test_a_standard_test_with_its_series_is_a_module_and_an_entry(steered, monke
     def drive(driver):
         runs = [SeriesRun(f"{a:g}", f"{a:g} rad", {"driver.amplitude": a}, "wiggle") for a in (0.1, 0.2)]
         judged = driver.make(runs)
-        return judgement.TestSeries(
+        return standard_tests.TestSeries(
             judged, f"{len(judged)} runs of {driver.duration:g} s.", {"runs": len(judged)}
         )
 

@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from components.drivers.sine_with_dwell import SineWithDwellParameters, sine_with_dwell
-from orchestrator.evaluation.judgement import Evaluation, NotJudged, Verdict
 from orchestrator.evaluation.sine_with_dwell import amplitudes, evaluate_dwell, is_series, judge_series
-from orchestrator.evaluation.standard_tests import TESTS
+from orchestrator.evaluation.standard_tests import TESTS, Evaluation, NotJudged, Verdict
 from orchestrator.evaluation.steering_tests import G, characteristic_angle, evaluate_slow_steer
 from orchestrator.evaluation.trace import Trace, load_mapping, load_trace
 from orchestrator.figures.style import save

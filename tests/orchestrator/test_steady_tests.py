@@ -13,8 +13,8 @@ from scipy.signal import lsim
 import yawbench as yb
 from components.drivers.sine_sweep import SineSweepParameters, sweep
 from orchestrator.evaluation.braking_and_wind import evaluate_turn
-from orchestrator.evaluation.judgement import Evaluation, Verdict
 from orchestrator.evaluation.lane_change import evaluate_lane_change, judge_entry_speeds
+from orchestrator.evaluation.standard_tests import Evaluation, Verdict
 from orchestrator.evaluation.steering_tests import evaluate_step, evaluate_sweep, evaluate_understeer
 from orchestrator.evaluation.trace import Trace, trace_of
 from orchestrator.results.read import Results

@@ -7,9 +7,9 @@ from math import degrees, radians
 import pytest
 
 import yawbench as yb
-from orchestrator.evaluation.judgement import Evaluation, Verdict
 from orchestrator.evaluation.lane_change import evaluate_lane_change
 from orchestrator.evaluation.sine_with_dwell import evaluate_dwell
+from orchestrator.evaluation.standard_tests import Evaluation, Verdict
 from orchestrator.evaluation.steering_tests import evaluate_slow_steer
 from orchestrator.evaluation.trace import trace_of
 from orchestrator.plan import Override
