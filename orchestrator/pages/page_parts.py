@@ -1,25 +1,26 @@
-"""Parts shared by report, comparison and ranking pages: figures as images, tables of FMUs and versions."""
+"""Parts shared by all pages: templates, style, verdict symbols, figures as images, tables of FMUs."""
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from datetime import datetime, timezone
+from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 from urllib.parse import quote
 
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from ..experiments.tables import Table
+from ..experiments.verdict_tables import FAILS, HOLDS, NOT_JUDGED, UNDECIDED
+from ..messages import printable
 from ..plan import Plan
 from ..results.read import Results
 from ..results.run_record import versions
-
-if TYPE_CHECKING:
-    pass
-
 
 CURLY = str.maketrans("'\"", "’”")
 """Typographic quotes for text, so that straight ones occur only in the markup."""
@@ -95,3 +96,45 @@ def made_by() -> dict[str, object]:
 def anchor(text: str) -> str:
     """Return a text as an HTML anchor name."""
     return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
+
+
+SIGNS = {
+    HOLDS: ("good", "✓"),
+    UNDECIDED: ("unsure", "?"),
+    NOT_JUDGED: ("open", "–"),
+    **{word: ("bad", "✗") for word in FAILS.values()},
+}
+"""Verdict -> CSS class and symbol, which differ even without colours."""
+
+
+def render(template: str, **facts: Any) -> str:
+    """Render a template; a variable that is missing is an error, not empty text."""
+    return _templates().get_template(template).render(facts)
+
+
+@functools.cache
+def _templates() -> Environment:
+    """Return the template environment; each template is compiled once."""
+    environment = Environment(
+        loader=PackageLoader("orchestrator.pages"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        finalize=lambda value: printable(value) if type(value) is str else value,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["verdict"] = verdict_sign
+    return environment
+
+
+def style() -> Markup:
+    """Return the style sheet shared by all pages with text."""
+    return Markup((files(__package__) / "static" / "page.css").read_text(encoding="utf-8"))
+
+
+def verdict_sign(word: str) -> Markup:
+    """Return a verdict as a symbol with its word; other text unchanged."""
+    if word not in SIGNS:
+        return Markup.escape(word)
+    kind, sign = SIGNS[word]
+    return Markup('<span class="verdict {}"><b aria-hidden="true">{}</b> {}</span>').format(kind, sign, word)

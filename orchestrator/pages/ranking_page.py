@@ -31,8 +31,7 @@ from ..experiments.ranking_tables import (
 from ..experiments.tables import Table
 from ..labels import changed
 from ..plan import Override
-from .page_parts import FigureImage, anchor, image_of, made_by
-from .rendering import render, style
+from .page_parts import FigureImage, anchor, image_of, made_by, render, style
 
 STATES = {
     "passed": "passed",

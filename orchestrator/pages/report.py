@@ -58,9 +58,10 @@ from .page_parts import (
     image_of,
     made_by,
     programs_of,
+    render,
+    style,
 )
 from .provenance import count_kinds, groups_of
-from .rendering import render, style
 from .viewer import MOST, PANELS, Settings, View, assets, viewer
 
 

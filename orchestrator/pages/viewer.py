@@ -31,7 +31,7 @@ from ..metrics.measures import words
 from ..metrics.run_metrics import columns_of, evaluate, metric, reference_of
 from ..results.read import Results
 from .friction_map import ground_of
-from .rendering import render
+from .page_parts import render
 from .viewer_data import is_numeric, pack
 
 SCRIPTS = ("data", "panels", "draw", "scene", "close_up", "road", "")
