@@ -213,7 +213,7 @@ class Run:
         Raises:
             ResultsError: they cannot be written.
         """
-        from orchestrator.results.columnar import write_results
+        from orchestrator.results.recorder import write_results
 
         place = arguments.path(folder, "folder")
         write_results(self.results, place, format=arguments.text(format, "format"))

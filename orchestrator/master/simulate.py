@@ -23,12 +23,11 @@ from ..interrupts import StopFlag, interrupts
 from ..messages import printable
 from ..metrics.plausibility import PlausibilityWatch
 from ..plan import Plan
-from ..results.columnar import MemoryRecorder
 from ..results.folder import COMPLETED, RUNNING
 from ..results.formats import recorder_of
 from ..results.freshness import key_of
 from ..results.read import Results
-from ..results.recorder import Recorder
+from ..results.recorder import MemoryRecorder, Recorder
 from ..results.run_record import DiagnosticRecord, EndRecord, ErrorRecord, WarningRecord, run_record
 from .child_run import ChildRun, can_be_apart
 from .fmi import keeps, open_unit

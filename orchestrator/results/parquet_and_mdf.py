@@ -17,9 +17,9 @@ import numpy as np
 
 from ..errors import ResultsError
 from ..labels import with_changes
-from .columnar import ColumnRecorder
 from .csv_file import column_of, values_of
 from .formats import FILES, FORMATS, plain
+from .recorder import ColumnRecorder
 from .run_record import RunRecord
 
 UNIT = b"unit"

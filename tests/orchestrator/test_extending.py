@@ -26,7 +26,7 @@ from orchestrator.experiments.schema import FIGURE_KINDS, FigureKind
 from orchestrator.fault_kinds import KINDS, FaultKind
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.results import formats
-from orchestrator.results.columnar import ColumnRecorder
+from orchestrator.results.recorder import ColumnRecorder
 from orchestrator.scenario.overrides import read_changes
 from tests.commands import status_of
 from tests.sentences import golden, refused
