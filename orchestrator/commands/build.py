@@ -16,17 +16,17 @@ Components = Annotated[
     list[str] | None,
     typer.Argument(
         metavar="[COMPONENT]...",
-        help="What to build: names of FMUs (controller_fnn), Python files, folders of units in C; "
+        help="What to build: names of FMUs (controller_fnn), Python files, folders of components in C; "
         "default: every component.",
     ),
 ]
 BuildFolder = Annotated[
     Path | None,
     typer.Option(
-        "--out", metavar="DIR", help="Folder for the FMUs; default: fmus/ of a checkout, else the cache."
+        "--out", metavar="DIR", help="Folder for the FMUs. Default: fmus/ of a checkout, else the cache."
     ),
 ]
-Force = Annotated[bool, typer.Option("--force", help="Build even what has not changed.")]
+Force = Annotated[bool, typer.Option("--force", help="Also build FMUs whose sources have not changed.")]
 
 
 def build(components: Components = None, out: BuildFolder = None, force: Force = False) -> None:
@@ -56,9 +56,9 @@ def build(components: Components = None, out: BuildFolder = None, force: Force =
     names = [name for name in named if name in known]
     if named and not names:
         return
-    report = build_all(target, components=names or None, force=force, progress=tell_of_build)
+    report = build_all(target, components=names or None, force=force, progress=report_build)
     if report.warning:
-        why = f"these FMUs load in Python only, they have no launcher: {report.warning}"
+        why = f"these FMUs load in Python only, as they have no launcher: {report.warning}"
         say(f"warning: {why}")
     for name, why in report.in_python.items():
         say(f"{name} runs in Python: {why}")
@@ -67,7 +67,7 @@ def build(components: Components = None, out: BuildFolder = None, force: Force =
         say(f"{len(report.current)} of {total} FMUs up to date")
 
 
-def tell_of_build(name: str, what: str) -> None:
+def report_build(name: str, what: str) -> None:
     """Report the result of building an FMU, unless it was up to date."""
     if what != "current":
         say(f"{name}: {what}")
@@ -77,7 +77,7 @@ Action = Literal["show", "verify", "clear"]
 CacheAction = Annotated[
     Action,
     typer.Argument(
-        help="show: what there is, and how large; verify: look at every byte, and delete what is damaged; "
+        help="show: list contents and sizes; verify: check every byte and delete damaged entries; "
         "clear: delete everything.",
     ),
 ]
@@ -87,7 +87,8 @@ def cache(action: CacheAction = "show") -> None:
     """Show, verify or clear the cache.
 
     Unpacked FMUs, the compiled launcher, keys of sources, and FMUs whose own folder cannot be
-    written. All of it is made again when it is needed. Nothing is deleted while another command uses it.
+    written. Deleted entries are made again when needed.
+    Nothing is deleted while another command uses the cache.
     """
     from ..cache import alone_in, cache_folders
     from ..fmu.archive import kept_in, remove
@@ -111,8 +112,8 @@ def cache(action: CacheAction = "show") -> None:
                 if unwanted and not alone:
                     in_use = True
         if not alone:
-            print(f"{folder}: another command uses it, so nothing was deleted", file=sys.stderr)
+            print(f"{folder}: in use by another command, nothing was deleted", file=sys.stderr)
     if action == "verify":
-        print(f"damaged: {damaged}" if damaged else "everything is whole", file=sys.stderr)
+        print(f"damaged: {damaged}" if damaged else "no entry is damaged", file=sys.stderr)
     if in_use:
         raise typer.Exit(1)

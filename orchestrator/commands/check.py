@@ -21,9 +21,7 @@ if TYPE_CHECKING:
 
     from ..plan import Instance, Plan, Value, Wire
 
-All = Annotated[
-    bool, typer.Option("--all", help="Show every value, including those left at the defaults of the FMUs.")
-]
+All = Annotated[bool, typer.Option("--all", help="Show every value, including the FMUs' defaults.")]
 K = TypeVar("K")
 V = TypeVar("V")
 CAMBER = wheels("inclination_angle_*")
@@ -33,16 +31,16 @@ PIPE_WIDTH = 140
 
 
 @takes(*CHANGES, "fmus", "no_build", "no_validate")
-def check(scenario: ScenarioFile, wishes: RunOptions, all_: All = False) -> None:
-    """Validate a scenario; show units, values, wires.
+def check(scenario: ScenarioFile, options: RunOptions, all_: All = False) -> None:
+    """Validate a scenario; show its instances, values and wires.
 
-    Every value is shown with its origin, the units with the reason for their order, and what the
-    control side sees as the truth, a measurement or an estimate.
+    Shows the origin of every value, the reason for the evaluation order, and whether the control side
+    receives true, measured or estimated signals.
     """
-    plan = plan_of_scenario(scenario, wishes)
+    plan = plan_of_scenario(scenario, options)
     show(plan, scenario, defaults=all_)
-    for one in plan.diagnostics:
-        say(f"note: {one}")
+    for diagnostic in plan.diagnostics:
+        say(f"note: {diagnostic}")
     for unit in plan.instances:
         for doubt in unit.fmu.doubts():
             say(f"warning: {unit.name}: {doubt}")
@@ -71,33 +69,40 @@ def _print(plan: Plan, scenario: Path, console: Console, defaults: bool) -> None
         f"{_number(plan.n_steps * plan.step)} s in {plan.n_steps} steps of {_number(1000 * plan.step)} ms, "
         f"{plan.algorithm}; {len(plan.wires)} wires, {len(plan.record)} outputs recorded"
     )
-    _show(console, "Units in evaluation order", ("unit", "FMU", "step"), _unit_rows(plan))
+    _show(console, "Instances in evaluation order", ("instance", "FMU", "step"), _unit_rows(plan))
     values, hidden = _values(plan, defaults)
-    columns = ("what", "value", "from", "units", *(["source of the default"] if defaults else []))
+    columns = ("name", "value", "origin", "instances", *(["source of the default"] if defaults else []))
     _show(console, "Values", columns, values)
     if hidden:
         also = " or come from tyre files" if plan.scenario.get("tyre_files") else ""
         console.print(f"  {hidden} more are left at the FMUs' defaults{also}: --all shows them", style="dim")
-    _show(console, "Derived from the vehicle file", ("what", "as", "units"), _derived(plan))
-    of_stiffness = ("what", "given", "of the tyres at static loads", "apart", "units")
-    _show(console, "Given, though the tyres tell it", of_stiffness, _beside_tyres(plan))
+    _show(console, "Derived from the vehicle file", ("name", "formula", "instances"), _derived(plan))
+    of_stiffness = ("name", "given", "tyres at static loads", "difference", "instances")
+    _show(console, "Given, although the tyres determine it", of_stiffness, _beside_tyres(plan))
     if idle := _idle(plan):
-        console.print(f"  also in the vehicle file, but for other units: {', '.join(idle)}", style="dim")
+        console.print(f"  in the vehicle file, but used by no instance: {', '.join(idle)}", style="dim")
     wires = list(_wire_rows(plan))
-    if any(seen for _, _, seen, _ in wires):
-        _show(console, "Wires", ("from", "to", "as", "variables"), wires)
+    if any(kind for _, _, kind, _ in wires):
+        _show(console, "Wires", ("from", "to", "signal", "variables"), wires)
     else:
-        _show(console, "Wires", ("from", "to", "variables"), [(of, to, what) for of, to, _, what in wires])
-    _show(console, "Faults", ("on", "what", "of"), _fault_rows(plan))
+        _show(
+            console,
+            "Wires",
+            ("from", "to", "variables"),
+            [(source, to, names) for source, to, _, names in wires],
+        )
+    _show(console, "Faults", ("target", "fault", "signals"), _fault_rows(plan))
     direct = evaluate({unit.name: unit.fmu for unit in plan.instances}, plan.wires).direct
-    headings = ("unit", "after", "because its outputs follow")
+    headings = ("instance", "after", "direct feedthrough of")
     _show(console, "Why this order", headings, _order_rows(plan, direct))
     _show(
         console, "Against the order", ("from", "to", "uses earlier values of"), _backward_rows(plan, direct)
     )
-    warned = sum(one.severity == "warning" and one.location.signal is not None for one in plan.diagnostics)
-    doubtful = f"No error, but {counted(warned, 'value')} to look at: see the notes."
-    console.print(f"\n{doubtful if warned else 'Nothing is wrong.'}")
+    warned = sum(
+        entry.severity == "warning" and entry.location.signal is not None for entry in plan.diagnostics
+    )
+    doubtful = f"No errors, but {counted(warned, 'suspicious value')}: see the notes."
+    console.print(f"\n{doubtful if warned else 'No errors.'}")
 
 
 def _show(console: Console, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
@@ -125,7 +130,7 @@ def _unit_rows(plan: Plan) -> Iterable[Sequence[str]]:
 
 
 def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
-    """Return a row for every value with its origin, and the number of irrelevant defaults left out."""
+    """Return a row for every value with its origin, and the number of defaults not shown."""
     from ..messages import fold
 
     files = plan.scenario.get("tyre_files", {})
@@ -167,7 +172,7 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
 
 def _run_rows(plan: Plan) -> Iterable[Sequence[str]]:
     """Yield the rows of values that apply to the whole run."""
-    given = {str(change.target): change.origin for change in plan.changes}
+    origins = {str(change.target): change.origin for change in plan.changes}
     run = {
         **({"start_time": f"{_number(plan.start)} s"} if plan.start else {}),
         "stop_time": f"{_number(plan.time(plan.n_steps))} s",
@@ -175,7 +180,7 @@ def _run_rows(plan: Plan) -> Iterable[Sequence[str]]:
         "algorithm": plan.algorithm,
     }
     for name, value in run.items():
-        yield name, value, given.get(name, "scenario" if name in plan.scenario else "default"), "all"
+        yield name, value, origins.get(name, "scenario" if name in plan.scenario else "default"), "all"
 
 
 def _derived(plan: Plan) -> Iterable[Sequence[str]]:
@@ -208,19 +213,19 @@ def _beside_tyres(plan: Plan) -> Iterable[Sequence[str]]:
         return
     loads = {wheel: car.values[name] for wheel, name in zip(WHEELS[::2], STATIC_LOADS, strict=True)}
     try:
-        found = dict(zip(STIFFNESSES, cornering_stiffness(tyres[0], loads).values(), strict=True))
+        of_tyres = dict(zip(STIFFNESSES, cornering_stiffness(tyres[0], loads).values(), strict=True))
     except (ValueError, YawbenchError):
-        return  # they do not tell it
+        return  # the tyre model does not provide it
     for (name, given), units in takers.items():
-        of_axle = 2.0 * found[name]
-        apart = f"{round(100.0 * (given / of_axle - 1.0), 1) + 0.0:+g} %" if of_axle else ""
-        yield name, _shown(given, "N/rad"), _shown(of_axle, "N/rad"), apart, ", ".join(units)
+        of_axle = 2.0 * of_tyres[name]
+        difference = f"{round(100.0 * (given / of_axle - 1.0), 1) + 0.0:+g} %" if of_axle else ""
+        yield name, _shown(given, "N/rad"), _shown(of_axle, "N/rad"), difference, ", ".join(units)
 
 
 def _idle(plan: Plan) -> list[str]:
     """Return the values of the vehicle file that no instance uses."""
-    given = plan.scenario.get("vehicle_parameters", {})
-    return [name for name in given if not any(unit.fmu.variables.get(name) for unit in plan.instances)]
+    names = plan.scenario.get("vehicle_parameters", {})
+    return [name for name in names if not any(unit.fmu.variables.get(name) for unit in plan.instances)]
 
 
 def _matters(unit: Instance, name: str) -> bool:

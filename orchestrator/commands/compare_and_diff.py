@@ -18,32 +18,32 @@ Swaps = Annotated[
     typer.Option(
         "--swap",
         metavar="UNIT=FMU,FMU,...",
-        help="FMUs to compare for a unit; one alone is compared with the scenario's own. An FMU may bring "
+        help="FMUs to compare for a unit; a single FMU is compared with the scenario's. An FMU may bring "
         "parameters, FMU:PARAMETER=VALUE. Repeatable.",
     ),
 ]
 
 
 @takes("set_", "fault", *MAKING, "jobs", "format_", "fresh")
-def compare(context: typer.Context, scenario: ScenarioFile, swap: Swaps, wishes: RunOptions) -> None:
-    """Run a scenario with several FMUs for a unit.
+def compare(context: typer.Context, scenario: ScenarioFile, swap: Swaps, options: RunOptions) -> None:
+    """Run a scenario with several FMUs for a unit and compare.
 
-    report.html, which needs no server, begins with what the runs come to, side by side, and the signals
-    that differ most; then where the runs part, overlays, the system.
+    Writes report.html: metrics side by side, the signals that differ most, when the runs diverge,
+    overlays, and the system.
 
     Without --out, results go to results/<folder of the scenario>/<its name>-compare. A run that
-    fails is named and takes no other with it.
+    fails is reported; the other runs continue.
     """
     from ..experiments.comparison import comparison, comparison_table
     from ..pages.comparison import comparison_facts, most_different
     from ..results.folder import default_folder
 
-    folder = wishes.out or default_folder(scenario, wishes.changes, suffix="-compare")
+    folder = options.out or default_folder(scenario, options.changes, suffix="-compare")
     hold(context, folder)
-    each = pooled(context, wishes)
-    findings = conduct(comparison(scenario, swap, wishes.changes), folder, wishes, each)
+    each = pooled(context, options)
+    findings = conduct(comparison(scenario, swap, options.changes), folder, options, each)
     print_tables([comparison_table(findings)])
-    command = command_of("compare", scenario, **wishes.changing | {"swap": swap})
+    command = command_of("compare", scenario, **options.changing | {"swap": swap})
     view = most_different(findings)
     views = [view] if view else []
     facts = comparison_facts(findings)
@@ -54,15 +54,16 @@ def compare(context: typer.Context, scenario: ScenarioFile, swap: Swaps, wishes:
 
 
 Halvings = Annotated[
-    int, typer.Option("--halvings", metavar="N", min=2, max=10, help="How often the step is halved.")
+    int,
+    typer.Option("--halvings", metavar="N", min=2, max=10, help="Number of times the step size is halved."),
 ]
-Signal = Annotated[str, typer.Option("--signal", metavar="UNIT.VARIABLE", help="What is compared.")]
+Signal = Annotated[str, typer.Option("--signal", metavar="UNIT.VARIABLE", help="Signal to compare.")]
 Algorithms = Annotated[
     list[str] | None,
     typer.Option(
         "--algorithm",
         metavar="NAME",
-        help=f"{listed(ALGORITHMS, last='or')}; repeatable, all are compared with the first. "
+        help=f"{listed(ALGORITHMS, last='or')}; repeatable: all are compared with the first. "
         "Default: the scenario's.",
     ),
 ]
@@ -72,15 +73,15 @@ Algorithms = Annotated[
 def converge(
     context: typer.Context,
     scenario: ScenarioFile,
-    wishes: RunOptions,
+    options: RunOptions,
     halvings: Halvings = 3,
     signal: Signal = "plant.yaw_rate",
     algorithm: Algorithms = None,
 ) -> None:
-    """Halve the step size again and again; show error and order.
+    """Halve the step size repeatedly; show error and order.
 
-    The error is that against the finest run. Units with a step size of their own keep it. Runs
-    follow each other, so that their wall times can be compared. Without --out, results go to
+    Errors are relative to the finest run. Units with their own step size keep it. Runs are made one
+    after the other, so that their wall times can be compared. Without --out, results go to
     results/<folder of the scenario>/<its name>-converge.
     """
     from dataclasses import replace
@@ -102,19 +103,19 @@ def converge(
     for name in algorithm or ():
         if name not in ALGORITHMS:
             guess = hint(name, ALGORITHMS, lead="there are")
-            raise ScenarioError(f"--algorithm {name}: no such algorithm{guess}", code="algorithm-unknown")
-    folder = wishes.out or default_folder(scenario, wishes.changes, suffix="-converge")
+            raise ScenarioError(f"--algorithm {name}: unknown algorithm{guess}", code="algorithm-unknown")
+    folder = options.out or default_folder(scenario, options.changes, suffix="-converge")
     hold(context, folder)
-    wishes = replace(wishes, jobs=1, fresh=True)
-    each = pooled(context, wishes)
+    options = replace(options, jobs=1, fresh=True)
+    each = pooled(context, options)
     experiment = refinements(
         scenario,
         halvings=halvings,
         signal=signal,
         algorithms=algorithm or (),
-        changes=wishes.changes,
+        changes=options.changes,
     )
-    findings = conduct(experiment, folder, wishes, each, record=(signal,))
+    findings = conduct(experiment, folder, options, each, record=(signal,))
     rows = measure(findings, signal)
     table = convergence_table(rows, experiment.spec.title)
     write_whole(folder / "converge.csv", to_csv(columns_of(rows)))
@@ -125,11 +126,11 @@ def converge(
         halvings=[halvings],
         signal=[signal],
         algorithm=algorithm,
-        **wishes.changing,
+        **options.changing,
     )
     charts = []
     if any(row.error for row in rows):
-        note = f"yawbench converge {scenario} · units with a step size of their own keep it"
+        note = f"yawbench converge {scenario} · units with their own step size keep it"
         figure = convergence_figure(rows, signal, experiment.spec.title, note)
         save(figure, folder / "converge")
         charts = [image_of(folder / "converge.svg", experiment.spec.title)]
@@ -139,16 +140,16 @@ def converge(
         raise typer.Exit(1)
 
 
-One = Annotated[Path, typer.Argument(help="Folder of results.", metavar="RUN")]
-Other = Annotated[Path, typer.Argument(help="Folder of the results to compare it with.", metavar="RUN")]
+One = Annotated[Path, typer.Argument(help="Results folder.", metavar="RUN")]
+Other = Annotated[Path, typer.Argument(help="Results folder to compare it with.", metavar="RUN")]
 
 
 def diff(one: One, other: Other) -> None:
     """Show what differs between two runs.
 
-    First what they were made of: scenario, parameters, FMUs, connections, versions of programs. Then
-    their results, signal by signal: from when on they differ, from when on a curve shows it (1 % of the
-    signal's largest value), and by how much at most.
+    First the inputs: scenario, parameters, FMUs, connections, program versions. Then the results, signal
+    by signal: when they start to differ, when the difference becomes visible (1 % of the signal's
+    largest value), and the largest difference.
     """
     from ..pages.comparison import differences, differences_table, divergence, partings_table
     from ..results.read import load_results
@@ -161,4 +162,4 @@ def diff(one: One, other: Other) -> None:
     if parted.partings or parted.notes:
         print_tables([partings_table(parted, first, second)])
     if not (found or parted.partings or parted.notes):
-        say("The runs are the same, in what they were made of and in every number.")
+        say("The runs are identical: same inputs, same numbers.")

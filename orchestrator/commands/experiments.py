@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 
 
 def conduct(
-    experiment: LoadedExperiment, folder: Path, wishes: RunOptions, each: Each, **of_jobs: Any
+    experiment: LoadedExperiment, folder: Path, options: RunOptions, each: Each, **of_jobs: Any
 ) -> ExperimentResult:
-    """Make the runs that are missing, judge them, draw the figures and write all outputs.
+    """Make missing runs, judge them, draw the figures and write all outputs.
 
     Args:
         experiment: as loaded.
         folder: its results folder.
-        wishes: the options of the command.
+        options: the options of the command.
         each: `map` used to read results and to draw figures.
         of_jobs: fields of all jobs in place of their defaults.
 
@@ -38,11 +38,11 @@ def conduct(
         YawbenchError: a run cannot start; none has been started.
         typer.Exit: Ctrl-C.
     """
-    with stoppable(folder), executor_of(folder, experiment.identity, wishes, each, **of_jobs) as execute:
-        return concluded(experiment, execute, wishes)
+    with stoppable(folder), executor_of(folder, experiment.identity, options, each, **of_jobs) as execute:
+        return concluded(experiment, execute, options)
 
 
-def concluded(experiment: LoadedExperiment, execute: Executor, wishes: RunOptions) -> ExperimentResult:
+def concluded(experiment: LoadedExperiment, execute: Executor, options: RunOptions) -> ExperimentResult:
     """Return the result of an experiment, drawn and written; see `conduct`."""
     from ..errors import YawbenchError
     from ..experiments.figures import draw_all
@@ -50,28 +50,28 @@ def concluded(experiment: LoadedExperiment, execute: Executor, wishes: RunOption
     from ..experiments.record import write_findings
     from ..labels import changed
 
-    if wishes.quick and experiment.spec.repeats:
+    if options.quick and experiment.spec.repeats:
         experiment = experiment.short
     if experiment.by_options:
         say(f"changed: {changed(experiment.by_options)}")
     try:
-        findings = execute(experiment, keep=wishes.keep)
+        findings = execute(experiment, keep=options.keep)
     except YawbenchError:
-        if not wishes.no_run or experiment.spec.axes:
+        if not options.no_run or experiment.spec.axes:
             raise  # scenarios or FMUs are missing, but existing results can be judged without them
         findings = judge_results(experiment, execute.folder, each=execute.each)
     drawn, problems = draw_all(findings, execute.folder, each=execute.each)
-    if findings.planned and experiment.spec.region and not wishes.quick:
+    if findings.planned and experiment.spec.region and not options.quick:
         findings = _over_region(findings.planned, findings, execute)
     write_findings(findings, drawn, execute.folder)
     for problem in problems:
         say(problem)
-    say_remarks(findings)
+    say_problems(findings)
     return findings
 
 
-def say_remarks(findings: ExperimentResult) -> None:
-    """Print which runs of an experiment are missing or failed, and what is remarkable about the others."""
+def say_problems(findings: ExperimentResult) -> None:
+    """Print which runs of an experiment are missing or failed, and the warnings about the others."""
     if findings.not_made:
         say(f"{findings.not_made} of {counted(len(findings.records), 'run')} not made yet")
     if findings.spec.axes:  # without axes, failed runs have been reported one by one
@@ -92,14 +92,14 @@ def _over_region(
     jobs = {job.key: job for job in plan.jobs.values()}
     records = execute.journal.records
     if execute.runner is None and (left := left_to_do(list(jobs.values()), records)):
-        say(f"note: {counted(len(left), 'run')} of the region not made yet; it is left out")
+        say(f"note: {counted(len(left), 'run')} of the region not made yet; the region is omitted")
         return findings
-    title = f"{planned.experiment.spec.title}, region of its verdicts"
+    title = f"{planned.experiment.spec.title}, region of the verdicts"
     execute.run(title, list(jobs.values()), journaled=True)
     failed = {jobs[key].label: str(records[key].reason) for key in jobs if not records[key].ok}
     say_failed(failed)
     if failed:
-        say(f"{len(failed)} of {len(jobs)} runs of the region failed; they count as another verdict")
+        say(f"{len(failed)} of {len(jobs)} runs of the region failed; their verdicts count as different")
     return replace(findings, regions=judge_region(plan, findings, records))
 
 
@@ -128,7 +128,7 @@ def chapter_of(
             findings, command=command, stale=out_of_date, folder=folder, shown_in=shown_in, views=views
         )
     for name, why in out_of_date.items():
-        say(f"{name}: not what a run would give now: {why}")
+        say(f"{name}: out of date: {why}")
     return facts | {"comparison": None, "results": []} | more
 
 
@@ -154,7 +154,7 @@ def write_page(chapters: Sequence[dict[str, Any]], folder: Path) -> None:
     say(f"The page: {page} ({page.stat().st_size / 1e6:.1f} MB)")
 
 
-def of_files(context: typer.Context, files: Sequence[Path], wishes: RunOptions) -> None:
+def of_files(context: typer.Context, files: Sequence[Path], options: RunOptions) -> None:
     """Conduct the experiments of files; the tables of a single one are printed, all go to one page.
 
     Raises:
@@ -169,11 +169,11 @@ def of_files(context: typer.Context, files: Sequence[Path], wishes: RunOptions) 
     from ..results.folder import default_folder, names_of
     from .progress import print_tables
 
-    changes, out = wishes.changes, wishes.out
+    changes, out = options.changes, options.out
     experiments = [load_experiment(file, changes=changes) for file in files]
     if tuned := [str(one.path) for one in experiments if one.spec.tuning]:
         raise ScenarioError(
-            [f"{file}: a tuning file; it is for `yawbench tune`" for file in tuned], code="file-wrong-kind"
+            [f"{file}: a tuning file; use `yawbench tune`" for file in tuned], code="file-wrong-kind"
         )
     if out is None:
         folders = [default_folder(file, changes) for file in files]
@@ -190,15 +190,15 @@ def of_files(context: typer.Context, files: Sequence[Path], wishes: RunOptions) 
                 code="name-duplicate",
             )
     hold(context, *folders)
-    each = pooled(context, wishes)
+    each = pooled(context, options)
     chapters, failed = [], False
     for experiment, folder in zip(experiments, folders, strict=True):
-        findings = conduct(experiment, folder, wishes, each)
+        findings = conduct(experiment, folder, options, each)
         command = command_of(
             "study" if experiment.spec.runs else "sweep",
             experiment.path,
-            quick=wishes.quick and (experiment.spec.region is not None or bool(experiment.spec.repeats)),
-            **wishes.changing,
+            quick=options.quick and (experiment.spec.region is not None or bool(experiment.spec.repeats)),
+            **options.changing,
         )
         chapters.append(chapter_of(findings, folder, command, shown_in=page))
         failed = failed or bool(findings.failed) or bool(findings.not_made)
@@ -218,15 +218,15 @@ StudyFile = Annotated[
 
 
 @takes(*CHANGES, *MAKING, "jobs", "scheduler", "format_", "quick", "fresh", "no_run")
-def study(context: typer.Context, file: StudyFile, wishes: RunOptions) -> None:
+def study(context: typer.Context, file: StudyFile, options: RunOptions) -> None:
     """Run a study: tables, figures, a verdict per claim.
 
-    Begin with report.html. Without --out, results go to results/<folder of the study>/<its name>. Runs
-    are made by worker processes; one that fails is named in the table and takes no other with it. Runs
-    that have been made already, of the same scenario, FMUs and program, are not made again. If the file
-    has a region, claims are also judged over the open values there: how far each verdict carries.
+    Start reading at report.html. Without --out, results go to results/<folder of the study>/<its name>. Runs
+    are made by worker processes; a run that fails is listed in the table, the others continue. Runs
+    already made from the same scenario, FMUs and program version are not repeated. If the file
+    has a region, claims are also judged over the open values there: how robust each verdict is.
     """
-    of_files(context, [file], wishes)
+    of_files(context, [file], options)
 
 
 SweepFile = Annotated[
@@ -235,15 +235,14 @@ SweepFile = Annotated[
 
 
 @takes(*CHANGES, *MAKING, "jobs", "scheduler", "keep", "format_", "fresh", "no_run")
-def sweep(context: typer.Context, file: SweepFile, wishes: RunOptions) -> None:
+def sweep(context: typer.Context, file: SweepFile, options: RunOptions) -> None:
     """Run a scenario over a grid, list or Latin hypercube.
 
-    Its metrics become a table, limits, curves and maps. Without --out, results go to
-    results/<folder of the sweep file>/<its name>: report.html; table.csv and table.parquet, one row per
-    run; figures. Runs are made by worker processes. An interrupted sweep goes on where it was; nothing that
-    is finished is run again.
+    Writes report.html with tables, limits, curves and maps of the metrics; table.csv and table.parquet,
+    one row per run; figures. Without --out, results go to results/<folder of the sweep file>/<its name>.
+    Runs are made by worker processes. An interrupted sweep is resumed; finished runs are not repeated.
     """
-    of_files(context, [file], wishes)
+    of_files(context, [file], options)
 
 
 Studies = Annotated[
@@ -253,19 +252,19 @@ Studies = Annotated[
 
 
 @takes(*MAKING, "jobs", "format_", "quick", "fresh", "no_run")
-def report(context: typer.Context, wishes: RunOptions, studies: Studies = None) -> None:
+def report(context: typer.Context, options: RunOptions, studies: Studies = None) -> None:
     """Write one page that reproduces the papers.
 
-    report.html: per study the verdicts, system, figures, tables, parameters and their source. One file
-    that needs no server; figures lie beside it as SVG and PNG. Runs whose results are missing, or were
-    made from another scenario or FMU, are made first. Without --out, the page of one study lies in its
-    folder below results/, that of several in results/. Regions take most of the time, half an
-    hour on two cores for all studies in scenarios/; --quick leaves them out.
+    report.html: per study the verdicts, system, figures, tables, parameters and their sources; a single
+    file, with the figures beside it as SVG and PNG. Runs whose results are missing or out of date are
+    made first. Without --out, the page of one study goes to its folder below results/, that of several
+    to results/. Regions take most of the time, half an hour on two cores for all studies in scenarios/;
+    --quick omits them.
     """
     from ..pages.report import found_studies
 
     paths = list(dict.fromkeys(studies or found_studies()))
-    of_files(context, paths, wishes)
+    of_files(context, paths, options)
 
 
 TuningFile = Annotated[
@@ -274,13 +273,13 @@ TuningFile = Annotated[
 
 
 @takes(*CHANGES, *MAKING, "jobs", "scheduler", "fresh")
-def tune(context: typer.Context, file: TuningFile, wishes: RunOptions) -> None:
-    """Seek the parameters that minimize an objective.
+def tune(context: typer.Context, file: TuningFile, options: RunOptions) -> None:
+    """Find the parameters that minimize an objective.
 
-    Every law of the file has the same objective, search (differential evolution) and budget. Without
+    All control laws of the file have the same objective, search (differential evolution) and budget. Without
     --out, results go to results/<folder of the tuning file>/<its name>: report.html; trials.csv, one row per
-    trial; the history as a figure; where the file asks for it, entries.yaml for a ranking. An interrupted
-    search goes on where it was; with the same seed, and whatever the number of workers, it finds the same.
+    trial; the history as a figure; if the file asks for it, entries.yaml for a ranking. An interrupted
+    search is resumed; the same seed gives the same result with any number of workers.
     """
     from ..experiments.experiment import load_experiment
     from ..experiments.record import to_csv
@@ -300,24 +299,24 @@ def tune(context: typer.Context, file: TuningFile, wishes: RunOptions) -> None:
     from ..pages.page_parts import image_of
     from ..results.folder import default_folder
 
-    experiment = load_experiment(file, changes=wishes.changes)
-    folder = wishes.out or default_folder(file, wishes.changes)
+    experiment = load_experiment(file, changes=options.changes)
+    folder = options.out or default_folder(file, options.changes)
     hold(context, folder)
-    each = pooled(context, wishes)
+    each = pooled(context, options)
 
-    with stoppable(folder), executor_of(folder, experiment.identity, wishes, each) as execute:
+    with stoppable(folder), executor_of(folder, experiment.identity, options, each) as execute:
 
         def judged(trials: LoadedExperiment) -> ExperimentResult:
-            findings = execute(trials, keep=wishes.keep)
-            say_remarks(findings)
+            findings = execute(trials, keep=options.keep)
+            say_problems(findings)
             return findings
 
         found = search(experiment, judged)
-        findings = concluded(best_of(experiment, found), execute, wishes)
+        findings = concluded(best_of(experiment, found), execute, options)
     table = tuning_table(experiment, found)
     write_whole(folder / "trials.csv", to_csv(columns_of(found)))
     print_tables([table])
-    command = command_of("tune", file, **wishes.changing)
+    command = command_of("tune", file, **options.changing)
     if tuning_of(experiment).entries:
         write_whole(folder / ENTRIES, entries_text(entries_of(experiment, found), command))
     save(history_figure(experiment, found, command), folder / "history")

@@ -20,18 +20,19 @@ Masters = Annotated[
     typer.Option("--master", metavar="NAME", help="libcosim, Ecos or fmpy; repeatable. Default: all."),
 ]
 Pinned = Annotated[
-    bool, typer.Option("--one-core/--no-one-core", help="Measure every master also on one processor core.")
+    bool,
+    typer.Option("--one-core/--no-one-core", help="Also measure every master on a single processor core."),
 ]
 
 
 @takes(*CHANGES, "fmus", "no_build")
 def second_opinion(
-    scenario: ScenarioFile, wishes: RunOptions, master: Masters = None, one_core: Pinned = True
+    scenario: ScenarioFile, options: RunOptions, master: Masters = None, one_core: Pinned = True
 ) -> None:
     """Run a scenario in libcosim, Ecos and fmpy, and compare.
 
-    Every signal, and the time per step. Exit status 1 if one that should agree does not: libcosim
-    and Ecos run what `jacobi` runs here.
+    Compares every signal, and the time per step. Exit status 1 if libcosim or Ecos disagrees: their
+    algorithm is `jacobi`.
     """
     from ..errors import ScenarioError, SimulationError
     from ..interop.second_opinion import MASTERS, second_opinion
@@ -42,14 +43,14 @@ def second_opinion(
     for name in master or ():
         if name.lower() not in known:
             raise ScenarioError(
-                f"--master {name}: there is no such master{hint(name, known, lead='known')}",
+                f"--master {name}: unknown master{hint(name, known, lead='known')}",
                 code="master-unknown",
             )
     chosen = [known[name.lower()] for name in master or known]
-    plan = plan_of_scenario(scenario, wishes)
+    plan = plan_of_scenario(scenario, options)
     if plan.faults:
         raise ScenarioError(
-            f"{scenario}: other masters know nothing of faults; leave out {faults_of(plan)}",
+            f"{scenario}: faults are not supported by other masters; omit {faults_of(plan)}",
             code="faults-unsupported",
         )
     if plan.changes:
@@ -70,7 +71,7 @@ def second_opinion(
     if wrong:
         names = " and ".join(one.master.title for one in wrong)
         raise SimulationError(
-            f"{scenario}: no agreement with {names}, see above",
+            f"{scenario}: the results disagree with {names}, see above",
             instance=None,
             time=0.0,
             code="masters-disagree",
@@ -100,48 +101,51 @@ def show(opinions: list[SecondOpinion]) -> None:
         if one.problem:
             print(printable(f"{one.master.title}: {one.problem}"))
         elif one.one_step or one.master.note:
-            step = "compared with one step for all units: " if one.one_step else ""
+            step = "compared with a common step size for all units: " if one.one_step else ""
             print(printable(f"{one.master.title}: {step}{one.master.note}"))
 
 
 def _show_still(one: SecondOpinion) -> None:
-    """Print how many signals are constant during the run, so that comparing them says little."""
+    """Print which signals are constant during the run: their agreement is not evidence."""
     from ..messages import counted, fold, listed, printable
 
     if one.still:
         share = f"{len(one.still)} of {counted(len(one.differences), 'signal')}"
         names = listed(fold(list(one.still)))
-        print(printable(f"Constant during the run, so their agreement says little: {share}, {names}."))
+        print(printable(f"Constant during the run, so their agreement is not evidence: {share}, {names}."))
 
 
 ArchiveOption = Annotated[
-    Path | None, typer.Option("--out", metavar="FILE", help="The archive; default: <scenario>.ssp, here.")
+    Path | None,
+    typer.Option(
+        "--out", metavar="FILE", help="Archive to write. Default: <scenario>.ssp in the working directory."
+    ),
 ]
 
 
 Standard = Annotated[Literal["1.0", "2.0"], typer.Option("--standard", help="Version of SSP.")]
 For = Annotated[
     Literal["all", "omsimulator"],
-    typer.Option("--for", help="Leave out what OMSimulator refuses, and say what that is."),
+    typer.Option("--for", help="Omit what OMSimulator does not support, and list it."),
 ]
 
 
 @takes(*CHANGES, "fmus", "no_build")
 def export_ssp(
     scenario: ScenarioFile,
-    wishes: RunOptions,
+    options: RunOptions,
     out: ArchiveOption = None,
     for_: For = "all",
     standard: Standard = "1.0",
 ) -> None:
     """Write a scenario and its FMUs as an SSP archive.
 
-    SSP: System Structure and Parameterization. `yawbench run` reads it back and gives the same numbers.
+    SSP: System Structure and Parameterization. `yawbench run` accepts the archive and gives the same numbers.
     """
     from ..interop.ssp_write import for_omsimulator, write_ssp
     from ..labels import faults_of
 
-    plan = plan_of_scenario(scenario, wishes)
+    plan = plan_of_scenario(scenario, options)
     notes = list(map(str, plan.diagnostics))
     if plan.faults:
         notes.append(f"faults are not part of the archive: {faults_of(plan)}")
@@ -152,4 +156,4 @@ def export_ssp(
         say(f"note: {note}")
     path = out or Path(f"{scenario.stem}.ssp")
     write_ssp(plan, path, standard, named=out is not None)
-    say(f"{path}: {len(plan.instances)} units, {len(plan.wires)} connections")
+    say(f"{path}: {len(plan.instances)} instances, {len(plan.wires)} connections")

@@ -11,15 +11,15 @@ from .options import RunOptions, plan_of_scenario, takes
 
 Wanted = Annotated[
     Literal["runs", "scenarios", "fmus", "vehicles", "signals", "metrics"] | None,
-    typer.Argument(help="What to list; default: scenarios and vehicles.", metavar="WHAT"),
+    typer.Argument(help="What to list. Default: scenarios and vehicles.", metavar="WHAT"),
 ]
 SCENARIOS = ("a scenario", "a study file", "a sweep file")
 VEHICLES = ("a vehicle file",)
 ListedFolder = Annotated[
     Path | None,
     typer.Argument(
-        help="Of runs, scenarios, FMUs and vehicles: the folder to look in, default results, scenarios or "
-        "the nearest fmus. Of signals: a scenario; default: all FMUs.",
+        help="Folder to search for runs, scenarios, FMUs or vehicles; default: results, scenarios, or "
+        "the nearest fmus. For signals: a scenario; default: all FMUs.",
         metavar="PLACE",
     ),
 ]
@@ -27,16 +27,16 @@ ListedFolder = Annotated[
 
 Units = Annotated[
     bool,
-    typer.Option("--units", help="List FMUs with how each of them runs: natively, or in Python and why."),
+    typer.Option("--units", help="List FMUs and whether each runs natively, or why it runs in Python."),
 ]
 
 
 @takes("fmus")
-def list(wishes: RunOptions, what: Wanted = None, place: ListedFolder = None, units: Units = False) -> None:
+def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, units: Units = False) -> None:
     """List runs, scenarios, FMUs, vehicles, signals or metrics.
 
-    Runs are shown with when they began, their scenario, what was changed, how they ended, and the largest
-    sideslip, yaw rate and lateral acceleration.
+    Runs are listed with their start time, scenario, overrides, status, and the largest sideslip, yaw rate
+    and lateral acceleration.
     """
     from ..experiments.tables import (
         files_table,
@@ -53,7 +53,7 @@ def list(wishes: RunOptions, what: Wanted = None, place: ListedFolder = None, un
     from .progress import print_tables
 
     if units:
-        found, errors = fmus_in(_folder_of_fmus(place or wishes.fmus))
+        found, errors = fmus_in(_folder_of_fmus(place or options.fmus))
         table = units_table(found)
         table.notes += map(str, errors)
         print_tables([table])
@@ -73,30 +73,30 @@ def list(wishes: RunOptions, what: Wanted = None, place: ListedFolder = None, un
         table = metrics_table()
     elif what == "signals" and place is not None:
         scenario = catalogue.find(place, "a scenario")
-        table = recorded_table(plan_of_scenario(scenario, wishes))
+        table = recorded_table(plan_of_scenario(scenario, options))
     else:
-        found, errors = fmus_in(_folder_of_fmus(place or wishes.fmus))
+        found, errors = fmus_in(_folder_of_fmus(place or options.fmus))
         table = fmus_table(found, errors)
         if what == "signals":
             table = signals_table(found)
     print_tables([table])
 
 
-def _folder_of_fmus(given: Path | None) -> Path:
+def _folder_of_fmus(folder: Path | None) -> Path:
     """Return the given or the nearest folder of FMUs; if there is none, build the project's FMUs."""
     from fmus.build import build_all
     from fmus.upkeep import place_of
 
     from ..errors import ModelDescriptionError
     from ..fmu.opener import HOME, Opener, find_folder
-    from .build import tell_of_build
+    from .build import report_build
 
-    if given is None:
+    if folder is None:
         folder = find_folder(Path("here"), opener=Opener(build=True))
         if folder == HOME:
             folder = place_of(HOME)
-            build_all(folder, progress=tell_of_build)
+            build_all(folder, progress=report_build)
         return folder
-    if not any(given.glob("*.fmu")):
-        raise ModelDescriptionError(f"{given}: holds no FMUs", code="fmu-missing")
-    return given
+    if not any(folder.glob("*.fmu")):
+        raise ModelDescriptionError(f"{folder}: contains no FMUs", code="fmu-missing")
+    return folder

@@ -30,7 +30,7 @@ def check_name(name: str, *, role: str, taken: Iterable[str]) -> None:
     """
     if name.startswith(f"{role}_") and name != f"{role}_":
         raise ScenarioError(
-            f"{name!r}: leave out {role!r}, the FMU gets it by itself: {_plain(name, role)!r}",
+            f"{name!r}: omit {role!r}, which is added to the FMU's name: {_plain(name, role)!r}",
             code="name-invalid",
         )
     if not re.fullmatch(r"[a-z][a-z0-9_]{0,49}", name) or keyword.iskeyword(name):
@@ -39,18 +39,18 @@ def check_name(name: str, *, role: str, taken: Iterable[str]) -> None:
         guess = f"; for example {suggestion!r}" if usable else ""
         raise ScenarioError(
             f"{name!r} cannot name a {role}: use up to 50 lower-case letters, digits and _, "
-            f"a letter first, no word of Python{guess}",
+            f"starting with a letter, and no keyword of Python{guess}",
             code="name-invalid",
         )
     if f"{role}_{name}" in taken:
         raise ScenarioError(
-            f"there is a {role} {name!r} already; nothing is overwritten, choose another name",
+            f"the {role} {name!r} exists already; choose another name",
             code="file-exists",
         )
 
 
 def _plain(name: str, role: str) -> str:
-    """Return a valid name similar to the given one: MyIdea-2 -> my_idea_2."""
+    """Return a valid name similar to `name`: MyIdea-2 -> my_idea_2."""
     words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name)
     return re.sub(r"[^a-z0-9]+", "_", words.lower()).strip("_").removeprefix(f"{role}_")
 
@@ -80,7 +80,7 @@ UNITS = {
 MORE = {"road": ("road_patchwork", "")}
 """Instances that this run does not have."""
 ROLES = ("controller", "driver", "reference", "tyre", "plant", "road")
-"""Roles that there are templates for."""
+"""Roles that have templates."""
 KINDS = (*ROLES, "vehicle", "scenario", "study", "sweep")
 """All kinds of templates."""
 LAW = {"gain": 20000.0, "integral_gain": 50000.0, "limit": 5000.0}
@@ -90,7 +90,7 @@ VEHICLES = PurePosixPath("scenarios/vehicles")
 
 @dataclass(frozen=True)
 class NewFiles:
-    """New files by their paths relative to the project folder, and the role of the important ones."""
+    """New files by their paths relative to the project folder, and which of them to run, build and test."""
 
     files: dict[PurePosixPath, str]
     main: PurePosixPath  # the file to run: a scenario, a study, a sweep
@@ -180,7 +180,7 @@ def write_new(files: dict[PurePosixPath, str], folder: Path, *, also: Iterable[P
     if there:
         verb = "exists" if len(there) == 1 else "exist"
         raise ScenarioError(
-            f"{folder}: {listed(there)} {verb} already; nothing is overwritten, nothing written",
+            f"{folder}: {listed(there)} {verb} already; nothing was written",
             code="file-exists",
         )
     for path, text in files.items():
@@ -191,38 +191,36 @@ def write_new(files: dict[PurePosixPath, str], folder: Path, *, also: Iterable[P
 
 
 NewKind = Literal[KINDS]  # type: ignore[valid-type]
-NewKindArgument = Annotated[NewKind, typer.Argument(help="What to write.", metavar="KIND")]
-NewName = Annotated[str, typer.Argument(help="Its name: lower-case letters, digits and _.", metavar="NAME")]
+NewKindArgument = Annotated[NewKind, typer.Argument(help="Kind of template.", metavar="KIND")]
+NewName = Annotated[str, typer.Argument(help="Name: lower-case letters, digits and _.", metavar="NAME")]
 Written = Annotated[Literal["python", "c"], typer.Option("--language", help="Language of a controller.")]
 Project = Annotated[
     Path | None,
     typer.Option(
         "--out",
         metavar="DIR",
-        help="Folder of the project; default: the checkout you are in, else this folder.",
+        help="Project folder. Default: the current checkout, else the working directory.",
     ),
 ]
 
 
 def new(kind: NewKindArgument, name: NewName, language: Written = "python", out: Project = None) -> None:
-    """Write a starting point that works as it stands.
+    """Write a working template to start from.
 
-    KIND is a unit (controller, driver, reference, tyre, plant, road), written with its test and a scenario
-    that uses it; a vehicle with a scenario; a scenario; or a study or sweep of one. The next steps are
-    printed. In a checkout of yawbench the files are put among its own, where `yawbench build` finds them;
-    elsewhere into folders controllers, tests, scenarios and so on. Nothing is ever overwritten.
+    KIND is a component (controller, driver, reference, tyre, plant, road), written with a test and a
+    scenario that uses it; a vehicle with a scenario; a scenario; or a study or sweep of a scenario. The
+    commands to run next are printed. In a checkout of yawbench the files go beside its own, where
+    `yawbench build` finds them; elsewhere into folders controllers, tests, scenarios and so on. Existing
+    files are never overwritten.
     """
     from fmus.build import COMPONENTS, find_recipes
 
     from ..errors import ScenarioError
-
-    pass
-    pass
     from .progress import say
 
     check_name(name, role=kind, taken=set(find_recipes()))
     if language == "c" and kind != "controller":
-        raise ScenarioError("--language c: only a controller can be begun in C", code="name-invalid")
+        raise ScenarioError("--language c: only available for controllers", code="name-invalid")
     root = COMPONENTS.parent
     checkout = root if (root / "scenarios").is_dir() else None  # None: installed without them
     here = checkout is not None and Path.cwd().resolve().is_relative_to(checkout)
@@ -240,8 +238,6 @@ def new(kind: NewKindArgument, name: NewName, language: Written = "python", out:
 
 def _next(kind: str, name: str, begun: NewFiles, folder: Path, in_checkout: bool) -> list[list[str]]:
     """Return the commands that build, test and run the new files."""
-    pass
-
     yawbench, python = _program("yawbench"), _program("python")
     fmus = [] if in_checkout else ["--out", str(_shown(folder / "fmus"))]
     commands = [[yawbench, "build", *fmus]]

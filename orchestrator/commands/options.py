@@ -18,22 +18,22 @@ if TYPE_CHECKING:
     from ..plan import Override, Plan
 
 
-def named(kind: str, **told: Any) -> Any:
-    """Return an argument for a file of a kind, or for its name (see `scenario.catalogue`)."""
+def named(kind: str, **settings: Any) -> Any:
+    """Return an argument for a file of a kind, given as a path or a name (see `scenario.catalogue`)."""
 
-    def find(given: Any) -> Any:
+    def find(value: Any) -> Any:
         from ..scenario import catalogue
 
-        if isinstance(given, (list, tuple)):
-            return [catalogue.find(one, kind) for one in given]
-        return given and catalogue.find(given, kind)
+        if isinstance(value, (list, tuple)):
+            return [catalogue.find(name, kind) for name in value]
+        return value and catalogue.find(value, kind)
 
     def complete(incomplete: str) -> list[str]:
         from ..scenario import catalogue
 
         return [name for name in catalogue.names(kind) if name.startswith(incomplete)]
 
-    return typer.Argument(callback=find, autocompletion=complete, **told)
+    return typer.Argument(callback=find, autocompletion=complete, **settings)
 
 
 ScenarioFile = Annotated[
@@ -57,7 +57,7 @@ class RunOptions:
     swap: Annotated[
         list[str] | None,
         typer.Option(
-            "--swap", metavar="UNIT=FMU", help="Replace a unit's FMU: a name or a path. Repeatable."
+            "--swap", metavar="UNIT=FMU", help="Replace the FMU of a unit, by name or path. Repeatable."
         ),
     ] = None
     set_: Annotated[
@@ -73,33 +73,36 @@ class RunOptions:
         list[str] | None,
         typer.Option(
             "--fault",
-            metavar="'PLACE: KIND VALUE'",
-            help="Let something go wrong, such as 'plant.yaw_rate -> sensor: freeze from 2 s until 3 s'; "
-            "place: unit.output, unit.output -> unit or unit.input; "
-            f"kind: {', '.join(KINDS)}; {NO_FAULTS} takes away the scenario's own. Repeatable.",
+            metavar="'TARGET: KIND VALUE'",
+            help="Inject a fault, such as 'plant.yaw_rate -> sensor: freeze from 2 s until 3 s'; "
+            "target: unit.output, unit.output -> unit or unit.input; "
+            f"kind: {', '.join(KINDS)}; {NO_FAULTS} removes the scenario's own. Repeatable.",
         ),
     ] = None
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out", metavar="DIR", help="Folder for the results, and for the page if there is one."
-        ),
+        typer.Option("--out", metavar="DIR", help="Folder for the results and pages."),
     ] = None
     fmus: Annotated[
         Path | None,
-        typer.Option("--fmus", metavar="DIR", help="Folder of the FMUs; default: the nearest fmus/ folder."),
+        typer.Option("--fmus", metavar="DIR", help="Folder of the FMUs. Default: the nearest fmus/ folder."),
     ] = None
     no_build: Annotated[
         bool,
         typer.Option(
             "--no-build",
             envvar="YAWBENCH_NO_BUILD",
-            help="Use FMUs as they are, even if their sources have changed; by default they are rebuilt.",
+            help="Do not rebuild FMUs whose sources have changed.",
         ),
     ] = False
     jobs: Annotated[
         int | None,
-        typer.Option("--jobs", metavar="N", min=1, help="Runs at a time; default: one per processor core."),
+        typer.Option(
+            "--jobs",
+            metavar="N",
+            min=1,
+            help="Number of parallel runs. Default: the number of processor cores.",
+        ),
     ] = None
     scheduler: Annotated[
         str | None,
@@ -119,24 +122,24 @@ class RunOptions:
     quick: Annotated[
         bool,
         typer.Option(
-            "--quick", help="Judge claims at the chosen point alone, not over the region of the open values."
+            "--quick", help="Judge claims at the nominal point only, not over the region of open values."
         ),
     ] = False
     fresh: Annotated[
         bool,
-        typer.Option(
-            "--fresh", "--again", help="Make all runs anew, including those that have been made already."
-        ),
+        typer.Option("--fresh", "--again", help="Repeat all runs, including finished ones."),
     ] = False
     no_run: Annotated[
         bool,
-        typer.Option("--no-run", help="Run and build nothing: judge and draw what is in the results folder."),
+        typer.Option(
+            "--no-run", help="Only judge and draw what is in the results folder; build and run nothing."
+        ),
     ] = False
     isolate: Annotated[
         bool,
         typer.Option(
             "--isolate",
-            help="Run each unit in a process of its own: if its FMU crashes or hangs, the run ends with "
+            help="Run each unit in its own process: if its FMU crashes or hangs, the run ends with "
             "an error and the results so far. Same numbers; 30 to 70 µs more per unit and step.",
         ),
     ] = False
@@ -145,15 +148,14 @@ class RunOptions:
         typer.Option(
             "--call-limit",
             metavar="TIME",
-            help="With --isolate: the longest that a call of an FMU may take, such as '500 ms'; default: "
-            "10 s.",
+            help="With --isolate: time limit of an FMU call, such as '500 ms'. Default: 10 s.",
         ),
     ] = None
     no_validate: Annotated[
         bool,
         typer.Option(
             "--no-validate",
-            help="Accept FMUs whose model descriptions are formally wrong, with a warning that says what is.",
+            help="Accept FMUs with invalid model descriptions, with a warning.",
         ),
     ] = False
 
@@ -161,7 +163,7 @@ class RunOptions:
         from ..errors import ScenarioError
 
         if self.fresh and self.no_run:
-            raise ScenarioError("--fresh and --no-run contradict each other", code="option-invalid")
+            raise ScenarioError("--fresh and --no-run are mutually exclusive", code="option-invalid")
         if self.format_ != "csv":  # importing the other formats takes time
             from ..results.formats import check_format
 
@@ -194,7 +196,7 @@ class RunOptions:
         if not self.isolate:
             if given is not None:
                 raise ScenarioError(
-                    "--call-limit goes with --isolate: in one process no call can be ended",
+                    "--call-limit requires --isolate: a call in this process cannot be ended",
                     code="option-invalid",
                 )
             return None
@@ -215,19 +217,19 @@ class RunOptions:
 
 
 def takes(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Add options of `RunOptions` after a command's own; it receives them as `wishes`."""
+    """Decorate a command with options of `RunOptions`, passed as `options` and listed after its own."""
     shared = inspect.signature(RunOptions, eval_str=True).parameters
 
     def taking(command: Callable[..., None]) -> Callable[..., None]:
         own = inspect.signature(command, eval_str=True).parameters
 
         @functools.wraps(command)
-        def called(**given: Any) -> None:
-            wishes = RunOptions(**{name: given.pop(name) for name in names})
-            command(**given, wishes=wishes)
+        def called(**arguments: Any) -> None:
+            options = RunOptions(**{name: arguments.pop(name) for name in names})
+            command(**arguments, options=options)
 
-        every = [one for name, one in own.items() if name != "wishes"]
-        every += [one for name, one in shared.items() if name in names]
+        every = [parameter for name, parameter in own.items() if name != "options"]
+        every += [parameter for name, parameter in shared.items() if name in names]
         called.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
         return called
 
@@ -240,7 +242,7 @@ MAKING = ("out", "fmus", "no_build", "isolate", "call_limit")
 """Options of commands that make runs."""
 
 
-def plan_of_scenario(scenario: Path, wishes: RunOptions) -> Plan:
+def plan_of_scenario(scenario: Path, options: RunOptions) -> Plan:
     """Return the plan of a scenario with the overrides of the options, building its FMUs if necessary.
 
     Raises:
@@ -248,6 +250,6 @@ def plan_of_scenario(scenario: Path, wishes: RunOptions) -> Plan:
     """
     from ..planner import Planner
 
-    planner = Planner(build=wishes.build)
-    loaded = planner.load(scenario, wishes.changes, validate=not wishes.no_validate)
-    return planner.plan(loaded, fmus=wishes.fmus, isolated=wishes.isolate)
+    planner = Planner(build=options.build)
+    loaded = planner.load(scenario, options.changes, validate=not options.no_validate)
+    return planner.plan(loaded, fmus=options.fmus, isolated=options.isolate)

@@ -48,7 +48,7 @@ def hold(context: typer.Context, *folders: Path) -> None:
     context.with_resource(writing(*folders))
 
 
-def pooled(context: typer.Context, wishes: RunOptions) -> Each:
+def pooled(context: typer.Context, options: RunOptions) -> Each:
     """Return a `map` that distributes work over processes until this command ends.
 
     Raises:
@@ -56,7 +56,7 @@ def pooled(context: typer.Context, wishes: RunOptions) -> Each:
     """
     from ..workers import Pool
 
-    return context.with_resource(Pool(wishes.jobs)).map
+    return context.with_resource(Pool(options.jobs)).map
 
 
 @contextlib.contextmanager
@@ -70,7 +70,7 @@ def stoppable(folder: Path) -> Iterator[None]:
         yield
     except KeyboardInterrupt as error:
         number = Interrupted.of(error).number
-        raise Interrupted(f"Interrupted; what was recorded until then: {folder}", number=number) from None
+        raise Interrupted(f"Interrupted; results so far: {folder}", number=number) from None
 
 
 @dataclass
@@ -99,7 +99,9 @@ class Terminal:
         """Print how many runs are left, and show a bar; of runs with results, also a line for each."""
         total = len({(job.key, job.out) for job in jobs})
         done = total - len(left)
-        before = "" if not done else ", all finished before" if done == total else f", {done} finished before"
+        before = (
+            "" if not done else ", all finished already" if done == total else f", {done} finished already"
+        )
         say(f"{title}: {counted(len(jobs), 'run')}{before}")
         if not self.making or not left:
             return contextlib.nullcontext(lambda outcome: None)
@@ -107,25 +109,25 @@ class Terminal:
 
 
 def executor_of(
-    folder: Path, identity: str, wishes: RunOptions, each: Each = map, **of_jobs: Any
+    folder: Path, identity: str, options: RunOptions, each: Each = map, **of_jobs: Any
 ) -> Executor:
     """Return the executor of experiments in a results folder, which shows their progress on the terminal.
 
     Args:
         folder: locked results folder.
         identity: of the experiments in it.
-        wishes: the options of the command.
+        options: the options of the command.
         each: `map` used to read results.
         of_jobs: fields of all jobs in place of the options'.
     """
     from ..experiments.execution import Executor, runner_of
     from ..planner import Planner
 
-    runner = None if wishes.no_run else runner_of(wishes.jobs, wishes.scheduler)
-    planner = Planner(build=wishes.build)
-    given = wishes.of_jobs | of_jobs
+    runner = None if options.no_run else runner_of(options.jobs, options.scheduler)
+    planner = Planner(build=options.build)
+    given = options.of_jobs | of_jobs
     return Executor(
-        folder, identity, runner, planner, wishes.fresh, given, each, Terminal(making=not wishes.no_run)
+        folder, identity, runner, planner, options.fresh, given, each, Terminal(making=not options.no_run)
     )
 
 
@@ -152,7 +154,7 @@ def reported(
     width, count = len(str(total)), done
     with bar(title, total, done, quiet=each) as progress:
 
-        def told(outcome: Outcome) -> None:
+        def report(outcome: Outcome) -> None:
             nonlocal count
             count += 1
             progress(count)
@@ -160,12 +162,12 @@ def reported(
                 ended = f"{outcome.seconds:.1f} s" if outcome.ok else f"failed: {outcome.reason}"
                 say(f"[{count:{width}}/{total}] {outcome.job.label}: {ended}")
 
-        yield told
+        yield report
 
 
 @contextlib.contextmanager
 def bar(title: str, total: int, done: int = 0, *, quiet: bool = False) -> Iterator[Callable[[int], None]]:
-    """Show progress and the time left: a bar on a terminal, elsewhere a line now and then, or nothing."""
+    """Show progress and the time left: a bar on a terminal, elsewhere lines or nothing."""
     if not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
         yield (lambda count: None) if quiet else _lines(total, done)
         return
@@ -193,7 +195,7 @@ def _lines(total: int, done: int) -> Callable[[int], None]:
     """Return a function that prints a line for every tenth of the remaining runs."""
     began, last = time.monotonic(), done
 
-    def told(count: int) -> None:
+    def report(count: int) -> None:
         nonlocal last
         if count < total and 10 * (count - last) < total - done:
             return
@@ -201,7 +203,7 @@ def _lines(total: int, done: int) -> Callable[[int], None]:
         left = (time.monotonic() - began) / (count - done) * (total - count)
         say(f"[{count:{len(str(total))}}/{total}]" + (f" {left:.0f} s left" if count < total else ""))
 
-    return told
+    return report
 
 
 def save_figure(figure: Figure, wanted: Path | None, default: Path) -> None:

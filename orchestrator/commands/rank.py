@@ -24,28 +24,28 @@ Controller = Annotated[
     typer.Option(
         "--controller",
         metavar="FMU",
-        help="A controller of your own to stand beside the file's: path of its FMU, perhaps with parameters, "
+        help="Another controller to rank: path of its FMU, optionally with parameters, "
         "my.fmu:gain=3. Repeatable.",
     ),
 ]
 Only = Annotated[
     list[str] | None,
-    typer.Option("--only", metavar="ENTRY", help="Make the runs of this entry alone. Repeatable."),
+    typer.Option("--only", metavar="ENTRY", help="Run only this entry. Repeatable."),
 ]
 ConditionOption = Annotated[
     list[str] | None,
-    typer.Option("--condition", metavar="NAME", help="Drive this condition alone. Repeatable."),
+    typer.Option("--condition", metavar="NAME", help="Run only this condition. Repeatable."),
 ]
 Quick = Annotated[
     bool,
-    typer.Option("--quick", help="The last amplitude of few conditions: minutes, to see whether all works."),
+    typer.Option("--quick", help="Run only the last amplitude of a few conditions, as a trial (minutes)."),
 ]
 
 
 @takes(*MAKING, "jobs", "scheduler", "fresh", "no_run")
 def rank(
     context: typer.Context,
-    wishes: RunOptions,
+    options: RunOptions,
     file: RankingFile = Path("proving_ground/ranking"),
     controller: Controller = None,
     only: Only = None,
@@ -54,9 +54,9 @@ def rank(
 ) -> None:
     """Rank controllers by sine with dwell.
 
-    Begin with report.html. Without --out, results go to results/<folder of the ranking>/<its name>. Runs that
-    have been made already, of the same scenario, FMUs and program, are not made again; an entry that lacks
-    some has no place. A ranking that was stopped goes on where it was.
+    Start reading at report.html. Without --out, results go to results/<folder of the ranking>/<its name>.
+    Runs already made from the same scenario, FMUs and program version are not repeated, so an interrupted
+    ranking is resumed. Entries with missing runs are not ranked.
     """
     from ..errors import ScenarioError
     from ..experiments.ranking import load_ranking
@@ -70,32 +70,34 @@ def rank(
     for name in only or ():
         if name not in ranking.entries:
             raise ScenarioError(
-                f"--only {name}: there is no such entry{hint(name, ranking.entries, lead='known')}",
+                f"--only {name}: unknown entry{hint(name, ranking.entries, lead='known')}",
                 code="entry-unknown",
             )
-    folder = wishes.out or default_folder(file)
+    folder = options.out or default_folder(file)
     hold(context, folder)
-    with stoppable(folder), executor_of(folder, ranking.identity, wishes, format="parquet") as execute:
+    with stoppable(folder), executor_of(folder, ranking.identity, options, format="parquet") as execute:
         ranked = run_ranking(ranking, execute, only=only or ())
         command = command_of("rank", file, quick=quick, controller=controller, condition=condition)
-        _write(ranked, folder, command, pooled(context, wishes))
+        _write(ranked, folder, command, pooled(context, options))
     print_tables([table_of(ranked, "gains", "speed lost", "chatter")])
-    if lacking := [one.entry for one in ranked.scores if one.missing]:
-        say(f"without a place, as runs are missing: {', '.join(lacking)}")
+    if unranked := [score.entry for score in ranked.scores if score.missing]:
+        say(f"not ranked (missing runs): {', '.join(unranked)}")
 
 
-def _entry(given: str) -> tuple[str, EntrySpec]:
+def _entry(text: str) -> tuple[str, EntrySpec]:
     """Return the name and the entry of a controller given on the command line."""
     from ..errors import ScenarioError
     from ..experiments.ranking import CONTROLLER, EntrySpec
     from ..fault_kinds import FaultList
     from ..scenario.overrides import is_path, swap_of
 
-    fmu, *brought = swap_of(CONTROLLER, given, "--controller")
+    fmu, *settings = swap_of(CONTROLLER, text, "--controller")
     name = Path(str(fmu.value)).stem
     if is_path(str(fmu.value)) and not Path(str(fmu.value)).is_file():
         raise ScenarioError(f"--controller {fmu.value}: there is no such file", code="file-missing")
-    parameters = {one.target.variable: one.value for one in brought if not isinstance(one.value, FaultList)}
+    parameters = {
+        change.target.variable: change.value for change in settings if not isinstance(change.value, FaultList)
+    }
     words = ", ".join([name, *(f"{key} {value}" for key, value in parameters.items())])
     path = Path(str(fmu.value)).absolute() if is_path(str(fmu.value)) else fmu.value
     spec = EntrySpec(

@@ -18,15 +18,17 @@ from .options import CHANGES, MAKING, RunOptions, takes
 
 RunSources = Annotated[
     list[Path],
-    typer.Argument(help="Folders of results, or scenarios; several are overlaid.", metavar="RESULTS..."),
+    typer.Argument(help="Results folders or scenarios; several are overlaid.", metavar="RESULTS..."),
 ]
 Labels = Annotated[
     list[str] | None,
-    typer.Option("--label", metavar="TEXT", help="Label of a run in the legend, in the order of RESULTS."),
+    typer.Option(
+        "--label", metavar="TEXT", help="Label of a run in the legend, in the order of RESULTS. Repeatable."
+    ),
 ]
 
 
-def recorded(sources: Sequence[Path], wishes: RunOptions) -> list[Path]:
+def recorded(sources: Sequence[Path], options: RunOptions) -> list[Path]:
     """Return the folders of all results, after running scenarios that have none.
 
     Raises:
@@ -41,23 +43,23 @@ def recorded(sources: Sequence[Path], wishes: RunOptions) -> list[Path]:
     from ..scenario import catalogue
     from .progress import reported, say, stoppable
 
-    sources = [one if os.path.exists(one) else catalogue.named(one) or one for one in sources]
-    scenarios = [one for one in sources if one.suffix in catalogue.ENDINGS and not os.path.isdir(one)]
-    if wishes.changes and not scenarios:
+    sources = [path if os.path.exists(path) else catalogue.named(path) or path for path in sources]
+    scenarios = [path for path in sources if path.suffix in catalogue.ENDINGS and not os.path.isdir(path)]
+    if options.changes and not scenarios:
         raise ScenarioError(
-            "--swap, --set and --fault change a scenario; only folders of results are given",
+            "--swap, --set and --fault apply to scenarios, not to results folders",
             code="option-invalid",
         )
-    given = [Job(one.stem, one, Path(), wishes.changes, **wishes.of_jobs) for one in scenarios]
+    wanted = [Job(path.stem, path, Path(), options.changes, **options.of_jobs) for path in scenarios]
     jobs = {}
-    for job in ready(given, planner=Planner(build=wishes.build)):
+    for job in ready(wanted, planner=Planner(build=options.build)):
         assert job.plan is not None
         jobs[job.scenario] = replace(job, out=default_folder(job.scenario, job.plan.changes))
     for note in stale_fmus(unit.fmu for job in jobs.values() if job.plan for unit in job.plan.instances):
         say(f"note: {note}")
     stale = [job for job in jobs.values() if job.plan and staleness(job.plan, job.out)]
-    with stoppable(Path("results")), reported("", len(stale)) as told:
-        outcomes = execute(stale, done=told)
+    with stoppable(Path("results")), reported("", len(stale)) as report:
+        outcomes = execute(stale, done=report)
     for outcome in outcomes:
         if not outcome.ok:
             raise typer.Exit(outcome.exit_status)
@@ -86,7 +88,7 @@ def labels_of(folders: Sequence[Path], given: Sequence[str] | None) -> list[str]
 
     if given and len(given) != len(folders):
         counts = f"{counted(len(given), 'label')}, {counted(len(folders), 'folder')}"
-        raise ScenarioError(f"--label: needs one for each folder of results ({counts})")
+        raise ScenarioError(f"--label: give one label per results folder (got {counts})")
     return list(given or distinct(folders))
 
 
@@ -103,28 +105,27 @@ Panels = Annotated[
         "--panel",
         metavar="NAME",
         help="A signal (yaw_rate, plant.roll_angle, wheel_torque_*), its error (sideslip_error), one over "
-        "another (yaw_rate(sideslip)) or path; repeatable. Default: all the papers draw.",
+        "another (yaw_rate(sideslip)) or path; repeatable. Default: the figures of the papers.",
     ),
 ]
 
 
-AsPage = Annotated[bool, typer.Option("--page", help="Write view.html, a page to explore the runs.")]
+AsPage = Annotated[bool, typer.Option("--page", help="Write view.html, an interactive page, instead.")]
 
 
 @takes(*CHANGES, *MAKING)
 def plot(
     sources: RunSources,
-    wishes: RunOptions,
+    options: RunOptions,
     label: Labels = None,
     panel: Panels = None,
     page: AsPage = False,
 ) -> None:
-    """Draw runs, one or several overlaid.
+    """Draw one run, or several overlaid.
 
-    Figures are written as SVG and PNG; with --page, a page to explore the runs is written instead.
-    A scenario is run first if its results (those of `yawbench run` without --out) are missing or were
-    made from another scenario or FMU. Without --out, the figure of one run goes into its folder, that of
-    several into the folder that holds them all.
+    Figures are written as SVG and PNG; with --page, an interactive page is written instead. A scenario is
+    run first if its results (those of `yawbench run` without --out) are missing or out of date. Without
+    --out, the figure of one run goes into its folder, that of several into their common parent folder.
     """
     from ..experiments.comparison import FIGURES
     from ..figures.panels import check_panels, shown_by
@@ -133,10 +134,10 @@ def plot(
     from ..results.read import load_results
     from .progress import say
 
-    folders = recorded(sources, wishes)
+    folders = recorded(sources, options)
     labels = labels_of(folders, label)
     if page:
-        write_view(folders, labels, panel or (), wishes.out and wishes.out / "view.html")
+        write_view(folders, labels, panel or (), options.out and options.out / "view.html")
         return
     runs = [
         LabelledRun(name, load_results(folder, thin=True))
@@ -147,23 +148,23 @@ def plot(
     if len(runs) > 1 and not panel:
         figures = {name: panels for name, panels in FIGURES.items() if shown_by(runs, panels)}
     for name, panels in figures.items():
-        paths = save(draw(runs, panels), (wishes.out or folder_of_all(folders)) / name)
+        paths = save(draw(runs, panels), (options.out or folder_of_all(folders)) / name)
         say(f"{paths[0]}, {paths[1].name}")
 
 
-Page = Annotated[Path | None, typer.Option("--out", metavar="FILE.html", help="The page to write.")]
+Page = Annotated[Path | None, typer.Option("--out", metavar="FILE.html", help="Page to write.")]
 
 
 @takes(*CHANGES, "fmus", "no_build")
-def animate(sources: RunSources, wishes: RunOptions, label: Labels = None, out: Page = None) -> None:
-    """Write a page to explore runs: the same as `plot --page`.
+def animate(sources: RunSources, options: RunOptions, label: Labels = None, out: Page = None) -> None:
+    """Write an interactive page of runs, like `plot --page`.
 
-    Recorded signals of all runs with a common cursor, zoom, differences from a baseline; cars, paths, lanes,
-    patches of the road, tyre forces and friction circles, animated. A scenario is run first if its
-    results are missing or were made from another scenario or FMU. Without --out, the page of one run is
-    view.html in its folder; that of several lies in the folder that holds them all.
+    Shows all recorded signals with a common cursor, zoom and differences from a baseline, and animates
+    cars, paths, lanes, road patches, tyre forces and friction circles. A scenario is run first if its
+    results are missing or out of date. Without --out, the page of one run is view.html in its folder,
+    that of several goes to their common parent folder.
     """
-    folders = recorded(sources, wishes)
+    folders = recorded(sources, options)
     write_view(folders, labels_of(folders, label), (), out)
 
 
@@ -202,20 +203,22 @@ def write_view(
         write_whole(file, text, named=out is not None)
     except OSError as error:
         raise ResultsError(
-            f"{file}: the page cannot be written: {error.strerror or error}.", code="results-unwritable"
+            f"{file}: cannot write the page: {error.strerror or error}", code="results-unwritable"
         ) from None
     say(f"{file}: {len(text.encode()) / 1000:.0f} kB")
 
 
-Folders = Annotated[list[Path], typer.Argument(help="Folders of runs that died.", metavar="FOLDER...")]
+Folders = Annotated[
+    list[Path], typer.Argument(help="Results folders of runs that were killed.", metavar="FOLDER...")
+]
 
 
 def salvage(folders: Folders) -> None:
-    """Recover what runs recorded before they died.
+    """Recover the results of runs that were killed.
 
-    Killed processes leave files that end in .part. The whole rows among them become results with the
-    status "died"; if results of an earlier run stand in the folder they go to failed/ beside those, which
-    can then be read again. Of Parquet and MDF, which can be read only whole, nothing is kept.
+    Killed processes leave files that end in .part. Their complete rows become results with the status
+    "died"; if the folder has results of an earlier run, which become readable again, they go to failed/
+    instead. Incomplete Parquet and MDF files cannot be recovered.
     """
     from ..messages import counted
     from ..results.salvage import lost_format, salvage
@@ -227,5 +230,5 @@ def salvage(folders: Folders) -> None:
         if rows:
             say(f"{place}: {counted(rows, 'row')}")
         else:
-            why = f"{lost} can be read only whole" if lost else "it had written no row"
-            say(f"{folder}: nothing of the run could be kept: {why}")
+            why = f"incomplete {lost} files cannot be read" if lost else "no complete row was written"
+            say(f"{folder}: nothing could be recovered: {why}")

@@ -23,15 +23,14 @@ MetricsOption = Annotated[
     typer.Option(
         "--metric",
         metavar="NAME",
-        help="Print a metric of the run, such as 'peak(sideslip)' or 'peak(sideslip) from 1 s to 3 s'; "
-        "'standard' prints the usual ones. "
-        "Repeatable.",
+        help="Metric to print, such as 'peak(sideslip)' or 'peak(sideslip) from 1 s to 3 s'; "
+        "'standard' prints the standard metrics. Repeatable.",
     ),
 ]
 
 RunName = Annotated[
     str | None,
-    typer.Option("--name", metavar="NAME", help="Name of the folder for the results, below results/."),
+    typer.Option("--name", metavar="NAME", help="Name of the results folder, below results/."),
 ]
 
 SHOWN = 5
@@ -42,13 +41,13 @@ BESIDE = 36
 
 @takes(*CHANGES, *MAKING, "format_", "no_validate")
 def run(
-    scenario: ScenarioFile, wishes: RunOptions, name: RunName = None, metric: MetricsOption = None
+    scenario: ScenarioFile, options: RunOptions, name: RunName = None, metric: MetricsOption = None
 ) -> None:
     """Run a scenario and write results.csv and run.json.
 
-    Without --out, results go to results/<folder of the scenario>/<its name>, followed by what --swap
-    and --set change, or to results/NAME. They replace those of an earlier run there, except that a
-    failed run never replaces a good one: its results go to a folder failed/ below.
+    Without --out and --name, results go to results/<folder of the scenario>/<its name>, with the overrides
+    appended to the name. They replace those of an earlier run, but a failed run never replaces a
+    completed one: its results go to failed/ in that folder.
     """
     from ..errors import ScenarioError, SimulationError
     from ..labels import changed, with_changes
@@ -60,29 +59,29 @@ def run(
     from ..results.formats import size_note
     from ..results.lock import refuse_below_others
 
-    if wishes.out and name:
-        raise ScenarioError(
-            "--out names the folder and --name a part of its path: give one of them", code="option-invalid"
-        )
+    if options.out and name:
+        raise ScenarioError("--out and --name are mutually exclusive", code="option-invalid")
     metrics = _metric_names(metric or ())
-    plan = plan_of_scenario(scenario, wishes)
+    plan = plan_of_scenario(scenario, options)
     if named := [name for name in metric or () if name != "standard"]:
         from ..metrics import run_metrics
 
         run_metrics.check_metrics(plan, map(run_metrics.metric, named))
-    folder = wishes.out or default_folder(scenario, plan.changes, name=name)
+    folder = options.out or default_folder(scenario, plan.changes, name=name)
     refuse_below_others(folder)
-    for note in (*plan.diagnostics, size_note(plan, folder, wishes.format_)):
+    for note in (*plan.diagnostics, size_note(plan, folder, options.format_)):
         if note:
             say(f"note: {note}")
-    if wishes.limit is None and (why := slower_because()):
-        say(f"note: {why}; Python makes the steps, which takes longer")
+    if options.limit is None and (why := slower_because()):
+        say(f"note: {why}; stepping in Python, which is slower")
     if plan.changes:
         say(f"changed: {changed(plan.changes)}")
     title = with_changes(plan.title or scenario.stem, plan.changes)
     try:
-        with _bar(title) as progress, opener_of(plan, wishes.limit) as opener:
-            info = simulate(plan, folder, progress=progress, opener=opener, format=wishes.format_, apart=True)
+        with _bar(title) as progress, opener_of(plan, options.limit) as opener:
+            info = simulate(
+                plan, folder, progress=progress, opener=opener, format=options.format_, apart=True
+            )
     except SimulationError as error:
         _say_warnings(error.warnings)
         raise
@@ -109,17 +108,17 @@ def run(
 def _say_warnings(diagnostics: Iterable[Diagnostic]) -> None:
     from ..errors import warnings_in
 
-    for one in warnings_in(diagnostics):
-        say(f"note: {one}")
+    for warning in warnings_in(diagnostics):
+        say(f"note: {warning}")
 
 
-def _metric_names(given: Sequence[str]) -> list[str]:
+def _metric_names(texts: Sequence[str]) -> list[str]:
     """Return the metrics given by `--metric`, each once."""
-    if not given:
+    if not texts:
         return []
     from ..metrics.run_metrics import STANDARD, metric
 
-    names = [name for one in given for name in (STANDARD if one == "standard" else [metric(one).name])]
+    names = [name for text in texts for name in (STANDARD if text == "standard" else [metric(text).name])]
     return list(dict.fromkeys(names))
 
 

@@ -31,7 +31,9 @@ TestToDrive = Annotated[DrivenName, typer.Argument(help="The test.", metavar="TE
 ScenarioOption = Annotated[
     str | None,
     typer.Option(
-        "--scenario", metavar="SCENARIO", help="Scenario of one run; default: the test's in proving_ground."
+        "--scenario",
+        metavar="SCENARIO",
+        help="Scenario of a single run. Default: that of the test in proving_ground.",
     ),
 ]
 Slow = Annotated[
@@ -44,35 +46,42 @@ Slow = Annotated[
 ]
 VehicleOption = Annotated[
     str | None,
-    typer.Option("--vehicle", metavar="FILE", help="Vehicle file, or the name of one as in list."),
+    typer.Option(
+        "--vehicle", metavar="FILE", help="Vehicle file, or a name that `yawbench list vehicles` gives."
+    ),
 ]
 StartAngle = Annotated[
     str | None,
-    typer.Option("--angle", metavar="ANGLE", help="A in place of runs that find it, such as '35.8 deg'."),
+    typer.Option(
+        "--angle",
+        metavar="ANGLE",
+        help="A (hand-wheel angle at 0.3 g), such as '35.8 deg'; default: measured by runs.",
+    ),
 ]
-DriveFigures = Annotated[bool, typer.Option("--figures", help="Draw every run, not the series alone.")]
+DriveFigures = Annotated[bool, typer.Option("--figures", help="Also draw every run.")]
 
 
 @takes(*CHANGES, *MAKING, "jobs", "fresh")
 def drive(
     context: typer.Context,
     test: TestToDrive,
-    wishes: RunOptions,
+    options: RunOptions,
     vehicle: VehicleOption = None,
     scenario: ScenarioOption = None,
     slow_steer: Slow = None,
     angle: StartAngle = None,
     figures: DriveFigures = False,
 ) -> None:
-    """Drive a standard test with all its runs and evaluate it.
+    """Make all runs of a standard test and evaluate them.
 
-    Sine with dwell: slowly increasing steer to both sides gives A, from which the amplitudes follow, left
-    first and right first. Without --out, results go to results/<folder of the scenario>/<its name>_series.
-    An interrupted series goes on where it was; nothing that is finished is run again. Of a car that rolls
-    over, what it has recorded until then is judged, as far as it goes.
+    Sine with dwell: slowly increasing steer to both sides gives the angle A, which determines the
+    amplitudes, driven left first and right first. If the car rolls over, the run is judged up to then.
 
-    Lane changes of ISO 3888: the highest speed at the first cones at which no cone is touched, to half a
-    kilometre per hour, from the scenario's own speed in steps and halves.
+    Lane changes of ISO 3888: finds the highest entry speed without touching a cone, to half a kilometre
+    per hour, starting at the scenario's speed.
+
+    Without --out, results go to results/<folder of the scenario>/<its name>_series. An interrupted series
+    is resumed; finished runs are not repeated.
     """
     from ..errors import ScenarioError
     from ..experiments.standard_test_runs import TestDriver
@@ -80,15 +89,15 @@ def drive(
     from ..scenario import catalogue
 
     chosen = DRIVEN[test]
-    changes = (*_vehicle(vehicle), *wishes.changes)
+    changes = (*_vehicle(vehicle), *options.changes)
     one_run = catalogue.find(scenario or f"{GROUND}/{str(test).replace('-', '_')}", "a scenario")
-    folder = wishes.out or default_folder(one_run, changes, suffix="_series")
-    execute = executor_of(folder, str(one_run), wishes, format="parquet")
+    folder = options.out or default_folder(one_run, changes, suffix="_series")
+    execute = executor_of(folder, str(one_run), options, format="parquet")
     if (angle or slow_steer) and not chosen.needs_angle:
         raise ScenarioError(f"{test} takes no A: omit --angle and --slow-steer", code="option-invalid")
     for change in changes:
         if str(change.target) in chosen.varies:
-            why = "the series itself says what is driven"
+            why = "set by the series itself"
             raise ScenarioError(f"{change.target}: {why}", code="option-invalid")
     steer = f"{GROUND}/slowly_increasing_steer"
     slow = catalogue.find(slow_steer or steer, "a scenario") if chosen.needs_angle else None
@@ -98,7 +107,7 @@ def drive(
         known = angle_of(angle) or _angle_driven(slow, changes, execute)
         say(f"A = {math.degrees(known):.1f} degrees")
     driver = TestDriver(
-        chosen, one_run, changes, execute, lambda title, runs: _made(title, runs, execute), known
+        chosen, one_run, changes, execute, lambda title, runs: _run_all(title, runs, execute), known
     )
     series = chosen.drive(driver)
     EvaluatedRuns(chosen, driver.traces, driver.judged, series, known, folder).conclude(each=figures)
@@ -110,14 +119,14 @@ def _angle_driven(scenario: Path, changes: Sequence[Override], execute: Executor
     """Return A [rad] from runs of slowly increasing steer.
 
     Raises:
-        ResultsError: they do not give it.
-        typer.Exit: one of them has failed.
+        ResultsError: the runs do not determine it.
+        typer.Exit: a run failed.
     """
     from ..errors import ResultsError
     from ..evaluation.steering_tests import characteristic_angle, evaluate_slow_steer
     from ..experiments.standard_test_runs import slow_steer_runs, traces
 
-    jobs, status = _made("slowly increasing steer", slow_steer_runs(scenario, changes, execute), execute)
+    jobs, status = _run_all("slowly increasing steer", slow_steer_runs(scenario, changes, execute), execute)
     if status:
         raise typer.Exit(status)
     try:
@@ -126,8 +135,8 @@ def _angle_driven(scenario: Path, changes: Sequence[Override], execute: Executor
         raise ResultsError(str(why), code="test-not-applicable") from None
 
 
-def _made(title: str, runs: Sequence[NamedRun], execute: Executor) -> tuple[list[Job], int]:
-    """Make the runs that are not finished; return their jobs and the exit status, not 0 if one failed.
+def _run_all(title: str, runs: Sequence[NamedRun], execute: Executor) -> tuple[list[Job], int]:
+    """Make unfinished runs; return all jobs and the exit status, not 0 if a run failed.
 
     Raises:
         typer.Exit: Ctrl-C.
@@ -137,7 +146,7 @@ def _made(title: str, runs: Sequence[NamedRun], execute: Executor) -> tuple[list
     jobs = execute.planned(experiment_of(runs[0].scenario, runs, title=title)).jobs
     with stoppable(execute.folder):
         outcomes = execute.run(title, jobs, journaled=False)
-    return jobs, max((one.exit_status for one in outcomes if not one.ok), default=0)
+    return jobs, max((outcome.exit_status for outcome in outcomes if not outcome.ok), default=0)
 
 
 def _vehicle(given: str | None) -> tuple[Override, ...]:
@@ -159,13 +168,13 @@ TestToEvaluate = Annotated[TestName, typer.Argument(help="The test.", metavar="T
 EvaluatedSources = Annotated[
     list[Path],
     typer.Argument(
-        help="Folders of results, also with runs in folders below; or with --signals files of columns.",
+        help="Results folders, searched with their subfolders; with --signals, files of measured data.",
         metavar="RESULTS...",
     ),
 ]
 SignalsOption = Annotated[
     Path | None,
-    typer.Option("--signals", metavar="FILE", help="Mapping: which columns of measured files are what."),
+    typer.Option("--signals", metavar="FILE", help="Mapping of the columns of measured files to signals."),
 ]
 SlowSteer = Annotated[
     list[Path] | None,
@@ -181,7 +190,7 @@ EvaluationFigures = Annotated[bool, typer.Option("--figures/--no-figures", help=
 OutFile = Annotated[
     Path | None,
     typer.Option(
-        "--out", metavar="DIR", help="Folder for evaluation.json and figures; default: that of the run(s)."
+        "--out", metavar="DIR", help="Folder for evaluation.json and figures. Default: that of the runs."
     ),
 ]
 
@@ -197,11 +206,11 @@ def evaluate(
     figures: EvaluationFigures = True,
     out: OutFile = None,
 ) -> None:
-    """Evaluate runs as a standard test says.
+    """Evaluate recorded or measured runs of a standard test.
 
-    Every quantity, a verdict per criterion with its reason, a figure per run; also of measured data.
-    Of sine with dwell, A comes from runs of slowly increasing steer (--slow-steer) or is given
-    (--angle); several runs are judged as a series. Exit status 1 if nothing could be judged.
+    Prints all quantities and a verdict with its reason per criterion; draws a figure per run. For sine
+    with dwell, give A with --slow-steer or --angle; several runs are judged as a series. Exit status 1
+    if nothing could be judged.
     """
     from ..evaluation.trace import load_mapping, load_trace
     from ..results.folder import below_results
@@ -221,7 +230,7 @@ def evaluate(
     EvaluatedRuns(chosen, traces, judged, series, known, folder).conclude(
         each=figures, together=out is not None
     )
-    if all(one.judges_nothing for one in judged):
+    if all(evaluation.judges_nothing for evaluation in judged):
         say(f"{chosen.name}: nothing could be judged, see above")
         raise typer.Exit(1)
 
@@ -294,23 +303,23 @@ def _runs(source: Path, mapping: MappingSpec | None) -> list[Path]:
 
     if not source.is_dir():
         if not source.exists():
-            raise ResultsError(f"{source}: there is no such folder or file", code="results-missing")
+            raise ResultsError(f"{source}: no such file or folder", code="results-missing")
         return [source]
     runs = found_runs(source)
     found = [run.folder for run in runs if run.status == COMPLETED]
     unreadable = [run.problem for run in runs if run.status == UNREADABLE]
     if not found:
-        raise ResultsError(unreadable or f"{source}: holds no run that was completed", code="runs-missing")
+        raise ResultsError(unreadable or f"{source}: contains no completed run", code="runs-missing")
     for problem in unreadable:
-        say(f"note: left out: {problem}")
+        say(f"note: skipped: {problem}")
     return found
 
 
 def angle_of(given: str | None) -> float | None:
-    """Return A [rad] as given by an option, None if it is not given.
+    """Return A [rad] as given by `--angle`; None without it.
 
     Raises:
-        ScenarioError: the text is not such an angle.
+        ScenarioError: the text is not an angle between 0 and 360 degrees.
     """
     from ..errors import ScenarioError
     from ..scenario.quantities import convert
@@ -335,12 +344,11 @@ def _angle(
     from ..errors import ResultsError, ScenarioError
     from ..evaluation.steering_tests import characteristic_angle, evaluate_slow_steer
     from ..evaluation.trace import load_trace
+    from ..messages import counted
     from .progress import say
 
     if given and slow_steer:
-        raise ScenarioError(
-            "--angle and --slow-steer both say what A is: give one of them", code="option-invalid"
-        )
+        raise ScenarioError("--angle and --slow-steer are mutually exclusive", code="option-invalid")
     if (given or slow_steer) and not test.needs_angle:
         raise ScenarioError(f"{test.name} takes no A: omit --angle and --slow-steer", code="option-invalid")
     if not slow_steer:
@@ -350,5 +358,6 @@ def _angle(
         angle = characteristic_angle([evaluate_slow_steer(load_trace(p, mapping)) for p in places])
     except NotJudged as why:
         raise ResultsError(str(why), code="test-not-applicable") from None
-    say(f"A = {math.degrees(angle):.1f} degrees, from {len(places)} of slowly increasing steer")
+    runs = counted(len(places), "run")
+    say(f"A = {math.degrees(angle):.1f} degrees, from {runs} of slowly increasing steer")
     return angle

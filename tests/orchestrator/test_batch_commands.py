@@ -167,7 +167,7 @@ def test_study_makes_again_only_what_has_not_been_made_of_the_same_scenario(yawb
         json.loads((folder / f"o/{run}/run.json").read_text())["id"] for run in ("off", "fuzzy_sideslip")
     ]
     assert (ids[0] == again[0], ids[1] == again[1]) == (False, True)
-    assert "finished before" not in yawbench("study", "study.yaml", "--out", "o", "--fresh")[2]
+    assert "finished already" not in yawbench("study", "study.yaml", "--out", "o", "--fresh")[2]
 
 
 def test_options_change_all_runs_of_a_study_and_are_named(yawbench, folder):
@@ -194,11 +194,11 @@ def test_study_judges_what_is_there_without_running(yawbench, folder):
 
 
 def test_study_without_running_tells_which_results_are_of_another_run(yawbench, folder):
-    assert "not what a run would give now" not in yawbench("study", "study.yaml", "--out", "o")[2]
-    assert "not what a run would give now" not in yawbench("study", "study.yaml", "--out", "o", "--no-run")[2]
+    assert "out of date" not in yawbench("study", "study.yaml", "--out", "o")[2]
+    assert "out of date" not in yawbench("study", "study.yaml", "--out", "o", "--no-run")[2]
     scenario = folder / "half.yaml"
     scenario.write_text(scenario.read_text() + "# the same\n")
-    assert "not what a run would give now" not in yawbench("study", "study.yaml", "--out", "o", "--no-run")[2]
+    assert "out of date" not in yawbench("study", "study.yaml", "--out", "o", "--no-run")[2]
     scenario.write_text(SCENARIO.replace("stop_time: ", "stop_time: 1"))
     status, _, said = yawbench("study", "study.yaml", "--out", "o", "--no-run")
     assert status == 0

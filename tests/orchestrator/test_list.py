@@ -84,7 +84,7 @@ def test_runs_that_are_the_same_say_so(yawbench, tmp_path):
         (("runs", "."), ".: holds no results; make some with 'yawbench run SCENARIO'"),
         (("scenarios", "."), ".: holds no file that is a scenario or a study file or a sweep file"),
         (("vehicles", "none"), "none: there is no such folder"),
-        (("fmus", "."), ".: holds no FMUs"),
+        (("fmus", "."), ".: contains no FMUs"),
     ],
 )
 def test_a_list_of_nothing_is_one_sentence(arguments, sentence, yawbench, tmp_path, monkeypatch):

@@ -72,7 +72,7 @@ def in_one_sentence(said, arguments, words):
         ((*RUN, "--out", "a_file"), ["a_file: results cannot be written here", "name another with --out"]),
         ((*RUN, "--format", "excel"), ["no such format; there are: csv, parquet and mf4"]),
         ((*RUN, "--fmus", "nowhere"), ["--fmus nowhere: no such folder"]),
-        ((*RUN, "--call-limit", "5"), ["--call-limit goes with --isolate"]),
+        ((*RUN, "--call-limit", "5"), ["--call-limit requires --isolate"]),
         (("plot", "nowhere"), ["nowhere: no results here", "make them with 'yawbench run SCENARIO"]),
         (("list", "runs"), ["results: there is no such folder"]),
         (("build", "controler_off"), [f"there is no component 'controler_off'; {KNOWN} 'controller_off'?"]),

@@ -202,14 +202,14 @@ def test_the_other_language_does_not_overwrite_either(tmp_path, new):
     [
         ("MyIdea", "for example 'my_idea'"),
         ("my-idea", "for example 'my_idea'"),
-        ("2nd", "a letter first"),
-        ("lambda", "no word of Python"),
+        ("2nd", "starting with a letter"),
+        ("lambda", "no keyword of Python"),
         ("../idea", "for example 'idea'"),
-        ("", "a letter first"),
+        ("", "starting with a letter"),
         ("x" * 51, "up to 50"),
         ("idéa", "lower-case letters, digits and _"),
-        ("controller_idea", "leave out 'controller', the FMU gets it by itself: 'idea'"),
-        ("fnn", "there is a controller 'fnn' already"),
+        ("controller_idea", "omit 'controller', which is added to the FMU's name: 'idea'"),
+        ("fnn", "the controller 'fnn' exists already"),
     ],
 )
 def test_a_name_that_cannot_be_is_refused_in_one_sentence(tmp_path, new, name, sentence):

@@ -198,7 +198,7 @@ def test_a_ranking_that_was_killed_goes_on_where_it_was(tmp_path, capsys):
     assert not (out / "table.csv").exists()
     assert status_of("rank", file, "--out", out) == 0
     told = capsys.readouterr().err
-    assert re.search(r"small: 4 runs, [123] finished before", told), told
+    assert re.search(r"small: 4 runs, [123] finished already", told), told
     assert [one["missing"] for one in rows(out / "table.csv")] == ["0", "0"]
 
 
@@ -218,11 +218,11 @@ def test_noisy_sensors_give_a_margin_with_its_confidence(tmp_path):
         (("car: s,", "car: t,"), (), "conditions.dry.car: there is no car 't'; there are s"),
         (("every: 20", "evry: 20"), (), "unknown key; did you mean 'every'?"),
         (("source: paper C", "sauce: paper C"), (), "did you mean 'source'?"),
-        ((), ("--only", "fuzy_pid"), "--only fuzy_pid: there is no such entry; did you mean 'fuzzy_pid'?"),
+        ((), ("--only", "fuzy_pid"), "--only fuzy_pid: unknown entry; did you mean 'fuzzy_pid'?"),
         ((), ("--condition", "wet"), "there is no condition 'wet'"),
         ((), ("--controller", "nowhere/my.fmu"), "--controller nowhere/my.fmu: there is no such file"),
         ((), ("--controller", "none"), "there is already an entry 'none'"),
-        ((), ("--fresh", "--no-run"), "--fresh and --no-run contradict each other"),
+        ((), ("--fresh", "--no-run"), "--fresh and --no-run are mutually exclusive"),
         ((), ("--no-run",), "holds no A of 's' of this build; rank without --no-run"),
     ],
 )

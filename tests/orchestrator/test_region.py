@@ -285,7 +285,7 @@ def test_study_makes_the_runs_of_the_region_once_and_quick_leaves_them_out(
     assert golden_in(said)
     assert record["claims"][0]["region"] == region
     out, said, record = study("--no-run", "--quick")
-    assert "region of its verdicts" not in said
+    assert "region of the verdicts" not in said
     only = "at the chosen point only; the region of the open values has not been run"
     assert golden_in(said)
     assert f"verdicts: {only}" in " ".join(out.split())

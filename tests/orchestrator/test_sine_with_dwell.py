@@ -505,7 +505,7 @@ def test_a_series_with_a_car_that_rolls_over_has_a_verdict(tmp_path, capsys):
     "options, sentence",
     [
         (("--vehicle", "large_salon"), "did you mean 'large_saloon'?"),
-        (("--set", "driver.amplitude=1"), "driver.amplitude: the series itself says what is driven"),
+        (("--set", "driver.amplitude=1"), "driver.amplitude: set by the series itself"),
         (("--angle", "400 deg"), "--angle: must be between 0 and 360 degrees"),
         (("--angle", "3 m"), "--angle: '3 m' is not a value in rad"),
     ],
@@ -520,7 +520,7 @@ def test_what_a_series_cannot_be_driven_with_is_said_before_any_run(options, sen
     "options, sentence",
     [
         (("--angle", "40 deg"), "iso-3888-2 takes no A: omit --angle and --slow-steer"),
-        (("--set", "speed=70km/h"), "speed: the series itself says what is driven"),
+        (("--set", "speed=70km/h"), "speed: set by the series itself"),
     ],
 )
 def test_what_a_series_of_lane_changes_cannot_be_driven_with_is_said_before_any_run(

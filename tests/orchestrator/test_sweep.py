@@ -246,7 +246,7 @@ def test_a_run_that_kills_its_process_every_time_is_named_and_tried_again_next_t
     assert [row["status"] for row in found] == ["completed"] * 2 + ["failed"] * 2
     assert golden(found[2]["reason"])
     assert len(journal(tmp_path / "out")) == 2
-    assert "4 runs, 2 finished before" in yawbench(file, "out")[2]
+    assert "4 runs, 2 finished already" in yawbench(file, "out")[2]
 
 
 def test_more_levels_add_runs_and_repeat_none(moods, yawbench, tmp_path):
@@ -260,7 +260,7 @@ def test_more_levels_add_runs_and_repeat_none(moods, yawbench, tmp_path):
 def test_fresh_makes_all_runs_again(moods, yawbench, tmp_path):
     file = moods(10)
     yawbench(file, "out")
-    assert "finished before" not in yawbench(file, "out", "--fresh")[2]
+    assert "finished already" not in yawbench(file, "out", "--fresh")[2]
     assert len(journal(tmp_path / "out")) == 2
 
 
@@ -268,7 +268,7 @@ def test_kept_results_can_be_loaded_in_every_format_and_are_made_once(moods, yaw
     file = moods(10)
     yawbench(file, "out")
     assert not (tmp_path / "out" / "runs").exists()
-    assert "finished before" not in yawbench(file, "out", "--keep", "--format", "parquet")[2]
+    assert "finished already" not in yawbench(file, "out", "--keep", "--format", "parquet")[2]
     results = load_results(tmp_path / "out" / "runs" / rows(tmp_path / "out")[1]["key"][:12])
     assert results.file.name == "results.parquet"
     assert results["controller.yaw_moment"][-1] == pytest.approx(1.0)

@@ -42,7 +42,7 @@ def test_a_cluster_gives_the_table_of_this_machine_to_the_byte(moods, yawbench, 
     assert (tmp_path / "here" / "table.parquet").read_bytes() == (
         tmp_path / "there" / "table.parquet"
     ).read_bytes()
-    assert "all finished before" in yawbench(file, "there", "--scheduler", cluster.scheduler_address)[2]
+    assert "all finished already" in yawbench(file, "there", "--scheduler", cluster.scheduler_address)[2]
 
 
 def test_runs_travel_in_batches_as_long_as_workers_stay_busy_alike():
