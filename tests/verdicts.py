@@ -30,11 +30,11 @@ FILE = ROOT / "docs" / "verdicts.md"
 HEAD = """# Every verdict, and how far it carries
 
 All claims of the four papers, judged over the values that each of them leaves open. A verdict in **bold** is
-robust: nothing flips it, no point of the region and no open value by itself.
-[How far a verdict carries](regions.md) says what is run and what the columns mean; the ranges of the open
-values, and the reason for each, stand in the study files and in `results/report.html`.
+robust: no point of the region and no single open value flips it.
+[How far a verdict carries](regions.md) explains the runs and the columns; the ranges of the open values, and
+the reason for each, are in the study files and in `results/report.html`.
 
-*A test makes all these runs and holds this page to them.*
+*A test makes all these runs and checks this page.*
 """
 KINDS = (HOLDS, UNDECIDED, FAILS["claims"])
 

@@ -33,7 +33,7 @@ def page() -> str:
     return "\n\n".join(parts)
 
 
-_INTRODUCTION = """Called as `.venv/bin/yawbench` in a checkout; `--help` says the same on a terminal. Exit
-status 0: fine, 1: a run failed, 2: the input is wrong. Tables go to standard output, everything else that
-is said to standard error.
+_INTRODUCTION = """All commands with their arguments and options, as `yawbench COMMAND --help` prints them. In
+a checkout the command is `.venv/bin/yawbench`. The exit status is 0 on success, 1 if a run failed, 2 if the
+input is wrong, 130 after Ctrl-C, 143 after SIGTERM. Tables go to standard output, messages to standard error.
 """

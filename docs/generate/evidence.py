@@ -13,10 +13,10 @@ FILE = Path(__file__).resolve().parents[1] / "evidence.json"
 CHAPTERS = {
     "cars": (
         "Cars on tyres against independent solutions",
-        "The same equations written down a second time as one system, the loops of load, force "
-        "and acceleration closed at every instant, solved by scipy with tolerances far below what "
-        "is compared; or the model of somebody else. The largest difference over the whole run as "
-        "a share of the peak, of the worst signal compared, at a step of 1 ms with the "
+        "The reference is either a second implementation of the same equations as one system, with "
+        "the loops of load, force and acceleration closed at every instant, solved by scipy with "
+        "much tighter tolerances, or a model by others. The table has the largest difference over "
+        "the whole run, relative to the peak, of the worst signal, at a step of 1 ms with the "
         "`extrapolated` algorithm.",
     ),
     "tyres": (
@@ -25,22 +25,22 @@ CHAPTERS = {
     ),
     "order": (
         "Convergence",
-        "The observed order of the error of the coupling against the same solutions, from steps "
-        "of 4 and 1 ms, of 2 and 1 ms where inputs are held. With order p, half the step leaves "
-        "1/2^p of the error.",
+        "The observed order of the coupling error against the same solutions, from steps of 4 and "
+        "1 ms, of 2 and 1 ms where inputs are held. With order p, halving the step divides the "
+        "error by 2^p.",
     ),
     "energy": (
         "Energy",
-        "What is gained or lost that nothing in the model gives or takes, as a share of the energy "
-        "that moves.",
+        "Energy that appears or vanishes without a source or sink in the model, as a share of the "
+        "energy exchanged.",
     ),
     "mirror": (
         "Left and right",
-        "The largest difference between a manoeuvre and its mirror image; there should be none at all.",
+        "The largest difference between a manoeuvre and its mirror image; it should be zero.",
     ),
     "masters": (
         "Other masters",
-        "The same FMUs run by other co-simulation masters, with the algorithm that they have: the "
+        "The same FMUs run by other co-simulation masters, with their own algorithm: the "
         "largest difference of any signal as a share of its range.",
     ),
 }
@@ -52,16 +52,15 @@ def page() -> str:
     record = json.loads(FILE.read_text(encoding="utf-8"))
     parts = [
         "# How far to trust the numbers",
-        "*The figures on this page are measured by the tests named beside them, recorded, and "
-        "checked whenever these run; the page is made from that record at every build of the "
-        "docs.*",
-        "They say how well the program solves its models, not whether the models are those of a "
-        "paper, or of a real car: see [how far a verdict carries](regions.md) and "
+        "*The named tests measure the numbers on this page, record them, and check them on every "
+        "run; the page is generated from that record.*",
+        "The numbers show how accurately the program solves its models, not whether the models "
+        "match a paper or a real car: see [how far a verdict carries](regions.md) and "
         "[limits](limits.md).",
     ]
     for key, (heading, text) in CHAPTERS.items():
         rows = [_row(place, entry) for place, entry in record.get(key, {}).items()]
-        parts += [f"## {heading}", text, table(("what", "against", "measured", "limit", "test"), rows)]
+        parts += [f"## {heading}", text, table(("quantity", "reference", "measured", "limit", "test"), rows)]
     return "\n\n".join(part for part in parts if part)
 
 

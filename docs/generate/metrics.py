@@ -22,11 +22,11 @@ def page() -> str:
         NOTE,
         docstring(run_metrics.__doc__ or ""),
         "x is the signal, x_ref its reference, T the duration of the run or of the window. A signal's rate "
-        "is the recorded one, `x_rate`, else the difference quotient. A measure without a number is absent: "
-        "an error relative to a reference of zero, a window that the run does not last for.",
-        "In files a stretch of time can also stand in `window`, as `[1, 3]` or `1 s to 3 s`.",
+        "is the recorded one, `x_rate`, else the difference quotient. Metrics that cannot be computed are "
+        "omitted: an error relative to a reference of zero, a window beyond the end of the run.",
+        "In files the window can also be given by the key `window`, as `[1, 3]` or `1 s to 3 s`.",
         "## Measures",
-        table(("measure", "definition", "unit", "needs besides"), rows),
-        "## Shown where nobody has chosen others",
+        table(("measure", "definition", "unit", "also needs"), rows),
+        "## Default metrics",
         table(("metric", "definition"), standard),
     ])  # fmt: skip

@@ -23,8 +23,8 @@ def page() -> str:
         table(("signal", "symbol", "unit", "meaning"), dictionary),
         "## Roles",
         docstring(roles.__doc__ or ""),
-        "An output of one unit feeds every input of the same name. What stands here must be declared by "
-        "every FMU of the role; it may declare more.",
+        "An output drives every input of the same name. Every FMU of a role must declare the signals "
+        "listed here; it may declare more.",
         table(("FMU", "folder", "inputs", "outputs"), contract),
     ])  # fmt: skip
 

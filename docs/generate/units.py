@@ -21,7 +21,7 @@ def page() -> str:
     Raises:
         FileNotFoundError: an FMU has not been built.
     """
-    parts = ["# Units", NOTE, _INTRODUCTION]
+    parts = ["# FMUs", NOTE, _INTRODUCTION]
     found = find_components()
     for folder, role in ROLES.items():
         names = [name for name, module in found.items() if module[0] == folder]
@@ -31,9 +31,9 @@ def page() -> str:
     return "\n\n".join(parts)
 
 
-_INTRODUCTION = """Everything that an FMU shows to the outside; `*` stands for the four wheels `fl`, `fr`,
-`rl`, `rr`. A scenario sets parameters by these names, and a vehicle file gives each to every unit that has
-it.
+_INTRODUCTION = """All FMUs of this project with their inputs, outputs and parameters; `*` stands for the
+four wheels `fl`, `fr`, `rl`, `rr`. A scenario sets parameters by these names; a value of a vehicle file goes
+to every FMU that has a parameter of its name.
 """
 
 
@@ -86,7 +86,9 @@ def _signals(causality: str, variables: dict[str, Any], follows: dict[str, list[
         if causality == "output":
             row.append(", ".join(map(code, fold(follows.get(v.name, [])))))
         rows.append(row)
-    head = [f"{causality}", "unit", "meaning"] + (["follows at once"] if causality == "output" else [])
+    head = [f"{causality}", "unit", "meaning"] + (
+        ["direct feedthrough from"] if causality == "output" else []
+    )
     return table(head, rows)
 
 

@@ -21,10 +21,10 @@ def page() -> str:
         "# Vehicle files",
         NOTE,
         docstring(vehicle.__doc__ or ""),
-        "A unit that declares a quantity it cannot do without, neither given nor derived, is refused, if the "
-        "file says enough of the car for its static loads.",
-        table(("quantity", "unit", "units do without", "plausible", "meaning"), quantities),
-        "## What follows from what",
+        "If the file has enough values for the static loads of the car, an FMU is refused that needs a "
+        "quantity which is neither given nor derived.",
+        table(("quantity", "unit", "optional", "plausible", "meaning"), quantities),
+        "## Derived quantities",
         docstring(derivations.__doc__ or ""),
         table(("quantity", "formula", "needs"), formulas),
     ])  # fmt: skip
