@@ -69,10 +69,14 @@ class PipeChannel:
 
     def send_object(self, kind: int, content: Any) -> None:
         """Write a pickled record, for a process that trusts this one."""
-        self._send(kind, pickle.dumps(content), _LENGTH_OF_OBJECT)
+        self.send_pickle(kind, pickle.dumps(content))
+
+    def send_pickle(self, kind: int, data: bytes) -> None:
+        """Write a record that is pickled already."""
+        self._send(kind, data, _LENGTH_OF_OBJECT)
 
     def receive_object(self) -> Any:
-        """Return the record written by `send_object`, whose first byte has just been read.
+        """Return the record written by `send_object` or `send_pickle`, whose first byte has just been read.
 
         Raises:
             EOFError: the other side is gone.

@@ -7,6 +7,8 @@ Workers are supervised processes of the fork server. They communicate through pi
 from __future__ import annotations
 
 import contextlib
+import copyreg
+import io
 import os
 import pickle
 import select
@@ -16,11 +18,14 @@ import traceback
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from .errors import RecordWarning, YawbenchError
+from .plan import Fmu
 from .processes import ServedChild, start
 from .supervisor import LOOK_EVERY, REPLY, REQUEST, PipeChannel, ProcessLost, SupervisedProcess
+
+T = TypeVar("T")
 
 FILES, FILES_EACH = 32, 4
 """Required limit of open files: a base, and more per process. Chosen: 32 suffice for two processes; each
@@ -63,6 +68,7 @@ class Worker(SupervisedProcess):
         self.calls = 0
         self.busy = False
         self.retires = False  # see `retire`
+        self._sent: dict[int, Fmu] = {}
 
     def give(self, number: int, function: Callable[..., Any], arguments: Sequence[Any]) -> None:
         """Have it call a function, importable by name."""
@@ -70,7 +76,15 @@ class Worker(SupervisedProcess):
         self.calls += 1
         self.busy = True
         with contextlib.suppress(BrokenPipeError):  # the cause is found when the answer is read
-            self._channel.send_object(REQUEST, (function, arguments))
+            self._channel.send_pickle(REQUEST, pickled((function, arguments), Fmu, self._once))
+
+    def _once(self, fmu: Fmu) -> tuple[Any, ...]:
+        """Reduce an FMU, most of a plan and common to many, to a number after the first time."""
+        number = id(fmu)
+        if number in self._sent:
+            return _kept, (number,)
+        self._sent[number] = fmu  # refers to it, so that no other object gets its number
+        return _keep, (number, vars(fmu))
 
     def descriptors(self) -> tuple[int, int]:
         """Return the descriptors that can be read when it has answered or died."""
@@ -206,6 +220,19 @@ def _require_files(needed: int) -> None:
         )
 
 
+_fmus: dict[int, Fmu] = {}
+"""In a worker: number -> FMU that it was sent; see `Worker._once`."""
+
+
+def _keep(number: int, fields: dict[str, Any]) -> Fmu:
+    _fmus[number] = Fmu(**fields)
+    return _fmus[number]
+
+
+def _kept(number: int) -> Fmu:
+    return _fmus[number]
+
+
 _retires = False
 
 
@@ -227,6 +254,15 @@ def main(reading: str, writing: str) -> None:
         except Exception as error:
             answer = None, _portable(error)
         channel.send_object(REPLY, (*answer, _retires))
+
+
+def pickled(content: Any, kind: type[T], reduce: Callable[[T], tuple[Any, ...]]) -> bytes:
+    """Return a pickle in which `reduce` says how objects of one type are restored, as `__reduce__` does."""
+    buffer = io.BytesIO()
+    pickler = pickle.Pickler(buffer)
+    pickler.dispatch_table = copyreg.dispatch_table | {kind: reduce}
+    pickler.dump(content)
+    return buffer.getvalue()
 
 
 def _portable(error: Exception) -> Exception:

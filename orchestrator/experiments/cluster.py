@@ -1,21 +1,26 @@
 """Execution of runs on a Dask cluster; needs the package `distributed`.
 
-Workers only need the same version of this program: plans travel with their tasks, and every FMU is sent
-once to each worker, which unpacks it into its own cache. Runs travel in batches. As with local runs, they
-are made by processes that the worker starts (`execute`), so an FMU that crashes does not take it down.
+Workers only need the same version of this program: every FMU is sent once to each worker, with its
+description, and the worker unpacks it into its own cache. Runs travel in batches, which refer to the FMUs and
+are compressed bytes: a scheduler unpickles the arguments of tasks, pickles them again, and keeps the last
+thousand messages to each worker. As with local runs, they are made by processes that the worker starts
+(`execute`), so an FMU that crashes does not take it down.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import hashlib
 import itertools
 import logging
 import os
+import pickle
 import platform
 import tempfile
+import zlib
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -28,12 +33,13 @@ from ..errors import Diagnostic, ResultsError, ScenarioError
 from ..fmu.archive import open_fmu, read_archive
 from ..interrupts import terminable
 from ..messages import listed
-from ..plan import Plan
+from ..plan import Fmu
+from ..workers import pickled
 from .jobs import Job, OnOutcome, Outcome, execute
 
 TIMEOUT = 10.0
 """Time limit for connecting to the scheduler [s]."""
-AHEAD = 4
+AHEAD = 3
 """Batches of runs submitted ahead of time per worker thread."""
 BATCH_TIME = 2.0
 """Time that a batch takes a worker [s]; chosen: long beside the scheduler's few milliseconds, short for a
@@ -41,8 +47,10 @@ user who watches the progress."""
 LARGEST_BATCH = 200
 """Largest number of runs in a batch."""
 
-_LOCAL: dict[str, Path] = {}
-"""On a worker: SHA-256 of an FMU -> the folder it is unpacked in."""
+_UNPACKED: dict[str, Fmu] = {}
+"""On a worker: key of an FMU -> the FMU in this machine's cache."""
+_NO_JOB = Job("", Path(), Path())
+"""In outcomes that travel back: the caller has the jobs."""
 
 
 def run_on_cluster(jobs: Sequence[Job], done: OnOutcome, *, scheduler: str) -> None:
@@ -58,11 +66,33 @@ def run_on_cluster(jobs: Sequence[Job], done: OnOutcome, *, scheduler: str) -> N
         ResultsError: the connection to the cluster was lost.
         KeyboardInterrupt: Ctrl-C or SIGTERM.
     """
-    fmus = {unit.fmu.sha256: unit.fmu for job in jobs if job.plan for unit in job.plan.instances}
+    parcels = _Parcels(jobs)
     with _connected(scheduler) as client, terminable():
         threads = _check_workers(client, scheduler)
-        client.register_plugin(_Archives({digest: read_archive(fmu.path) for digest, fmu in fmus.items()}))
-        _submit_all(client, jobs, done, scheduler, threads)
+        client.register_plugin(_Fmus(parcels.fmus))
+        _submit_all(client, jobs, done, scheduler, threads, parcels)
+
+
+class _Parcels:
+    """Packs batches of jobs.
+
+    Args:
+        jobs: all that will be packed.
+    """
+
+    def __init__(self, jobs: Sequence[Job]) -> None:
+        every = {id(unit.fmu): unit.fmu for job in jobs if job.plan for unit in job.plan.instances}
+        self._keys = {number: hashlib.sha256(pickle.dumps(fmu)).hexdigest() for number, fmu in every.items()}
+        self.fmus = {self._keys[number]: fmu for number, fmu in every.items()}
+
+    def pack(self, batch: Sequence[Job]) -> bytes:
+        """Return a batch as bytes, which `_unpack` reads where the FMUs are known."""
+        return zlib.compress(pickled(batch, Fmu, lambda fmu: (_fmu, (self._keys[id(fmu)],))))
+
+
+def _unpack(parcel: bytes) -> list[Job]:
+    batch: list[Job] = pickle.loads(zlib.decompress(parcel))
+    return batch
 
 
 class _Batches:
@@ -95,7 +125,9 @@ class _Batches:
         self._alone.extend(batch)
 
 
-def _submit_all(client: Any, jobs: Sequence[Job], done: OnOutcome, scheduler: str, threads: int) -> None:
+def _submit_all(
+    client: Any, jobs: Sequence[Job], done: OnOutcome, scheduler: str, threads: int, parcels: _Parcels
+) -> None:
     batches = _Batches(jobs, threads)
     submitted: dict[str, list[Job]] = {}
     numbers = itertools.count()
@@ -105,7 +137,7 @@ def _submit_all(client: Any, jobs: Sequence[Job], done: OnOutcome, scheduler: st
         while len(submitted) < AHEAD * threads and (batch := batches.next()):
             key = f"yawbench-{os.getpid()}-{next(numbers)}-{batch[0].key}"
             submitted[key] = batch
-            completed.add(client.submit(_make, batch, key=key, pure=False, retries=0))
+            completed.add(client.submit(_make, parcels.pack(batch), key=key, pure=False, retries=0))
 
     submit()
     try:
@@ -145,39 +177,35 @@ def _outcomes(future: Any, batch: Sequence[Job], scheduler: str) -> list[Outcome
     return [replace(outcome, job=job) for outcome, job in zip(future.result(), batch, strict=True)]
 
 
-def _make(batch: Sequence[Job]) -> list[Outcome]:
+def _make(parcel: bytes) -> list[Outcome]:
     """Execute runs on a worker, one after the other in a process of theirs."""
-    here = [replace(job, plan=_unpacked_here(job.plan)) for job in batch if job.plan is not None]
-    # the caller has the plans: do not send them back
-    return [replace(outcome, job=replace(outcome.job, plan=None)) for outcome in execute(here, workers=1)]
+    return [replace(outcome, job=_NO_JOB) for outcome in execute(_unpack(parcel), workers=1)]
 
 
-def _unpacked_here(plan: Plan) -> Plan:
-    units = tuple(
-        replace(unit, fmu=replace(unit.fmu, directory=_LOCAL[unit.fmu.sha256])) for unit in plan.instances
-    )
-    return replace(plan, instances=units)
+def _fmu(key: str) -> Fmu:
+    return _UNPACKED[key]
 
 
-class _Archives(distributed.WorkerPlugin):
+class _Fmus(distributed.WorkerPlugin):
     """Dask worker plugin that unpacks the FMUs before the first run starts.
 
     Args:
-        archives: SHA-256 -> content of the FMU.
+        fmus: key -> FMU.
     """
 
-    def __init__(self, archives: dict[str, bytes]) -> None:
-        self.archives = archives
-        self.name = "yawbench-fmus"
+    def __init__(self, fmus: Mapping[str, Fmu]) -> None:
+        self.fmus = {key: (fmu, read_archive(fmu.path)) for key, fmu in fmus.items()}
+        # those of another campaign are still needed by workers that join later
+        self.name = f"yawbench-{hashlib.sha256(''.join(sorted(fmus)).encode()).hexdigest()[:16]}"
         self.idempotent = False
 
     def setup(self, worker: Any) -> None:
         """Unpack the FMUs; Dask calls this on every worker, including those that join later."""
         with tempfile.TemporaryDirectory() as folder:
-            for digest, content in self.archives.items():
-                path = Path(folder, f"{digest}.fmu")
+            for key, (fmu, content) in self.fmus.items():
+                path = Path(folder, f"{fmu.sha256}.fmu")
                 path.write_bytes(content)
-                _LOCAL[digest] = open_fmu(path, validate=False).directory
+                _UNPACKED[key] = replace(fmu, directory=open_fmu(path, validate=False).directory)
 
 
 @contextlib.contextmanager

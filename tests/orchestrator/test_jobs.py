@@ -12,7 +12,9 @@ import pytest
 
 from orchestrator.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
 from orchestrator.experiments.jobs import Job, execute, read_back, ready
+from orchestrator.plan import Fmu, Variable
 from orchestrator.results.read import load_results
+from orchestrator.supervisor import PipeChannel
 from orchestrator.workers import Pool
 from tests.sentences import golden, golden_in, refused, texts_of
 
@@ -192,6 +194,28 @@ def test_processes_that_share_work_keep_its_order_and_hand_on_what_is_raised():
         assert workers.map(half, []) == []
         with refused(YawbenchError, "run-process-died"):
             workers.map(half, [2, 99])
+
+
+def title_of(fmu, number):
+    """Return what a worker knows of an FMU."""
+    return fmu.description, len(fmu.variables), number, os.getpid()
+
+
+def test_a_worker_is_sent_an_fmu_once(monkeypatch):
+    variables = {
+        f"x{k}": Variable(f"x{k}", k, "Real", "local", "continuous", *[None] * 4, "") for k in range(99)
+    }
+    fmus = [Fmu(name, Path(), Path(), "", "", "", "", variables, name) for name in ("one", "another")]
+    sizes = []
+    send = PipeChannel.send_pickle
+    monkeypatch.setattr(
+        PipeChannel, "send_pickle", lambda self, kind, data: (sizes.append(len(data)), send(self, kind, data))
+    )
+    with Pool(1) as workers:
+        told = workers.map(title_of, [fmus[0], fmus[1], *fmus], range(4))
+    assert [known[:3] for known in told] == [(fmus[k % 2].description, 99, k) for k in range(4)]
+    assert len({process for *_, process in told}) == 1
+    assert max(sizes[2:]) < min(sizes[:2]) / 20
 
 
 def test_too_few_open_files_are_told_before_a_process_starts(tmp_path):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -21,6 +22,7 @@ from orchestrator.experiments.planning import plan_experiment
 from .test_sweep import UNITS, moods, rows, yawbench  # noqa: F401
 
 distributed = pytest.importorskip("distributed")
+from orchestrator.experiments import cluster as cluster_module  # noqa: E402
 from orchestrator.experiments.cluster import AHEAD, BATCH_TIME, _Batches  # noqa: E402
 
 
@@ -64,6 +66,37 @@ def test_runs_travel_in_batches_as_long_as_workers_stay_busy_alike():
     assert sum(sizes) == len(jobs)
     assert sizes[0] == len(jobs) // (AHEAD * 2)
     assert sizes[-1] == 1
+
+
+def test_runs_in_a_batch_share_what_is_common(moods, fmus, tmp_path, monkeypatch):  # noqa: F811
+    experiment = load_experiment(moods(*range(20), count=2))
+    jobs = plan_experiment(experiment, tmp_path, fmus=fmus, keep=False).jobs
+    parcels = cluster_module._Parcels(jobs)
+    monkeypatch.setattr(cluster_module, "_UNPACKED", parcels.fmus)
+    one, every = parcels.pack(jobs[:1]), parcels.pack(jobs)
+    assert cluster_module._unpack(every) == jobs
+    whole = len(pickle.dumps(jobs[0]))
+    assert len(one) < whole / 4
+    assert (len(every) - len(one)) / (len(jobs) - 1) < whole / 40
+
+
+def test_as_many_batches_are_submitted_as_keep_the_workers_busy(moods, fmus, cluster, tmp_path, monkeypatch):  # noqa: F811
+    experiment = load_experiment(moods(1, 2, 3, 4, 5, 6, count=2))
+    jobs = left_to_do(plan_experiment(experiment, tmp_path, fmus=fmus, keep=False).jobs, {})
+    submitted, finished, ahead = [], [], []
+    submit = distributed.Client.submit
+
+    def counting(client, make, parcel, **options):
+        submitted.append(parcel)
+        ahead.append(len(submitted) - len(finished))
+        return submit(client, make, parcel, **options)
+
+    monkeypatch.setattr(distributed.Client, "submit", counting)
+    monkeypatch.setattr(cluster_module, "LARGEST_BATCH", 1)
+    cluster_module.run_on_cluster(jobs, finished.append, scheduler=cluster.scheduler_address)
+    assert len(submitted) == len(finished) == len(jobs) == 12
+    assert max(ahead) == 2 * AHEAD
+    assert all(type(parcel) is bytes for parcel in submitted)
 
 
 @pytest.mark.exhaustive

@@ -1,0 +1,108 @@
+"""What short runs on a Dask cluster of this machine cost: `python -m tests.cluster_cost [--runs 5000]`.
+
+Starts a scheduler and two workers, runs a sweep there by the command line, and prints the processor time of
+the command, the scheduler and the workers with the processes that they start, from the first run to the last;
+what the scheduler needs without runs, measured while the command plans; and the memory of both as the number
+of finished runs grows.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from time import perf_counter, sleep
+
+import distributed
+import psutil
+
+from .bench import DEFAULT
+
+WORKERS = 2
+PARTS = 8
+"""Points at which the memory is read, in equal parts of the runs."""
+
+
+@contextmanager
+def dask(what: str, file: Path, *options: str) -> Iterator[psutil.Process]:
+    """Start a scheduler or a worker."""
+    command = [sys.executable, "-m", f"distributed.cli.dask_{what}", "--scheduler-file", str(file)]
+    local = ["--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0"]
+    with subprocess.Popen([*command, *local, *options], stderr=subprocess.DEVNULL) as process:
+        try:
+            yield psutil.Process(process.pid)
+        finally:
+            process.terminate()
+
+
+def processor_time(process: psutil.Process) -> float:
+    """Return the processor time of a process and of all that it has started [s]."""
+    while True:
+        try:
+            everyone = [one.cpu_times() for one in (process, *process.children(recursive=True))]
+        except psutil.NoSuchProcess:  # a child has just ended: its time is its parent's now
+            continue
+        return sum(one.user + one.system + one.children_user + one.children_system for one in everyone)
+
+
+def finished(journal: Path) -> int:
+    """Return the number of runs in a journal, whose first line is its head."""
+    return max(0, journal.read_bytes().count(b"\n") - 1) if journal.is_file() else 0
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=5000)
+    parser.add_argument("--stop", type=float, default=0.05, help="stop time of each run [s]")
+    chosen = parser.parse_args()
+    axis = {"vary": "plant.mass", "from": 1000, "to": 2000, "count": chosen.runs}
+    sweep = {"title": "Short runs", "scenario": str(DEFAULT), "set": {"stop_time": chosen.stop}}
+    metrics = {"sideslip": {"metric": "peak(sideslip)"}, "yaw_rate": {"metric": "rms(yaw_rate)"}}
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        file, out = folder / "sweep.yaml", folder / "out"
+        file.write_text(json.dumps({**sweep, "axes": {"mass": axis}, "metrics": metrics}))
+        cluster = folder / "scheduler.json"
+        scheduler = stack.enter_context(dask("scheduler", cluster, "--port", "0"))
+        workers = [stack.enter_context(dask("worker", cluster, "--nthreads", "1")) for _ in range(WORKERS)]
+        with distributed.Client(scheduler_file=str(cluster), set_as_default=False) as client:
+            client.wait_for_workers(WORKERS)
+            address = client.scheduler.address
+        command = [sys.executable, "-m", "orchestrator.cli", "sweep", str(file), "--out", str(out)]
+        planning, idle = perf_counter(), processor_time(scheduler)
+        memory: list[tuple[int, int, int]] = []
+        with subprocess.Popen([*command, "--scheduler", address], stderr=subprocess.DEVNULL) as running:
+            everyone = psutil.Process(running.pid), scheduler, *workers
+            while not (done := finished(out / "runs.jsonl")):
+                assert running.poll() is None
+                before, began = [*map(processor_time, everyone)], perf_counter()
+                sleep(0.05)
+            idle = (before[1] - idle) / (began - planning)
+            while done < chosen.runs:
+                assert running.poll() is None
+                if done >= len(memory) * chosen.runs / PARTS:
+                    memory.append((done, *(process.memory_info().rss for process in everyone[:2])))
+                sleep(0.05)
+                done = finished(out / "runs.jsonl")
+            wall = perf_counter() - began
+            spent = [processor_time(process) - start for process, start in zip(everyone, before, strict=True)]
+            memory.append((done, *(process.memory_info().rss for process in everyone[:2])))
+        assert running.wait() == 0
+    print(f"{chosen.runs} runs, planned in {began - planning:.0f} s, made in {wall:.0f} s")
+    for what, seconds in (
+        ("command, planning", before[0]), ("command, runs", spent[0]), ("scheduler", spent[1]),
+        ("workers", sum(spent[2:])),
+    ):  # fmt: skip
+        print(f"{what:18s}{seconds:8.1f} s of processor time, {1e3 * seconds / chosen.runs:6.2f} ms a run")
+    print(f"scheduler: {spent[1] / wall:.1%} of the time, {idle:.1%} without runs")
+    for done, ours, theirs in memory:
+        print(f"after {done:6d} runs: command {ours / 1e6:.0f} MB, scheduler {theirs / 1e6:.0f} MB")
+
+
+if __name__ == "__main__":
+    main()
