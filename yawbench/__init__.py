@@ -52,6 +52,7 @@ if TYPE_CHECKING:
         YawbenchWarning,
     )
 
+    from ._controller import Controller
     from ._experiment import Experiment, Runs, experiment
     from ._ranking import Ranking, rank
     from ._run import Run, open
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BuildError",
+    "Controller",
     "Diagnostic",
     "Experiment",
     "Location",
@@ -89,6 +91,7 @@ __all__ = [
 _PACKAGES = ("components", "fmus", "orchestrator", "scenarios", "vocabulary")
 _MODULES = {
     "components.fmi.variables": ("output", "parameter", "signal"),
+    "yawbench._controller": ("Controller",),
     "yawbench._experiment": ("Experiment", "Runs", "experiment"),
     "yawbench._ranking": ("Ranking", "rank"),
     "yawbench._run": ("Run", "open"),

@@ -19,7 +19,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 from xml.etree import ElementTree
 
 import numpy as np
@@ -37,10 +37,54 @@ from vocabulary.wheels import wheels
 
 from . import arguments
 
-__all__ = ["PythonComponent", "output", "parameter", "signal"]
+__all__ = ["Controller", "ControllerLike", "PythonComponent", "output", "parameter", "signal"]
 
 HOME = Path("/python")
 """Folder in the made-up paths of Python components, used in messages and records; it does not exist."""
+
+
+class Controller(Protocol):
+    """An object in plain Python that replaces the FMU of an instance, usually of the controller.
+
+        >>> class Gain:
+        ...     inputs = ("yaw_rate_ref", "yaw_rate")
+        ...     outputs = ("yaw_moment",)
+        ...
+        ...     def output(self, t, u):
+        ...         return 2e4 * (u.yaw_rate_ref - u.yaw_rate)
+        >>> controller: yb.Controller = Gain()
+        >>> base.swap(controller=controller).run().metric("rms_error(yaw_rate)") < 0.1
+        True
+
+    It may also have `start(t, u)`, called once before the first step, `advance(t, h, u)`, called for every
+    step of `h` [s], `step_size`, the time between two samples [s], and `sampled`, False if its outputs are
+    continuous in time.
+    """
+
+    @property
+    def inputs(self) -> Sequence[str | VariableSpec]:
+        """Names of the inputs, or what `signal` returns."""
+
+    @property
+    def outputs(self) -> Sequence[str | VariableSpec]:
+        """Names of the outputs, or what `output` returns."""
+
+    def output(self, t: float, u: Any, /) -> Numbers:
+        """Return the values of the outputs in SI, in order.
+
+        Args:
+            t: time [s].
+            u: a named tuple with the values of the inputs in SI.
+        """
+
+
+Controller.__module__ = "yawbench"  # set here because a protocol has no other attributes than its members
+
+Numbers = float | Sequence[float] | np.ndarray
+"""What a program returns: the value of its only output, or one value for each, shape (outputs,)."""
+
+ControllerLike = str | Path | Callable[..., Numbers] | Controller | type[Component]
+"""What can replace the FMU of an instance: the name or path of an FMU, or plain Python."""
 
 
 class PythonComponent:
@@ -58,7 +102,7 @@ class PythonComponent:
         ScenarioError: it is none of these, or declares what cannot be.
     """
 
-    def __init__(self, given: Any, *, unit: str, role: str) -> None:
+    def __init__(self, given: object, *, unit: str, role: str) -> None:
         self.given = given
         try:
             self.component = _component(given, role)

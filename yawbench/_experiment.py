@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from orchestrator.errors import Diagnostic, Location, ScenarioError
 from orchestrator.experiments.experiment import LoadedExperiment as Design
@@ -23,6 +23,7 @@ from orchestrator.master.fmi import open_unit
 from orchestrator.master.run_loop import OpenInstance
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.messages import hint, listed, printable, short
+from orchestrator.plan import Value
 from orchestrator.results.read import Results
 from orchestrator.scenario.quantities import number_and_unit
 from orchestrator.scenario.validation import Model, validate
@@ -30,6 +31,7 @@ from orchestrator.scenario.yaml_lines import Document, scalar
 
 from . import arguments
 from ._calls import make_all
+from ._controller import ControllerLike
 from ._run import Run, shown_in_notebooks
 from ._scenario import Scenario, warn
 
@@ -43,7 +45,10 @@ FAR = 1e100
 
 
 def experiment(
-    base: Scenario, axes: Mapping[str, Iterable[Any]], *, metrics: str | Iterable[str] = ()
+    base: Scenario,
+    axes: Mapping[str, Iterable[Value | ControllerLike]],
+    *,
+    metrics: str | Iterable[str] = (),
 ) -> Experiment:
     """Return the runs of a scenario at every combination of levels, to be made by `run`.
 
@@ -212,7 +217,18 @@ class Runs:
         return to_pandas(columns_of(self.findings))
 
     def plot(
-        self, metric: str, *, x: str, y: str = "", lines: str = "", panels: str = "", **more: Any
+        self,
+        metric: str,
+        *,
+        x: str,
+        y: str = "",
+        lines: str = "",
+        panels: str = "",
+        title: str = "",
+        scale: Literal["linear", "log"] = "linear",
+        largest: float | str | None = None,
+        mark: float | str | None = None,
+        only: Mapping[str, Iterable[Value]] | None = None,
     ) -> Figure:
         """Return a figure of a metric over an axis, or as a map over two.
 
@@ -224,7 +240,11 @@ class Runs:
             x: axis to the right.
             y: axis upwards, of a map.
             lines, panels: axes with a line or a panel per level.
-            more: `title`, `scale`, `largest`, `mark`, `only`, as a figure of a sweep file has them.
+            title: default: none.
+            scale: of the metric.
+            largest: where the metric's scale ends, in SI or with a unit; default: at the largest value.
+            mark: a value of the metric to draw a line at, in SI or with a unit.
+            only: axis -> those of its levels that are drawn; default: all.
 
         Raises:
             ScenarioError: there is no such axis or metric, or an axis has no place.
@@ -246,15 +266,18 @@ class Runs:
                 f"there is no metric {metric!r}{hint(metric, spec.metrics, lead='metrics')}",
                 code="metric-unknown",
             )
-        if left := [
-            name for name in spec.axes if name not in (x, y, lines, panels, *_axes_of(more.get("only")))
-        ]:
+        if left := [name for name in spec.axes if name not in (x, y, lines, panels, *_axes_of(only))]:
             raise ScenarioError(
                 f"the axis {left[0]!r} has no place in this figure: give lines or panels",
                 code="argument-invalid",
             )
-        for name, value in more.items():
-            more[name] = self._checked(name, value, metric)
+        chosen = {
+            "title": arguments.text(title, "title", empty=True),
+            "scale": arguments.text(scale, "scale"),
+            "largest": self._limit("largest", largest, metric),
+            "mark": self._limit("mark", mark, metric),
+            "only": {axis: self._levels_of(axis, levels) for axis, levels in _axes_of(only).items()},
+        }
         places = {key: value for key, value in (("y", y), ("lines", lines), ("panels", panels)) if value}
         given = {
             "name": "figure",
@@ -262,21 +285,18 @@ class Runs:
             "metric": metric,
             "x": x,
             **places,
-            **more,
+            **chosen,
         }
         return shown_in_notebooks(draw_over_axes(self.findings, _checked(FigureSpec, given)))
 
-    def _checked(self, name: str, value: Any, metric: str) -> Any:
-        """Return what a figure is told beside its axes as plain Python."""
-        if name == "only":
-            return {axis: self._levels_of(axis, levels) for axis, levels in _axes_of(value).items()}
-        if name == "title":
-            return arguments.text(value, name, empty=True)
-        given = None if value is None else arguments.scalar(value, name)
-        if name in ("largest", "mark") and given is not None:
-            with arguments.as_scenario_errors(f"{name}:"):
-                if not abs(si_number(given, self.table.attrs["units"].get(metric, ""))) < FAR:
-                    raise ValueError(f"must be between {-FAR:g} and {FAR:g} (got {short(given)})")
+    def _limit(self, name: str, value: float | str | None, metric: str) -> Value | None:
+        """Return a value on the metric's scale as plain Python."""
+        if value is None:
+            return None
+        given = arguments.scalar(value, name)
+        with arguments.as_scenario_errors(f"{name}:"):
+            if not abs(si_number(given, self.table.attrs["units"].get(metric, ""))) < FAR:
+                raise ValueError(f"must be between {-FAR:g} and {FAR:g} (got {short(given)})")
         return given
 
     def _levels_of(self, axis: str, levels: Any) -> list[Any]:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from components.fmi.component import Component
 from orchestrator.errors import ScenarioError
@@ -30,7 +30,7 @@ from orchestrator.scenario import catalogue
 
 from . import arguments
 from ._calls import make_all
-from ._controller import PythonComponent
+from ._controller import Controller, ControllerLike, PythonComponent
 from ._run import shown_in_notebooks
 from ._scenario import fmu_of
 
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 def rank(
-    controller: Any = None,
+    controller: ControllerLike | type[Controller] | None = None,
     *,
     name: str = "",
     against: Iterable[str] | None = None,
@@ -123,7 +123,7 @@ def _entry(given: Any, name: str) -> tuple[dict[str, EntrySpec], dict[Path, Pyth
     return {words: _spec(words, str(program.path))}, {program.path: program}
 
 
-def _object_of(given: type) -> Any:
+def _object_of(given: type) -> object:
     try:
         return given()
     except Exception as error:
@@ -175,19 +175,19 @@ class Ranking:
             )
         return places[name]
 
-    def plot(self, kind: str = "matrix") -> Figure:
+    def plot(self, kind: Literal["matrix", "pareto"] = "matrix") -> Figure:
         """Return a picture: `matrix`, who passes what, or `pareto`, stability over intervention.
 
         Raises:
             ScenarioError: there is no such picture.
         """
         drawn = {"matrix": draw_matrix, "pareto": draw_pareto}
-        kind = arguments.text(kind, "kind")
-        if kind not in drawn:
+        chosen = arguments.text(kind, "kind")
+        if chosen not in drawn:
             raise ScenarioError(
-                f"there is no picture {kind!r}{hint(kind, drawn, lead='known')}", code="figure-unknown"
+                f"there is no picture {chosen!r}{hint(chosen, drawn, lead='known')}", code="figure-unknown"
             )
-        return shown_in_notebooks(drawn[kind](self.ranked, "yawbench.rank"))
+        return shown_in_notebooks(drawn[chosen](self.ranked, "yawbench.rank"))
 
     def __repr__(self) -> str:
         rows, columns = self.ranked.scores, self.ranked.ranking.conditions

@@ -17,6 +17,7 @@ from orchestrator.evaluation.standard_tests import TESTS, Evaluation
 from orchestrator.evaluation.trace import trace_of
 from orchestrator.messages import hint, short
 from orchestrator.metrics.run_metrics import STANDARD, MetricValue, evaluate, evaluate_all, metric, why_none
+from orchestrator.plan import Override
 from orchestrator.results.read import Results, load_results
 
 from . import arguments
@@ -83,9 +84,9 @@ class Run:
         return self.results.record.all_diagnostics
 
     @property
-    def changes(self) -> list[dict[str, Any]]:
-        """What was other than in the scenario file, each with place, value and origin."""
-        return [one.model_dump() for one in self.results.record.changes]
+    def changes(self) -> tuple[Override, ...]:
+        """The overrides of the scenario file."""
+        return self.results.record.overrides
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Return a column, shape (rows,): `unit.variable`, or the only variable of that name."""
@@ -226,7 +227,7 @@ class Run:
     def _repr_html_(self) -> str:
         from orchestrator.figures.style import shown
 
-        changed = "".join(f"<br>{escape(str(c['place']))} = {escape(str(c['value']))}" for c in self.changes)
+        changed = "".join(f"<br>{escape(str(one.target))} = {escape(str(one.plain))}" for one in self.changes)
         cells = [(metric(name).title, shown(x.number, x.unit)) for name, x in self.metrics().items()]
         rows = "".join(f"<tr><td>{escape(title)}</td><td>{escape(value)}</td></tr>" for title, value in cells)
         noted = "".join(f"<br>⚠ {escape(str(one))}" for one in warnings_in(self.diagnostics))

@@ -32,7 +32,7 @@ from vocabulary.roles import role_of
 
 from . import arguments
 from ._calls import opener_of
-from ._controller import PythonComponent
+from ._controller import ControllerLike, PythonComponent
 from ._run import Run
 
 
@@ -60,7 +60,7 @@ class Scenario:
 
         >>> base = yb.load("fnn_sideslip/25mps")
         >>> run = base.swap(controller="controller_off").set({"plant.initial_speed": "80 km/h"}).run()
-        >>> [change["place"] for change in run.changes]
+        >>> [str(change.target) for change in run.changes]
         ['controller', 'plant.initial_speed']
 
     Attributes:
@@ -85,7 +85,7 @@ class Scenario:
         if not arguments.is_a(self.programs, dict):
             arguments.refuse("programs", "programs as `swap` makes them", self.programs)
 
-    def swap(self, **units: Any) -> Scenario:
+    def swap(self, **units: ControllerLike) -> Scenario:
         """Return the scenario with other units.
 
             >>> linear = base.swap(tyre="tyre_linear")
@@ -157,7 +157,9 @@ class Scenario:
         value: float | str | None = None,
         start: float | str | None = None,
         until: float | str | None = None,
-        **told: float | str,
+        share: float | None = None,
+        every: float | str | None = None,
+        seed: int | None = None,
     ) -> Scenario:
         """Return the scenario with a fault; several at one place act one after the other.
 
@@ -172,13 +174,16 @@ class Scenario:
             kind: one of the reference of scenario files, such as bias or freeze.
             value: as the kind has it: in SI, or with its unit.
             start, until: when it begins and ends [s]; default: with the run.
-            told: `share` of the messages, `every` how often they come [s], `seed` of what is random.
+            share: fraction of the messages that it affects.
+            every: time between two messages [s].
+            seed: of its random numbers.
 
         Raises:
             ScenarioError: there is no such place or kind, or it takes something else.
         """
         place, kind = arguments.text(place, "place"), arguments.text(kind, "kind")
-        given = {"kind": kind, "value": value, **told, "from": start, "until": until}
+        given = {"kind": kind, "value": value, "share": share, "every": every, "seed": seed}
+        given |= {"from": start, "until": until}
         with arguments.as_scenario_errors("fault"):
             item = {name: arguments.scalar(x, name) for name, x in given.items() if x is not None}
         new = faults_at(place, item, "fault")

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
 
 from orchestrator.errors import ResultsError
 from orchestrator.figures.style import LabelledRun
@@ -65,7 +64,7 @@ def view(
     return View(names, html, arguments.count(height, "height", least=LEAST, most=MOST))
 
 
-def _labelled(runs: Any) -> list[LabelledRun]:
+def _labelled(runs: object) -> list[LabelledRun]:
     """Return runs with labels: those of a mapping, else their titles, numbered if equal."""
     if arguments.is_a(runs, Run):
         runs = [runs]

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
 from itertools import islice
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar, cast
+from typing import Any, NoReturn, TypeGuard, TypeVar, cast
 
 import numpy as np
 
@@ -123,7 +123,7 @@ def path(value: Any, name: str) -> Path:
     return Path(given)
 
 
-def names_file(value: object) -> bool:
+def names_file(value: object) -> TypeGuard[str | Path]:
     """Return whether a value is a text or a path: of a file, or a name in place of one."""
     return is_a(value, str, os.PathLike)
 

@@ -198,12 +198,11 @@ def _parameters() -> Iterator[Parameter]:
             may=FINITE | {"minus one second"},
             right={"None"},
         )
-    yield of("Scenario.fault.told [share]", fault("dropout", "share"), "share", may=FINITE | TRUTHS)
-    yield of("Scenario.fault.told [every]", fault("dropout", "every", share=0.5), "every", right={"None"},
+    yield of("Scenario.fault.share", fault("dropout", "share"), "share", may=FINITE | TRUTHS)
+    yield of("Scenario.fault.every", fault("dropout", "every", share=0.5), "every", right={"None"},
              may={"three", "two and a half", "numpy uint8", "10**18"})  # fmt: skip
-    yield of("Scenario.fault.told [seed]", fault("dropout", "seed", share=0.5), "seed",
+    yield of("Scenario.fault.seed", fault("dropout", "seed", share=0.5), "seed",
              right={"None", "three"}, may={"zero", "numpy uint8", "10**18", "hostile int"})  # fmt: skip
-    yield of("Scenario.fault.told [unknown]", fault("freeze", "unknown"), "unknown", right={"None"})
     # Runs.
     progress = {"lambda of all", "builtin"}
     yield of("Scenario.run.progress", lambda x: b.base.run(progress=x), right={"None", *progress},
@@ -270,11 +269,10 @@ def _parameters() -> Iterator[Parameter]:
     for name, right, may in (
         ("title", PRINTABLE | EMPTY, set()), ("scale", set(), set()), ("only", {"None"}, set()),
         ("largest", {"None", "three"}, FINITE), ("mark", {"None", "three"}, FINITE),
-        ("unknown", set(), set()),
     ):  # fmt: skip
-        yield of(f"Runs.plot.more [{name}]", lambda x, n=name: b.runs.plot("peak(sideslip)",
+        yield of(f"Runs.plot.{name}", lambda x, n=name: b.runs.plot("peak(sideslip)",
                  x="driver.amplitude", lines="controller", **{n: x}), name, right=right, may=may)  # fmt: skip
-    yield of("Runs.plot.more [only, levels]", lambda x: b.runs.plot("peak(sideslip)", x="driver.amplitude",
+    yield of("Runs.plot.only [levels]", lambda x: b.runs.plot("peak(sideslip)", x="driver.amplitude",
              lines="controller", only={"driver.amplitude": x}), "only", "driver.amplitude")  # fmt: skip
     # Rankings.
     yield of("rank.controller", rank("controller"), right={"None"},
@@ -377,12 +375,16 @@ def _is_key(value: Any) -> bool:
 UNHASHABLE = {label for label, make in WRONG.items() if not _is_key(make())}
 
 
+NOT_CALLED = (yb.Controller, yb.Diagnostic, yb.Location)
+"""What users write, or only read."""
+
+
 def described() -> dict[str, list[str]]:
-    """Return every public function and method with its parameters, but for what users only read."""
+    """Return every public function and method with its parameters, but for those of `NOT_CALLED`."""
     found = {}
     for name in yb.__all__:
         public = getattr(yb, name)
-        if public in (yb.Diagnostic, yb.Location):
+        if public in NOT_CALLED:
             continue
         if not isinstance(public, type):
             found[name] = list(inspect.signature(public).parameters)
