@@ -24,6 +24,8 @@ from typing import Any
 
 import pytest
 
+from orchestrator.errors import Diagnostic
+
 ROOT = Path(__file__).parents[1]
 FILE = ROOT / "tests/sentences.json"
 COMMAND = "pytest --rewrite-sentences"
@@ -34,6 +36,11 @@ ALIKE = 0.4
 def texts_of(told: Any) -> tuple[str, ...]:
     """Return the texts of the diagnostics of a plan, a run or an error."""
     return tuple(map(str, told.diagnostics))
+
+
+def places_of(told: Iterable[Diagnostic]) -> list[tuple[str, str]]:
+    """Return the code and the location of each diagnostic."""
+    return [(one.code, str(one.location)) for one in told]
 
 
 class _Sentences:
