@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from ..figures.style import digits_of, shown
 from .judged_schema import GridSpec, rank_correlation
-from .judging import MetricTable
 from .tables import Cell, Table
+from .verdicts import MetricTable
 
 
 @dataclass(frozen=True)

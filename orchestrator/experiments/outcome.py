@@ -22,11 +22,10 @@ from .experiment import Case, LoadedExperiment, NamedRun
 from .grids import correlation
 from .jobs import NOT_MADE, MeasuredRun, Outcome, measured, read_back
 from .judged_schema import Claim, LimitSpec, calculate
-from .judging import ClaimResult, MetricTable, judge
-from .margins import Region
 from .planning import PlannedExperiment, metrics_of
 from .schema import ExperimentSpec
 from .tables import Cell, Table
+from .verdicts import ClaimResult, MetricTable, Region, judge
 
 K = TypeVar("K")
 Each = Callable[..., Iterable[Any]]

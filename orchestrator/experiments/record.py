@@ -22,10 +22,9 @@ from ..metrics.run_metrics import MetricValue, metric
 from ..results.folder import LARGEST
 from ..results.read import Results
 from .judged_schema import si_number, text_of
-from .judging import ClaimResult
-from .margins import Region
 from .outcome import ExperimentResult, limits_of
 from .verdict_tables import heading, verdict
+from .verdicts import ClaimResult, Region
 
 if TYPE_CHECKING:
     import pandas as pd

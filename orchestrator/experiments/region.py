@@ -24,10 +24,9 @@ from .experiment import RUNS, LoadedExperiment, NamedRun
 from .grids import ranked
 from .jobs import Job, MeasuredRun, keyed, ready
 from .judged_schema import Claim, MetricReference
-from .judging import ClaimResult, judge
-from .margins import TIMES, LevelVerdict, OpenValueScan, PointVerdict, Region
 from .outcome import ExperimentResult, derive
 from .planning import PlannedExperiment, metrics_of, number_of, reached
+from .verdicts import TIMES, ClaimResult, LevelVerdict, OpenValueScan, PointVerdict, Region, judge
 
 ORIGIN = "region"
 """Origin of overrides that open values make."""

@@ -25,10 +25,10 @@ from ..metrics.run_metrics import MetricValue
 from ..names import Target
 from .axes import DesignAxisSpec, OverrideSpec, VariantSpec, level_at
 from .experiment import LoadedExperiment
-from .judging import MetricTable
 from .outcome import ExperimentResult, derive
 from .record import TableColumn
 from .tables import Table
+from .verdicts import MetricTable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -18,10 +18,10 @@ from .experiment import NamedRun
 from .grids import cells, grid_tables, side_by_side
 from .jobs import NOT_MADE
 from .judged_schema import Claim, GridSpec, MetricReference, MetricSpec, si_number
-from .judging import ClaimResult
 from .outcome import ExperimentResult, limit_table
 from .schema import TableSpec
 from .tables import Cell, Table, marked, remarks
+from .verdicts import ClaimResult
 
 HOLDS, UNDECIDED, NOT_JUDGED = "holds", "undecided", "not judged"
 CARRIES = ("margin", "region", "nearest flip")

@@ -19,7 +19,6 @@ from ..experiments.confidence import LEVEL
 from ..experiments.experiment import FIGURES
 from ..experiments.figures import runs_of, title_of
 from ..experiments.jobs import Job
-from ..experiments.judging import ClaimResult
 from ..experiments.outcome import ExperimentResult
 from ..experiments.region import runs_of as runs_of_claim
 from ..experiments.schema import FigureSpec
@@ -39,6 +38,7 @@ from ..experiments.verdict_tables import (
     run_tables,
     verdict,
 )
+from ..experiments.verdicts import ClaimResult
 from ..figures.portrait import signals_of
 from ..figures.style import LabelledRun
 from ..labels import changed

@@ -14,11 +14,11 @@ from orchestrator.cli import main
 from orchestrator.errors import Diagnostic, ScenarioError
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.jobs import MeasuredRun
-from orchestrator.experiments.margins import Gap, PointVerdict, Region, margin
 from orchestrator.experiments.outcome import ExperimentResult
 from orchestrator.experiments.planning import plan_experiment
 from orchestrator.experiments.region import judge_region, plan_region, runs_of
 from orchestrator.experiments.verdict_tables import region_words, verdict
+from orchestrator.experiments.verdicts import Gap, PointVerdict, Region, margin
 from orchestrator.planner import Planner
 from tests.checkout import ROOT
 from tests.sentences import golden, golden_in, refused

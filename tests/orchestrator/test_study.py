@@ -20,12 +20,12 @@ from orchestrator.experiments.figures import draw_all
 from orchestrator.experiments.grids import correlation
 from orchestrator.experiments.jobs import Job, Outcome
 from orchestrator.experiments.judged_schema import Claim, GridSpec, calculate, rank_correlation
-from orchestrator.experiments.judging import judge
 from orchestrator.experiments.outcome import judge_results
 from orchestrator.experiments.planning import jobs_of
 from orchestrator.experiments.record import write_findings
 from orchestrator.experiments.tables import Table, for_terminal
 from orchestrator.experiments.verdict_tables import claim_tables, derived_tables, run_tables, share
+from orchestrator.experiments.verdicts import judge
 from orchestrator.figures.style import shown
 from orchestrator.metrics.run_metrics import MetricValue
 from orchestrator.pages.report import chapter, report_page, viewer_of
