@@ -21,9 +21,8 @@ from ..messages import short
 from ..names import INPUTS, OF_RUN, VEHICLE, Target
 from ..plan import Override, Value
 from ..scenario import overrides, yaml_lines
-from ..scenario.fault_schema import FaultSpec, by_location
 from ..scenario.quantities import parse_unit
-from ..scenario.scenario_schema import AlgorithmName, Scalar
+from ..scenario.scenario_schema import AlgorithmName, FaultSpec, Scalar, by_location
 from ..scenario.validation import StrictModel, Time
 from .judged_schema import Number, Patterns, is_finite, text_of
 

@@ -32,7 +32,7 @@ from ..messages import hint, listed
 from ..names import FACTS, FAULTS, INPUTS, OF_RUN, TYRES, VEHICLE, Target
 from ..plan import Override, Value
 from . import yaml_lines
-from .fault_schema import location_of, parse_faults, read_line
+from .scenario_schema import location_of, parse_faults, read_line
 from .yaml_lines import Document, KeyPath
 
 
@@ -50,7 +50,7 @@ def read_changes(
         swaps: `unit=fmu`, as given to --swap; a path is relative to the working directory. An FMU may bring
             parameters along, `unit=fmu:parameter=value`.
         settings: `unit.parameter=value`, as given to --set.
-        faults: `location: kind ...`, as given to --fault (see `fault_schema`); those of one location add up.
+        faults: `location: kind ...`, as given to --fault (see `scenario_schema`); those of one location add up.
 
     Raises:
         ScenarioError: with all malformed options.
