@@ -26,9 +26,10 @@ from ..plan import Plan
 from ..results.folder import COMPLETED, RUNNING
 from ..results.formats import recorder_of
 from ..results.freshness import key_of
+from ..results.plan_record import run_record
 from ..results.read import Results
 from ..results.recorder import MemoryRecorder, Recorder
-from ..results.run_record import DiagnosticRecord, EndRecord, ErrorRecord, WarningRecord, run_record
+from ..results.run_record import DiagnosticRecord, EndRecord, ErrorRecord, WarningRecord
 from .child_run import ChildRun, can_be_apart
 from .fmi import keeps, open_unit
 from .log import STATUS, Log, Message

@@ -279,8 +279,9 @@ def evaluate(results: Results, chosen: Metric, window: TimeWindow | None = None)
 
 def results_to_be(plan: Plan) -> Results:
     """Return results without rows that have the columns which a plan will record."""
+    from ..results.plan_record import connections_of
     from ..results.read import Results
-    from ..results.run_record import FmuRecord, RunRecord, connections_of
+    from ..results.run_record import FmuRecord, RunRecord
 
     units = {unit.name: unit for unit in plan.instances}
     variables = {str(signal): units[signal.instance].fmu.variables[signal.variable] for signal in plan.record}

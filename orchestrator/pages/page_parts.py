@@ -19,8 +19,8 @@ from ..experiments.tables import Table
 from ..experiments.verdict_tables import FAILS, HOLDS, NOT_JUDGED, UNDECIDED
 from ..messages import printable
 from ..plan import Plan
+from ..results.plan_record import versions
 from ..results.read import Results
-from ..results.run_record import versions
 
 CURLY = str.maketrans("'\"", "’”")
 """Typographic quotes for text, so that straight ones occur only in the markup."""

@@ -46,8 +46,9 @@ from ..messages import counted, listed
 from ..metrics.run_metrics import evaluate, metric
 from ..plan import Plan
 from ..planner import Planner
+from ..results.plan_record import run_record
 from ..results.read import Results
-from ..results.run_record import RunRecord, load_record, run_record
+from ..results.run_record import RunRecord, load_record
 from ..scenario import catalogue, yaml_lines
 from ..scenario.load import LoadedScenario
 from .diagram import diagrams, systems_of

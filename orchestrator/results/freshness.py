@@ -18,17 +18,9 @@ from ..checksums import checksum
 from ..errors import ResultsError
 from ..plan import Plan
 from .folder import COMPLETED, RUN_FILE, is_dead
+from .plan_record import PROGRAMS, connections_of, run_record, units_of, version_of
 from .read import load_results
-from .run_record import (
-    PROGRAMS,
-    FmuRecord,
-    RunRecord,
-    connections_of,
-    load_record,
-    run_record,
-    units_of,
-    version_of,
-)
+from .run_record import FmuRecord, RunRecord, load_record
 
 
 def key_of(plan: Plan, also: Any = None) -> str:

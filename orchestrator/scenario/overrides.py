@@ -50,7 +50,7 @@ def read_changes(
         swaps: `unit=fmu`, as given to --swap; a path is relative to the working directory. An FMU may bring
             parameters along, `unit=fmu:parameter=value`.
         settings: `unit.parameter=value`, as given to --set.
-        faults: `location: kind ...`, as given to --fault (see `scenario_schema`); those of one location add up.
+        faults: `location: kind ...`, as given to --fault (see `scenario_schema`); those of a location add up.
 
     Raises:
         ScenarioError: with all malformed options.

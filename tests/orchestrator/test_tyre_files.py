@@ -19,8 +19,8 @@ from orchestrator.names import Target
 from orchestrator.pages.provenance import groups_of
 from orchestrator.results.folder import default_folder
 from orchestrator.results.freshness import key_of
+from orchestrator.results.plan_record import run_record
 from orchestrator.results.read import load_results
-from orchestrator.results.run_record import run_record
 from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.overrides import changes_of, read_changes
 from orchestrator.wiring.make_plan import make_plan
