@@ -59,7 +59,7 @@ def show(plan: Plan, scenario: Path, *, defaults: bool = False) -> None:
 
 
 def _print(plan: Plan, scenario: Path, console: Console, defaults: bool) -> None:
-    from ..labels import changed
+    from ..messages import changed
     from ..wiring.order import evaluate
 
     console.print(printable(f"{scenario}: {plan.title}" if plan.title else f"{scenario}"))

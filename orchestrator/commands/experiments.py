@@ -48,7 +48,7 @@ def concluded(experiment: LoadedExperiment, execute: Executor, options: RunOptio
     from ..experiments.figures import draw_all
     from ..experiments.outcome import judge_results
     from ..experiments.record import write_findings
-    from ..labels import changed
+    from ..messages import changed
 
     if options.quick and experiment.spec.repeats:
         experiment = experiment.short

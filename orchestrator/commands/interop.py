@@ -36,8 +36,7 @@ def second_opinion(
     """
     from ..errors import ScenarioError, SimulationError
     from ..interop.second_opinion import MASTERS, second_opinion
-    from ..labels import changed, faults_of
-    from ..messages import hint
+    from ..messages import changed, faults_of, hint
 
     known = {one.title.lower(): one for one in MASTERS}
     for name in master or ():
@@ -143,7 +142,7 @@ def export_ssp(
     SSP: System Structure and Parameterization. `yawbench run` accepts the archive and gives the same numbers.
     """
     from ..interop.ssp_write import for_omsimulator, write_ssp
-    from ..labels import faults_of
+    from ..messages import faults_of
 
     plan = plan_of_scenario(scenario, options)
     notes = list(map(str, plan.diagnostics))

@@ -185,7 +185,7 @@ def write_view(
     from ..errors import ResultsError
     from ..figures.style import LabelledRun
     from ..files import write_whole
-    from ..labels import changed_each
+    from ..messages import changed_each
     from ..pages.viewer import SETTINGS, Settings, View, page
     from ..results.read import load_results
     from .progress import say

@@ -50,11 +50,11 @@ def run(
     completed one: its results go to failed/ in that folder.
     """
     from ..errors import ScenarioError, SimulationError
-    from ..labels import changed, with_changes
     from ..master.compiled_loop import slower_because
     from ..master.isolation import opener_of
     from ..master.log import STATUS, WARNING
     from ..master.simulate import simulate
+    from ..messages import changed, with_changes
     from ..results.folder import default_folder
     from ..results.formats import size_note
     from ..results.lock import refuse_below_others

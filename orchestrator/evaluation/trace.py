@@ -39,8 +39,7 @@ from vocabulary.signals import SIGNALS
 
 from ..errors import ResultsError, ScenarioError
 from ..files import reads
-from ..labels import with_changes
-from ..messages import hint, listed
+from ..messages import hint, listed, with_changes
 from ..metrics.measures import si_of
 from ..metrics.run_metrics import columns_of
 from ..results.read import Results, load_results

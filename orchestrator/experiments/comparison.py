@@ -24,7 +24,7 @@ import numpy as np
 
 from ..errors import ResultsError, ScenarioError
 from ..figures.style import QUIET, frame, line_style, new_figure
-from ..labels import changed, with_changes
+from ..messages import changed, with_changes
 from ..metrics.measures import variable_of, words
 from ..metrics.run_metrics import MetricValue, metric
 from ..names import SignalName

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ResultsError
 from ..figures.plots import draw
 from ..figures.style import ROW, LabelledRun, frame, literal, new_figure, save
-from ..labels import changed
-from ..messages import counted
+from ..messages import changed, counted
 from .axis_figures import FAILED, Drawing
 from .experiment import FIGURES
 from .outcome import Each, ExperimentResult

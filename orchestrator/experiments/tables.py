@@ -18,8 +18,7 @@ from ..errors import Diagnostic, ModelDescriptionError, ScenarioError, text_of
 from ..figures.style import shown
 from ..fmu.archive import open_fmu
 from ..fmu.binary import runs_as
-from ..labels import changed, with_changes
-from ..messages import printable, star
+from ..messages import changed, printable, star, with_changes
 from ..metrics.measures import catalogue as measures
 from ..metrics.measures import symbol
 from ..metrics.run_metrics import STANDARD, MetricValue, columns_of, evaluate_all, metric

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from ..evaluation.standard_tests import Evaluation, StandardTest, TestQuantity, TestSeries
 from ..figures.style import shown
-from ..labels import changed
+from ..messages import changed
 from ..metrics.run_metrics import MetricValue, metric
 from .axes import levels_of
 from .experiment import NamedRun

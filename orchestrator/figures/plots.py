@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ResultsError
-from ..labels import changed_each
+from ..messages import changed_each
 from .panels import SPAN, Panel, in_legend, shown_by, spans_of
 from .style import REFERENCE, ROW, LabelledRun, digits_of, frame, line_style, new_figure, reference_words
 

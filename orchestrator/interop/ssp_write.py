@@ -33,8 +33,7 @@ from lxml.etree import SubElement, _Element
 from ..errors import ResultsError, WiringError
 from ..files import write_whole
 from ..fmu.archive import read_archive
-from ..labels import with_changes
-from ..messages import fold, listed
+from ..messages import fold, listed, with_changes
 from ..plan import Fmu, Instance, Plan, Value, Variable, Wire
 from ..scenario.quantities import BASE_UNITS, Unit, measure_of
 from ..scenario.ssp_archive import (

@@ -18,8 +18,7 @@ from vocabulary.wheels import WHEELS
 from ..experiments.outcome import ExperimentResult
 from ..experiments.tables import Table, marked, remarks
 from ..figures.style import LabelledRun, digits_of, shown, shown_unit
-from ..labels import changed
-from ..messages import counted, star
+from ..messages import changed, counted, star
 from ..metrics.measures import variable_of
 from ..metrics.run_metrics import MetricValue, metric
 from ..names import SignalName

@@ -29,7 +29,7 @@ from ..experiments.ranking_tables import (
     words_of,
 )
 from ..experiments.tables import Table
-from ..labels import changed
+from ..messages import changed
 from ..plan import Override
 from .page_parts import FigureImage, anchor, image_of, made_by, render, style
 

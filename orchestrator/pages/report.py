@@ -41,8 +41,7 @@ from ..experiments.verdict_tables import (
 from ..experiments.verdicts import ClaimResult
 from ..figures.portrait import signals_of
 from ..figures.style import LabelledRun
-from ..labels import changed
-from ..messages import counted, listed
+from ..messages import changed, counted, listed
 from ..metrics.run_metrics import evaluate, metric
 from ..plan import Plan
 from ..planner import Planner

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ResultsError
-from ..labels import with_changes
+from ..messages import with_changes
 from .csv_file import column_of, values_of
 from .formats import FILES, FORMATS, plain
 from .recorder import ColumnRecorder

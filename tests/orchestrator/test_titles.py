@@ -13,7 +13,7 @@ from orchestrator.figures import plots
 from orchestrator.figures.panels import LabelledRun
 from orchestrator.figures.plots import draw
 from orchestrator.figures.style import save
-from orchestrator.labels import changed, changed_each, with_changes
+from orchestrator.messages import changed, changed_each, with_changes
 from orchestrator.plan import Override
 from orchestrator.results.read import load_results
 from tests.sentences import golden, golden_in
