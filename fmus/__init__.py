@@ -1,1 +1,1 @@
-"""How FMUs are built; the built *.fmu stand beside this file and are not in git."""
+"""Building FMUs from components; the built *.fmu files are next to this file and not in git."""

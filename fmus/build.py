@@ -1,11 +1,11 @@
-"""Make components into FMUs: find what has changed, build it, check it, put it in place.
+"""Building FMUs from components: find those that changed, build, check and install them.
 
-    build_all(out)                       every component of the project, in Python or in C
-    build_component(source, out, ...)    one from anywhere, or one with other default values
+    build_all(out)                       all components of the project, in Python or in C
+    build_component(source, out, ...)    a component from anywhere, also with other default values
 
 An FMU is current if it was built from the same sources, by the same builder, with the same
-launcher; a key of all these stands in its archive's mark. What cannot be built keeps the FMU that
-it has; who runs scenarios does not use it (see `upkeep`).
+launcher; the key of all these is in the stamp of its archive. If a component cannot be built, its old
+FMU stays, but runs do not use it (see `upkeep`).
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from orchestrator.fmu.binary import NATIVE, REASON, runs_as
 from orchestrator.workers import Pool
 from vocabulary.roles import ROLES
 
+from .build_stamp import BuildStamp, read_stamp
 from .c.c_recipe import CRecipe, find_c_components
 from .check import defects, reference_files
 from .closure import Parts, Sources
 from .compiler import compile_launcher
-from .mark import BuildStamp, read_mark
 from .native.build import LATER
 from .packing import to_bytes
 from .presentation import CREDITS, presented
@@ -39,14 +39,14 @@ HERE = Path(__file__).resolve().parent
 COMPONENTS = HERE.parent / "components"
 
 Recipe = PythonRecipe | CRecipe
-"""One FMU that can be built."""
+"""How to build an FMU."""
 BuildProgress = Callable[[str, str], None]
-"""Called with the name of an FMU and what became of it: built, current, removed or failed."""
+"""Called with the name of an FMU and its outcome: built, current, removed or failed."""
 
 
 @dataclass
 class Report:
-    """What a build did, by name of FMU."""
+    """Outcome of a build: names of FMUs."""
 
     built: list[str] = field(default_factory=list)
     current: list[str] = field(default_factory=list)
@@ -56,19 +56,19 @@ class Report:
 
 
 def find_components(root: Path = COMPONENTS) -> dict[str, Parts]:
-    """Return name of FMU -> module of every component in Python below `root`."""
-    found: dict[str, Parts] = {}
+    """Return the components in Python below `root`, as name of FMU -> module."""
+    modules: dict[str, Parts] = {}
     for folder in sorted(root.iterdir()):
         if folder.is_dir() and folder.name in ROLES:
             for file in sorted(folder.glob("*.py")):
                 if file.name != "__init__.py":
                     module = (folder.name, file.stem)
-                    found[natural_name(module)] = module
-    return found
+                    modules[natural_name(module)] = module
+    return modules
 
 
 def find_recipes(root: Path = COMPONENTS) -> dict[str, Recipe]:
-    """Return name of FMU -> recipe of every component below `root`."""
+    """Return the recipes of all components below `root`, by name of FMU."""
     sources = Sources(root)
     in_python = {name: PythonRecipe(name, module, sources) for name, module in find_components(root).items()}
     return in_python | {name: CRecipe(folder) for name, folder in find_c_components(root).items()}
@@ -82,12 +82,12 @@ def build_all(
     progress: BuildProgress | None = None,
     root: Path = COMPONENTS,
 ) -> Report:
-    """Build the components that have changed into `out`, all or those named (names of FMUs).
+    """Build changed components into `out`: all, or those with the given FMU names.
 
-    If all could be built, FMUs of components that are gone are removed.
+    If all are built without error, FMUs whose components no longer exist are removed.
 
     Raises:
-        BuildError: with one sentence or more per component that cannot be built; all others are.
+        BuildError: some components cannot be built; all others are.
     """
     known = find_recipes(root)
     chosen = list(known) if components is None else list(dict.fromkeys(components))
@@ -97,20 +97,20 @@ def build_all(
         raise BuildError(sentences, code="component-unknown")
     errors: list[Diagnostic] = []
     report = Report()
-    tell = progress or (lambda name, what: None)
+    report_progress = progress or (lambda name, what: None)
     stale = []
     for name in chosen:
         remove_draft(out / f"{name}.fmu")
         if not force and _is_current(known[name], out / f"{name}.fmu", root):
             report.current.append(name)
-            tell(name, "current")
+            report_progress(name, "current")
         else:
             stale.append(name)
-    for name, found in _built(stale, known, out, root):
-        errors += found
-        if not found:
+    for name, problems in _built(stale, known, out, root):
+        errors += problems
+        if not problems:
             report.built.append(name)
-        tell(name, "failed" if found else "built")
+        report_progress(name, "failed" if problems else "built")
     if errors:
         raise BuildError(errors)
     report.built.sort(key=chosen.index)
@@ -122,17 +122,17 @@ def build_all(
         report.warning = compile_launcher()[1]
     if components is None and out.is_dir():
         for fmu in sorted(out.glob("*.fmu")):
-            mark = read_mark(fmu)
-            if fmu.stem not in known and mark is not None and mark.is_component:
+            stamp = read_stamp(fmu)
+            if fmu.stem not in known and stamp is not None and stamp.is_component:
                 fmu.unlink()
                 report.removed.append(fmu.stem)
-                tell(fmu.stem, "removed")
+                report_progress(fmu.stem, "removed")
     return report
 
 
 def _is_current(recipe: Recipe, target: Path, root: Path) -> bool:
     try:
-        return read_mark(target) == replace(component_mark(recipe, root), key=recipe.key(), tool=TOOL)
+        return read_stamp(target) == replace(component_stamp(recipe, root), key=recipe.key(), tool=TOOL)
     except (BuildError, OSError):
         return False
 
@@ -140,7 +140,7 @@ def _is_current(recipe: Recipe, target: Path, root: Path) -> bool:
 def _built(
     names: list[str], known: Mapping[str, Recipe], out: Path, root: Path
 ) -> Iterator[tuple[str, list[Diagnostic]]]:
-    """Build components, as many at a time as there are processors; yield each with what is wrong with it."""
+    """Build components in parallel; yield each name with its errors."""
     if len(names) < 2 or sys.platform == "win32":
         for name in names:
             yield name, errors_of(known[name], out, root)
@@ -156,7 +156,7 @@ def _built(
 
 
 def _build_one(name: str, out: Path, root: Path) -> list[Diagnostic]:
-    """Build a component in a worker and return what is wrong with it."""
+    """Build a component in a worker process and return its errors."""
     with contextlib.redirect_stdout(sys.stderr):  # components may print while they are imported
         return errors_of(_recipes(root)[name], out, root)
 
@@ -166,16 +166,16 @@ _recipes = functools.cache(find_recipes)
 
 
 def errors_of(recipe: Recipe, out: Path, root: Path) -> list[Diagnostic]:
-    """Build a component and return what is wrong with it."""
+    """Build a component and return its errors."""
     try:
-        bring_up_to_date(recipe, out / f"{recipe.name}.fmu", component_mark(recipe, root), force=True)
+        bring_up_to_date(recipe, out / f"{recipe.name}.fmu", component_stamp(recipe, root), force=True)
     except BuildError as error:
         return error.diagnostics
     return []
 
 
-def component_mark(recipe: Recipe, root: Path = COMPONENTS) -> BuildStamp:
-    """Return the mark of a component of the project, still without its key."""
+def component_stamp(recipe: Recipe, root: Path = COMPONENTS) -> BuildStamp:
+    """Return the stamp of a component of the project, without its key."""
     return BuildStamp(recipe.name, key="", source=f"components/{recipe.source.relative_to(root).as_posix()}")
 
 
@@ -192,11 +192,11 @@ def build_component(
     """Build one component into `out` and return the FMU.
 
     Args:
-        source: a Python file, inside `root` or anywhere: then it imports the project's modules as
-            `components.<...>` and its own neighbours as `.<neighbour>`; or the folder of a unit
-            in C.
-        role: folder of a role, such as "controllers"; if left out, the source's folder says it, or
-            the file's name ("controller_idea.py").
+        source: a Python file inside or outside `root`, or the folder of a component in C. A file
+            outside imports the project's modules as `components.<...>` and files in its own folder as
+            `.<file>`.
+        role: folder of a role, such as "controllers"; default: that of the source's folder or of the
+            file's name ("controller_idea.py").
         name: of the FMU; default `<role>_<file>`.
         defaults: other default values of parameters.
         root: the folder `components`.
@@ -204,7 +204,7 @@ def build_component(
     source = source.resolve()
     recipe = recipe_of(source, role=role, name=name, defaults=defaults, root=root)
     target = out.absolute() / f"{recipe.name}.fmu"
-    mark = BuildStamp(
+    stamp = BuildStamp(
         recipe.name,
         key="",
         source=Path(os.path.relpath(source, target.parent.resolve())).as_posix(),
@@ -212,7 +212,7 @@ def build_component(
         role=recipe.module[0] if isinstance(recipe, PythonRecipe) else "",
         defaults=dict(defaults or {}),
     )
-    bring_up_to_date(recipe, target, mark, force)
+    bring_up_to_date(recipe, target, stamp, force)
     return target
 
 
@@ -224,15 +224,15 @@ def recipe_of(
     defaults: Mapping[str, Any] | None = None,
     root: Path = COMPONENTS,
 ) -> Recipe:
-    """Return the recipe of one source (see `build_component`).
+    """Return the recipe of a source (see `build_component`).
 
     Raises:
-        BuildError: no such file, no role, or a name that is none.
+        BuildError: the file does not exist, has no role, or the name is invalid.
     """
     if source.is_dir():
         return CRecipe(source)
     if not source.is_file():
-        raise BuildError(f"{source}: there is no such file", code="component-unreadable")
+        raise BuildError(f"{source}: no such file", code="component-unreadable")
     stem = source.stem
     if role is None and source.parent.name in ROLES:
         role = source.parent.name
@@ -242,7 +242,7 @@ def recipe_of(
             break
     if role not in ROLES:
         raise BuildError(
-            f"{source}: which role? Put it into a folder called one of: {', '.join(ROLES)}",
+            f"{source}: has no role: put it into a folder with one of the names {', '.join(ROLES)}",
             code="component-without-role",
         )
     elsewhere = {} if source.is_relative_to(root) else {role: source.parent}
@@ -251,39 +251,40 @@ def recipe_of(
         name or natural_name((role, stem)), (role, source.stem), sources, dict(defaults or {})
     )
     if not recipe.name.isidentifier() or not recipe.name.isascii():
-        raise BuildError(f"{recipe.name}: the name of an FMU is made of letters, digits and _")
+        raise BuildError(f"{recipe.name}: the name of an FMU may contain letters, digits and _ only")
     return recipe
 
 
 def bring_up_to_date(
-    recipe: Recipe, target: Path, mark: BuildStamp, force: bool = False, *, hurry: bool = False
+    recipe: Recipe, target: Path, stamp: BuildStamp, force: bool = False, *, hurry: bool = False
 ) -> bool:
-    """Build an FMU unless it is current; return whether it was built. `mark` is still without its key.
+    """Build an FMU unless it is current; return whether it was built. `stamp` comes without its key.
 
-    With `hurry`, a native library that takes long to make is left for later, and the mark says so.
+    With `hurry`, a native library that takes long to build is postponed, and the stamp records that.
 
     Raises:
         BuildError: each problem begins with the FMU's name.
     """
     remove_draft(target)
     try:
-        mark = replace(mark, key=recipe.key(), tool=TOOL)
-        if not force and read_mark(target) == mark:
+        stamp = replace(stamp, key=recipe.key(), tool=TOOL)
+        if not force and read_stamp(target) == stamp:
             return False
         files, modules = recipe.make(hurry=hurry)
         if files.get(REASON) == LATER.encode():
-            mark = mark.unfinished()
-        credits = CREDITS if mark.is_component else {}
-        if mark.is_component:
+            stamp = stamp.unfinished()
+        credits = CREDITS if stamp.is_component else {}
+        if stamp.is_component:
             target.parent.mkdir(parents=True, exist_ok=True)
-            with draft_of(target, to_bytes(files, mark)) as draft:
-                made = reference_files(draft, *modules)
-            files |= {path: text.encode() for path, text in made.items()}
+            with draft_of(target, to_bytes(files, stamp)) as draft:
+                reference = reference_files(draft, *modules)
+            files |= {path: text.encode() for path, text in reference.items()}
         files = presented(files, recipe.listing(), role=recipe.role, credits=credits)
-        put(target, to_bytes(files, mark), *modules)
+        put(target, to_bytes(files, stamp), *modules)
     except BuildError as error:
         raise BuildError([
-            replace(one, message=f"{recipe.name}: {one.message}") for one in error.diagnostics
+            replace(diagnostic, message=f"{recipe.name}: {diagnostic.message}")
+            for diagnostic in error.diagnostics
         ]) from None  # fmt: skip
     except OSError as error:
         raise BuildError(
@@ -293,10 +294,10 @@ def bring_up_to_date(
 
 
 def put(target: Path, content: bytes, *modules: str) -> None:
-    """Check an FMU, whose Python modules are called `modules`, and put it in its place in one stroke.
+    """Check an FMU with the Python modules `modules`, and move it to its place atomically.
 
     Raises:
-        BuildError: what is wrong with it; the place is left as it was.
+        BuildError: it is defective; an existing FMU stays unchanged.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
     with draft_of(target, content) as draft:

@@ -1,7 +1,7 @@
-"""Is an FMU that has just been built right: its model description, and does it load? What does it compute?
+"""Checks of a newly built FMU: is its model description valid, does it load, what does it compute?
 
-It is loaded in a process of its own, one for all FMUs of a build: an FMU may end its process, and
-what it leaves behind in one is nobody's concern.
+FMUs are loaded in a separate process, the same for all FMUs of a build: an FMU may crash its process or
+leave anything behind in it.
 """
 
 from __future__ import annotations
@@ -23,26 +23,25 @@ _checker: subprocess.Popen[str] | None = None
 
 
 def defects(fmu: Path, *modules: str) -> list[str]:
-    """Return what is wrong with an FMU whose Python modules are called `modules`; best is nothing.
+    """Return the defects of an FMU with the Python modules `modules`, empty if there are none.
 
-    It is validated, loaded once, and its parameters must have the values that its model
-    description says.
+    It is validated and loaded once; its parameters must have the values in its model description.
     """
     answer = _ask("defects", fmu, *modules)
     return [f"does not load: its process {answer}"] if isinstance(answer, str) else answer
 
 
 def reference_files(fmu: Path, *modules: str) -> dict[str, str]:
-    """Return path in the archive -> text of an FMU's reference result, nothing if its run fails.
+    """Return path in the archive -> text of an FMU's reference result, empty if its run fails.
 
-    It fails here where there is no binary for this platform, for instance.
+    It fails, for instance, without a binary for this platform.
     """
     answer = _ask("reference_files", fmu, *modules)
     return {} if isinstance(answer, str) else answer
 
 
 def _ask(what: str, *arguments: object) -> Any:
-    """Return the answer to a request; a text says how the process that should give it ended."""
+    """Return the answer to a request; if the process died, a text with how it ended."""
     global _checker
     if _checker is None or _checker.poll() is not None:
         _checker = subprocess.Popen(
@@ -63,8 +62,8 @@ def _end(checker: subprocess.Popen[str]) -> None:
 
 
 def main() -> None:
-    """Answer requests until there is nobody to ask; what FMUs print goes to stderr."""
-    die_with_parent()  # others may have inherited the pipe that would tell
+    """Answer requests until stdin is closed; output of FMUs goes to stderr."""
+    die_with_parent()  # the pipe may not close: other processes may have inherited it
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends this process
     answers: IO[str] = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
@@ -76,10 +75,10 @@ def main() -> None:
 
 def _reference_files(fmu: str, *modules: str) -> dict[str, str]:
     from .reference_result import reference_result
-    from .staging import apart
+    from .staging import isolated_modules
 
     try:
-        with apart(*modules):
+        with isolated_modules(*modules):
             return reference_result(Path(fmu))
     except Exception:  # the FMU's own, or fmpy's
         return {}
@@ -89,13 +88,13 @@ def _defects(fmu: str, *modules: str) -> list[str]:
     import fmpy
     from fmpy.validation import validate_fmu
 
-    from .staging import apart
+    from .staging import isolated_modules
 
     found = [f"model description: {problem}" for problem in validate_fmu(fmu)]
     if found or fmpy.platform not in fmpy.supported_platforms(fmu):
         return found
     description = fmpy.read_model_description(fmu)
-    with tempfile.TemporaryDirectory(prefix="yawbench_") as folder, apart(*modules):
+    with tempfile.TemporaryDirectory(prefix="yawbench_") as folder, isolated_modules(*modules):
         fmpy.extract(fmu, folder)
         return _load(description, folder)
 
@@ -111,21 +110,21 @@ def _load(description: Any, folder: str) -> list[str]:
 
     wrong: list[str] = []
     try:
-        unit = instantiate_fmu(folder, description, "CoSimulation", logger=log)
-        unit.setupExperiment()
+        instance = instantiate_fmu(folder, description, "CoSimulation", logger=log)
+        instance.setupExperiment()
         getters: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {
-            "Real": (unit.getReal, float),
-            "Integer": (unit.getInteger, int),
-            "Boolean": (unit.getBoolean, lambda text: text == "true"),
-            "String": (lambda vr: [text.decode() for text in unit.getString(vr)], str),
+            "Real": (instance.getReal, float),
+            "Integer": (instance.getInteger, int),
+            "Boolean": (instance.getBoolean, lambda text: text == "true"),
+            "String": (lambda vr: [text.decode() for text in instance.getString(vr)], str),
         }
         for v in description.modelVariables:
             if v.causality == "parameter":
                 getter, convert = getters[v.type]
                 value = getter([v.valueReference])[0]
                 if value != convert(v.start):
-                    wrong.append(f"parameter {v.name} is {value!r}, its model description says {v.start}")
-        unit.freeInstance()
+                    wrong.append(f"parameter {v.name} is {value!r}, but {v.start} in its model description")
+        instance.freeInstance()
     except Exception as error:
         return [f"does not load: {messages[0] if messages else error}"]
     return wrong + [f"logs when loaded: {message}" for message in messages[:1]]

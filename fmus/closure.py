@@ -1,12 +1,12 @@
-"""Which source files one FMU needs: the transitive closure of its imports, and nothing more.
+"""The source files that an FMU needs: the transitive closure of its imports.
 
-Only the closure is packed and only the closure is hashed, so touching `mathematics/fuzzy.py` changes the
-FMUs that use it and no other. Imports are read from the syntax tree; nothing is executed. Every
-absolute import must be of the standard library, because the host's Python may have nothing else, or
-of what the component declares as its `host_packages`.
-Three are allowed and made relative: `components.<...>`, as a file outside this project writes it, and
-`vocabulary.<...>` and `pythonfmu.<...>`, of which each FMU carries its own copy, so that another FMU's
-version of them in the same process cannot come between.
+Only the closure is packed and hashed, so a change of `mathematics/fuzzy.py` changes only the FMUs that use
+it. Imports are read from the syntax tree; nothing is executed. Absolute imports must be of the standard
+library, because the host's Python may have nothing else, or of packages that the component declares as
+`host_packages`.
+Three packages are allowed and their imports made relative: `components.<...>`, used by files outside this
+project, and `vocabulary.<...>` and `pythonfmu.<...>`. Each FMU carries its own copy of these, so that it does
+not use another FMU's version in the same process.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ Parts = tuple[str, ...]
 PYTHONFMU = Path(pythonfmu.__file__).resolve().parent
 """Folder of the installed PythonFMU."""
 BESIDE = {"pythonfmu": PYTHONFMU, "vocabulary": Path(vocabulary.__file__).resolve().parent}
-"""Package that an FMU carries a copy of beside the components -> its folder."""
+"""Packages that are copied into FMUs besides the components -> their folders."""
 _ABSOLUTE = re.compile(rf"\bfrom\s+(?:components\b\.?|(?=(?:{'|'.join(BESIDE)})\.))")
-"""How an import begins that is made relative."""
+"""Beginning of an import that is made relative."""
 
 
 @dataclass(frozen=True)
@@ -60,53 +60,55 @@ class Sources:
     def __init__(self, root: Path, *, elsewhere: Mapping[str, Path] | None = None) -> None:
         self.root = root
         self.elsewhere = dict(elsewhere or {})
-        self.evidence: dict[Parts, dict[str, str]] = {}  # of a closure that has been found: see `evidence`
+        self.evidence: dict[Parts, dict[str, str]] = {}  # module -> evidence of its closure, see `evidence`
         self._modules: dict[Parts, _Module | None] = {}
 
     def closure(self, module: Parts) -> dict[str, str]:
         """Return path -> text of every file that importing `module` executes, sorted.
 
         Raises:
-            BuildError: a file that is missing, cannot be parsed or imports what no FMU may.
+            BuildError: a file is missing, cannot be parsed, or imports what an FMU must not.
         """
         files: dict[str, str] = {}
         evidence: dict[str, str] = {}
         folders: set[Path] = set()
         waiting = [(module, "")]
-        seen: set[Parts] = set()
+        visited: set[Parts] = set()
         first = self._module(module)
         allowed = first.host_packages if first is not None else ()
         while waiting:
             parts, where = waiting.pop()
-            if parts in seen:
+            if parts in visited:
                 continue
-            seen.add(parts)
-            found = self._module(parts)
-            if found is None:
+            visited.add(parts)
+            source = self._module(parts)
+            if source is None:
                 raise BuildError(
-                    f"{where}there is no module {'.'.join(parts)} in {self.root}{self._namesake(parts)}",
+                    f"{where}no module {'.'.join(parts)} in {self.root}{self._namesake(parts)}",
                     code="component-import-forbidden",
                 )
             waiting += [(parts[:i], where) for i in range(len(parts))]  # the packages above it
             is_package = self.file(parts).name == "__init__.py"
-            files["/".join((*parts, "__init__") if is_package else parts) + ".py"] = found.text
-            waiting += found.imports
-            for package, line in found.outside:
+            files["/".join((*parts, "__init__") if is_package else parts) + ".py"] = source.text
+            waiting += source.imports
+            for package, line in source.outside:
                 if package not in allowed:
                     raise BuildError(
                         f"{line}: imports {package}, {_WAYS_OUT.format(package=package)}",
                         code="component-import-forbidden",
                     )
-            if found.file is not None:
-                evidence[str(found.file)] = found.digest
-                folders.add(found.file.parent)  # a new file in it can come before one that is known
+            if source.file is not None:
+                evidence[str(source.file)] = source.digest
+                folders.add(source.file.parent)  # a new file in it can come before one that is known
         self.evidence[module] = evidence | SourceDigests().evidence(sorted(folders))
         return dict(sorted(files.items()))
 
     def _namesake(self, parts: Parts) -> str:
-        """Return where a module of this name stands, as the end of a sentence; names are used once."""
-        found = [file.relative_to(self.root).with_suffix("") for file in self.root.glob(f"*/{parts[-1]}.py")]
-        return "".join(f"; did you mean components.{'.'.join(file.parts)}?" for file in found[:1])
+        """Return a suggestion, as the end of a message: a module of this name in another package."""
+        matches = [
+            file.relative_to(self.root).with_suffix("") for file in self.root.glob(f"*/{parts[-1]}.py")
+        ]
+        return "".join(f"; did you mean components.{'.'.join(file.parts)}?" for file in matches[:1])
 
     def file(self, parts: Parts) -> Path:
         """Return the file of a module or package, whether or not it exists."""
@@ -122,14 +124,14 @@ class Sources:
         """Return a module of the package, None if there is none."""
         if parts not in self._modules:
             file = self.file(parts)
-            found = None
+            source = None
             if parts == ("pythonfmu",):
-                found = _Module(_PYTHONFMU, ())
+                source = _Module(_PYTHONFMU, ())
             elif file.exists():
-                found = self._parse(file, parts)
+                source = self._parse(file, parts)
             elif self.root.joinpath(*parts).is_dir() or (len(parts) == 1 and parts[0] in self.elsewhere):
-                found = _Module("", ())  # a folder without __init__.py
-            self._modules[parts] = found
+                source = _Module("", ())  # a folder without __init__.py
+            self._modules[parts] = source
         return self._modules[parts]
 
     def _parse(self, file: Path, parts: Parts) -> _Module:
@@ -158,7 +160,7 @@ class Sources:
                 outside += [(top, where)] if (top := _outside(node.module or "", where)) else []
                 continue
             if node.level == 0:
-                dots = "." * (len(package) + 1)  # relative, in the line as it stands
+                dots = "." * (len(package) + 1)  # relative, edited in the line itself
                 lines[node.lineno - 1] = _ABSOLUTE.sub(f"from {dots}", lines[node.lineno - 1], 1)
             modules = [base] + [(*base, a.name) for a in node.names if self.file((*base, a.name)).exists()]
             imports += [(module, f"{where}: ") for module in modules]
@@ -182,7 +184,7 @@ class Sources:
             return None
         if node.level > len(package) + 1:
             raise BuildError(
-                f"{where}: the relative import goes beyond the package of the components",
+                f"{where}: the relative import leaves the package of the components",
                 code="component-import-forbidden",
             )
         return package[: len(package) + 1 - node.level] + names
@@ -197,7 +199,7 @@ def _module_file(folder: Path, parts: Parts) -> Path:
 
 
 def _imports(tree: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:
-    """Yield every import that runs, so none below `if TYPE_CHECKING:`."""
+    """Yield all imports that run, so none below `if TYPE_CHECKING:`."""
     for node in ast.iter_child_nodes(tree):
         if isinstance(node, ast.Import | ast.ImportFrom):
             yield node
@@ -209,14 +211,14 @@ def _imports(tree: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:
 
 
 _WAYS_OUT = (
-    "which is outside the standard library; an FMU must run in a Python that has nothing else installed. "
+    "which is not in the standard library; an FMU must run in a Python with nothing else installed. "
     'Declare host_packages = ("{package}",) in the component if every host\'s Python has it, take an FMU '
     "from elsewhere, or run the controller as plain Python with the library `yawbench`"
 )
 
 
 def _outside(name: str, where: str) -> str | None:
-    """Return the package that an absolute import needs beyond the standard library, if it does."""
+    """Return the package of an absolute import, None if it is in the standard library."""
     top = name.partition(".")[0]
     if top in ("components", *BESIDE):
         raise BuildError(
@@ -227,7 +229,7 @@ def _outside(name: str, where: str) -> str | None:
 
 
 def _declared_packages(tree: ast.Module) -> tuple[str, ...]:
-    """Return what the classes of a module declare as `host_packages`, which must be written out."""
+    """Return the `host_packages` that a class of a module declares, which must be literals."""
     for node in ast.walk(tree):
         match node:
             case ast.Assign([ast.Name("host_packages")], value) | ast.AnnAssign(
@@ -239,5 +241,5 @@ def _declared_packages(tree: ast.Module) -> tuple[str, ...]:
 
 
 def _shown(file: Path) -> str:
-    """Return a file's name as messages give it: the last folder and the file."""
+    """Return a file's name for messages: its folder and name."""
     return f"{file.parent.name}/{file.name}"

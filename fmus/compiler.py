@@ -1,4 +1,4 @@
-"""C sources as shared libraries; the launcher, and what this program itself calls, are kept in a cache."""
+"""Compiling C sources to shared libraries; the launcher and C code that this program calls are cached."""
 
 from __future__ import annotations
 
@@ -24,48 +24,51 @@ SOURCES = ("launcher.c", "calling_sequence.h", "fmi2.h", "find_python.h", "oldes
 FLAGS = ("-std=c11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-Wl,--build-id=none", "-s")
 LIBRARIES = ("-ldl", "-pthread")
 STORE = "launcher"
-"""Of compiled launchers in the cache."""
+"""Folder of the cache for compiled launchers."""
 OWN_FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off", "-pthread")
-"""Of C code that this program calls itself; contracted operations would give other bits than Python."""
+"""Compiler flags for C code that this program calls; contracted operations would differ from Python's."""
 
 
 def compiler_command() -> list[str]:
-    """Return how the C compiler is called: `cc`, or what `CC` names."""
+    """Return the command of the C compiler: that in the environment variable CC, else `cc`."""
     return shlex.split(os.environ.get("CC", "")) or ["cc"]
 
 
 def compiler_tools() -> tuple[str, str]:
-    """Return what decides which compiler that is and what it does (see `evidence`)."""
+    """Return what identifies the compiler (see `evidence`)."""
     return "env:CC", f"tool:{compiler_command()[0]}"
 
 
 def compiler_version(command: Sequence[str]) -> str:
-    """Return what a compiler says of itself.
+    """Return the version text of a compiler.
 
     Raises:
-        BuildError: there is none.
+        BuildError: the compiler does not exist.
     """
     if shutil.which(command[0]) is None:
-        raise BuildError(f"there is no C compiler ({command[0]}); CC can name one", code="compiler-missing")
+        raise BuildError(
+            f"no C compiler ({command[0]} not found); name one in the environment variable CC",
+            code="compiler-missing",
+        )
     return subprocess.run([*command, "--version"], capture_output=True, text=True, check=False).stdout
 
 
 def compile_library(command: Sequence[str], sources: Mapping[str, bytes], *arguments: str) -> bytes:
-    """Return the shared library made of files; what the compiler warns of goes to stderr.
+    """Compile files into a shared library and return it; warnings of the compiler go to stderr.
 
     Args:
-        command: how the compiler is called.
-        sources: name -> content. Names are relative: bytes must not depend on where the files stand.
-        arguments: what is compiled, and how.
+        command: the command of the compiler.
+        sources: relative name -> content; relative, so that equal sources give equal libraries.
+        arguments: files to compile, and options.
 
     Raises:
-        BuildError: what the compiler says is wrong.
+        BuildError: compiling fails; with the compiler's messages.
     """
     with tempfile.TemporaryDirectory(prefix="yawbench_") as temporary:
         for name, content in sources.items():
             Path(temporary, name).write_bytes(content)
         done = subprocess.run(
-            [*command, *arguments, "-o", "made.so"],
+            [*command, *arguments, "-o", "library.so"],
             cwd=temporary,
             capture_output=True,
             text=True,
@@ -78,25 +81,25 @@ def compile_library(command: Sequence[str], sources: Mapping[str, bytes], *argum
             )
         if done.stderr:
             print(printable(done.stderr.rstrip()), file=sys.stderr)
-        return Path(temporary, "made.so").read_bytes()
+        return Path(temporary, "library.so").read_bytes()
 
 
-def recalled_library(
+def cached_library(
     store: str, sources: Mapping[str, bytes], arguments: Sequence[str], version: str | None = None
 ) -> bytes:
-    """Return a shared library from the cache, where it is stored when it has been compiled once.
+    """Return a shared library from the cache; compile it first if it is not there.
 
     Args:
         store: folder of the cache.
         sources, arguments: as for `compile_library`.
-        version: of the compiler; None: any version makes a library that serves as well.
+        version: of the compiler; None: libraries of all versions are equivalent.
 
     Raises:
-        BuildError: there is no C compiler, or what it says is wrong.
+        BuildError: there is no C compiler, or compiling fails.
     """
     command = compiler_command()
-    said = "\0".join([*command, version or platform.machine(), *arguments])
-    key = hashlib.sha256(b"".join([said.encode(), *sources.values()])).hexdigest()[:16]
+    settings = "\0".join([*command, version or platform.machine(), *arguments])
+    key = hashlib.sha256(b"".join([settings.encode(), *sources.values()])).hexdigest()[:16]
     binary = recall(store, key)
     if binary is None:
         if version is None:
@@ -108,12 +111,12 @@ def recalled_library(
 
 @cache
 def load_compiled(source: Path) -> tuple[ctypes.CDLL | None, str]:
-    """Return a file of C as a library loaded into this process, or None with the reason why there is none."""
+    """Compile a C file and load it into this process; return the library, or None and the reason."""
     if os.name != "posix" or sys.maxsize < 2**32:
-        return None, f"{source.name} is for 64-bit systems with POSIX threads"
+        return None, f"{source.name} requires a 64-bit system with POSIX threads"
     try:
         sources = {source.name: source.read_bytes()}
-        binary = recalled_library(source.stem, sources, [*OWN_FLAGS, source.name])
+        binary = cached_library(source.stem, sources, [*OWN_FLAGS, source.name])
         with tempfile.NamedTemporaryFile(dir=cache_folder(), suffix=".so") as copy:
             copy.write(binary)
             copy.flush()
@@ -125,7 +128,7 @@ def load_compiled(source: Path) -> tuple[ctypes.CDLL | None, str]:
 
 
 def compile_launcher() -> tuple[bytes | None, str]:
-    """Return the launcher for this machine, or None with the reason why there is none.
+    """Return the launcher for this machine, or None and the reason.
 
     The same sources and the same compiler give the same bytes; another compiler may give others.
     """
@@ -135,11 +138,11 @@ def compile_launcher() -> tuple[bytes | None, str]:
 @cache
 def _launcher(command: tuple[str, ...]) -> tuple[bytes | None, str]:
     if sys.platform != "linux" or platform.machine() != "x86_64":
-        return None, f"it is for Linux on x86-64, this is {platform.system()} on {platform.machine()}"
+        return None, f"it requires Linux on x86-64, this is {platform.system()} on {platform.machine()}"
     sources = {name: (HERE / name).read_bytes() for name in SOURCES}
     try:
         arguments = [*FLAGS, SOURCES[0], *LIBRARIES]
-        binary = recalled_library(STORE, sources, arguments, compiler_version(command))
+        binary = cached_library(STORE, sources, arguments, compiler_version(command))
     except BuildError as error:
         why = str(error.diagnostics[0])
         return None, why if "C compiler" in why else f"the C compiler failed: {why}"

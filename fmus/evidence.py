@@ -1,12 +1,12 @@
-"""What the key of an FMU follows from: files, names in folders, tools, each with a digest of its state.
+"""Evidence for the key of an FMU: the files, folders and tools that determine it, with their digests.
 
-A key is costly to find (sources are parsed, a compiler is asked for its version), its evidence is
-cheap to look at: while every digest is the same, so is the key.
+A key is costly to compute (sources are parsed, the compiler reports its version), its evidence is
+cheap to check: as long as all digests are the same, so is the key.
 
     /path/to/file, /path/to/folder      content; names in it
     env:CC                              an environment variable
     tool:cc                             a program on PATH
-    tool:/path/to/file                  a file of an installed package, which nobody edits
+    tool:/path/to/file                  a file of an installed package, never edited in place
 """
 
 from __future__ import annotations
@@ -18,32 +18,32 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 Evidence = Mapping[str, str]
-"""What was looked at -> digest of what was found."""
+"""Item, as above -> its digest."""
 
 
 class SourceDigests:
-    """Digests of the present state, each found once."""
+    """Digests of the present state, each computed once."""
 
     def __init__(self) -> None:
-        self._found: dict[str, str] = {}
+        self._digests: dict[str, str] = {}
 
-    def at(self, what: str) -> str:
-        """Return the digest of one thing as it is now."""
-        if what not in self._found:
-            self._found[what] = _digest(what)
-        return self._found[what]
+    def at(self, item: str) -> str:
+        """Return the present digest of an item."""
+        if item not in self._digests:
+            self._digests[item] = _digest(item)
+        return self._digests[item]
 
     def confirm(self, evidence: Evidence) -> bool:
-        """Return whether everything is as it was."""
-        return all(self.at(what) == digest for what, digest in evidence.items())
+        """Return whether all digests are still the same."""
+        return all(self.at(item) == digest for item, digest in evidence.items())
 
-    def evidence(self, of: Iterable[str | Path]) -> dict[str, str]:
-        """Return the evidence of things as they are now."""
-        return {str(what): self.at(str(what)) for what in of}
+    def evidence(self, items: Iterable[str | Path]) -> dict[str, str]:
+        """Return the present evidence: the items with their digests."""
+        return {str(item): self.at(str(item)) for item in items}
 
 
-def _digest(what: str) -> str:
-    scheme, _, rest = what.partition(":")
+def _digest(item: str) -> str:
+    scheme, _, rest = item.partition(":")
     if scheme == "env":
         return os.environ.get(rest, "")
     try:
@@ -51,10 +51,10 @@ def _digest(what: str) -> str:
             path = shutil.which(rest) or rest
             status = os.stat(path)
             return f"{path} {status.st_size} {status.st_mtime_ns}"
-        if os.path.isdir(what):
-            names = sorted(n for n in os.listdir(what) if not n.startswith(".") and n != "__pycache__")
+        if os.path.isdir(item):
+            names = sorted(n for n in os.listdir(item) if not n.startswith(".") and n != "__pycache__")
             return content_digest("\0".join(names).encode())
-        with open(what, "rb", buffering=0) as file:
+        with open(item, "rb", buffering=0) as file:
             return content_digest(file.read())
     except OSError:
         return ""

@@ -656,7 +656,7 @@ EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi
 EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size,
                                           fmi2FMUstate *state)
 {
-    static const char failure[] = "fmi2DeSerializeFMUstate: these bytes are no state of this FMU";
+    static const char failure[] = "fmi2DeSerializeFMUstate: not a state of this FMU";
     INSTANCE(c)
     REQUIRE(bytes != NULL && state != NULL, "fmi2DeSerializeFMUstate: no bytes, or no place for the state")
     Progress at;

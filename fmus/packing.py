@@ -1,7 +1,7 @@
-"""The archive that is an FMU: complete, minimal, reproducible.
+"""Packing of FMU archives: complete, minimal, reproducible.
 
-The same sources give the same bytes, wherever and whenever they are built: files in sorted order,
-stored without compression (compressors differ), with one date and one set of permissions. The GUID
+The same sources give the same bytes, wherever and whenever they are built: files are sorted,
+stored without compression (compressors differ), all with the same date and permissions. The GUID
 follows from the model description and the resources, not from the binaries.
 """
 
@@ -15,28 +15,28 @@ from collections.abc import Mapping
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
+from .build_stamp import BuildStamp
 from .closure import PYTHONFMU
-from .mark import BuildStamp
 
 DESCRIPTION = "modelDescription.xml"
 _DATE = (1980, 1, 1, 0, 0, 0)
 LIBRARIES = sorted(PYTHONFMU.glob("resources/binaries/*/*"))
-"""PythonFMU's, in a folder for each platform."""
+"""PythonFMU's libraries, in a folder for each platform."""
 PYTHONFMU_LIBRARY = "libpythonfmu-export.so"
-"""Name of PythonFMU's library beside the launcher; the launcher opens it by this name."""
+"""Name of PythonFMU's library next to the launcher, which opens it by this name."""
 
 
 def pack(
     resources: Mapping[str, str], description: Element, *, name: str, version: str, launcher: bytes | None
 ) -> dict[str, bytes]:
-    """Return path -> content of the FMU `name`.
+    """Return the files of an FMU, as path -> content.
 
     Args:
-        resources: path -> text of what is for Python.
+        resources: Python sources, as path -> text.
         description: the model description.
         name: of the FMU.
         version: of the FMU.
-        launcher: the binary for Linux in place of PythonFMU's library, which it opens.
+        launcher: binary for Linux that opens PythonFMU's library; None: that library alone.
     """
     files = {f"resources/{path}": text.encode() for path, text in sorted(resources.items())}
     description.set("version", version)
@@ -58,8 +58,8 @@ def pack(
     return files
 
 
-def to_bytes(files: Mapping[str, bytes], mark: BuildStamp) -> bytes:
-    """Return the archive of `files`; its comment is the mark."""
+def to_bytes(files: Mapping[str, bytes], stamp: BuildStamp) -> bytes:
+    """Return the archive of `files`, with the stamp as its comment."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
         for path, data in sorted(files.items()):
@@ -67,5 +67,5 @@ def to_bytes(files: Mapping[str, bytes], mark: BuildStamp) -> bytes:
             info.create_system = 3  # Unix, also when built elsewhere
             info.external_attr = 0o100644 << 16
             archive.writestr(info, data)
-        archive.comment = mark.to_comment()
+        archive.comment = stamp.to_comment()
     return buffer.getvalue()

@@ -1,7 +1,7 @@
-"""What a program shows of an FMU: who made it, a page of documentation, an icon.
+"""What other programs show of an FMU: its authors, a page of documentation, an icon.
 
 Nothing here depends on when or where the FMU is built: the date is that of this version of the
-program, the icon was drawn before (`docs/generate/icons.py`).
+program, and the icons are drawn in advance (`docs/generate/icons.py`).
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from .packing import DESCRIPTION
 from .reference_result import FOLDER
 
 DATE = "2026-11-22T00:00:00Z"
-"""Of this version of the program; the time of a build would make equal sources give different FMUs."""
+"""Date of this version of the program; with the time of the build, FMUs would not be reproducible."""
 CREDITS = {
     "author": "The yawbench developers",
     "copyright": "Copyright (c) 2026 The yawbench developers",
     "license": "MIT",
 }
-"""Of the project's own components."""
+"""Attributes of the model descriptions of the project's own components."""
 HERE = Path(__file__).resolve().parent
 ICONS = HERE / "icons"
 PAGE = HERE / "page.html.j2"
@@ -37,13 +37,13 @@ PAGE = HERE / "page.html.j2"
 def presented(
     files: Mapping[str, bytes], sources: Mapping[str, str], *, role: str, credits: Mapping[str, str]
 ) -> dict[str, bytes]:
-    """Return the files of an FMU with what is shown of it.
+    """Return the files of an FMU with documentation, icon and credits added.
 
     Args:
         files: of the archive.
-        sources: path -> text of what it was written as, the component's own file first.
-        role: of the unit, such as "controller".
-        credits: attributes of the model description that it does not have yet.
+        sources: its sources as path -> text, the component's own file first.
+        role: such as "controller".
+        credits: attributes of the model description, added where they are missing.
     """
     root = ElementTree.fromstring(files[DESCRIPTION])
     generated = {"generationTool": f"yawbench {version('yawbench')}", "generationDateAndTime": DATE}
@@ -70,12 +70,12 @@ def _declare_role(root: Element, role: str) -> None:
 
 
 def icon(role: str) -> list[Path]:
-    """Return the file of a role's icon, if it has one."""
+    """Return the file of a role's icon, empty if it has none."""
     return [file] if (file := ICONS / f"{role}.png").exists() else []
 
 
 def _page(root: Element, sources: Mapping[str, str], files: Iterable[str]) -> str:
-    """Return the documentation of an FMU with these files, of which others show what it computes."""
+    """Return the documentation page of an FMU; `files` are searched for its reference result."""
     needed = root.find("VendorAnnotations/Tool[@name='yawbench']/hostPackages")
     return _template().render(
         about=root.attrib,
@@ -97,7 +97,7 @@ def _template() -> Template:
 
 
 def _blocks(source: str) -> list[str]:
-    """Return the blocks of a docstring: paragraphs, and what is indented, equations mostly."""
+    """Return the blocks of a docstring: paragraphs and indented equations."""
     try:
         docstring = ast.get_docstring(ast.parse(source)) or ""
     except SyntaxError:  # not written in Python
@@ -112,13 +112,13 @@ _GREEK = {
 
 
 def _symbols(equations: str) -> str:
-    """Return equations as they are printed."""
+    """Return equations with Greek letters and superscripts."""
     shown = re.sub(r"\b([a-z]+)(?=\b|_)", lambda m: _GREEK.get(m[1], m[1]), equations)
     return shown.replace("^2", "²").replace("^3", "³")
 
 
 def _variables(root: Element) -> Iterator[dict[str, str]]:
-    """Yield what the page shows of a variable, of an output also the inputs that it follows at once."""
+    """Yield the rows of the page's table of variables, for outputs with their direct feedthrough."""
     variables = root.findall("ModelVariables/ScalarVariable")
     names = [variable.get("name", "") for variable in variables]
     follows = {
@@ -128,11 +128,11 @@ def _variables(root: Element) -> Iterator[dict[str, str]]:
         for unknown in root.iterfind("ModelStructure/Outputs/Unknown")
     }
     for variable, name in zip(variables, names, strict=True):
-        said = variable.find("Annotations/Tool[@name='yawbench']/variable")
+        annotation = variable.find("Annotations/Tool[@name='yawbench']/variable")
         yield {
             **variable[0].attrib,
             **variable.attrib,
             "meaning": variable.get("description", ""),
             "follows at once": follows.get(name, ""),
-            "source": "" if said is None else said.get("source", ""),
+            "source": "" if annotation is None else annotation.get("source", ""),
         }

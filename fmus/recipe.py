@@ -1,4 +1,4 @@
-"""How a component in Python becomes the files of an FMU; `c.c_recipe` is its like for units in C."""
+"""How a Python component becomes the files of an FMU; `c.c_recipe` does the same for components in C."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ HERE = Path(__file__).resolve().parent
 
 @dataclass(frozen=True)
 class PythonRecipe:
-    """A component. All raise BuildError with what is wrong with the sources."""
+    """Builds the FMU of a Python component. Its methods raise BuildError if the sources are wrong."""
 
     name: str
     module: Parts
@@ -45,7 +45,7 @@ class PythonRecipe:
         return ROLES[self.module[0]].name
 
     def listing(self) -> dict[str, str]:
-        """Return path -> text of what somebody has written for it alone."""
+        """Return the component's own file, as path -> text."""
         path = "/".join(self.module) + ".py"
         return {path: self._files[path]}
 
@@ -54,14 +54,14 @@ class PythonRecipe:
         return self.sources.closure(self.module)
 
     def key(self) -> str:
-        """Return a hash of all that decides what the FMU's bytes are."""
+        """Return a hash of everything that determines the content of the FMU."""
         parts = [self.name, ".".join(self.module), json.dumps(dict(self.defaults)), _builder(self.role)]
         parts += [toolchain(), hashlib.sha256(compile_launcher()[0] or b"").hexdigest(), _hash(self._files)]
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
     def evidence(self) -> dict[str, str]:
-        """Return what the key follows from, cheap to look at (see `evidence`)."""
-        self._files  # noqa: B018 - found once, with its evidence
+        """Return the evidence for the key (see `evidence`)."""
+        self._files  # noqa: B018 - parses the sources, which gives their evidence
         libraries = [f"tool:{file}" for file in LIBRARIES]
         translator = [*sorted((HERE / "native").glob("*.py")), *HEADERS.values()]
         return self.sources.evidence[self.module] | SourceDigests().evidence(
@@ -78,7 +78,7 @@ class PythonRecipe:
     def make(self, *, hurry: bool = False) -> tuple[dict[str, bytes], tuple[str, ...]]:
         """Return the files of the archive, and the names of the Python modules among them.
 
-        With `hurry`, a native library that takes long to make is left for later.
+        With `hurry`, a native library that takes long to build is postponed.
         """
         module, files = self.module, self._files
         if self.defaults or self.name != natural_name(module):
@@ -99,7 +99,7 @@ class PythonRecipe:
             resources["slavemodule.txt"] = entry
             launcher, _ = compile_launcher()
             packed = pack(resources, description, name=self.name, version=digest, launcher=launcher)
-            made = native(
+            library = native(
                 component,
                 stage.folder / package,
                 source="/".join(module) + ".py",
@@ -107,19 +107,19 @@ class PythonRecipe:
                 resources=stage.folder,
                 hurry=hurry,
             )
-        packed |= made.files
-        packed[REASON] = made.why_not.encode()
+        packed |= library.files
+        packed[REASON] = library.why_not.encode()
         return packed, (package, entry)
 
 
 def natural_name(module: Parts) -> str:
-    """Return the name of the FMU that a module becomes: `<role>_<file>`."""
+    """Return the default name of the FMU of a module: `<role>_<file>`."""
     return f"{ROLES[module[0]].name}_{module[-1]}"
 
 
 @cache
 def _builder(role: str) -> str:
-    """Return a hash of this builder, of what it takes from PythonFMU, and of the icon of a role."""
+    """Return a hash of this builder, PythonFMU's libraries and the icon of a role."""
     content = hashlib.sha256(TOOL.encode())
     for file in [*sorted(HERE.glob("*.py")), PAGE, *LIBRARIES, *icon(role)]:
         content.update(file.read_bytes())

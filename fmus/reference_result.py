@@ -1,12 +1,12 @@
-"""A reference result: what an FMU computes here, for others to see whether it does the same there.
+"""Reference results: outputs of an FMU for given inputs, with which other tools can compare theirs.
 
 Inputs, settings and outputs have the form of the FMI Cross-Check (`NAME_in.csv`, `NAME_ref.opt`,
-`NAME_ref.csv`), which tools know; a manifest after FMI-LS-REF 1.0.0-alpha.1, the layered standard
-for files that come with an FMU, says what each of them is.
+`NAME_ref.csv`), which many tools read; a manifest following FMI-LS-REF 1.0.0-alpha.1, the layered
+standard for reference files, describes them.
 
-Every input swings within its usual range, each at a frequency of its own; parameters have their
-default values. Outputs have six digits of the largest value of their column: what mathematical
-libraries differ by is lost, so that the same sources give the same bytes.
+Every input is a sine within its usual range, with its own frequency; parameters have their default
+values. Outputs are rounded to six digits of the largest value of their column, so that differences
+between mathematical libraries vanish and the same sources give the same bytes.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from typing import Any
 from .usual_ranges import usual_range
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
-STOP, STEP = 2.0, 0.02  # [s], chosen: every unit has moved by then; few enough rows for an archive
+STOP, STEP = 2.0, 0.02  # [s], chosen: all components respond by then; few enough rows for an archive
 DIGITS = 6
-"""Of the largest value of a column. Chosen: ten orders above what mathematical libraries differ by."""
+"""Digits of the largest value of a column. Chosen: far coarser than differences of mathematical libraries."""
 _MANIFEST = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiReferences xmlns:fmi-ls="http://fmi-standard.org/fmi-ls-manifest"
   fmi-ls:fmi-ls-name="org.fmi-standard.fmi-ls-ref" fmi-ls:fmi-ls-version="1.0.0-alpha.1"
@@ -39,7 +39,7 @@ _LOWEST, _SPACING = 0.5, 0.07  # [Hz], chosen: between one and five periods with
 
 
 def reference_result(fmu: Path) -> dict[str, str]:
-    """Return path in the archive -> text of the reference result of an FMU that is run for it.
+    """Run an FMU and return its reference result, as path in the archive -> text.
 
     Raises:
         Exception: the run fails.
@@ -82,7 +82,7 @@ def _stimuli(names: list[str]) -> Any:
 
 
 def _rounded(values: Any) -> Any:
-    """Return values with as many decimals as give the largest its digits."""
+    """Return values rounded to the decimals at which the largest has `DIGITS` digits."""
     largest = float(abs(values).max())
     decimals = DIGITS - 1 - math.floor(math.log10(largest)) if largest else 0
     return values.round(decimals) + 0.0  # no negative zero

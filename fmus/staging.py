@@ -1,8 +1,8 @@
-"""A component's sources as a package of its own, imported apart from everything else.
+"""A component's sources as a separate package, imported in isolation.
 
-Building imports the component, because its class gives the model description. Its
-modules carry the name `yawbench_<hash>`, are taken out of `sys.modules` again afterwards, and
-modules of the same name that are in use (an FMU that is loaded in this process) are put back.
+Building imports the component, because its class gives the model description. Its package is named
+`yawbench_<hash>` and removed from `sys.modules` afterwards; modules of the same name that are in use
+(by an FMU loaded in this process) are restored.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ ENTRY = '''"""Entry module of the FMU {name}."""
 {needs}
 from {package}.{module} import {component}
 
-# At every instantiation PythonFMU's library runs these lines once more, with locals of their own,
-# and then gives back a reference to the globals that it never took. Here it gets one.
+# At every instantiation PythonFMU's library runs these lines again, with separate locals,
+# and then releases a reference to the globals that it never acquired. Acquire it here.
 if locals() is not globals():
     try:
         import ctypes
@@ -48,7 +48,7 @@ if missing:
     raise ImportError("{name} needs " + ", ".join(missing) + ", which this Python lacks: " + sys.prefix)
 """
 
-VARIANT = '''"""{module} with a name or default values of its own."""
+VARIANT = '''"""{module} with another name or other default values."""
 
 from __future__ import annotations
 
@@ -75,8 +75,8 @@ class {component}(Base):
 
 
 @contextmanager
-def apart(*packages: str) -> Iterator[None]:
-    """Import modules of these packages afresh, and leave no trace of them behind."""
+def isolated_modules(*packages: str) -> Iterator[None]:
+    """Import modules of these packages anew within the block, and remove them afterwards."""
 
     def ours(name: str) -> bool:
         return name.partition(".")[0] in packages
@@ -98,7 +98,7 @@ def apart(*packages: str) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class StagingFolder:
-    """A folder with the package of one component, for as long as the context lasts."""
+    """A temporary folder with the package of a component; see `staged`."""
 
     folder: Path
     package: str
@@ -107,7 +107,7 @@ class StagingFolder:
         """Return the component class that a module of the package defines.
 
         Raises:
-            BuildError: importing it fails, or it defines none or several.
+            BuildError: importing it fails, or it does not define exactly one component.
         """
         name = f"{self.package}.{'.'.join(module)}"
         try:
@@ -115,15 +115,15 @@ class StagingFolder:
             loaded = importlib.import_module(name)
         except (Exception, SystemExit) as error:
             raise BuildError(self.explain(error)) from None
-        found = [
+        classes = [
             value
             for value in vars(loaded).values()
             if issubclass(type(value), type) and issubclass(value, base) and value.__module__ == name
         ]
-        final = [c for c in found if not any(other is not c and issubclass(other, c) for other in found)]
+        final = [c for c in classes if not any(other is not c and issubclass(other, c) for other in classes)]
         if len(final) != 1:
             names = ", ".join(c.__name__ for c in final)
-            raise BuildError(f"defines {'components ' + names if names else 'no component'}; one is right")
+            raise BuildError(f"must define one component (defines {names or 'none'})")
         (component,) = final
         assert isinstance(component, type)
         return component
@@ -132,16 +132,16 @@ class StagingFolder:
         """Return the model description of a component.
 
         Raises:
-            BuildError: it cannot be made.
+            BuildError: creating an instance fails.
         """
         try:
-            made: Element = component(instance_name="described", resources=str(self.folder)).to_xml()
+            description: Element = component(instance_name="described", resources=str(self.folder)).to_xml()
         except (Exception, SystemExit) as error:
             raise BuildError(self.explain(error)) from None
-        return made
+        return description
 
     def explain(self, error: BaseException) -> str:
-        """Return an exception as one sentence with the file and line of the package it came from."""
+        """Return an exception as a message with the file and line in the package."""
         where = ""
         for frame in traceback.extract_tb(error.__traceback__):
             file = Path(frame.filename)
@@ -153,13 +153,13 @@ class StagingFolder:
 
 
 _MACHINERY = ("fmi/component.py", "fmi/variables.py")
-"""What finds a wrong declaration, but is not where it stands."""
+"""Files that detect a wrong declaration but do not contain it."""
 
 
 @contextmanager
 def staged(files: Mapping[str, str], package: str) -> Iterator[StagingFolder]:
-    """Write `files` as the package `package` into a temporary folder that can be imported from."""
-    with tempfile.TemporaryDirectory(prefix="yawbench_") as temporary, apart(package):
+    """Write `files` as `package` into a temporary folder from which it can be imported."""
+    with tempfile.TemporaryDirectory(prefix="yawbench_") as temporary, isolated_modules(package):
         folder = Path(temporary).resolve()
         for path, text in files.items():
             file = folder / package / path
@@ -182,7 +182,7 @@ def variant(component: type[Any], name: str, defaults: Mapping[str, Any]) -> str
     """Return the source of a module that gives a component another name and other defaults.
 
     Raises:
-        BuildError: a default for something that is no parameter, of the wrong type, or not allowed.
+        BuildError: a default is not of a parameter, has the wrong type, or is not allowed.
     """
     parameters = {v.name: v for v in component.variables if v.causality == "parameter"}
     annotation = {"Real": "float", "Integer": "int", "Boolean": "bool", "String": "str"}
@@ -196,7 +196,7 @@ def variant(component: type[Any], name: str, defaults: Mapping[str, Any]) -> str
         if kind == "float" and type(value) is int:
             value = float(value)
         if type(value).__name__ != kind:
-            raise BuildError(f"parameter {key} is of type {kind}, not {type(value).__name__}")
+            raise BuildError(f"parameter {key} must be of type {kind} (got {type(value).__name__})")
         try:
             check(parameters[key], value)
         except ValueError as error:
@@ -209,7 +209,7 @@ def variant(component: type[Any], name: str, defaults: Mapping[str, Any]) -> str
 
 
 def missing_signals(role: Role, variables: Iterable[Any]) -> list[str]:
-    """Return one sentence per signal that the role demands and the component does not declare."""
+    """Return a message for every signal that the role requires and the component does not declare."""
     declared = {(v.causality, v.name) for v in variables}
     problems = []
     for causality, patterns in (("input", role.inputs), ("output", role.outputs)):

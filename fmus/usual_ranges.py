@@ -1,7 +1,7 @@
-"""Where signals lie while a car is on the road: what units are tried with.
+"""Usual ranges of signals while a car is driven; test inputs of components.
 
-From, to, in the unit of the signal. Chosen: a passenger car between 55 and 110 km/h, up to what its
-tyres carry on a dry road.
+Lowest and highest value, in the unit of the signal. Chosen: a passenger car between 55 and 110 km/h, up
+to the limit of its tyres on a dry road.
 """
 
 from __future__ import annotations
@@ -58,10 +58,10 @@ _RANGES = {
 
 
 def pattern_of(name: str) -> str:
-    """Return a signal's name with `*` for the wheel it ends with, if it ends with one."""
+    """Return a signal's name with its wheel, if it has one, replaced by `*`."""
     return f"{name[:-2]}*" if name[-2:] in WHEELS and name[-3:-2] == "_" else name
 
 
 def usual_range(name: str) -> tuple[float, float]:
-    """Return from where to where a signal goes, `x_true` as `x`; -1 to 1 if it is not in the list."""
+    """Return the usual range of a signal, of `x_true` that of `x`; -1 to 1 if it is not listed."""
     return _RANGES.get(pattern_of(name.removesuffix("_true")), (-1.0, 1.0))

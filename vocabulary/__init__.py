@@ -1,1 +1,1 @@
-"""What units and the bench have to agree on: plain data, part of the FMUs that use it, importing nothing."""
+"""Definitions shared by components and the bench: plain data, copied into the FMUs that use it."""

@@ -1,13 +1,13 @@
-"""A road's friction as a table over x and y, written as text: what a spreadsheet keeps as CSV.
+"""A road's friction as a table over x and y, written as text, as spreadsheets export CSV.
 
     y \\ x,    0,   20,   40
         4,   0.9,  0.9,  0.9
         0,   0.9,  0.3,  0.8
        -4,   0.9,  0.3,  0.8
 
-The first row holds x [m], the first column y [m], in rising or falling order; what stands in the corner is a
-remark, and so is what follows a `#`. Values are apart by commas, semicolons or tabs. Between them friction is
-interpolated along x and y; outside the table the road has its friction elsewhere.
+The first row holds x [m], the first column y [m], in rising or falling order; the corner cell and text
+after `#` are comments. Values are separated by commas, semicolons or tabs. Between the points friction is
+interpolated along x and y; outside the table the road's friction comes from elsewhere.
 """
 
 import re
@@ -40,15 +40,15 @@ class FrictionTable(NamedTuple):
 
 
 def between(x: float, x_0: float, x_1: float, f_0: float, f_1: float) -> float:
-    """Return the value at x on the line from f_0 at x_0 to f_1 at x_1, to the bit from either end."""
+    """Interpolate between f_0 at x_0 and f_1 at x_1; swapping both ends gives the same bits."""
     return (f_0 * (x_1 - x) + f_1 * (x - x_0)) / (x_1 - x_0)
 
 
 def table_of(text: str) -> FrictionTable | None:
-    """Return the table that a text says, None if it says nothing.
+    """Parse a table; None for an empty text.
 
     Raises:
-        ValueError: what is wrong with it, and in which line.
+        ValueError: the text is not a table; the message gives the line.
     """
     rows = [
         (number, re.split(r"[,;\t]", line.partition("#")[0]))
@@ -62,17 +62,19 @@ def table_of(text: str) -> FrictionTable | None:
     for number, cells in rows[1:]:
         y, *values = (_number(cell, number) for cell in cells)
         if len(values) != len(x):
-            raise ValueError(f"line {number}: {len(values)} values of friction for {len(x)} of x")
+            raise ValueError(
+                f"line {number}: must have {len(x)} values of friction, one for each x (got {len(values)})"
+            )
         if (least := min(values, default=0.0)) < 0.0:
             raise ValueError(f"line {number}: friction must not be negative (got {least:g})")
         if y in by_y:
-            raise ValueError(f"line {number}: y = {y:g} has a row already")
+            raise ValueError(f"line {number}: there is already a row for y = {y:g}")
         by_y[y] = values
     for name, axis in (("x", x), ("y", list(by_y))):
         if len(axis) < 2:
-            raise ValueError(f"a table needs two values of {name} or more (got {len(axis)})")
+            raise ValueError(f"a table needs at least two values of {name} (got {len(axis)})")
         if axis not in (sorted({*axis}), sorted({*axis}, reverse=True)):
-            raise ValueError(f"values of {name} must rise or fall from one to the next")
+            raise ValueError(f"values of {name} must strictly rise or fall")
     columns = sorted(range(len(x)), key=lambda i: x[i])
     return FrictionTable(
         tuple(x[i] for i in columns),
@@ -87,5 +89,5 @@ def _number(cell: str, line: int) -> float:
     except ValueError:
         value = float("nan")
     if not isfinite(value):
-        raise ValueError(f"line {line}: {cell.strip()!r} is no number")
+        raise ValueError(f"line {line}: {cell.strip()!r} is not a finite number")
     return value

@@ -1,4 +1,4 @@
-"""The acceleration of gravity that all units and everything that judges them count with."""
+"""The acceleration of gravity used by all components and evaluations."""
 
 G = 9.81
 """Acceleration of gravity, rounded as the papers do [m/s2]."""

@@ -12,8 +12,8 @@ Lane 5 begins again at the right border of lane 1. y = 0 is the middle of lane 1
 the track.
 
 Source: ISO 3888-1, Passenger cars - Test track for a severe lane-change manoeuvre - Part 1: Double
-lane-change; ISO 3888-2, Part 2: Obstacle avoidance, where the place of lane 5 is our reading. Ours adds:
-transitions of another length, for speeds that a slippery road does not bear on the standard's.
+lane-change; ISO 3888-2, Part 2: Obstacle avoidance, where the position of lane 5 is our interpretation. Our
+addition: transitions of another length, for slippery roads on which the standard's speed is impossible.
 """
 
 from collections.abc import Mapping
@@ -22,12 +22,12 @@ from typing import Any, NamedTuple
 
 PART_1, PART_2 = "iso_3888_1", "iso_3888_2"
 LENGTHS = {PART_1: (15.0, 30.0, 25.0, 25.0, 30.0), PART_2: (12.0, 13.5, 11.0, 12.5, 12.0)}
-"""Of lane 1, transition 2, lane 3, transition 4 and lane 5, with 6 where there is one [m]."""
+"""Lengths of lane 1, transition 2, lane 3, transition 4 and lane 5, including lane 6 of part 1 [m]."""
 GAP = 1.0
-"""Between lanes 1 and 3 of part 2, from border to border [m]."""
+"""Gap between the borders of lanes 1 and 3 of part 2 [m]."""
 
 PARAMETERS = ("vehicle_width", "track_start", "lane_offset", "transition_scale")
-"""Parameters of a driver that knows such a track; `track_standard` says which, part 1 if it is left out."""
+"""Parameters of a driver for such a track; `track_standard` selects the part, by default part 1."""
 
 
 class Lane(NamedTuple):
@@ -40,7 +40,7 @@ class Lane(NamedTuple):
 
     @property
     def middle(self) -> float:
-        """The y of its middle [m]."""
+        """y of the centre line [m]."""
         return 0.5 * (self.right + self.left)
 
 
@@ -57,8 +57,8 @@ def lanes(
     Args:
         vehicle_width: w [m].
         track_start: x of the first cones [m].
-        lane_offset: of lane 3 to the left [m]; of part 2 only its sign counts.
-        transition_scale: length of the transitions over the standard's [1].
+        lane_offset: of lane 3 to the left [m]; for part 2 only its sign matters.
+        transition_scale: length of the transitions relative to the standard's [1].
         standard: a key of `LENGTHS`.
     """
     one, two, three, four, five = LENGTHS[standard]
@@ -71,7 +71,7 @@ def lanes(
     four *= transition_scale
     side = copysign(1.0, lane_offset)
     right = -0.5 * first
-    made = []
+    sections = []
     x = track_start
     for length, gap, width, shift in (
         (one, two, first, 0.0),
@@ -80,16 +80,13 @@ def lanes(
     ):
         border = right + shift
         borders = (side * border, side * (border + width))
-        made.append(Lane(x, x + length, min(borders), max(borders)))
+        sections.append(Lane(x, x + length, min(borders), max(borders)))
         x += length + gap
-    return made[0], made[1], made[2]
+    return sections[0], sections[1], sections[2]
 
 
 def lanes_of(parameters: Mapping[str, Any]) -> list[Lane]:
-    """Return the lanes that a driver's parameters describe; none if they are not of such a track.
-
-    Without an offset there is no change of lanes, and so no cones.
-    """
+    """Return the lanes that a driver's parameters describe; empty without a track or an offset."""
     known = {name: parameters.get(name) for name in PARAMETERS}
     if not all(isinstance(value, (int, float)) for value in known.values()) or known["lane_offset"] == 0:
         return []

@@ -1,15 +1,15 @@
-"""The patches of a road: places whose friction is another one, written as text.
+"""Road patches: areas with a different friction coefficient, written as text.
 
     y > 0                                    left of the line y = 0: split friction
     60 < x < 80                              from x = 60 m to 80 m: a jump down and up again
     x % 40 < 20                              20 m of every 40 m
     x % 10 < 5, y % 3 < 1.5                  where both hold; the same again every 10 m along x, 3 m along y
     (20 0) (45 0) (30 2)                     a polygon of these corners x y
-    0.3: y > 0; 0.1: 60 < x < 80             several, with a friction of their own
+    0.3: y > 0; 0.1: 60 < x < 80             several, each with its own friction
 
-Patches are apart by `;` or stand on lines of their own; what follows a `#` is a remark. A patch without a
-friction of its own has that which its road has for patches. A later patch lies upon the earlier ones.
-Coordinates are those of the road [m], x = y = 0 where the car begins; the lower edge belongs to the patch.
+Patches are separated by `;` or by line breaks; text after `#` is a comment. A patch without its own friction
+has the road's default for patches. Later patches lie on top of earlier ones. Coordinates are those of the
+road [m], with x = y = 0 where the car starts; the lower edge belongs to the patch.
 """
 
 import re
@@ -37,9 +37,9 @@ class Span(NamedTuple):
 
 
 class Patch(NamedTuple):
-    """A place: where all spans hold, and within the polygon if there is one."""
+    """An area: the points where all spans hold, and within the polygon if there is one."""
 
-    friction: float | None  # None: what the road has for patches
+    friction: float | None  # None: the road's default for patches
     spans: tuple[Span, ...]
     corners: tuple[Point, ...]
 
@@ -53,25 +53,25 @@ class Patch(NamedTuple):
 
 
 def patches_of(text: str) -> tuple[Patch, ...]:
-    """Return the patches that a text says, in its order.
+    """Parse patches; they are returned in the order of the text.
 
     Raises:
-        ValueError: what is no patch, and what is one.
+        ValueError: a part of the text is not a patch; the message gives examples.
     """
     parts = ";".join(line.partition("#")[0] for line in text.splitlines()).split(";")
     return tuple(_patch(part.strip()) for part in parts if part.strip())
 
 
 def friction_at(point: Point, patches: tuple[Patch, ...], *, base: float, patch: float) -> float:
-    """Return the friction [1] at x, y [m]: that of the last patch that holds it.
+    """Return the friction [1] at x, y [m]: that of the last patch that contains it.
 
     Args:
         base: friction outside all patches.
-        patch: friction of patches that have none of their own.
+        patch: friction of patches without their own.
     """
-    for one in reversed(patches):
-        if one.holds(point):
-            return patch if one.friction is None else one.friction
+    for area in reversed(patches):
+        if area.holds(point):
+            return patch if area.friction is None else area.friction
     return base
 
 
@@ -93,10 +93,10 @@ def _patch(text: str) -> Patch:
 
 
 def _span(condition: str, text: str) -> Span:
-    found = _SPAN.fullmatch(condition)
-    low_text, axis, period_text, sign, bound = found.groups("") if found else ("",) * 5
+    match = _SPAN.fullmatch(condition)
+    low_text, axis, period_text, sign, bound = match.groups("") if match else ("",) * 5
     if not axis or not (low_text or sign) or (low_text and sign == ">"):
-        raise ValueError(f"{condition!r} is no place on a road (in {text!r}): {_EXAMPLES} is")
+        raise ValueError(f"{condition!r} is not a patch (in {text!r}): write {_EXAMPLES}")
     low = _number(low_text, text) if low_text else float("-inf")
     high = float("inf")
     if sign == ">":
@@ -105,27 +105,27 @@ def _span(condition: str, text: str) -> Span:
         high = _number(bound, text)
     period = _number(period_text, text) if period_text else 0.0
     if period_text and not period > 0.0:
-        raise ValueError(f"{condition!r}: what follows % must be above zero (in {text!r})")
+        raise ValueError(f"{condition!r}: the period after % must be above zero (in {text!r})")
     if not low < high or (period and (low >= period or high <= 0.0)):
-        raise ValueError(f"{condition!r} holds nowhere (in {text!r})")
+        raise ValueError(f"{condition!r} is true nowhere (in {text!r})")
     return Span("xy".index(axis), low, high, period)
 
 
 def _number(digits: str, text: str) -> float:
     value = float(digits)
     if not isfinite(value):
-        raise ValueError(f"{digits} is too large a number (in {text!r})")
+        raise ValueError(f"the number {digits} is too large (in {text!r})")
     return value
 
 
 def _corners(condition: str, text: str) -> tuple[Point, ...]:
     corners, at = [], 0
-    while found := _CORNER.match(condition, at):
-        corners.append((_number(found[1], text), _number(found[2], text)))
-        at = found.end()
+    while match := _CORNER.match(condition, at):
+        corners.append((_number(match[1], text), _number(match[2], text)))
+        at = match.end()
     if at < len(condition) or len(corners) < 3:
         raise ValueError(
-            f"{condition!r}: a polygon is three corners or more, such as (20 0) (45 0) (30 2) (in {text!r})"
+            f"{condition!r}: a polygon needs three or more corners, as (20 0) (45 0) (30 2) (in {text!r})"
         )
     return tuple(corners)
 

@@ -1,8 +1,7 @@
 """The roles of instances, and the signals that each role must have.
 
-An FMU that keeps this contract can replace any other of its role. The folder of a component
-gives its role, folder and file name together the name of its FMU:
-`controllers/fnn.py` becomes `controller_fnn`.
+An FMU that has these signals can replace any other FMU of its role. The folder of a component determines
+its role; role and file name make the name of its FMU: `controllers/fnn.py` becomes `controller_fnn`.
 """
 
 from dataclasses import dataclass
@@ -10,7 +9,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Role:
-    """A role: its name and the signals that every FMU of it declares (`*` = four wheels)."""
+    """A role: its name and the signals that its FMUs must declare (`*` = four wheels)."""
 
     name: str
     inputs: tuple[str, ...] = ()

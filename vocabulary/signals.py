@@ -1,4 +1,4 @@
-"""The signal dictionary: the name, unit, meaning and symbol of everything units say to each other.
+"""The signal dictionary: the name, unit, meaning and symbol of the signals that components exchange.
 
 Axes and signs are those of ISO 8855: x forward, y left, z up; angles and moments positive
 counter-clockwise seen from above. `*` stands for the four wheels fl, fr, rl, rr.
@@ -9,19 +9,19 @@ from typing import NamedTuple
 
 
 class SignalEntry(NamedTuple):
-    """What is known of a signal."""
+    """Properties of a signal."""
 
     unit: str
     text: str
-    """What it is: the description that a variable of an FMU carries."""
+    """Meaning: the description of its variables in FMUs."""
     symbol: str = ""
-    """The field's, as papers write it; `_` begins a subscript. Of `x_ref` it follows from that of `x`."""
+    """Symbol as used in papers; `_` begins a subscript. That of `x_ref` follows from that of `x`."""
     words: str = ""
-    """What headings call it, where that is not its name in words."""
+    """Name in headings, if it differs from its identifier in words."""
     minimum: float | None = None
-    """A smaller value is a mistake, not a strange road."""
+    """Smallest valid value."""
     largest: float | None = None
-    """A larger magnitude in a measurement is no car's: most likely its unit is another one. All chosen."""
+    """Largest plausible magnitude in a measurement: a larger value probably has another unit. Chosen."""
 
 
 SIGNALS: dict[str, SignalEntry] = {

@@ -1,29 +1,28 @@
-"""What a vehicle file can say of a car: name, unit of measurement and meaning of every quantity.
+"""The quantities of vehicle files: name, unit of measurement and meaning.
 
-A parameter of a unit that bears one of these names means the same and has
-the same unit of measurement.
+A parameter of an FMU with one of these names has the same meaning and unit.
 """
 
 from typing import NamedTuple
 
 
 class VehicleQuantity(NamedTuple):
-    """What is known of a quantity."""
+    """Properties of a quantity."""
 
     unit: str
     text: str
     needed: bool = False
-    """Without it a unit would be another car: what its FMU begins with stands for none but its own."""
+    """Whether a vehicle file must give it: the default of an FMU describes only its own car."""
     minimum: float | None = None
     plausible: tuple[float, float] | None = None
-    """Least and largest value of a car; 0 may stand for what is turned off. Chosen: beyond those of road
-    vehicles between a light quadricycle, some 400 kg, and the heaviest of FMVSS 126, 4536 kg; so wide
-    that only mistakes are outside."""
+    """Smallest and largest plausible value; 0 may mean that something is turned off. Chosen: wider than
+    road vehicles from a light quadricycle, some 400 kg, to the heaviest of FMVSS 126, 4536 kg, so that
+    only mistakes are outside."""
 
 
 DYNAMIC_INDEX = (0.4, 1.6)
-"""Yaw inertia over mass times the distances of both axles from the centre of mass. Chosen: 1 is that of two
-masses at the axles; the cars in `scenarios/vehicles` have 0.61 to 1.10."""
+"""Plausible ratios of yaw inertia to mass times the distances of both axles from the centre of mass. Chosen:
+1 is that of two masses at the axles; the cars in `scenarios/vehicles` have 0.61 to 1.10."""
 
 CAR: dict[str, VehicleQuantity] = {
     "mass": VehicleQuantity("kg", "Mass m of the car as it drives", True, 1.0, plausible=(300, 5000)),

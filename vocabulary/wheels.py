@@ -1,7 +1,7 @@
-"""The four wheels of a car: their names, their order, what a `*` in a signal's name stands for."""
+"""The four wheels of a car: their names, their order, and `*` in names of signals."""
 
 Four = tuple[float, float, float, float]
-"""A number for each wheel, in the order of `WHEELS`."""
+"""A number per wheel, in the order of `WHEELS`."""
 
 WHEEL_NAMES = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 """The wheels in words, always in this order."""

@@ -378,7 +378,7 @@ class Component(Fmi2Slave):
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
         try:
             if not isinstance(state, dict) or "_values" not in state:
-                raise ValueError("this is no state of this unit")
+                raise ValueError("not a state of this FMU")
             fresh = copy.deepcopy(state)
             for name in [k for k in self.__dict__ if k not in self._not_state]:
                 del self.__dict__[name]

@@ -320,7 +320,7 @@ def output_variables(
     """Return the scalar outputs of a declaration with their direct dependencies, in order.
 
     Raises:
-        DeclarationError: an output depends on something that is no input.
+        DeclarationError: an output depends on a variable that is not an input.
     """
     names = list(inputs)
     variables = []
@@ -334,7 +334,7 @@ def output_variables(
                 sources += [expanded[i]] if per_wheel and len(expanded) == 4 else expanded
             unknown = [source for source in sources if source not in names]
             if unknown:
-                raise DeclarationError(f"output {name} depends on {unknown[0]!r}, which is no input")
+                raise DeclarationError(f"output {name} depends on {unknown[0]!r}, which is not an input")
             variable = replace(
                 s,
                 name=name,

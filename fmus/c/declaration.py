@@ -69,7 +69,7 @@ def _variable(element: ElementTree.Element, real: ElementTree.Element) -> CVaria
             return None if given is None else float(given)
         except ValueError:
             raise BuildError(
-                f"{DESCRIPTION}: {element.get('name')}: {key} is no number: {given!r}",
+                f"{DESCRIPTION}: {element.get('name')}: {key} must be a number (got {given!r})",
                 code="declaration-invalid",
             ) from None
 

@@ -688,7 +688,7 @@ FMI2_EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte b
             forget(saved);
         }
         free(saved);
-        return complain(unit, "fmi2DeSerializeFMUstate: these bytes are no state of this FMU");
+        return complain(unit, "fmi2DeSerializeFMUstate: not a state of this FMU");
     }
     fmi2FreeFMUstate(c, state);
     *state = saved;

@@ -32,9 +32,9 @@ Force = Annotated[bool, typer.Option("--force", help="Also build FMUs whose sour
 def build(components: Components = None, out: BuildFolder = None, force: Force = False) -> None:
     """Build the FMUs whose sources have changed."""
     from fmus.build import HERE, build_all, build_component, find_recipes
-    from fmus.upkeep import place_of
+    from fmus.upkeep import build_folder
 
-    target = out or place_of(HERE)
+    target = out or build_folder(HERE)
     if out is None and target != HERE:
         say(f"FMUs go to {target}")
 

@@ -85,7 +85,7 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
 def _folder_of_fmus(folder: Path | None) -> Path:
     """Return the given or the nearest folder of FMUs; if there is none, build the project's FMUs."""
     from fmus.build import build_all
-    from fmus.upkeep import place_of
+    from fmus.upkeep import build_folder
 
     from ..errors import ModelDescriptionError
     from ..fmu.opener import HOME, Opener, find_folder
@@ -94,7 +94,7 @@ def _folder_of_fmus(folder: Path | None) -> Path:
     if folder is None:
         folder = find_folder(Path("here"), opener=Opener(build=True))
         if folder == HOME:
-            folder = place_of(HOME)
+            folder = build_folder(HOME)
             build_all(folder, progress=report_build)
         return folder
     if not any(folder.glob("*.fmu")):

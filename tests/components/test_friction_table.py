@@ -54,17 +54,17 @@ def test_it_lies_on_the_base_and_beneath_the_patches():
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("y, 0, 10\n0, 0.9", "line 2: 1 values of friction for 2 of x"),
-        ("y, 0, 10\n0, 0.9, wet\n1, 1, 1", "line 2: 'wet' is no number"),
-        ("y, 0, 10\n0, 0.9, 1e400\n1, 1, 1", "line 2: '1e400' is no number"),
+        ("y, 0, 10\n0, 0.9", "line 2: must have 2 values of friction, one for each x (got 1)"),
+        ("y, 0, 10\n0, 0.9, wet\n1, 1, 1", "line 2: 'wet' is not a finite number"),
+        ("y, 0, 10\n0, 0.9, 1e400\n1, 1, 1", "line 2: '1e400' is not a finite number"),
         ("y, 0, 10\n0, 0.9, -0.1\n1, 1, 1", "line 2: friction must not be negative (got -0.1)"),
-        ("y, 0, 10\n0, 1, 1\n# more\n0, 1, 1", "line 4: y = 0 has a row already"),
-        ("y, 0, 10\n0, 1, 1", "a table needs two values of y or more (got 1)"),
-        ("y, 0\n0, 1\n1, 1", "a table needs two values of x or more (got 1)"),
-        ("y, 0, 20, 10\n0, 1, 1, 1\n1, 1, 1, 1", "values of x must rise or fall from one to the next"),
-        ("y, 0, 1\n0, 1, 1\n2, 1, 1\n1, 1, 1", "values of y must rise or fall from one to the next"),
-        ("y\n0\n1", "a table needs two values of x or more (got 0)"),
-        ("x y friction", "a table needs two values of x or more (got 0)"),
+        ("y, 0, 10\n0, 1, 1\n# more\n0, 1, 1", "line 4: there is already a row for y = 0"),
+        ("y, 0, 10\n0, 1, 1", "a table needs at least two values of y (got 1)"),
+        ("y, 0\n0, 1\n1, 1", "a table needs at least two values of x (got 1)"),
+        ("y, 0, 20, 10\n0, 1, 1, 1\n1, 1, 1, 1", "values of x must strictly rise or fall"),
+        ("y, 0, 1\n0, 1, 1\n2, 1, 1\n1, 1, 1", "values of y must strictly rise or fall"),
+        ("y\n0\n1", "a table needs at least two values of x (got 0)"),
+        ("x y friction", "a table needs at least two values of x (got 0)"),
     ],
 )
 def test_a_slip_in_it_is_told(text, said):

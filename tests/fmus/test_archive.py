@@ -21,9 +21,9 @@ from lxml import html
 from fmus import compiler
 from fmus.build import COMPONENTS, build_all, build_component, find_components, put
 from fmus.build import HERE as FMUS
+from fmus.build_stamp import read_stamp
 from fmus.check import reference_files
 from fmus.compiler import compile_launcher
-from fmus.mark import read_mark
 from fmus.packing import to_bytes
 from fmus.reference_result import FOLDER
 from orchestrator.cache import content_of
@@ -211,9 +211,9 @@ def test_an_fmu_whose_binary_ends_the_process_is_refused_in_one_sentence(checkou
     spoilt = files | {binary: files[binary][: len(files[binary]) // 2]}
     for _ in range(2):  # what looks at FMUs is there again for the next
         with refused(BuildError, "component-invalid"):
-            put(target, to_bytes(spoilt, read_mark(target)))
+            put(target, to_bytes(spoilt, read_stamp(target)))
     assert target.read_bytes() == good
-    put(target, to_bytes(files, read_mark(target)))
+    put(target, to_bytes(files, read_stamp(target)))
     assert [file.name for file in tmp_path.iterdir() if file.suffix != ".fmu"] == ["another checkout"]
 
 

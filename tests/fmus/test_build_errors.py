@@ -273,9 +273,9 @@ def test_what_fmpy_finds_in_the_model_description_is_an_error(attempt):
     ("defaults", "message"),
     [
         ({"gian": 1.0}, "has no parameter 'gian'; it has: gain, steps, fast, mode"),
-        ({"gain": "much"}, "parameter gain is of type float, not str"),
-        ({"steps": 1.5}, "parameter steps is of type int, not float"),
-        ({"fast": 1}, "parameter fast is of type bool, not int"),
+        ({"gain": "much"}, "parameter gain must be of type float (got str)"),
+        ({"steps": 1.5}, "parameter steps must be of type int (got float)"),
+        ({"fast": 1}, "parameter fast must be of type bool (got int)"),
         ({"gain": -1.0}, "gain must be at least 0 (got -1.0)"),
         ({"mode": "c"}, "mode must be one of a, b (got 'c')"),
     ],

@@ -11,8 +11,8 @@ import pytest
 
 from fmus.build import HERE as FMUS
 from fmus.build import build_all, build_component
+from fmus.build_stamp import read_stamp
 from fmus.c.c_recipe import TO_WINDOWS
-from fmus.mark import read_mark
 from orchestrator.commands.new import begin
 from orchestrator.errors import BuildError
 from tests.fmus.bare import ERROR, OK, Fmu, Refused, Unit
@@ -81,7 +81,7 @@ def test_an_fmu_whose_sources_are_broken_stays_and_one_whose_sources_are_gone_is
     assert target.exists()
     edited(folder / "idea.c", "nothing", "0.0")
     build_all(tmp_path / "out", root=root)
-    assert read_mark(target).source == "components/controllers/idea"
+    assert read_stamp(target).source == "components/controllers/idea"
     shutil.rmtree(folder)
     assert build_all(tmp_path / "out", root=root).removed == ["controller_idea"]
     assert not target.exists()
@@ -97,7 +97,7 @@ def test_an_fmu_whose_sources_are_broken_stays_and_one_whose_sources_are_gone_is
         ('name="yaw_rate"', 'name="yaw rate"', "'yaw rate' can be no name in C"),
         ('causality="input"', 'causality="local"', "yaw_rate must be an input, an output or a parameter"),
         ('<Real unit="N.m" start', "<Integer start", "moment_limit is not Real"),
-        ('min="0"', 'min="none"', "min is no number: 'none'"),
+        ('min="0"', 'min="none"', "min must be a number (got 'none')"),
         ('unit="N.m/rad" start', 'unit="N/rad" start', 'unit "N/rad"'),
     ],
 )
