@@ -16,7 +16,7 @@ proved itself:
     yb.load("fnn_sideslip/25mps").swap(controller=proportional).run().metric("peak(sideslip)")
 
 Scenarios are immutable: `swap`, `set` and `fault` return new ones. Nothing is written or printed unless
-requested. All errors derive from YawbenchError; `diagnostics` says what is wrong; `code`, `file` and `line`
+requested. All errors derive from YawbenchError; `diagnostics` lists what is wrong; `code`, `file` and `line`
 are those of the first:
 
     YawbenchError
@@ -99,7 +99,7 @@ _MODULES = {
     "yawbench._view": ("View", "view"),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
-"""Where the public names are defined; all others are in `orchestrator.errors`."""
+"""Module of each public name; all others are in `orchestrator.errors`."""
 
 
 def _refuse_foreign_packages() -> None:

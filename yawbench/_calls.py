@@ -1,4 +1,4 @@
-"""Execution of many runs: those with plain Python in this process, the others in worker processes."""
+"""Execution of many runs: those with Python components in this process, the others in worker processes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ._controller import PythonComponent
 
 
 def opener_of(programs: Mapping[Path, PythonComponent]) -> Callable[[Instance, Log, set[Path]], Any]:
-    """Return the factory of a run's instances: FMUs, and programs by the paths that stand for them."""
+    """Return the function that opens a run's instances: FMUs, and `programs` by their made-up paths."""
 
     def opener(unit: Instance, log: Log, corrupted: set[Path]) -> Any:
         program = programs.get(unit.fmu.path)
@@ -33,21 +33,21 @@ def make_all(
     done: Callable[[Outcome], None],
     run: Callable[..., Any],
 ) -> list[Outcome]:
-    """Make all runs and return their outcomes in order; those of plain Python follow each other at the end.
+    """Make all runs and return their outcomes in order; those with Python components run last, one by one.
 
     Args:
-        jobs: what to run, planned.
-        programs: by the paths that stand for them.
+        jobs: planned runs.
+        programs: Python components by their made-up paths.
         workers, done, run: see `execute`; `run` also takes an `opener`.
     """
     here = [
-        any(one.fmu.path in programs for one in job.plan.instances) if job.plan else False for job in jobs
+        any(unit.fmu.path in programs for unit in job.plan.instances) if job.plan else False for job in jobs
     ]
     apart = [job for job, plain in zip(jobs, here, strict=True) if not plain]
-    made = iter(execute(apart, workers=workers, done=done, run=run) if apart else ())
+    outcomes_apart = iter(execute(apart, workers=workers, done=done, run=run) if apart else ())
     outcomes = []
     for job, plain in zip(jobs, here, strict=True):
-        outcome = _made_here(job, run, programs) if plain else next(made)
+        outcome = _made_here(job, run, programs) if plain else next(outcomes_apart)
         outcomes.append(outcome)
         if plain:
             done(outcome)

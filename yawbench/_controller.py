@@ -88,37 +88,37 @@ ControllerLike = str | Path | Callable[..., Numbers] | Controller | type[Compone
 
 
 class PythonComponent:
-    """What stands in for an FMU: a component class, and where in a plan it belongs.
+    """A component in plain Python, used in a plan like an FMU.
 
     Args:
-        given: a function, an object with `output`, or a component class.
-        unit: the unit whose FMU it replaces, for messages.
-        role: of that unit (controller, driver, ...); its signals are the outputs of a function.
+        program: a function, an object with `output`, or a component class.
+        unit: the instance whose FMU it replaces, for messages.
+        role: of that instance (controller, driver, ...); it determines the outputs of a function.
 
     Attributes:
-        step_size: time between two samples [s], None where the program does not say.
+        step_size: sampling time [s]; None if the program declares none.
 
     Raises:
-        ScenarioError: it is none of these, or declares what cannot be.
+        ScenarioError: the program is none of these, or its declarations are invalid.
     """
 
-    def __init__(self, given: object, *, unit: str, role: str) -> None:
-        self.given = given
+    def __init__(self, program: object, *, unit: str, role: str) -> None:
+        self.program = program
         try:
-            self.component = _component(given, role)
-            self.step_size = _step_size(given)
+            self.component = _component(program, role)
+            self.step_size = _step_size(program)
             xml = ElementTree.tostring(self._made(unit).to_xml())
         except ScenarioError as error:
             raise ScenarioError(f"{unit}: {error}", code="controller-invalid") from None
         except (TypeError, ValueError) as error:
-            raise ScenarioError(f"{unit}: {_name(given)}: {error}", code="controller-invalid") from error
+            raise ScenarioError(f"{unit}: {_name(program)}: {error}", code="controller-invalid") from error
         except Exception as error:  # the user's code may raise anything while its declarations are read
             raise ScenarioError(
-                f"{unit}: {_name(given)}: {arguments.said(error)}", code="controller-invalid"
+                f"{unit}: {_name(program)}: {arguments.error_text(error)}", code="controller-invalid"
             ) from error
         name = self.component.fmu_name
         self.path = HOME / f"{name}.fmu"
-        digest = hashlib.sha256(xml + _source(given)).hexdigest()
+        digest = hashlib.sha256(xml + _source(program)).hexdigest()
         described = describe({"modelDescription.xml": xml}, _archived(xml), self.path)
         self.fmu: Fmu = replace(described, sha256=digest, generation_tool="Python, no FMU", role=role)
 
@@ -131,7 +131,7 @@ class PythonComponent:
 
 
 class PythonInstance:
-    """An instance of a program with the interface of `orchestrator.master.instance.FmuInstance`."""
+    """A running Python component, with the interface of `orchestrator.master.instance.FmuInstance`."""
 
     def __init__(self, unit: Instance, component: Component, log: Log) -> None:
         self.name = unit.name
@@ -140,7 +140,7 @@ class PythonInstance:
 
     @property
     def error(self) -> BaseException | None:
-        """The exception that the program has raised, None if there is none."""
+        """The exception raised by the program, if any."""
         return getattr(self._component, "error", None)
 
     def connect(self, buffers: Buffers) -> StepCalls:
@@ -212,20 +212,21 @@ def _archived(xml: bytes) -> bytes:
     return archive.getvalue()
 
 
-def _component(given: Any, role: str) -> type[Component]:
+def _component(program: Any, role: str) -> type[Component]:
     """Return the component class made from a function, an object or a class."""
-    if arguments.is_a(given, type):
-        if issubclass(given, Component):
-            return _reporting(given)
+    if arguments.is_a(program, type):
+        if issubclass(program, Component):
+            return _reporting(program)
         raise ScenarioError(
-            f"{_name(given)} is a class; give an object of it, {_name(given)}()", code="controller-invalid"
+            f"{_name(program)} is a class; give an object of it, {_name(program)}()",
+            code="controller-invalid",
         )
-    if hasattr(given, "output"):
-        return _of_object(given)
-    if callable(given):
-        return _of_function(given, role)
+    if hasattr(program, "output"):
+        return _of_object(program)
+    if callable(program):
+        return _of_function(program, role)
     raise ScenarioError(
-        f"{_name(given)} is no controller: give the name or path of an FMU, a function of signals, "
+        f"{_name(program)} is not a controller: give the name or path of an FMU, a function of signals, "
         "an object with inputs, outputs and a method output(t, u), or a component class",
         code="controller-invalid",
     )
@@ -233,10 +234,10 @@ def _component(given: Any, role: str) -> type[Component]:
 
 def _of_function(function: Callable[..., Any], role: str) -> type[Component]:
     """Return a component class that calls a function of signals; its outputs are those of the role."""
-    known = {one.name: one.outputs for one in ROLES.values()}
+    known = {item.name: item.outputs for item in ROLES.values()}
     if role not in known:
         raise ScenarioError(
-            f"{_name(function)}: what it returns is not known for a unit that is none of {', '.join(known)}; "
+            f"{_name(function)}: the outputs of a function are known for {', '.join(known)} only; "
             "give an object with outputs",
             code="controller-invalid",
         )
@@ -244,146 +245,146 @@ def _of_function(function: Callable[..., Any], role: str) -> type[Component]:
     plain = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
     if unnamed := [str(p) for p in parameters if p.kind not in plain]:
         raise ScenarioError(
-            f"{_name(function)}: {unnamed[0]} names no signal: name each, as in (yaw_rate, t)",
+            f"{_name(function)}: {unnamed[0]} is not the name of a signal: name each, as in (yaw_rate, t)",
             code="controller-invalid",
         )
     names = [p.name for p in parameters if p.default is p.empty]
     inputs = [name for name in names if name != "t"]
-    outputs = [one for pattern in known[role] for one in wheels(pattern)]
+    outputs = [item for pattern in known[role] for item in wheels(pattern)]
 
     def compute(self: Component, t: float, u: Sequence[float]) -> Any:
-        given = dict(zip(inputs, u, strict=True))
-        result = function(**given, t=t) if "t" in names else function(**given)
+        values = dict(zip(inputs, u, strict=True))
+        result = function(**values, t=t) if "t" in names else function(**values)
         return _numbers(result, outputs)
 
     return _class(function, inputs, known[role], {"output": compute})
 
 
-def _of_object(given: Any) -> type[Component]:
-    """Return a component whose instances each work with a copy of an object."""
+def _of_object(program: Any) -> type[Component]:
+    """Return a component class; each of its instances uses a copy of the object."""
     for wanted in ("inputs", "outputs"):
-        if not hasattr(given, wanted):
+        if not hasattr(program, wanted):
             raise ScenarioError(
-                f"{_name(given)} has no {wanted}: name its signals, as in ('yaw_rate',)",
+                f"{_name(program)} has no {wanted}: name its signals, as in ('yaw_rate',)",
                 code="controller-invalid",
             )
 
     def __init__(self: Any, **kwargs: Any) -> None:
         super(component, self).__init__(**kwargs)
         try:
-            self._given = copy.deepcopy(given)  # so that a run does not affect the next one
+            self._program = copy.deepcopy(program)  # so that a run does not affect the next one
         except Exception as error:
             raise ScenarioError(
-                f"{_name(given)} cannot be copied for a run: {error}", code="controller-invalid"
+                f"{_name(program)} cannot be copied for a run: {error}", code="controller-invalid"
             ) from error
 
     members = {"__init__": __init__}
     for method in ("output", "advance", "start"):
-        if hasattr(given, method):
-            if not callable(getattr(given, method)):
-                arguments.refuse(method, "a method", getattr(given, method))
+        if hasattr(program, method):
+            if not callable(getattr(program, method)):
+                arguments.refuse(method, "a method", getattr(program, method))
             members[method] = _passing_on(method)
-    component = _class(given, given.inputs, given.outputs, members)
+    component = _class(program, program.inputs, program.outputs, members)
     return component
 
 
 def _passing_on(method: str) -> Callable[..., Any]:
     def call(self: Any, t: float, *rest: Any) -> Any:
         *step, u = rest
-        result = getattr(self._given, method)(t, *step, self._named(*u))
+        result = getattr(self._program, method)(t, *step, self._named(*u))
         if method != "output":
             return None
-        return _numbers(result, [one.name for one in self.variables[self._n_in : self._n_io]])
+        return _numbers(result, [variable.name for variable in self.variables[self._n_in : self._n_io]])
 
     return call
 
 
 def _class(
-    given: Any, inputs: Sequence[Any], outputs: Sequence[Any], members: dict[str, Any]
+    program: Any, inputs: Sequence[Any], outputs: Sequence[Any], members: dict[str, Any]
 ) -> type[Component]:
     """Return a component class; outputs without declared dependencies depend on all inputs."""
     inputs, outputs = _signals(inputs, "inputs"), _signals(outputs, "outputs")
-    names = [one if isinstance(one, str) else one.name for one in inputs]
-    declared = tuple(output(one, *names) if isinstance(one, str) else one for one in outputs)
+    names = [item if isinstance(item, str) else item.name for item in inputs]
+    declared = tuple(output(item, *names) if isinstance(item, str) else item for item in outputs)
     scalars = [name for pattern in names for name in wheels(pattern)]
     members |= {
         "inputs": tuple(inputs),
         "outputs": declared,
-        "sampled": arguments.flag(getattr(given, "sampled", True), "sampled"),
-        "fmu_name": _name(given),
-        "__doc__": inspect.getdoc(given) or f"{_name(given)}, plain Python.",
+        "sampled": arguments.flag(getattr(program, "sampled", True), "sampled"),
+        "fmu_name": _name(program),
+        "__doc__": inspect.getdoc(program) or f"{_name(program)}, plain Python.",
         "_named": staticmethod(namedtuple("Inputs", scalars)),
         "_fail": _fail,
     }
-    return type(_name(given), (Component,), members)
+    return type(_name(program), (Component,), members)
 
 
 def _reporting(component: type[Component]) -> type[Component]:
-    """Return a subclass that keeps the exceptions of its code, otherwise unchanged."""
+    """Return a subclass that stores the exceptions of its code, otherwise unchanged."""
     same = {name: getattr(component, name) for name in ("__doc__", "__module__", "fmu_name")}
     return type(component.__name__, (component,), {**same, "_fail": _fail})
 
 
-def _signals(given: Any, name: str) -> tuple[str | VariableSpec, ...]:
-    """Return declared signals: names, or the results of `signal` and `output`."""
+def _signals(signals: Any, name: str) -> tuple[str | VariableSpec, ...]:
+    """Return the declared signals: names, or results of `signal` and `output`."""
     wanted = "a tuple of names, ('yaw_rate',)"
-    found = arguments.items(given, name, wanted)
-    for k, one in enumerate(found):
-        if not arguments.is_a(one, VariableSpec):
-            found[k] = arguments.text(one, f"{name}[{k}]")
-    return tuple(found)
+    declared = arguments.items(signals, name, wanted)
+    for k, item in enumerate(declared):
+        if not arguments.is_a(item, VariableSpec):
+            declared[k] = arguments.text(item, f"{name}[{k}]")
+    return tuple(declared)
 
 
-def _step_size(given: Any) -> float | None:
-    """Return the sampling time that a program declares [s], None if it declares none."""
-    wanted = getattr(given, "step_size", None)
+def _step_size(program: Any) -> float | None:
+    """Return the declared sampling time of a program [s]; None if it declares none."""
+    wanted = getattr(program, "step_size", None)
     if wanted is None:
         return None
-    found = arguments.number(wanted, "step_size")
-    if found <= 0.0:
-        raise ValueError(f"step_size: must be a time above 0 s (got {found:g})")
-    return found
+    step_size = arguments.number(wanted, "step_size")
+    if step_size <= 0.0:
+        raise ValueError(f"step_size: must be a time above 0 s (got {step_size:g})")
+    return step_size
 
 
-def _numbers(given: Any, outputs: Sequence[str]) -> tuple[float, ...]:
-    """Return the values that a program has returned, one number for each output.
+def _numbers(returned: Any, outputs: Sequence[str]) -> tuple[float, ...]:
+    """Return the outputs computed by a program as numbers.
 
     Raises:
         TypeError, ValueError: the value is something else; names the output.
     """
-    if type(given) is float and len(outputs) == 1:
-        return (given,)
-    if given is None:
+    if type(returned) is float and len(outputs) == 1:
+        return (returned,)
+    if returned is None:
         raise TypeError(f"nothing was returned; return {listed(outputs)}")
-    shape = given.shape if arguments.is_a(given, np.ndarray, np.generic) else None
-    if len(outputs) == 1 and (shape == () or not arguments.is_a(given, list, tuple, np.ndarray)):
-        values = [given]
+    shape = returned.shape if arguments.is_a(returned, np.ndarray, np.generic) else None
+    if len(outputs) == 1 and (shape == () or not arguments.is_a(returned, list, tuple, np.ndarray)):
+        values = [returned]
     elif shape is not None and len(shape) != 1:
         raise ValueError(
             f"an array of shape {shape} was returned for {listed(outputs)}: give numbers in order"
         )
     else:
-        values = arguments.items(given, listed(outputs), "numbers in order")
+        values = arguments.items(returned, listed(outputs), "numbers in order")
     if len(values) != len(outputs):
         raise ValueError(
-            f"output() gave {len(values)} values for {counted(len(outputs), 'output')}: {listed(outputs)}"
+            f"output() returned {len(values)} values for {counted(len(outputs), 'output')}: {listed(outputs)}"
         )
-    return tuple(_number(one, name) for one, name in zip(values, outputs, strict=True))
+    return tuple(_number(value, name) for value, name in zip(values, outputs, strict=True))
 
 
-def _number(given: Any, output: str) -> float:
+def _number(value: Any, output: str) -> float:
     """Return one output as a number; the master checks that it is finite."""
-    found = arguments.plain(given)
-    if arguments.is_a(found, bool) or not arguments.is_a(found, int, float, Fraction):
-        arguments.refuse(output, "a number", given)
+    converted = arguments.plain(value)
+    if arguments.is_a(converted, bool) or not arguments.is_a(converted, int, float, Fraction):
+        arguments.refuse(output, "a number", value)
     try:
-        return float(found)
+        return float(converted)
     except OverflowError:
-        return math.inf if found > 0 else -math.inf
+        return math.inf if converted > 0 else -math.inf
 
 
 def _fail(self: Any, what: str, t: float) -> None:
-    """Keep the exception for the caller of the run, then fail like any component.
+    """Store the exception for the caller of the run, then fail like any component.
 
     Exceptions that are not errors (Ctrl-C, exit) pass through to the caller.
     """
@@ -394,24 +395,24 @@ def _fail(self: Any, what: str, t: float) -> None:
     Component._fail(self, what, t)
 
 
-def _name(given: Any) -> str:
+def _name(program: Any) -> str:
     """Return the name of a program."""
-    if arguments.is_a(given, functools.partial):
-        return _name(given.func)
+    if arguments.is_a(program, functools.partial):
+        return _name(program.func)
     try:
-        name = getattr(given, "__name__", None)
+        name = getattr(program, "__name__", None)
     except Exception:
         name = None
     if name == "<lambda>":
         return "function"
-    return name if type(name) is str and name.isidentifier() else type(given).__name__
+    return name if type(name) is str and name.isidentifier() else type(program).__name__
 
 
-def _source(given: Any) -> bytes:
+def _source(program: Any) -> bytes:
     """Return the program's source text if Python knows it, to tell different programs apart."""
     try:
         return inspect.getsource(
-            given if callable(given) and not hasattr(given, "output") else type(given)
+            program if callable(program) and not hasattr(program, "output") else type(program)
         ).encode()
     except Exception:  # there is no source, or inspecting the user's object fails
-        return short(given).encode()
+        return short(program).encode()

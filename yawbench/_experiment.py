@@ -50,7 +50,7 @@ def experiment(
     *,
     metrics: str | Iterable[str] = (),
 ) -> Experiment:
-    """Return the runs of a scenario at every combination of levels, to be made by `run`.
+    """Return an experiment: runs of a scenario at every combination of levels.
 
         >>> axes = {"controller": ["controller_off", "controller_fnn"], "plant.initial_speed": [20, 30]}
         >>> yb.experiment(base, axes, metrics=["peak(sideslip)"])
@@ -58,16 +58,16 @@ def experiment(
 
     Args:
         base: the scenario.
-        axes: a unit -> FMUs by name or path, or plain Python, as `Scenario.swap` takes them; what
-            `Scenario.set` changes -> values, numbers in SI or all with one unit ("80 km/h").
-        metrics: columns of the table, such as "peak(sideslip)"; default: the usual ones.
+        axes: an instance -> FMUs by name or path, or plain Python, as in `Scenario.swap`; a target of
+            `Scenario.set` -> values, numbers in SI or all with the same unit ("80 km/h").
+        metrics: columns of the table, such as "peak(sideslip)"; default: the standard metrics.
 
     Raises:
-        ScenarioError: an axis, a level or a metric is wrong.
+        ScenarioError: an axis, a level or a metric is invalid.
     """
     base = arguments.instance(base, "base", Scenario, "yawbench.load")
-    axes = arguments.mapping(axes, "axes", "a mapping of what varies to levels, {'plant.mass': [900, 1000]}")
-    given: dict[str, Any] = {}
+    axes = arguments.mapping(axes, "axes", "a mapping of axes to levels, {'plant.mass': [900, 1000]}")
+    specs: dict[str, Any] = {}
     changed = base._unswapped(axes)
     for name, levels in axes.items():
         with arguments.as_scenario_errors():
@@ -76,21 +76,25 @@ def experiment(
             variants = {}
             for level in levels:
                 swapped = changed.swap(**{name: level})
-                swap, *brought = swapped.changes[len(changed.changes) :]
+                swap, *others = swapped.changes[len(changed.changes) :]
                 words = level if isinstance(level, str) else Path(str(swap.value)).stem
                 if words in variants:
-                    raise ScenarioError(f"{name}: two levels are called {words}", code="name-duplicate")
-                settings = {str(one.target): one.value for one in brought}
+                    raise ScenarioError(f"{name}: two levels have the name {words!r}", code="name-duplicate")
+                settings = {str(change.target): change.value for change in others}
                 variants[words] = {"swap": {name: str(swap.value)}, "set": settings}
                 changed = replace(changed, programs=swapped.programs)
-            given[name] = {"variants": variants}
+            specs[name] = {"variants": variants}
         else:
-            given[name] = {"vary": name, **_values(name, levels)}
+            specs[name] = {"vary": name, **_values(name, levels)}
     wanted = arguments.texts(metrics, "metrics")
-    spec = {"scenario": base.path.name, "axes": given, "metrics": {one: {"metric": one} for one in wanted}}
-    made = _checked(ExperimentSpec, {"title": base.title or base.path.stem, **spec})
+    spec = {
+        "scenario": base.path.name,
+        "axes": specs,
+        "metrics": {metric: {"metric": metric} for metric in wanted},
+    }
+    checked = _checked(ExperimentSpec, {"title": base.title or base.path.stem, **spec})
     run = NamedRun("", "", "", base.path, ())
-    return Experiment(changed, Design(base.path, made, {"": run}, (), changed.changes))
+    return Experiment(changed, Design(base.path, checked, {"": run}, (), changed.changes))
 
 
 def _checked(model: type[Model], given: dict[str, Any]) -> Model:
@@ -104,12 +108,12 @@ def _checked(model: type[Model], given: dict[str, Any]) -> Model:
     return made
 
 
-def _values(name: str, given: Iterable[Any]) -> dict[str, Any]:
-    """Return levels as an axis stores them: numbers, and the unit that they share."""
+def _values(name: str, items: Iterable[Any]) -> dict[str, Any]:
+    """Return the levels of an axis as numbers in a common unit."""
     with arguments.as_scenario_errors():
-        levels = [arguments.scalar(level, f"{name}[{k}]") for k, level in enumerate(given)]
+        levels = [arguments.scalar(level, f"{name}[{k}]") for k, level in enumerate(items)]
     split = [number_and_unit(level) if isinstance(level, str) else None for level in levels]
-    units = {one[1] for one in split if one}
+    units = {pair[1] for pair in split if pair}
     if as_text := next((x for x in levels if isinstance(x, str) and not isinstance(scalar(x), str)), None):
         raise ScenarioError(
             f"{name}: give numbers, True or False as such, not as text (got {as_text!r})",
@@ -118,13 +122,15 @@ def _values(name: str, given: Iterable[Any]) -> dict[str, Any]:
     if not units:
         return {"values": levels}
     if len(units) > 1 or not all(split):
-        raise ScenarioError(f"{name}: give all levels in one unit, or none", code="argument-invalid")
-    return {"values": [float(one[0]) for one in split if one], "unit": units.pop()}
+        raise ScenarioError(
+            f"{name}: give all levels in the same unit, or all without", code="argument-invalid"
+        )
+    return {"values": [float(pair[0]) for pair in split if pair], "unit": units.pop()}
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """A design, not yet run; made by `experiment`.
+    """An experiment that is not yet run; made by `experiment`.
 
     >>> made = yb.experiment(base, {"driver.amplitude": [0.02, 0.03]}, metrics=["peak(sideslip)"]).run()
     >>> made.table[["driver.amplitude", "status"]]
@@ -150,14 +156,13 @@ class Experiment:
         return f"<Experiment {self.design.spec.title!r}: {len(self)} runs over {over}>"
 
     def run(self, *, workers: int | None = None, keep: bool = True, progress: bool = False) -> Runs:
-        """Make all runs and return what they come to; nothing is written.
+        """Make all runs and return their results; nothing is written.
 
-        Runs are made by worker processes, but for those of plain Python, which follow each other in this one.
-        A run that fails is a row of the table with its reason. Remarks on the runs, if any, are one
-        `YawbenchWarning`.
+        Runs are made by worker processes; those with plain Python run in this process, one by one. A failed
+        run has a row with its reason in the table. All warnings are issued as one `YawbenchWarning`.
 
         Args:
-            workers: processes at a time; default: one per core.
+            workers: number of processes; default: the number of cores.
             keep: keep the results of all runs in memory, for `Runs.runs`.
             progress: show a bar.
 
@@ -169,15 +174,17 @@ class Experiment:
         planner = self.base._planner()
         planned = plan_experiment(self.design, self.base.path.parent, planner=planner)
         metrics = metrics_of(planned.experiment)
-        with _bar(self.design.spec.title, len(self), shown=progress) as told:
-            outcomes = make_all(planned.jobs, self.base.programs, workers=workers, done=told, run=_in_memory)
-        records = [measured(one.value, metrics) if one.ok else one.record for one in outcomes]
-        runs = [Run(one.value) if one.ok else None for one in outcomes] if keep else None
+        with _bar(self.design.spec.title, len(self), shown=progress) as report:
+            outcomes = make_all(
+                planned.jobs, self.base.programs, workers=workers, done=report, run=_in_memory
+            )
+        records = [measured(outcome.value, metrics) if outcome.ok else outcome.record for outcome in outcomes]
+        runs = [Run(outcome.value) if outcome.ok else None for outcome in outcomes] if keep else None
         findings = ExperimentResult(planned.experiment, records, {}, planned)
-        given = [one for job in planned.jobs if job.plan for one in job.plan.diagnostics]
-        if found := findings.remarkable():
-            given.append(Diagnostic("runs-with-warnings", found, "warning"))
-        warn(self.design.spec.title, given)
+        diagnostics = [entry for job in planned.jobs if job.plan for entry in job.plan.diagnostics]
+        if warning := findings.remarkable():
+            diagnostics.append(Diagnostic("runs-with-warnings", warning, "warning"))
+        warn(self.design.spec.title, diagnostics)
         return Runs(findings, runs)
 
 
@@ -188,15 +195,15 @@ def _in_memory(job: Job, opener: OpenInstance = open_unit) -> Results:
 
 @dataclass(frozen=True)
 class Runs:
-    """What the runs of an experiment come to.
+    """The results of an experiment.
 
         >>> made = yb.experiment(base, {"driver.amplitude": [0.02, 0.03]}).run()
         >>> made.runs[0].metric("peak(sideslip)") < made.runs[1].metric("peak(sideslip)")
         True
 
     Attributes:
-        findings: metrics and reasons, as studies and sweeps have them.
-        runs: every run with its results, None for one that failed; None if they were not kept.
+        findings: metrics and reasons of failures, as for studies and sweeps.
+        runs: every run, None for a failed run; None if results were not kept.
     """
 
     __module__ = "yawbench"
@@ -207,7 +214,7 @@ class Runs:
     def __post_init__(self) -> None:
         arguments.instance(self.findings, "findings", ExperimentResult, "Experiment.run")
         if self.runs is not None and not (
-            type(self.runs) is list and all(one is None or arguments.is_a(one, Run) for one in self.runs)
+            type(self.runs) is list and all(run is None or arguments.is_a(run, Run) for run in self.runs)
         ):
             arguments.refuse("runs", "a list of runs", self.runs)
 
@@ -237,18 +244,18 @@ class Runs:
 
         Args:
             metric: a column of the table.
-            x: axis to the right.
-            y: axis upwards, of a map.
-            lines, panels: axes with a line or a panel per level.
+            x: horizontal axis.
+            y: vertical axis of a map.
+            lines, panels: axes with a line or a panel for each level.
             title: default: none.
             scale: of the metric.
-            largest: where the metric's scale ends, in SI or with a unit; default: at the largest value.
+            largest: upper end of the metric's scale, in SI or with a unit; default: at the largest value.
             mark: a value of the metric to draw a line at, in SI or with a unit.
             only: axis -> those of its levels that are drawn; default: all.
 
         Raises:
-            ScenarioError: there is no such axis or metric, or an axis has no place.
-            ResultsError: no run gives a number.
+            ScenarioError: an axis or metric is unknown, or an axis is not used.
+            ResultsError: no run has a value.
         """
         spec = self.findings.spec
         metric, x = arguments.text(metric, "metric"), arguments.text(x, "x")
@@ -268,7 +275,7 @@ class Runs:
             )
         if left := [name for name in spec.axes if name not in (x, y, lines, panels, *_axes_of(only))]:
             raise ScenarioError(
-                f"the axis {left[0]!r} has no place in this figure: give lines or panels",
+                f"the axis {left[0]!r} is not used in this figure: assign it to lines or panels",
                 code="argument-invalid",
             )
         chosen = {
@@ -279,7 +286,7 @@ class Runs:
             "only": {axis: self._levels_of(axis, levels) for axis, levels in _axes_of(only).items()},
         }
         places = {key: value for key, value in (("y", y), ("lines", lines), ("panels", panels)) if value}
-        given = {
+        settings = {
             "name": "figure",
             "kind": "map" if y else "curve",
             "metric": metric,
@@ -287,37 +294,37 @@ class Runs:
             **places,
             **chosen,
         }
-        return shown_in_notebooks(draw_over_axes(self.findings, _checked(FigureSpec, given)))
+        return shown_in_notebooks(draw_over_axes(self.findings, _checked(FigureSpec, settings)))
 
     def _limit(self, name: str, value: float | str | None, metric: str) -> Value | None:
         """Return a value on the metric's scale as plain Python."""
         if value is None:
             return None
-        given = arguments.scalar(value, name)
+        converted = arguments.scalar(value, name)
         with arguments.as_scenario_errors(f"{name}:"):
-            if not abs(si_number(given, self.table.attrs["units"].get(metric, ""))) < FAR:
-                raise ValueError(f"must be between {-FAR:g} and {FAR:g} (got {short(given)})")
-        return given
+            if not abs(si_number(converted, self.table.attrs["units"].get(metric, ""))) < FAR:
+                raise ValueError(f"must be between {-FAR:g} and {FAR:g} (got {short(converted)})")
+        return converted
 
     def _levels_of(self, axis: str, levels: Any) -> list[Any]:
-        """Return levels of an axis that a figure shows alone."""
+        """Return the levels of an axis that a figure is restricted to."""
         spec, name = self.findings.spec, f"only[{axis!r}]"
         if axis not in spec.axes:
             raise ScenarioError(
                 f"only: there is no axis {axis!r}{hint(axis, spec.axes, lead='axes')}", code="axis-unknown"
             )
-        given = _values(name, arguments.items(levels, name, "a list of levels"))["values"]
-        known = [text_of(one) for one in spec.axes[axis].variants or spec.axes[axis].values or ()]
-        unknown = [text_of(one) for one in given if text_of(one) not in known]
-        if unknown or not given:
-            wrong = f"there is no level {unknown[0]!r}" if unknown else "names no level"
+        wanted = _values(name, arguments.items(levels, name, "a list of levels"))["values"]
+        known = [text_of(level) for level in spec.axes[axis].variants or spec.axes[axis].values or ()]
+        unknown = [text_of(level) for level in wanted if text_of(level) not in known]
+        if unknown or not wanted:
+            wrong = f"there is no level {unknown[0]!r}" if unknown else "give at least one level"
             raise ScenarioError(f"{name}: {wrong}; levels: {listed(known)}", code="axis-unknown")
-        return list(given)
+        return list(wanted)
 
     def __repr__(self) -> str:
-        all_, found = self.findings, self.findings.remarkable()
-        noted = f"; {found}" if found else ""
-        return f"<Runs {all_.spec.title!r}: {len(all_.records)} runs, {len(all_.failed)} failed{noted}>"
+        result, warning = self.findings, self.findings.remarkable()
+        noted = f"; {warning}" if warning else ""
+        return f"<Runs {result.spec.title!r}: {len(result.records)} runs, {len(result.failed)} failed{noted}>"
 
     def _repr_html_(self) -> str:
         return str(self.table.drop(columns="key").to_html(index=False, na_rep=""))

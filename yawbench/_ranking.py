@@ -1,4 +1,4 @@
-"""Ranking of a controller among others under the conditions of the proving ground."""
+"""Ranking of controllers under the conditions of the proving ground."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def rank(
     out: str | Path | None = None,
     workers: int | None = None,
 ) -> Ranking:
-    """Drive a controller and others through the conditions of a ranking and return where they stand.
+    """Rank a controller among others under the conditions of a ranking.
 
         >>> class Gain:
         ...     inputs = ("yaw_rate_ref", "yaw_rate")
@@ -63,18 +63,18 @@ def rank(
         (1, 2)
 
     Args:
-        controller: the name or path of an FMU, or plain Python: what `Scenario.swap` takes, or a class whose
-            objects are; None: rank the others alone.
-        name: of its entry; default: its own.
-        against: entries that are driven, too; default: all of the ranking.
+        controller: name or path of an FMU, or plain Python as in `Scenario.swap`, or a class of such
+            objects; None: rank only the others.
+        name: of its entry; default: the name of the controller.
+        against: other entries to rank; default: all of the ranking.
         conditions: of the ranking; default: all.
-        quick: the last amplitude of few conditions.
+        quick: run only the last amplitude of a few conditions.
         ranking: a name in a folder of scenarios, or the path of a file.
-        out: folder that keeps finished runs, such as that of `yawbench rank`; default: none is kept.
-        workers: processes at a time; default: one per core. Plain Python is run in this one.
+        out: folder for finished runs, such as that of `yawbench rank`; default: they are not kept.
+        workers: number of processes; default: the number of cores. Plain Python runs in this process.
 
     Raises:
-        YawbenchError: the controller is none, or a run cannot start.
+        YawbenchError: the controller is invalid, or a run cannot start.
     """
     chosen = arguments.texts(conditions, "conditions", ordered=False)
     others = None if against is None else arguments.texts(against, "against", ordered=False)
@@ -90,7 +90,7 @@ def rank(
             f"there is no entry {unknown[0]!r}{hint(unknown[0], loaded.entries, lead='known')}",
             code="entry-unknown",
         )
-    kept = {key: one for key, one in loaded.entries.items() if key in wanted or key in more}
+    kept = {key: entry for key, entry in loaded.entries.items() if key in wanted or key in more}
     loaded = replace(loaded, entries=kept)
     opened = {path: program.fmu for path, program in programs.items()}
     planner = Planner(build=True, tell=lambda text: None, opened=opened)
@@ -98,8 +98,8 @@ def rank(
         folder = Path(kept_in or stack.enter_context(tempfile.TemporaryDirectory()))
         stack.enter_context(writing(folder))
 
-        def runner(jobs: Sequence[Job], told: OnOutcome) -> None:
-            make_all(jobs, programs, workers=workers, done=told, run=run_job)
+        def runner(jobs: Sequence[Job], on_outcome: OnOutcome) -> None:
+            make_all(jobs, programs, workers=workers, done=on_outcome, run=run_job)
 
         execute = stack.enter_context(
             Executor(folder, loaded.identity, runner, planner, of_jobs={"format": "parquet"})
@@ -107,28 +107,28 @@ def rank(
         return Ranking(run_ranking(loaded, execute, keep=out is not None))
 
 
-def _entry(given: Any, name: str) -> tuple[dict[str, EntrySpec], dict[Path, PythonComponent]]:
+def _entry(controller: Any, name: str) -> tuple[dict[str, EntrySpec], dict[Path, PythonComponent]]:
     """Return the entry of a controller by its name, and its Python component, if any, by its path."""
-    if given is None:
+    if controller is None:
         return {}, {}
-    if arguments.names_file(given):
-        fmu = fmu_of(given, "controller")
+    if arguments.names_file(controller):
+        fmu = fmu_of(controller, "controller")
         if not (name or Path(fmu).stem):
-            raise ScenarioError(f"controller: {fmu!r} is no name of an FMU", code="controller-invalid")
+            raise ScenarioError(f"controller: {fmu!r} is not the name of an FMU", code="controller-invalid")
         return {name or Path(fmu).stem: _spec(name or Path(fmu).stem, fmu)}, {}
-    if arguments.is_a(given, type) and not issubclass(given, Component):
-        given = _object_of(given)
-    program = PythonComponent(given, unit=CONTROLLER, role=CONTROLLER)
+    if arguments.is_a(controller, type) and not issubclass(controller, Component):
+        controller = _object_of(controller)
+    program = PythonComponent(controller, unit=CONTROLLER, role=CONTROLLER)
     words = name or program.path.stem
     return {words: _spec(words, str(program.path))}, {program.path: program}
 
 
-def _object_of(given: type) -> object:
+def _object_of(kind: type) -> object:
     try:
-        return given()
+        return kind()
     except Exception as error:
-        said = f"no object can be made of it without arguments: {error!r}"
-        raise ScenarioError(f"controller: {given.__name__}: {said}", code="controller-invalid") from error
+        reason = f"cannot be created without arguments: {error!r}"
+        raise ScenarioError(f"controller: {kind.__name__}: {reason}", code="controller-invalid") from error
 
 
 def _spec(name: str, fmu: str) -> EntrySpec:
@@ -137,7 +137,7 @@ def _spec(name: str, fmu: str) -> EntrySpec:
 
 @dataclass(frozen=True)
 class Ranking:
-    """Where controllers stand; made by `rank`.
+    """The result of a ranking; made by `rank`.
 
     >>> places = yb.rank(against=["none"], conditions=["hard"], quick=True)
     >>> places.cells[["entry", "condition", "state"]].values.tolist()
@@ -153,7 +153,7 @@ class Ranking:
 
     @cached_property
     def table(self) -> pd.DataFrame:
-        """One row per controller, the first place first; `attrs["units"]` holds the units."""
+        """One row per controller, the best first; `attrs["units"]` holds the units."""
         return to_pandas(columns_of_entries(self.ranked))
 
     @cached_property
@@ -162,13 +162,13 @@ class Ranking:
         return to_pandas(columns_of_cells(self.ranked))
 
     def place(self, name: str) -> int | None:
-        """Return the place of an entry, None if it lacks runs.
+        """Return the rank of an entry, from 1; None if runs of it are missing.
 
         Raises:
-            ScenarioError: there is no such entry.
+            ScenarioError: the entry is unknown.
         """
         name = arguments.text(name, "name of an entry")
-        places = {one.entry: one.place for one in self.ranked.scores}
+        places = {score.entry: score.place for score in self.ranked.scores}
         if name not in places:
             raise ScenarioError(
                 f"there is no entry {name!r}{hint(name, places, lead='known')}", code="entry-unknown"
@@ -176,16 +176,16 @@ class Ranking:
         return places[name]
 
     def plot(self, kind: Literal["matrix", "pareto"] = "matrix") -> Figure:
-        """Return a picture: `matrix`, who passes what, or `pareto`, stability over intervention.
+        """Return a figure: `matrix` (who passes what) or `pareto` (stability over intervention).
 
         Raises:
-            ScenarioError: there is no such picture.
+            ScenarioError: the kind is unknown.
         """
         drawn = {"matrix": draw_matrix, "pareto": draw_pareto}
         chosen = arguments.text(kind, "kind")
         if chosen not in drawn:
             raise ScenarioError(
-                f"there is no picture {chosen!r}{hint(chosen, drawn, lead='known')}", code="figure-unknown"
+                f"there is no figure {chosen!r}{hint(chosen, drawn, lead='known')}", code="figure-unknown"
             )
         return shown_in_notebooks(drawn[chosen](self.ranked, "yawbench.rank"))
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def open(folder: str | Path) -> Run:
-    """Return the run whose results lie in a folder.
+    """Return the run recorded in a results folder.
 
         >>> yb.open("results/mine").title
         'Sideslip tracking at 25 m/s, mu 0.65'
@@ -40,7 +40,7 @@ def open(folder: str | Path) -> Run:
 
 
 class Run:
-    """What one run has recorded.
+    """A run and its results.
 
     >>> run = yb.load("fnn_sideslip/25mps").run()
     >>> len(run), "plant.yaw_rate" in run, sorted(run)[:2]
@@ -70,12 +70,12 @@ class Run:
 
     @property
     def record(self) -> dict[str, Any]:
-        """Everything needed to repeat the run: run.json."""
+        """The run record: everything needed to repeat the run, as in run.json."""
         return self.results.record.content()
 
     @property
     def diagnostics(self) -> tuple[Diagnostic, ...]:
-        """What was assumed or left out (severity "info"), and warnings on values and on the run's course.
+        """Assumptions and omissions (severity "info"), and warnings about values and behaviour.
 
         >>> warned = base.set({"speed": 300}).run().diagnostics[0]
         >>> warned.code, warned.location.signal, warned.value
@@ -128,22 +128,22 @@ class Run:
 
         Args:
             name: `measure(signal)`; the documentation lists all measures.
-            window: from when to when [s]; default: the whole run.
+            window: start and end [s]; default: the whole run.
 
         Raises:
-            ScenarioError: there is no such measure.
-            ResultsError: the run has not recorded what it needs, or does not last for the window.
+            ScenarioError: the measure is unknown.
+            ResultsError: a signal was not recorded, or the run does not cover the window.
         """
         chosen = metric(arguments.text(name, "name of a metric"))
         window = None if window is None else arguments.span(window, "window")
         value = evaluate(self.results, chosen, window)
         if value is None:
             why = why_none(self.results, chosen, window or chosen.window, self.time[-1])
-            raise ResultsError(why or f"{name}: this run gives no number", code="signal-unknown")
+            raise ResultsError(why or f"{name}: has no value for this run", code="signal-unknown")
         return value.number
 
     def metrics(self) -> dict[str, MetricValue]:
-        """Return the usual metrics that the run has the signals for: name -> number and unit.
+        """Return the standard metrics for which the run has the signals: name -> number and unit.
 
         >>> run.metrics()["peak(sideslip)"].unit
         'rad'
@@ -151,18 +151,18 @@ class Run:
         return evaluate_all(self.results, STANDARD)
 
     def evaluate(self, test: str, *, angle: float | None = None) -> Evaluation:
-        """Return what a standard test makes of the run: quantities in SI, verdicts with their reasons.
+        """Evaluate the run by a standard test: quantities in SI, verdicts with their reasons.
 
             >>> run.evaluate("step-steer").notes  # a sine ends where it began
             ['the hand wheel is not turned']
 
         Args:
-            test: its name, as `yawbench evaluate` has it.
+            test: its name, as for `yawbench evaluate`.
             angle: the hand-wheel angle at 0.3 g [rad], which sine with dwell needs for responsiveness.
 
         Raises:
-            ScenarioError: there is no such test, or the angle is none.
-            ResultsError: the run has not recorded what it needs.
+            ScenarioError: the test is unknown, or the angle invalid.
+            ResultsError: a signal was not recorded.
         """
         test = arguments.text(test, "test")
         if test not in TESTS:
@@ -182,24 +182,24 @@ class Run:
         return TESTS[test].evaluate(trace_of(self.results, self.title), angle)
 
     def plot(self, *panels: str, title: str | None = None) -> Figure:
-        """Return a figure, drawn as `yawbench plot` draws it.
+        """Return a figure, as `yawbench plot` draws it.
 
             >>> run.plot("sideslip", "yaw_rate(sideslip)", "path").savefig("run.svg")
 
         Args:
             panels: a signal, its error (`sideslip_error`), one over another (`yaw_rate(sideslip)`) or `path`;
-                default: all that the papers draw.
+                default: those of the papers.
             title: default: the run's.
 
         Raises:
-            ScenarioError: the run has not recorded one of them.
-            ResultsError: it has recorded nothing that could be drawn.
+            ScenarioError: a signal was not recorded.
+            ResultsError: no recorded signal can be drawn.
         """
         from orchestrator.figures import panels as drawing
         from orchestrator.figures.plots import OVERVIEW, draw
         from orchestrator.figures.style import LabelledRun
 
-        wanted = [arguments.text(one, f"panels[{k}]") for k, one in enumerate(panels)]
+        wanted = [arguments.text(panel, f"panels[{k}]") for k, panel in enumerate(panels)]
         title = None if title is None else arguments.text(title, "title")
         runs = [LabelledRun(self.title, self.results)]
         drawing.check_panels(runs, wanted, option="panel ")
@@ -235,7 +235,7 @@ class Run:
 
 
 def shown_in_notebooks(figure: Figure) -> Figure:
-    """Return the figure, which a notebook now shows as a picture, with or without pyplot."""
+    """Make a notebook show the figure as an image, with or without pyplot; return the figure."""
     figure._repr_png_ = functools.partial(_png, figure)  # type: ignore[attr-defined]
     return figure
 

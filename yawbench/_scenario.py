@@ -37,7 +37,7 @@ from ._run import Run
 
 
 def load(source: str | Path) -> Scenario:
-    """Return the scenario of a name or a file.
+    """Load a scenario by name or path.
 
         >>> yb.load("fnn_sideslip/25mps").title
         'Sideslip tracking at 25 m/s, mu 0.65'
@@ -47,16 +47,16 @@ def load(source: str | Path) -> Scenario:
             file or an SSP archive.
 
     Raises:
-        ScenarioError: there is no such scenario, or something is wrong with it.
+        ScenarioError: the scenario does not exist or is invalid.
     """
     scenario = Scenario(catalogue.find(arguments.path(source, "source"), "a scenario").absolute())
-    scenario.loaded  # noqa: B018 - what is wrong is said now
+    scenario.loaded  # noqa: B018 - raises now if it is invalid
     return scenario
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """A scenario and what is changed in it; made by `load`, never changed itself.
+    """An immutable scenario with overrides; made by `load`.
 
         >>> base = yb.load("fnn_sideslip/25mps")
         >>> run = base.swap(controller="controller_off").set({"plant.initial_speed": "80 km/h"}).run()
@@ -65,7 +65,7 @@ class Scenario:
 
     Attributes:
         path: the file.
-        changes: what is other than in the file.
+        changes: overrides of the file.
     """
 
     __module__ = "yawbench"
@@ -73,7 +73,7 @@ class Scenario:
     path: Path
     changes: tuple[Override, ...] = ()
     programs: Mapping[Path, PythonComponent] = field(default_factory=dict, repr=False)
-    """Units in plain Python, by the path that stands for each."""
+    """Components in plain Python, by their made-up paths."""
 
     def __post_init__(self) -> None:
         if not arguments.is_a(self.path, Path):
@@ -86,7 +86,7 @@ class Scenario:
             arguments.refuse("programs", "programs as `swap` makes them", self.programs)
 
     def swap(self, **units: ControllerLike) -> Scenario:
-        """Return the scenario with other units.
+        """Return the scenario with other FMUs or plain Python in place of instances.
 
             >>> linear = base.swap(tyre="tyre_linear")
             >>> follow = base.swap(controller=lambda yaw_rate_ref, yaw_rate: 2e4 * (yaw_rate_ref - yaw_rate))
@@ -94,24 +94,24 @@ class Scenario:
             [True, True]
 
         Args:
-            units: unit of the scenario -> the name of an FMU, the path of one, or plain Python: a
-                function whose parameters are named as signals are (`t` is the time in s); an object with
-                `inputs`, `outputs` and `output(t, u)`, perhaps `advance(t, h, u)`, `start(t, u)` and
-                `step_size`; or a component class. Every run works with a copy of an object.
+            units: instance of the scenario -> name or path of an FMU, or plain Python: a function whose
+                parameters have the names of signals (`t` is the time in s); an object with `inputs`,
+                `outputs` and `output(t, u)`, and optionally `advance(t, h, u)`, `start(t, u)` and
+                `step_size`; or a component class. Every run uses a copy of the object.
 
         Raises:
-            ScenarioError: there is no such unit, or what is given cannot stand for one.
+            ScenarioError: the instance is unknown, or its replacement invalid.
         """
-        given = self.loaded.units
+        existing = self.loaded.units
         changes, programs = [*self._unswapped(units).changes], dict(self.programs)
         for unit, wanted in units.items():
-            if unit not in given:
-                text = f"there is no unit {short(unit)}{hint(unit, given, lead='units')}"
+            if unit not in existing:
+                text = f"there is no unit {short(unit)}{hint(unit, existing, lead='units')}"
                 raise ScenarioError(Diagnostic("instance-unknown", text, location=Location(self.path)))
             if arguments.names_file(wanted):
                 changes.append(Override(Target.of_instance(unit), fmu_of(wanted, unit), "swap"))
                 continue
-            role = role_of(unit, Path(self.loaded.replaced.get(unit, given[unit].fmu)).stem)
+            role = role_of(unit, Path(self.loaded.replaced.get(unit, existing[unit].fmu)).stem)
             program = PythonComponent(wanted, unit=unit, role=role)
             programs[program.path] = program
             changes.append(Override(Target.of_instance(unit), str(program.path), "swap"))
@@ -123,7 +123,7 @@ class Scenario:
     def _unswapped(self, units: Iterable[str]) -> Scenario:
         """Return the scenario without earlier swaps of instances and the step sizes set by them."""
         targets = {Target.of_instance(unit, name) for unit in units for name in ("", "step_size")}
-        kept = (one for one in self.changes if one.origin != "swap" or one.target not in targets)
+        kept = (change for change in self.changes if change.origin != "swap" or change.target not in targets)
         return replace(self, changes=tuple(kept))
 
     def set(self, values: Mapping[str, Value]) -> Scenario:
@@ -134,19 +134,20 @@ class Scenario:
             22.22
 
         Args:
-            values: as `--set` takes them: `unit.parameter`, `vehicle.parameter`, `inputs.pattern`,
-                `unit.step_size`, `stop_time`, `step_size` or `algorithm` -> value, in SI or with its unit.
+            values: target -> value, in SI or with its unit. Targets are those of `--set`:
+                `unit.parameter`, `vehicle.parameter`, `inputs.pattern`, `unit.step_size`, `stop_time`,
+                `step_size` or `algorithm`.
 
         Raises:
-            ScenarioError: a place or value is wrong.
+            ScenarioError: a target or value is invalid.
         """
-        given = arguments.mapping(values, "values", "a mapping of places to values, {'stop_time': 2}")
+        entries = arguments.mapping(values, "values", "a mapping of targets to values, {'stop_time': 2}")
         with arguments.as_scenario_errors("set"):
-            targets = {name: Target.parse(name) for name in given}
-            plain = {targets[name]: _plain(targets[name], value) for name, value in given.items()}
+            targets = {name: Target.parse(name) for name in entries}
+            plain = {targets[name]: _plain(targets[name], value) for name, value in entries.items()}
         changed = [setting(target, value, "set") for target, value in plain.items()]
         scenario = replace(self, changes=(*self.changes, *changed))
-        scenario.loaded  # noqa: B018 - what is wrong is said now
+        scenario.loaded  # noqa: B018 - raises now if it is invalid
         return scenario
 
     def fault(
@@ -161,7 +162,7 @@ class Scenario:
         every: float | str | None = None,
         seed: int | None = None,
     ) -> Scenario:
-        """Return the scenario with a fault; several at one place act one after the other.
+        """Return the scenario with a fault; several at the same place apply in order.
 
             >>> blind = base.fault("plant.sideslip", kind="freeze", start=1.5)
             >>> blind = blind.fault("plant.sideslip -> controller", kind="bias", value="0.5 deg", until=3)
@@ -169,42 +170,42 @@ class Scenario:
             ['freeze from 1.5 s', 'bias 0.5 deg until 3 s']
 
         Args:
-            place: `unit.output` for all who take it and the results, `unit.output -> unit` on the way to
-                one of them, `unit.input`; a `*` stands for several.
-            kind: one of the reference of scenario files, such as bias or freeze.
-            value: as the kind has it: in SI, or with its unit.
-            start, until: when it begins and ends [s]; default: with the run.
-            share: fraction of the messages that it affects.
+            place: `unit.output` for all receivers and the results, `unit.output -> unit` for a single
+                receiver, or `unit.input`; `*` matches several signals.
+            kind: such as bias or freeze; the reference of scenario files lists all kinds.
+            value: of the kind, in SI or with its unit.
+            start, until: start and end [s]; default: those of the run.
+            share: fraction of the messages that are affected.
             every: time between two messages [s].
-            seed: of its random numbers.
+            seed: of the random numbers.
 
         Raises:
-            ScenarioError: there is no such place or kind, or it takes something else.
+            ScenarioError: the place or kind is unknown, or an argument does not fit the kind.
         """
         place, kind = arguments.text(place, "place"), arguments.text(kind, "kind")
-        given = {"kind": kind, "value": value, "share": share, "every": every, "seed": seed}
-        given |= {"from": start, "until": until}
+        settings = {"kind": kind, "value": value, "share": share, "every": every, "seed": seed}
+        settings |= {"from": start, "until": until}
         with arguments.as_scenario_errors("fault"):
-            item = {name: arguments.scalar(x, name) for name, x in given.items() if x is not None}
+            item = {name: arguments.scalar(x, name) for name, x in settings.items() if x is not None}
         new = faults_at(place, item, "fault")
         earlier = next((c for c in self.changes if (c.target, c.origin) == (new.target, "fault")), None)
         both = FaultList((*(earlier.faults if earlier else ()), *new.faults))
         others = [change for change in self.changes if change is not earlier]
         scenario = replace(self, changes=(*others, replace(new, value=both)))
-        scenario.loaded  # noqa: B018 - what is wrong is said now
+        scenario.loaded  # noqa: B018 - raises now if it is invalid
         return scenario
 
     @cached_property
     def loaded(self) -> scenario_schema.LoadedScenario:
-        """The scenario as its schema has it, all changes applied; the file is read once."""
+        """The validated scenario with all overrides applied; the file is read once."""
         return Planner().load(self.path, self.changes)
 
     def plan(self) -> Plan:
-        """Return what a run does: units in order, wires, constants, time grid.
+        """Return the plan of a run: instances in order, wires, constants, time grid.
 
         Raises:
             YawbenchError: an FMU is missing, a component whose source has changed cannot be built, or
-                the units cannot be connected.
+                the instances cannot be connected.
         """
         plan = self._planner().plan(self.loaded)
         notes = tuple(
@@ -229,10 +230,10 @@ class Scenario:
         All warnings about the run are issued as one `YawbenchWarning`.
 
         Args:
-            progress: called a few times a second with the steps done and those in all.
+            progress: called a few times per second with the number of steps done and in total.
 
         Raises:
-            SimulationError: a unit failed; what Python code raised is its `__cause__`.
+            SimulationError: an instance failed; an exception of Python code is its `__cause__`.
         """
         if progress is not None:
             arguments.function(progress, "progress", "done", "total")
@@ -270,9 +271,9 @@ class Scenario:
 
 
 def warn(title: str, diagnostics: Iterable[Diagnostic]) -> None:
-    """Issue all warnings among diagnostics as one, if there are any, at the line that called our caller."""
-    if said := text_of(warnings_in(diagnostics)):
-        warnings.warn(f"{title}: {said}", YawbenchWarning, stacklevel=3)
+    """Issue all warnings among diagnostics, if any, as one, attributed to the caller of our caller."""
+    if text := text_of(warnings_in(diagnostics)):
+        warnings.warn(f"{title}: {text}", YawbenchWarning, stacklevel=3)
 
 
 def fmu_of(wanted: str | Path, name: str) -> str:

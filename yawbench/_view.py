@@ -31,7 +31,7 @@ def view(
     title: str = "",
     height: int = HEIGHT,
 ) -> View:
-    """Return an interactive viewer of runs, which a notebook shows.
+    """Return an interactive viewer of runs, shown by notebooks.
 
         >>> free = base.swap(controller="controller_off").run()
         >>> shown = yb.view({"no control": free, "network": base.run()})
@@ -43,12 +43,12 @@ def view(
     Args:
         runs: a run, several, or a mapping of labels to runs; the first is the baseline.
         panels: signals shown at first, such as "yaw_rate" or "plant.sideslip - reference.sideslip_ref";
-            default: what all papers draw.
+            default: those of the papers.
         title: of the page; default: the labels.
         height: in a notebook [px].
 
     Raises:
-        ResultsError: there are no runs, too many, or none has recorded a panel's signal.
+        ResultsError: there are no or too many runs, or no run has recorded the signal of a panel.
     """
     labelled = _labelled(runs)
     wanted = [arguments.text(one, f"panels[{k}]") for k, one in enumerate(panels)]
@@ -72,15 +72,15 @@ def _labelled(runs: object) -> list[LabelledRun]:
         named = arguments.mapping(runs, "runs", "a mapping of labels to runs")
     else:
         several = arguments.items(runs, "runs", "a run, a list of runs, or a mapping of labels to runs")
-        titles = [one.title if arguments.is_a(one, Run) else "" for one in several]
+        titles = [run.title if arguments.is_a(run, Run) else "" for run in several]
         numbered = len(set(titles)) < len(titles)
         named = {
-            f"{k + 1}: {title}" if numbered else title: one
-            for k, (title, one) in enumerate(zip(titles, several, strict=True))
+            f"{k + 1}: {title}" if numbered else title: run
+            for k, (title, run) in enumerate(zip(titles, several, strict=True))
         }
     return [
-        LabelledRun(label, arguments.instance(one, f"runs[{label!r}]", Run, "Scenario.run").results)
-        for label, one in named.items()
+        LabelledRun(label, arguments.instance(run, f"runs[{label!r}]", Run, "Scenario.run").results)
+        for label, run in named.items()
     ]
 
 
@@ -93,7 +93,7 @@ class View:
 
     Attributes:
         labels: of the runs.
-        html: a whole page, which needs no network.
+        html: the complete page, which works offline.
         height: in a notebook [px].
     """
 
@@ -120,7 +120,7 @@ class View:
         try:
             write_whole(path, self.html, named=True)
         except OSError as error:
-            raise ResultsError(f"{path}: the page cannot be written: {reason(error)}.") from None
+            raise ResultsError(f"{path}: cannot write the page: {reason(error)}") from None
         return path
 
     def __repr__(self) -> str:

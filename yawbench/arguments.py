@@ -35,96 +35,96 @@ T = TypeVar("T")
 
 
 def text(value: Any, name: str, *, empty: bool = False) -> str:
-    """Return a text without control characters; `empty`: it may have no characters."""
-    given = plain(value)
-    if not is_a(given, str):
+    """Return text without control characters; `empty`: allow the empty text."""
+    converted = plain(value)
+    if not is_a(converted, str):
         refuse(name, "text", value)
-    if bad := unprintable(given):
-        raise ValueError(f"{name}: must be text without {bad} (got {short(given)})")
-    if not (given.strip() or (empty and not given)):
+    if bad := unprintable(converted):
+        raise ValueError(f"{name}: must be text without {bad} (got {short(converted)})")
+    if not (converted.strip() or (empty and not converted)):
         raise ValueError(f"{name}: must not be blank")
-    if len(given) > LONGEST:
-        raise ValueError(f"{name}: must be text of at most {LONGEST} characters (got {short(given)})")
-    return cast(str, given)
+    if len(converted) > LONGEST:
+        raise ValueError(f"{name}: must be text of at most {LONGEST} characters (got {short(converted)})")
+    return cast(str, converted)
 
 
 def flag(value: Any, name: str) -> bool:
     """Return True or False."""
-    given = plain(value)
-    return cast(bool, given) if is_a(given, bool) else refuse(name, "True or False", value)
+    converted = plain(value)
+    return cast(bool, converted) if is_a(converted, bool) else refuse(name, "True or False", value)
 
 
 def number(value: Any, name: str) -> float:
     """Return a finite number."""
-    given = plain(value)
-    if is_a(given, bool) or not is_a(given, int, float, Fraction):
+    converted = plain(value)
+    if is_a(converted, bool) or not is_a(converted, int, float, Fraction):
         refuse(name, "a number", value)
     try:
-        found = float(given)
+        result = float(converted)
     except OverflowError:
-        found = math.inf
-    if not math.isfinite(found):
+        result = math.inf
+    if not math.isfinite(result):
         raise ValueError(f"{name}: must be a finite number (got {short(value)})")
-    return found
+    return result
 
 
 def count(value: Any, name: str, *, least: int = 1, most: int = MOST) -> int:
     """Return a whole number from `least` to `most`."""
-    given = plain(value)
-    if is_a(given, bool) or not is_a(given, int):
+    converted = plain(value)
+    if is_a(converted, bool) or not is_a(converted, int):
         refuse(name, "a whole number", value)
-    if not least <= given <= most:
-        raise ValueError(f"{name}: must be a whole number from {least} to {most:,} (got {short(given)})")
-    return cast(int, given)
+    if not least <= converted <= most:
+        raise ValueError(f"{name}: must be a whole number from {least} to {most:,} (got {short(converted)})")
+    return cast(int, converted)
 
 
 def scalar(value: Any, name: str) -> float | int | bool | str:
     """Return a value that a scenario may give: a number, True or False, or text."""
-    given = plain(value)
-    if is_a(given, bool):
-        return cast(bool, given)
-    if is_a(given, str):
-        if bad := unprintable(given):
-            raise ValueError(f"{name}: must be text without {bad} (got {short(given)})")
-        return cast(str, given)
-    if is_a(given, int, float, Fraction):
-        finite = number(given, name)
-        return cast(int, given) if is_a(given, int) else finite
+    converted = plain(value)
+    if is_a(converted, bool):
+        return cast(bool, converted)
+    if is_a(converted, str):
+        if bad := unprintable(converted):
+            raise ValueError(f"{name}: must be text without {bad} (got {short(converted)})")
+        return cast(str, converted)
+    if is_a(converted, int, float, Fraction):
+        finite = number(converted, name)
+        return cast(int, converted) if is_a(converted, int) else finite
     refuse(name, "a number, True or False, or text", value)
 
 
 def span(value: Any, name: str) -> tuple[float, float]:
-    """Return the beginning and the end of a stretch of time [s]."""
+    """Return start and end of a time span [s]."""
     ends = items(value, name, "a pair of times, (1.0, 3.0)")
     if len(ends) != 2:
         refuse(name, "a pair of times, (1.0, 3.0)", value)
-    first, last = (number(one, f"{name}[{k}]") for k, one in enumerate(ends))
+    first, last = (number(end, f"{name}[{k}]") for k, end in enumerate(ends))
     if first > last:
         raise ValueError(f"{name}: must not end before it begins (got {first:g} to {last:g} s)")
     return first, last
 
 
 def path(value: Any, name: str) -> Path:
-    """Return the path of a file or folder, or a name in place of one."""
-    given = plain(value)
+    """Return a path or a name as a path."""
+    converted = plain(value)
     if is_a(value, os.PathLike):
         try:
-            given = os.fspath(value)
+            converted = os.fspath(value)
         except Exception as error:
-            raise TypeError(f"{name}: gives no path: {said(error)}") from error
-    if not is_a(given, str):
+            raise TypeError(f"{name}: is not a valid path: {error_text(error)}") from error
+    if not is_a(converted, str):
         refuse(name, "a name or a path", value)
     try:
-        longest = max((len(os.fsencode(part)) for part in Path(given).parts), default=0)
+        longest = max((len(os.fsencode(part)) for part in Path(converted).parts), default=0)
     except UnicodeEncodeError:
-        raise ValueError(f"{name}: no file can be called {short(given)}") from None
-    if "\0" in given or not given.strip() or longest > NAME:
-        raise ValueError(f"{name}: no file can be called {short(given)}")
-    return Path(given)
+        raise ValueError(f"{name}: is not a valid file name (got {short(converted)})") from None
+    if "\0" in converted or not converted.strip() or longest > NAME:
+        raise ValueError(f"{name}: is not a valid file name (got {short(converted)})")
+    return Path(converted)
 
 
 def names_file(value: object) -> TypeGuard[str | Path]:
-    """Return whether a value is a text or a path: of a file, or a name in place of one."""
+    """Return whether a value is text or a path."""
     return is_a(value, str, os.PathLike)
 
 
@@ -141,20 +141,20 @@ def items(value: Any, name: str, wanted: str, *, ordered: bool = True) -> list[A
     if is_a(value, *unfit) or not is_a(value, Iterable, np.ndarray) or _is_single(value):
         refuse(name, wanted, value)
     try:
-        given = list(islice(iter(value), MOST + 1))
+        entries = list(islice(iter(value), MOST + 1))
     except Exception as error:
-        raise TypeError(f"{name}: must be {wanted}, but cannot be read: {said(error)}") from error
-    if len(given) > MOST:
-        raise ValueError(f"{name}: gives more than {MOST:,} items")
-    return given
+        raise TypeError(f"{name}: must be {wanted}, but cannot be read: {error_text(error)}") from error
+    if len(entries) > MOST:
+        raise ValueError(f"{name}: must have at most {MOST:,} items")
+    return entries
 
 
 def texts(value: Any, name: str, *, ordered: bool = True) -> list[str]:
-    """Return texts; a single one need not be in a list."""
+    """Return a list of texts, also from a single text."""
     if is_a(plain(value), str):
         return [text(value, name)]
-    given = items(value, name, "text, or a list of texts", ordered=ordered)
-    return [text(one, f"{name}[{k}]") for k, one in enumerate(given)]
+    entries = items(value, name, "text, or a list of texts", ordered=ordered)
+    return [text(entry, f"{name}[{k}]") for k, entry in enumerate(entries)]
 
 
 def mapping(value: Any, name: str, wanted: str) -> dict[str, Any]:
@@ -163,16 +163,16 @@ def mapping(value: Any, name: str, wanted: str) -> dict[str, Any]:
         refuse(name, wanted, value)
     try:
         pairs = list(islice(value.items(), MOST + 1))
-        given = [(key, one) for key, one in pairs]
+        entries = [(key, entry) for key, entry in pairs]
     except Exception as error:
-        raise TypeError(f"{name}: must be {wanted}, but cannot be read: {said(error)}") from error
-    if len(given) > MOST:
-        raise ValueError(f"{name}: has more than {MOST:,} keys")
-    return {text(key, f"key {short(key)} of {name}"): one for key, one in given}
+        raise TypeError(f"{name}: must be {wanted}, but cannot be read: {error_text(error)}") from error
+    if len(entries) > MOST:
+        raise ValueError(f"{name}: must have at most {MOST:,} keys")
+    return {text(key, f"key {short(key)} of {name}"): entry for key, entry in entries}
 
 
 def function(value: Any, name: str, *parameters: str) -> Callable[..., Any]:
-    """Return a callable that accepts as many arguments as there are `parameters`."""
+    """Return a callable that accepts `parameters`, by position."""
     wanted = f"a function of {listed(parameters)}"
     if not callable(value) or is_a(value, type):
         refuse(name, wanted, value)
@@ -237,7 +237,7 @@ def _is_single(value: Any) -> bool:
     return is_a(value, np.ndarray) and value.shape == ()
 
 
-def said(error: BaseException) -> str:
+def error_text(error: BaseException) -> str:
     """Return type and text of an exception raised by a user's code."""
     try:
         return f"{type(error).__name__}: {error}"

@@ -86,10 +86,10 @@ def evaluate_braking(judged: Evaluation, trace: Trace) -> None:
     v_0 = at(t, speed, begin)
     stop = first_crossing(t, -speed, -STOPPED, begin)
     end = float(t[-1]) if stop is None else stop
-    judged.add("speed", "speed at the brake's beginning", v_0, "m/s")
-    judged.add("begin", "the brake's beginning", begin, "s")
+    judged.add("speed", "speed at the start of braking", v_0, "m/s")
+    judged.add("begin", "start of braking", begin, "s")
     distance = None if stop is None else at(t, way, stop)
-    judged.add("distance", "stopping distance", distance, "m", "way of the centre of mass")
+    judged.add("distance", "stopping distance", distance, "m", "distance travelled by the centre of mass")
     if stop is None:
         judged.notes.append(f"the car has not stopped by {end:.2f} s: {3.6 * at(t, speed, end):.0f} km/h")
     judged.add("deceleration", "mean deceleration", _mean_deceleration(t, speed, way, v_0, begin), "m/s2",
@@ -127,7 +127,7 @@ def _braking_start(trace: Trace) -> float:
         if found is not None:
             return found
     else:
-        raise NotJudged("neither drive_force nor acceleration_x is recorded, of which one tells the brake")
+        raise NotJudged("neither drive_force nor acceleration_x is recorded, so braking cannot be detected")
     raise NotJudged("the car is not braked")
 
 
@@ -187,7 +187,7 @@ def _add_jump(judged: Evaluation, trace: Trace, begin: float, end: float) -> Non
         share = (slowing - means[0]) / (means[1] - means[0])
         instant = first_crossing(even.time, share, ADAPTED, jump)
         adapted = None if instant is None else instant - jump
-    judged.add("adaptation", "time of adaptation", adapted, "s", f"{100 * ADAPTED:g} % of the change")
+    judged.add("adaptation", "adaptation time", adapted, "s", f"{100 * ADAPTED:g} % of the change")
     near = (t >= jump) & (t <= min(jump + 1.0, end))
     judged.add("jump_yaw_rate", "largest yaw rate after it", _peak(trace["yaw_rate"], near), "rad/s", "1 s")
 
@@ -202,11 +202,11 @@ STEADY = 0.03
 def evaluate_turn(judged: Evaluation, trace: Trace, action: float | None = None) -> None:
     """Evaluate braking or lifting off in a turn, 1 s after `action` [s]; default: as recorded."""
     t, v, r, a_y = trace.time, trace["velocity_x"], trace["yaw_rate"], trace["acceleration_y"]
-    now = trace.told("action_time", "when the pedals change") if action is None else action
+    now = trace.parameter("action_time", "when the pedals change") if action is None else action
     before = (t >= now - BEFORE_ACTION) & (t <= now)
     if now - BEFORE_ACTION < t[0] or now + AFTER_ACTION > t[-1] or np.count_nonzero(before) < 5:
         raise NotJudged(
-            f"the record has no {BEFORE_ACTION:g} s before and {AFTER_ACTION:g} s after {now:g} s"
+            f"the record does not cover {BEFORE_ACTION:g} s before and {AFTER_ACTION:g} s after {now:g} s"
         )
     v_0, r_0 = float(v[before].mean()), float(r[before].mean())
     if abs(r_0) < 1e-3 or np.ptp(r[before]) > STEADY * abs(r_0):
@@ -260,21 +260,21 @@ def evaluate_side_wind(judged: Evaluation, trace: Trace) -> None:
     x, y, psi = trace["position_x"], trace["position_y"], trace["yaw_angle"]
     blown = np.flatnonzero(wind != 0.0)
     if not blown.size:
-        raise NotJudged("no wind blows")
+        raise NotJudged("the run has no side wind")
     begin = float(t[blown[0]])
     before = (t >= begin - BEFORE_GUST) & (t < begin)
     if begin - BEFORE_GUST < t[0] or begin + AFTER_GUST > t[-1] or np.count_nonzero(before) < 5:
         raise NotJudged(
-            f"the record has no {BEFORE_GUST:g} s before and {AFTER_GUST:g} s after {begin:.2f} s"
+            f"the record does not cover {BEFORE_GUST:g} s before and {AFTER_GUST:g} s after {begin:.2f} s"
         )
     during = (t >= begin) & (t <= begin + AFTER_GUST)
-    judged.add("begin", "the wind's beginning", begin, "s")
+    judged.add("begin", "start of the wind", begin, "s")
     judged.add("speed", "speed there", at(t, trace["velocity_x"], begin), "m/s")
     strongest = int(np.argmax(np.abs(wind)))
     judged.add("force", "largest side force of the wind", float(wind[strongest]), "N")
     course = math.atan2(*(float(np.polyfit(t[before], line[before], 1)[0]) for line in (y, x)))
     off = (y - at(t, y, begin)) * math.cos(course) - (x - at(t, x, begin)) * math.sin(course)
-    reading = f"{AFTER_GUST:g} s after the wind's beginning"
+    reading = f"{AFTER_GUST:g} s after the start of the wind"
     judged.add("deviation", "lateral deviation", at(t, off, begin + AFTER_GUST), "m", reading)
     turned = at(t, psi, begin + AFTER_GUST) - float(psi[before].mean())
     judged.add("yaw_angle", "change of the yaw angle", turned, "rad", reading)
@@ -289,7 +289,7 @@ def evaluate_side_wind(judged: Evaluation, trace: Trace) -> None:
         k = int(np.argmax(np.abs(values)))
         judged.add(name, says, float(values[k]), unit, f"within {AFTER_GUST:g} s")
         if name != "sideslip":
-            judged.add(f"{name}_at", "its instant", float(t[k]) - begin, "s", "after the wind's beginning")
+            judged.add(f"{name}_at", "its instant", float(t[k]) - begin, "s", "after the start of the wind")
     if "steering_wheel_angle" in trace and np.ptp(trace["steering_wheel_angle"][during]) > HELD:
         turned_by = math.degrees(float(np.ptp(trace["steering_wheel_angle"][during])))
         judged.notes.append(f"the hand wheel is not held: it moves by {turned_by:.0f} degrees")

@@ -58,14 +58,14 @@ def evaluate_lane_change(judged: Evaluation, trace: Trace) -> None:
     judged.add("overrun", "largest distance beyond the cones", float(over[worst]), "m")
     if over[worst] > TOUCH:
         place = x[worst] - (start if isinstance(start, (int, float)) else 0.0)
-        said = f"{over[worst]:.3f} m beyond the cones, {place:.1f} m from the first ones"
+        said = f"{over[worst]:.3f} m beyond the cones, {place:.1f} m after the first cones"
         judged.rule("clean", False, said)
     elif instant is None:
         judged.rule("clean", None, "the car has not reached the first cones")
     elif through < 0:
         judged.rule("clean", None, "the record ends before the car has passed the last cones")
     else:
-        judged.rule("clean", True, "no cone is touched")
+        judged.rule("clean", True, "no cone was touched")
     if "sideslip" in trace:
         judged.add("sideslip", "peak sideslip", float(np.abs(trace["sideslip"]).max()), "rad")
     a_y = float(np.abs(trace["acceleration_y"]).max())
@@ -122,7 +122,7 @@ def is_clean(run: Evaluation) -> bool:
 EVERY = 5.0
 """Distance between the drawn outlines of the car [m]."""
 AROUND = 12.0
-"""Length of road drawn before the first cones and behind the last ones [m]."""
+"""Length of road drawn before the first and behind the last cones [m]."""
 
 
 def draw_run(trace: Trace, judged: Evaluation) -> Figure:

@@ -83,7 +83,7 @@ SLIGHT = 1e-6
 
 @dataclass(frozen=True)
 class DwellCourse:
-    """The zeroed signals of a run and its characteristic instants; None where one does not exist."""
+    """The zeroed signals of a run and its characteristic times; None for those that do not exist."""
 
     time: np.ndarray
     angle: np.ndarray  # of the hand wheel, the first half wave positive [rad]
@@ -125,7 +125,7 @@ def course_of(trace: Trace) -> DwellCourse:
         raise NotJudged("there is no second half wave of steering")
     end = first_crossing(t, angle, 0.0, float(t[np.argmin(np.where(t >= reversed_, angle, np.inf))]))
     if end is None:
-        raise NotJudged("completion of steer is not reached: the hand wheel does not come back to zero")
+        raise NotJudged("completion of steer is not reached: the hand wheel does not return to zero")
     displacement = _displacement(t, a_y, begin)
     _check_answers(t, angle, r, displacement, begin, reversed_)
     return DwellCourse(
@@ -185,10 +185,10 @@ def _check_answers(
 
 
 def _second_peak(t: np.ndarray, r: np.ndarray, begin: float, reversed_: float, end: float) -> float | None:
-    """Return the instant of the second peak, None if there is none.
+    """Return the time of the second peak; None if there is none.
 
     Raises:
-        NotJudged: the yaw rate hardly responds to the steering reversal.
+        NotJudged: the yaw rate barely responds to the steering reversal.
     """
     from scipy.signal import find_peaks
 
@@ -198,7 +198,7 @@ def _second_peak(t: np.ndarray, r: np.ndarray, begin: float, reversed_: float, e
     answered = float(x[instants <= latest].max(initial=0.0))
     if answered < LEAST_PEAK * before:
         raise NotJudged(
-            f"the yaw rate hardly answers the reversal: it reaches {math.degrees(answered):.2g} deg/s after "
+            f"the yaw rate barely responds to the reversal: {math.degrees(answered):.2g} deg/s after "
             f"{math.degrees(before):.2g} deg/s in the first half wave"
         )
     peaks, _ = find_peaks(x, prominence=PROMINENCE * float(x.max()), height=LEAST_PEAK * before)
@@ -233,9 +233,9 @@ def evaluate_dwell(judged: Evaluation, trace: Trace, angle: float | None = None)
     judged.notes += course.notes
     steered = np.abs(trace["steering_wheel_angle"] - _zero_of(trace, course))
     amplitude = float(steered.max())
-    told = trace.facts.get("amplitude")
-    if isinstance(told, float) and abs(abs(told) - amplitude) < math.radians(0.5):
-        amplitude = abs(told)  # exact, where the largest sample is not
+    nominal = trace.facts.get("amplitude")
+    if isinstance(nominal, float) and abs(abs(nominal) - amplitude) < math.radians(0.5):
+        amplitude = abs(nominal)  # exact, where the largest sample is not
     judged.add("amplitude", "amplitude", course.side * amplitude, "rad", "hand wheel, positive: left first")
     if angle:
         judged.add("multiple", "amplitude over A", amplitude / angle, "1")
@@ -271,7 +271,7 @@ def _stability(judged: Evaluation, course: DwellCourse) -> None:
         why = f"the record ends {t[-1] - course.end:.2f} s after completion of steer; "
         judged.rule("stability", None, f"{why}{RATIOS[-1][0]:g} s are needed")
     elif value is None:
-        judged.rule("stability", False, "the reversal produces no second peak of the yaw rate")
+        judged.rule("stability", False, "the yaw rate has no second peak after the reversal")
     else:
         judged.rule("stability", all(held), "; ".join(said))
 
@@ -286,18 +286,18 @@ def _responsiveness(
     judged.add("displacement", f"lateral displacement at BOS + {AT:g} s", found, "m", reading)
     criterion = "responsiveness"
     if angle is None:
-        judged.rule(criterion, None, "A is not known: give runs of slowly increasing steer")
+        judged.rule(criterion, None, "A is unknown: give runs of slowly increasing steer")
     elif amplitude < FROM * angle * (1.0 - SLIGHT):
         return  # the criterion does not apply to this run
     elif found is None:
         judged.rule(criterion, None, f"the record ends before BOS + {AT:g} s")
     elif trace.friction is not None and trace.friction < DRY * (1.0 - SLIGHT):
-        judged.rule(criterion, None, f"friction {trace.friction:g}; a dry road, {DRY:g}, is asked for")
+        judged.rule(criterion, None, f"friction {trace.friction:g}; a dry road, {DRY:g}, is required")
     else:
         least = FAR_HEAVY if trace.mass is not None and trace.mass > HEAVY else FAR
         judged.rule(criterion, found >= least, f"{found:.2f} m of at least {least:g} m")
         if trace.mass is None:
-            judged.notes.append(f"mass not known: taken as at most {HEAVY:g} kg")
+            judged.notes.append(f"mass unknown: assumed to be at most {HEAVY:g} kg")
 
 
 def _add_notes(judged: Evaluation, course: DwellCourse, trace: Trace) -> None:
@@ -310,13 +310,13 @@ def _add_notes(judged: Evaluation, course: DwellCourse, trace: Trace) -> None:
             stable = judged.rulings["stability"].verdict.value
             judged.notes.append(f"sideslip reaches {math.degrees(peak):.0f} degrees (stability: {stable})")
     else:
-        judged.notes.append("sideslip was not recorded: a spin may pass the ratios unseen")
+        judged.notes.append("sideslip was not recorded: a spin may pass the ratios undetected")
     if "velocity_x" in trace:
         speed = at(trace.time, trace["velocity_x"], course.begin)
         judged.add("speed", "speed at BOS", speed, "m/s")
         judged.add("speed_end", "speed at COS", at(trace.time, trace["velocity_x"], course.end), "m/s")
         if abs(speed - SPEED) > SLACK:
-            why = f"{3.6 * speed:.1f} km/h at BOS; 80 +- 2 km/h are asked for"
+            why = f"{3.6 * speed:.1f} km/h at BOS; 80 +- 2 km/h are required"
             for criterion in judged.rulings:
                 judged.rule(criterion, None, why)
 
@@ -364,7 +364,7 @@ SIDES = (("left", 1.0), ("right", -1.0))
 
 
 def drive_series(driver: SeriesDriver) -> TestSeries:
-    """Drive all amplitudes, left first and right first, and judge them."""
+    """Make the runs at all amplitudes, left first and right first, and judge them."""
     assert driver.angle is not None
     runs = []
     for name, side in SIDES:
@@ -406,20 +406,20 @@ def _ruling(criterion: str, runs: Sequence[Evaluation], missing: Sequence[float]
         lacking = ", ".join(f"{x:+.1f}" for x in missing)
         said = f"{len(missing)} runs are missing, of {lacking} degrees"
     elif not asked:
-        said = "no run is asked"
+        said = "no run is required"
     else:
         return CriterionResult(Verdict.PASSED, f"all {len(asked)} runs pass")
     return CriterionResult(Verdict.NOT_JUDGED, said)
 
 
 def _amplitude(run: Evaluation) -> float:
-    """Return the amplitude of a run [rad], positive if left first; NaN if it is not known."""
+    """Return the amplitude of a run [rad], positive if left first; NaN if unknown."""
     value = run["amplitude"]
     return math.nan if value is None else value
 
 
 def _failures(runs: Sequence[Evaluation]) -> str:
-    """Return in words how many runs fail in each direction, and the smallest amplitude among them."""
+    """Describe how many runs fail in each direction, and the smallest failing amplitude."""
     words = []
     for name, side in (("left first", 1.0), ("right first", -1.0)):
         found = [math.degrees(abs(_amplitude(run))) for run in runs if side * _amplitude(run) > 0]

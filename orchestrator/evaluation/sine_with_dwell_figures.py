@@ -53,7 +53,7 @@ def draw_run(trace: Trace, judged: Evaluation) -> Figure | None:
         note = " · ".join(
             [
                 *filter(None, [trace.title, trace.name]),
-                "first half wave positive, signals filtered and zeroed as UN R140 says",
+                "first half wave positive, signals filtered and zeroed as in UN R140",
                 *judged.notes,
             ]
         )
@@ -84,7 +84,7 @@ def _yaw_rate(axes: Axes, course: DwellCourse, judged: Evaluation) -> None:
     axes.plot(course.time, np.degrees(course.yaw_rate), **line_style(0))
     axes.set_title("Yaw rate [°/s]")
     if course.peak is None:
-        axes.text(0.99, 0.06, "the reversal produces no peak", transform=axes.transAxes, ha="right",
+        axes.text(0.99, 0.06, "no peak after the reversal", transform=axes.transAxes, ha="right",
                   color=MARKS[Verdict.FAILED])  # fmt: skip
         return
     value = math.degrees(at(course.time, course.yaw_rate, course.peak))
@@ -121,7 +121,7 @@ def _displaced(axes: Axes, course: DwellCourse, judged: Evaluation, trace: Trace
     colour = MARKS[ruling.verdict] if ruling else QUIET
     axes.axvline(instant, color=QUIET, linewidth=0.8, linestyle=(0, (1, 2)), zorder=1)
     axes.plot([instant], [found], "D", color=colour, markersize=5.5, zorder=4)
-    asked = "" if ruling else ", not asked of this amplitude"
+    asked = "" if ruling else ", not required at this amplitude"
     text = f"{found:.2f} m at BOS + {AT:g} s{asked}"
     _label(axes, instant, found, text, (-7, 4), color=colour, ha="right")
     if ruling and ruling.verdict is not Verdict.NOT_JUDGED:

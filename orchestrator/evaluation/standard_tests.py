@@ -79,12 +79,12 @@ class Evaluation:
 
     @property
     def verdict(self) -> Verdict | None:
-        """The verdict over all criteria, None if the test has none."""
+        """The verdict over all criteria; None if the test has none."""
         return overall(ruling.verdict for ruling in self.rulings.values())
 
     @property
     def judges_nothing(self) -> bool:
-        """Whether no criterion is judged or, in a test without criteria, no quantity has a value."""
+        """Whether nothing could be judged: no criterion or, in a test without criteria, no quantity."""
         if self.rulings:
             return all(one.verdict is Verdict.NOT_JUDGED for one in self.rulings.values())
         return all(one.value is None for one in self.quantities.values())
@@ -105,7 +105,7 @@ class Evaluation:
 def evaluation(
     fill: Callable[Concatenate[Evaluation, Trace, P], None],
 ) -> Callable[Concatenate[Trace, P], Evaluation]:
-    """Make a function that fills in an `Evaluation` create and return it; NotJudged becomes a note.
+    """Decorate a function that fills in an `Evaluation` to return it; NotJudged becomes a note.
 
     All such functions raise ResultsError if the trace lacks a signal that the test needs.
     """
@@ -134,7 +134,7 @@ class TestSeries:
 
 @dataclass(frozen=True)
 class SeriesRun:
-    """A run that a standard test asks for: a variation of its scenario."""
+    """A run required by a standard test: a variation of its scenario."""
 
     folder: str  # below that of the series
     label: str
@@ -144,7 +144,7 @@ class SeriesRun:
 
 
 class SeriesDriver(Protocol):
-    """What the series of a standard test is driven with."""
+    """Interface that makes the runs of a series."""
 
     angle: float | None  # A [rad], of tests that need it
     judged: list[Evaluation]  # of all runs so far
@@ -184,7 +184,7 @@ def overall(verdicts: Iterable[Verdict]) -> Verdict | None:
 
 @dataclass(frozen=True)
 class StandardTest:
-    """A standard test. Its modules, and NumPy with them, are imported only when they are used."""
+    """A standard test; its modules, and NumPy, are imported when first used."""
 
     name: str  # on the command line
     says: str
@@ -198,7 +198,7 @@ class StandardTest:
     varies: tuple[str, ...] = ()  # override targets that the series sets itself
 
     def evaluate(self, trace: Trace, angle: float | None = None) -> Evaluation:
-        """Return the evaluation of a run; `angle`: A [rad], if it is known and the test uses it."""
+        """Evaluate a run; `angle`: A [rad], if known and used by the test."""
         judged: Evaluation = _named(self.function)(trace, *([angle] if self.needs_angle else []))
         return judged
 
@@ -208,7 +208,7 @@ class StandardTest:
         return series
 
     def judge_together(self, runs: Sequence[Evaluation], angle: float | None) -> TestSeries | None:
-        """Return the verdict on several recorded runs together, None if they form no series."""
+        """Return the verdict on several recorded runs; None if they do not form a series."""
         series: TestSeries | None = _named(self.together)(runs, angle) if self.together else None
         return series
 
@@ -274,7 +274,7 @@ TESTS: dict[str, StandardTest] = {
         ),
         StandardTest(
             "turn-response",
-            "what becomes of a steady turn when the car is braked (after ISO 7975) or lifted off (ISO 9816)",
+            "response of a steady turn to braking (after ISO 7975) or lifting off (ISO 9816)",
             "braking_and_wind:evaluate_turn",
             ("deceleration", "yaw_ratio", "yaw_ratio_peak", "a_y_ratio", "sideslip", "sideslip_peak"),
         ),
@@ -286,7 +286,7 @@ TESTS: dict[str, StandardTest] = {
         ),
         StandardTest(
             "side-wind",
-            "how far a gust blows a car off its way while the hand wheel is held (after ISO 12021)",
+            "deviation of a car in a gust of side wind while the hand wheel is held (after ISO 12021)",
             "braking_and_wind:evaluate_side_wind",
             ("deviation", "yaw_angle", "yaw_rate", "acceleration_y", "sideslip"),
         ),

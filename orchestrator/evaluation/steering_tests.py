@@ -77,7 +77,7 @@ def evaluate_understeer(judged: Evaluation, trace: Trace) -> None:
     """
     names = ("steering_wheel_angle", "yaw_rate", "velocity_x", "acceleration_y")
     hand, r, v, a_y = (trace[name] for name in names)
-    ratio, front, rear = map(trace.told, ("steering_ratio", "cg_to_front_axle", "cg_to_rear_axle"))
+    ratio, front, rear = map(trace.parameter, ("steering_ratio", "cg_to_front_axle", "cg_to_rear_axle"))
     side = math.copysign(1.0, float(a_y[np.argmax(np.abs(a_y))]))
     a_y = side * a_y
     extra = side * (hand / ratio - (front + rear) * r / np.maximum(v, 0.1))
@@ -171,7 +171,7 @@ def characteristic_angle(judged: Sequence[Evaluation]) -> float:
     """
     without = next((one for one in judged if one["angle"] is None), None)
     if without or not judged:
-        why = "; ".join(without.notes) if without else "there is no run"
+        why = "; ".join(without.notes) if without else "no runs"
         raise NotJudged(f"slowly increasing steer{f', {without.label}' if without else ''}: {why}")
     mean = float(np.mean([abs(one["angle"] or 0.0) for one in judged]))
     return math.radians(round(math.degrees(mean), 1))

@@ -174,12 +174,12 @@ class Trace:
         if name not in self.signals:
             have = ", ".join(self.signals) or "nothing"
             raise ResultsError(
-                f"{self.label}: has no signal {name!r}, which this test needs; it has {have}",
+                f"{self.label}: the signal {name!r} is missing, which this test needs; recorded: {have}",
                 code="signal-unknown",
             )
         return self.signals[name]
 
-    def told(self, name: str, meaning: str = "") -> float:
+    def parameter(self, name: str, meaning: str = "") -> float:
         """Return a numeric parameter of the recorded run.
 
         Raises:
@@ -187,7 +187,7 @@ class Trace:
         """
         value = self.facts.get(name)
         if not isinstance(value, (int, float)) or isinstance(value, bool):
-            raise NotJudged(f"the run does not tell {name}{f', {meaning}' if meaning else ''}")
+            raise NotJudged(f"the run has no parameter {name}{f', {meaning}' if meaning else ''}")
         return float(value)
 
     @cached_property
@@ -218,30 +218,34 @@ def trace_of(results: Results, label: str = "") -> Trace:
         if name not in signals and own[name] == 1 and np.issubdtype(values.dtype, np.number):
             signals[name] = values
     fmus = results.record.fmus
-    told = {unit: {**fmu.defaults, **fmu.parameters} for unit, fmu in fmus.items()}
+    parameters = {unit: {**fmu.defaults, **fmu.parameters} for unit, fmu in fmus.items()}
     best = [
         unit for role in ("driver", "plant") for unit in results.units_of_role(role)
     ]  # their parameters win over others of the same name
-    facts = {name: value for unit in (*told, *best) for name, value in told.get(unit, {}).items()}
-    masses = [told[unit]["mass"] for unit in results.units_of_role("plant") if "mass" in told.get(unit, {})]
+    facts = {name: value for unit in (*parameters, *best) for name, value in parameters.get(unit, {}).items()}
+    masses = [
+        parameters[unit]["mass"]
+        for unit in results.units_of_role("plant")
+        if "mass" in parameters.get(unit, {})
+    ]
     mass = masses[-1] if masses else None
     return Trace(
         label or str(results.folder),
         results.time,
         signals,
         float(mass) if isinstance(mass, (int, float)) else None,
-        _friction(results, fmus, told),
+        _friction(results, fmus, parameters),
         facts,
         results.folder,
         with_changes(results.record.title or "", results.record.overrides),
     )
 
 
-def _friction(results: Results, fmus: Mapping[str, FmuRecord], told: Mapping[str, Any]) -> float | None:
+def _friction(results: Results, fmus: Mapping[str, FmuRecord], parameters: Mapping[str, Any]) -> float | None:
     """Return the lowest friction at any wheel: as recorded, else from the parameters of road and tyres."""
     if columns := columns_of(results, "friction_*"):
         return float(min(results.columns[column].min() for column in columns))
-    found = [told.get(unit, {}).get("base_friction") for unit in results.units_of_role("road")]
+    found = [parameters.get(unit, {}).get("base_friction") for unit in results.units_of_role("road")]
     for fmu in fmus.values():
         found += [value for name, value in fmu.constants.items() if name.startswith("friction_")]
     return min((float(value) for value in found if isinstance(value, (int, float))), default=None)
@@ -255,7 +259,7 @@ def _unit(text: str) -> str:
 def _signal(name: str) -> str:
     known = [one for one in SIGNALS if "*" not in one]
     if name not in known:
-        raise ValueError(f"{name!r} is no signal{hint(name, known, lead='known')}")
+        raise ValueError(f"unknown signal {name!r}{hint(name, known, lead='known')}")
     return name
 
 
@@ -317,9 +321,7 @@ def load_trace(path: Path, mapping: MappingSpec | None, label: str = "") -> Trac
     if os.path.isdir(path):
         return trace_of(load_results(path), label)
     if mapping is None:
-        raise ResultsError(
-            f"{path}: is no folder of results; of a file of columns --signals says what is what"
-        )
+        raise ResultsError(f"{path}: is not a results folder; for files of measured data give --signals")
     try:
         with reading_series(path):
             return _measured(SeriesFile(path), mapping, label or path.name, path.stem)

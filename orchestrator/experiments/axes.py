@@ -112,10 +112,10 @@ class AxisSpec(StrictModel):
     values: Levels | None = Field(None, description="A list, or a mapping of values to words")
     start: Number | None = Field(None, alias="from", description="The first of `count` values")
     end: Number | None = Field(None, alias="to", description="The last")
-    count: int | None = Field(None, ge=2, le=MOST, description="How many; a Latin hypercube needs none")
+    count: int | None = Field(None, ge=2, le=MOST, description="Number of values; not for a Latin hypercube")
     spacing: Literal["linear", "log"] = Field("linear", description="Equal steps or equal factors")
-    unit: str | None = Field(None, description="Of the numbers; left out: the parameter's own")
-    says: str = Field("", description="What figures call it; default: the parameter in words")
+    unit: str | None = Field(None, description="Unit of the numbers; default: that of the parameter")
+    says: str = Field("", description="Label in figures; default: the parameter in words")
 
     @property
     def kind(self) -> AxisKind:
@@ -171,7 +171,7 @@ class AxisSpec(StrictModel):
             raise ValueError(f"values: {self.vary[0]} takes names of files or FMUs")
         if self.unit is not None:
             if not self.numeric:
-                raise ValueError("unit: the values are no numbers")
+                raise ValueError("unit: the values must be numbers")
             parse_unit(self.unit)
         elif self.values is not None and self.kind == "setting":
             quantity = next((v for v in self.values if _is_quantity(v)), None)
@@ -185,7 +185,7 @@ class AxisSpec(StrictModel):
         if not self.start < self.end:
             raise ValueError(f"from must be below to (got {self.start:g} and {self.end:g})")
         if self.spacing == "log" and self.start * self.end <= 0:
-            raise ValueError("from and to must both be above 0, or both below, where spacing is log")
+            raise ValueError("from and to must both be above 0, or both below, for spacing log")
 
 
 class DesignAxisSpec(AxisSpec):

@@ -160,9 +160,7 @@ def _submit_all(
 def _outcomes(future: Any, batch: Sequence[Job], scheduler: str) -> list[Outcome] | None:
     """Return the outcomes that a worker reported; None if the workers died of one of several runs."""
     if future.status == "cancelled" or future.status == "lost":
-        raise ResultsError(
-            f"{scheduler}: the cluster was lost; what it had finished is kept.", code="runs-missing"
-        )
+        raise ResultsError(f"{scheduler}: the connection lost; finished runs are kept.", code="runs-missing")
     error = future.exception() if future.status == "error" else None
     if isinstance(error, distributed.KilledWorker):
         if len(batch) > 1:

@@ -253,7 +253,7 @@ def _samples(found: Results | None, signal: str, why: str) -> tuple[np.ndarray |
     if found is None:
         return None, None, why
     if not np.issubdtype(found[signal].dtype, np.number):
-        return None, None, f"{signal} is no number"
+        return None, None, f"{signal} is not a number"
     return found[signal], found.record.wall_time, ""
 
 

@@ -238,14 +238,14 @@ def left_to_do(jobs: Sequence[Job], records: Mapping[str, MeasuredRun]) -> list[
         else:
             record = records.get(job.key)
             if record is not None and (words := _other_unit(job, record)):
-                checksums.warn(f"{job.label} is to be made again: {words}")
+                checksums.warn(f"{job.label} will be repeated: {words}")
                 record = None
             made = record is not None and not (job.keep and record.ok and isinstance(read_back(job.out), str))
         if made:
             continue
         left[job.key, job.out] = job
         if words := altered(job.out):
-            checksums.warn(f"{job.label} is to be made again: {words}")
+            checksums.warn(f"{job.label} will be repeated: {words}")
     return list(left.values())
 
 
@@ -255,7 +255,7 @@ def _other_unit(job: Job, record: MeasuredRun) -> str:
     units = _units(job.plan, job.metrics)
     for key, value in record.values.items():
         if value is not None and units.get(key, value[1]) != value[1]:
-            return f"{key} is noted in {value[1]}, and measured in {units[key]}"
+            return f"{key} is stored in {value[1]}, but measured in {units[key]}"
     return ""
 
 

@@ -72,9 +72,7 @@ class ForBinding:
         for word in re.findall(r"\{([^{}]*)\}", text):
             if word not in use:
                 guess = hint(word, use, lead="'for' has")
-                self.document.report(
-                    (*self.key, *where), f"{{{word}}} stands for nothing{guess}", "axis-unknown"
-                )
+                self.document.report((*self.key, *where), f"{{{word}}} is undefined{guess}", "axis-unknown")
         return re.sub(r"\{(\w+)\}", lambda match: use.get(match[1], match[0]), text)
 
     def filled(self, entry: Texts) -> Texts:
@@ -100,7 +98,7 @@ def fillings(
     number = math.prod(map(len, for_each.values()))
     if number > MOST:
         document.report(
-            (*key, "for"), f"stands for {number} {what}; at most {MOST} are taken", "experiment-too-large"
+            (*key, "for"), f"stands for {number} {what}; at most {MOST} are allowed", "experiment-too-large"
         )
         return
     for combination in itertools.product(*(choices.items() for choices in for_each.values())):
@@ -338,7 +336,7 @@ def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> Lo
         for run in named_runs(document, i, entry):
             if len(runs) == MOST:
                 document.report(
-                    ("runs",), f"more than {MOST} runs; no more are taken", "experiment-too-large"
+                    ("runs",), f"more than {MOST} runs; at most {MOST} are allowed", "experiment-too-large"
                 )
                 raise ScenarioError(document.sorted_errors())
             if run.name in runs:

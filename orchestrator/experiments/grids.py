@@ -111,7 +111,7 @@ def grid_tables(spec: GridSpec, values: MetricTable, verdicts: Mapping[tuple[str
     tables = [Table(title, headings, [*measured], [], numbers)]
     if spec.published:
         printed = [[row, *(_digits(cell.published) for cell in line)] for row, line in lines]
-        tables.append(Table(f"{title}: what the paper prints", headings, [*printed], [], numbers))
+        tables.append(Table(f"{title}: published values", headings, [*printed], [], numbers))
     table = tables[-1]
     for cell in beside:
         said = f", the paper: {_digits(cell.published)}" if cell.published is not None else ""

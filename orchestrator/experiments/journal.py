@@ -147,7 +147,7 @@ class Journal:
                 ) from None
             checksums.warn(f"{self._path}: line 1: {error}; the runs below it are kept")
         for number, why in list(damaged.items())[:NAMED]:
-            checksums.warn(f"{self._path}: line {number}: {why}; its run is to be made again")
+            checksums.warn(f"{self._path}: line {number}: {why}; its run will be repeated")
         if len(damaged) > NAMED:
             checksums.warn(f"{self._path}: {counted(len(damaged) - NAMED, 'more line')} like these")
         if whole != [line + b"\n" for line in lines]:
@@ -226,7 +226,7 @@ def _content(line: bytes) -> dict[str, Any]:
     except (ValueError, RecursionError):
         raise ValueError("is no JSON") from None
     if not isinstance(found, dict):
-        raise ValueError("is no JSON object")
+        raise ValueError("is not a JSON object")
     return found
 
 

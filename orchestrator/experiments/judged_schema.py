@@ -92,7 +92,7 @@ def parse(text: str) -> ast.expr:
     try:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):  # syntax, null bytes, nested brackets
-        raise ValueError(f"{short(text)} is no expression, for example (a - b) / a") from None
+        raise ValueError(f"{short(text)} is not an expression such as (a - b) / a") from None
     for node in _nodes(tree):
         plain = isinstance(node, ast.Constant) and type(node.value) in (int, float)
         if not (plain or isinstance(node, (ast.Name, ast.BinOp, ast.UnaryOp))):
@@ -253,7 +253,7 @@ class GridSpec(StrictModel):
                 which = f"derived: {self.derived!r}" if self.derived else f"run: {self.run!r}"
                 raise ValueError(f"{which} does not depend on {{{name}}}")
         if len(rows) * len(columns) > CELLS:
-            raise ValueError(f"{len(rows) * len(columns)} runs; at most {CELLS} are taken")
+            raise ValueError(f"{len(rows) * len(columns)} runs; at most {CELLS} are allowed")
         if row == column:
             raise ValueError(f"rows and columns are both called {row!r}")
         if self.published and [len(line) for line in self.published] != [len(columns)] * len(rows):
@@ -297,7 +297,7 @@ class DerivedSpec(StrictModel):
             raise ValueError("only: belongs to a rank_correlation")
         for name in names_in(self.expression) if self.expression else ():
             if name not in self.of:
-                raise ValueError(f"expression: {name} stands for nothing; 'of' has {listed(self.of)}")
+                raise ValueError(f"expression: {name} is undefined; 'of' has {listed(self.of)}")
         if self.published is not None:
             try:
                 si_number(self.published, self.unit)

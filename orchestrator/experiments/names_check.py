@@ -170,7 +170,7 @@ def _check_limits(spec: ExperimentSpec, document: Document) -> None:
     for name, limit in spec.limits.items():
         if limit.of in spec.axes and not spec.axes[limit.of].numeric:
             document.report(
-                ("limits", name, "of"), f"the values of {limit.of!r} are no numbers", "figure-invalid"
+                ("limits", name, "of"), f"the values of {limit.of!r} must be numbers", "figure-invalid"
             )
         if limit.of in spec.repeats:
             document.report(("limits", name, "of"), f"numbers are means over {limit.of!r}", "figure-invalid")
@@ -196,7 +196,7 @@ def _check_places(spec: ExperimentSpec, document: Document, i: int, figure: Figu
         if axis in spec.repeats:
             document.report(("figures", i, name), f"numbers are means over {axis!r}", "figure-invalid")
         if name in "xy" and axis in spec.axes and figure.what.upwards and not spec.axes[axis].numeric:
-            document.report(("figures", i), f"the values of {axis!r} are no numbers", "figure-invalid")
+            document.report(("figures", i), f"the values of {axis!r} must be numbers", "figure-invalid")
     if figure.limit in spec.limits:
         of = spec.limits[figure.limit].of
         if of in used:
@@ -208,5 +208,5 @@ def _check_places(spec: ExperimentSpec, document: Document, i: int, figure: Figu
         name for name in (*spec.axes, *([RUN] if spec.runs else [])) if name not in used | {*spec.repeats}
     ]
     if spec.design == "grid" and left and not document.errors:
-        sentence = f"the axis {left[0]!r} has no place in this figure: make it lines or panels"
+        sentence = f"the axis {left[0]!r} is not used in this figure: assign it to lines or panels"
         document.report(("figures", i), sentence, "figure-invalid")

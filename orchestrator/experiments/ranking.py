@@ -95,11 +95,11 @@ class ConditionSpec(OverrideSpec):
 class EntrySpec(StrictModel):
     """A controller to be ranked."""
 
-    title: str = Field(min_length=1, description="What tables call it")
-    fmu: str = Field(min_length=1, description="Name of its FMU, or a path relative to the file")
-    parameters: dict[str, Scalar] = Field({}, description="Parameter -> value; default: as they are")
-    source: str = Field(min_length=1, description="Where it is from, and its gains")
-    gains: Literal["authors", "tuned"] = Field("authors", description="Whose gains they are")
+    title: str = Field(min_length=1, description="Title in tables")
+    fmu: str = Field(min_length=1, description="Name of the FMU, or a path relative to the file")
+    parameters: dict[str, Scalar] = Field({}, description="Parameter -> value; default: those of the FMU")
+    source: str = Field(min_length=1, description="Source of the controller and its gains")
+    gains: Literal["authors", "tuned"] = Field("authors", description="Who chose the gains")
 
 
 class EntriesSpec(StrictModel):
@@ -129,10 +129,10 @@ class RankingSpec(StrictModel):
 
     title: str = Field(min_length=1)
     source: str = Field("", description="Of the test that everything is judged by")
-    notes: list[str] = Field([], description="What a reader of its page has to know")
+    notes: list[str] = Field([], description="Note for readers of the page")
     step_size: Time | None = Field(None, description="In place of the scenarios'")
     stop_time: Time | None = Field(None, description="In place of the scenarios'")
-    every: int = Field(1, ge=1, description="Every so many of the amplitudes, from the last one down")
+    every: int = Field(1, ge=1, description="Take every n-th amplitude, counted from the last")
     cars: dict[str, CarSpec] = Field(min_length=1, description="Name -> car")
     conditions: dict[str, ConditionSpec] = Field(min_length=1, description="Name -> condition")
     entries: dict[str, EntrySpec] = Field({}, description="Name -> controller")

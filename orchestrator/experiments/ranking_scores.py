@@ -304,7 +304,7 @@ def run_ranking(
         if not record.made:
             car = case.run.name
             raise ResultsError(
-                f"{execute.folder}: holds no A of {car!r} of this build; rank without --no-run",
+                f"{execute.folder}: contains no A of {car!r} for these FMUs; rank without --no-run",
                 code="runs-missing",
             )
     angles = angles_of(ranking, slow)

@@ -84,7 +84,7 @@ def draw_matrix(ranked: RankingResult, note: str) -> Figure:
         handles = [
             Patch(facecolor=COLOURS["passed"], label="passed: all runs pass"),
             Patch(facecolor=COLOURS["spun"], label="spun: criteria met, but more than 20° of sideslip"),
-            Patch(facecolor=COLOURS["failed"], label="failed; so many runs of all pass"),
+            Patch(facecolor=COLOURS["failed"], label="failed; runs that pass of all"),
         ]
         frame(figure, ROW * (len(rows) + 4.3), handles, ranked.ranking.spec.title, note)
     return figure

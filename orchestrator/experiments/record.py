@@ -193,7 +193,7 @@ def _warn_if_edited(file: Path) -> None:
     """Warn if a record that is about to be overwritten was edited since it was written."""
     try:
         found = json.loads(read_bytes(file, largest=LARGEST))
-        words = checksums.changed_since(found) if isinstance(found, dict) else "it is no record"
+        words = checksums.changed_since(found) if isinstance(found, dict) else "it is not a record"
     except FileNotFoundError:
         return
     except (OSError, ValueError, RecursionError):

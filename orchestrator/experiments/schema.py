@@ -158,7 +158,7 @@ from .judged_schema import (
 class ChoiceSpec(OverrideSpec):
     """A value of a run's `for`, with its overrides."""
 
-    says: str = Field("", description="What texts call it; default: the value")
+    says: str = Field("", description="Label in texts; default: the value")
 
 
 def _choices(value: object) -> Any:
@@ -179,14 +179,14 @@ class RunSpec(OverrideSpec):
     for_each: dict[str, Choices] = Field(
         {}, alias="for", description="Key -> values: a list, or each with its words, or with what it changes"
     )
-    label: str = Field("", description="What legends call it; default: the name")
-    row: str = Field("", description="What tables call it; default: the label")
+    label: str = Field("", description="Label in legends; default: the name")
+    row: str = Field("", description="Label in tables; default: the label")
 
 
 class LawSpec(OverrideSpec):
     """A law to be tuned: its ranges and its overrides."""
 
-    axes: dict[str, AxisSpec] = Field(description="Name -> what is sought, from and to", min_length=1)
+    axes: dict[str, AxisSpec] = Field(description="Name -> parameter to tune, from and to", min_length=1)
 
     @model_validator(mode="after")
     def _ranges(self) -> LawSpec:
@@ -199,14 +199,14 @@ class LawSpec(OverrideSpec):
 class TuningSpec(StrictModel):
     """A search for parameters that minimize an objective, with the same budget for all laws."""
 
-    objective: str = Field(description="Key of `derived`; the least is the best")
+    objective: str = Field(description="Key of `derived` to minimize")
     population: int = Field(description="Trials of a generation", ge=5)
     generations: int = Field(description="With the first", ge=1)
-    seed: int = Field(description="Of all that is left to chance", ge=0)
-    runs: Patterns = Field(["*"], description="Runs that the laws drive; the others stand as they are")
-    laws: dict[str, LawSpec] = Field(description="Words -> what is tuned", min_length=1)
+    seed: int = Field(description="Of the random numbers", ge=0)
+    runs: Patterns = Field(["*"], description="Runs with the tuned laws; others are unchanged")
+    laws: dict[str, LawSpec] = Field(description="Label -> what is tuned", min_length=1)
     entries: str = Field(
-        "", description="Unit that every law swaps; what is found of it is written as entries of a ranking"
+        "", description="Unit that every law swaps; its tuned parameters are written as entries of a ranking"
     )
 
     @model_validator(mode="after")
@@ -267,12 +267,12 @@ class FigureSpec(StrictModel):
     metric: str = Field("", description="Key of `metrics`, for curves and maps")
     limit: str = Field("", description="Key of `limits`, for a limit")
     grid: str = Field("", description="Key of `grids`, for a line per column over the rows")
-    x: str = Field("", description="Axis to the right")
-    y: str = Field("", description="Axis upwards, of a map")
+    x: str = Field("", description="Horizontal axis")
+    y: str = Field("", description="Vertical axis, of a map")
     lines: str = Field("", description="Axis with a line per value, of curves and limits")
     only: dict[str, list[Scalar]] = Field({}, description="Axis -> those of its values that are drawn")
     scale: Literal["linear", "log"] = Field("linear", description="Of the metric")
-    largest: QuantityText | None = Field(None, description="Where the metric's scale ends")
+    largest: QuantityText | None = Field(None, description="Upper end of the metric's scale")
     mark: QuantityText | None = Field(None, description="A value of the metric to draw a line at")
 
     @property
@@ -348,12 +348,12 @@ class ExperimentSpec(OverrideSpec):
     tables: list[TableSpec] = []
     grids: dict[str, GridSpec] = {}
     derived: dict[str, DerivedSpec] = {}
-    claims: list[Claim] = Field([], description="What the paper says")
-    checks: list[Claim] = Field([], description="What this project asks of its own results")
-    region: RegionSpec | None = Field(None, description="How far the verdicts of claims carry")
+    claims: list[Claim] = Field([], description="Claims of the paper")
+    checks: list[Claim] = Field([], description="Checks of this project on its results")
+    region: RegionSpec | None = Field(None, description="Open values over which claims are judged again")
     limits: dict[str, LimitSpec] = {}
     figures: list[FigureSpec] = []
-    tuning: TuningSpec | None = Field(None, description="What `yawbench tune` seeks")
+    tuning: TuningSpec | None = Field(None, description="What `yawbench tune` tunes")
 
     @model_validator(mode="after")
     def _consistent(self) -> ExperimentSpec:
@@ -376,7 +376,7 @@ class ExperimentSpec(OverrideSpec):
             raise ValueError(f"axes.{self.repeats[0]}: repeats need a grid")
         number = self.number_of_points() * max(1, len(self.runs))
         if number > MOST:
-            raise ValueError(f"{number} runs; at most {MOST} are taken")
+            raise ValueError(f"{number} runs; at most {MOST} are allowed")
         return self
 
     def said(self) -> Iterator[tuple[str, int, Claim]]:
@@ -412,4 +412,4 @@ class ExperimentSpec(OverrideSpec):
                 raise ValueError(f"axes.{name}: needs count")
         if self.design == "list" and len(set(lengths.values())) > 1:
             counted = ", ".join(f"{name} has {n}" for name, n in lengths.items())
-            raise ValueError(f"axes of a list must have equally many values ({counted})")
+            raise ValueError(f"axes of a list must have the same number of values ({counted})")

@@ -72,7 +72,7 @@ class TestDriver:
         speed = 0.0 if given is None else float(convert(str(given), "m/s"))
         if speed <= 0.0:
             raise ScenarioError(
-                f"{self.scenario}: tells no speed above 0, from which the series could begin",
+                f"{self.scenario}: has no speed above 0, from which the series could start",
                 code="fmu-wrong-kind",
             )
         return speed
@@ -150,5 +150,5 @@ def slow_steer_amplitude(plan: Plan, scenario: Path) -> float:
         if isinstance(value, (int, float)) and value != 0:
             return abs(float(value))
     raise ScenarioError(
-        f"{scenario}: {AMPLITUDE} is no amplitude of a hand wheel other than 0", code="fmu-wrong-kind"
+        f"{scenario}: {AMPLITUDE} must be a non-zero hand-wheel amplitude", code="fmu-wrong-kind"
     )

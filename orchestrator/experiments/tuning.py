@@ -81,7 +81,7 @@ def tuning_of(experiment: LoadedExperiment) -> TuningSpec:
     """
     if experiment.spec.tuning is None:
         raise ScenarioError(
-            f"{experiment.path}: has no 'tuning'; it is for `yawbench study` or `sweep`",
+            f"{experiment.path}: has no 'tuning'; use `yawbench study` or `sweep`",
             code="file-wrong-kind",
         )
     return experiment.spec.tuning

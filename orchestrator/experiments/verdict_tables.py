@@ -196,7 +196,9 @@ def _run_table(findings: ExperimentResult, spec: TableSpec) -> Table:
             cells = [findings.at[setting].get((run.name, key)) for key in spec.metrics]
             ended = (findings.record(case).ended for case in findings.cases_of(run, setting))
             if early := next(filter(None, ended), None):
-                table.notes.append(f"{row}: {early}; what is of the whole run, or later, has no result")
+                table.notes.append(
+                    f"{row}: {early}; metrics of the whole run or of later windows have no value"
+                )
             if some:
                 cells[1:1] = _beside(said[run.name], len(carries))
                 table.notes += [f"{run.row}: {j.said.note}" for j in said[run.name] if j.said.note]
@@ -281,8 +283,8 @@ def claim_tables(findings: ExperimentResult) -> list[Table]:
     }
     tables = []
     for title, judged in (
-        ("What the paper says beyond single runs", findings.claims),
-        ("What this project asks of it", findings.checks),
+        ("Claims of the paper across runs", findings.claims),
+        ("Checks of this project", findings.checks),
     ):
         table = Table(
             title, ["claim", "measured", "verdict", *(CARRIES if findings.regions else CARRIES[:1])]

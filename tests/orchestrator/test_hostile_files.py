@@ -202,12 +202,12 @@ def said_of(load: object, text: str) -> list[str]:
         (
             f"{SWEEP}axes:\n"
             + "".join(f"  a{i}: {{vary: plant.p{i}, from: 1, to: 2, count: 1000}}\n" for i in range(3)),
-            "b.yaml:1: 1000000000 runs; at most 100000 are taken",
+            "b.yaml:1: 1000000000 runs; at most 100000 are allowed",
         ),
         (
             f"{SWEEP}design: latin_hypercube\nseed: 1\npoints: 1000000000\n"
             "axes: {a: {vary: plant.mass, from: 1, to: 2}}\n",
-            "b.yaml:1: 1000000000 runs; at most 100000 are taken",
+            "b.yaml:1: 1000000000 runs; at most 100000 are allowed",
         ),
     ],
 )

@@ -223,7 +223,7 @@ def test_noisy_sensors_give_a_margin_with_its_confidence(tmp_path):
         ((), ("--controller", "nowhere/my.fmu"), "--controller nowhere/my.fmu: there is no such file"),
         ((), ("--controller", "none"), "there is already an entry 'none'"),
         ((), ("--fresh", "--no-run"), "--fresh and --no-run are mutually exclusive"),
-        ((), ("--no-run",), "holds no A of 's' of this build; rank without --no-run"),
+        ((), ("--no-run",), "contains no A of 's' for these FMUs; rank without --no-run"),
     ],
 )
 def test_what_is_wrong_with_a_ranking_is_said_before_any_run(wrong, options, sentence, tmp_path, capsys):

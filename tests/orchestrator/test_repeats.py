@@ -145,7 +145,7 @@ def test_in_haste_there_are_fewer_repeats(load):
     [
         (("values: [1, 2, 3, 4]", "from: 1, to: 4, count: 4"), "repeats: needs a list of two values or more"),
         (('["*/noisy"]', '["*/nosy"]'), "axes.seed.runs[0]: no run is named '*/nosy'; runs: weak/quiet"),
-        (('{gain} tells', "{gian} tells"), "checks[0]: {gian} stands for nothing; did you mean 'gain'?"),
+        (('{gain} tells', "{gian} tells"), "checks[0]: {gian} is undefined; did you mean 'gain'?"),
         (('"share/{gain}/{noise}":', '"share/{gain}":'), "there is already a derived number 'share/weak'"),
         (("noisy, set: {", "noisy, set: {sensor.yaw_rate_gain: 2, "), "sensor.yaw_rate_gain is given twice"),
         (("kind: grid, grid: share", "kind: grid, grid: shares"), "there is no grid 'shares'"),

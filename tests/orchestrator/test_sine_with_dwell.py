@@ -195,7 +195,7 @@ def turned(made: Trace, *names: str) -> Trace:
         (turned(trace(-LARGE), "yaw_rate"), "the yaw rate opposes the steering"),
         (turned(trace(), "acceleration_y"), "the lateral acceleration opposes the steering"),
         (unanswered(trace(), np.zeros_like), "the yaw rate does not follow the steering"),
-        (trace(yaw_rate=noise(1e-4)), "the yaw rate hardly answers the reversal"),
+        (trace(yaw_rate=noise(1e-4)), "the yaw rate barely responds to the reversal"),
     ],
     ids=["steering", "yaw rate", "right first", "acceleration", "still", "no answer to the reversal"],
 )
@@ -443,7 +443,7 @@ def test_units_in_the_file_are_si(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "wrong, sentence",
     [
-        (("yaw_rate", "yaw_rat"), "'yaw_rat' is no signal; did you mean 'yaw_rate'?"),
+        (("yaw_rate", "yaw_rat"), "unknown signal 'yaw_rat'; did you mean 'yaw_rate'?"),
         (("deg,", "grad,"), "'grad' is not a unit"),
         (("LRW", "Lenkrad"), "has no column 'Lenkrad'"),
         (("unit: deg,", "unit: kg,"), "column 'LRW': its unit 'kg' does not fit: rad is wanted"),

@@ -193,9 +193,9 @@ def test_what_python_code_raises_is_the_cause(base):
 @pytest.mark.parametrize(
     ("given", "sentence"),
     [
-        (3, "int is no controller"),
+        (3, "int is not a controller"),
         (Proportional, r"Proportional is a class; give an object of it, Proportional\(\)"),
-        (lambda **signals: 0.0, r"function: \*\*signals names no signal: name each"),
+        (lambda **signals: 0.0, r"function: \*\*signals is not the name of a signal: name each"),
         (lambda x: x, "signal 'x' is not in the signal dictionary"),
         (type("Mute", (), {"output": lambda self, t, u: 0.0, "inputs": ()})(), "Mute has no outputs"),
         (type("Text", (Proportional,), {"output": None})(), "output: must be a method"),
@@ -249,7 +249,7 @@ def test_what_a_run_cannot_be_evaluated_with_is_said_in_a_sentence(run, test, an
     ("call", "kind", "sentence"),
     [
         (lambda base, run: yb.load(None), TypeError, r"source: must be a name or a path \(got nothing\)"),
-        (lambda base, run: base.set([("a", 1)]), TypeError, "values: must be a mapping of places to values"),
+        (lambda base, run: base.set([("a", 1)]), TypeError, "values: must be a mapping of targets to values"),
         (
             lambda base, run: base.set({"vehicle.mass": b"1"}),
             yb.ScenarioError,
