@@ -17,8 +17,9 @@ from orchestrator.experiments.jobs import Job, Outcome, measured
 from orchestrator.experiments.judged_schema import si_number, text_of
 from orchestrator.experiments.outcome import ExperimentResult
 from orchestrator.experiments.planning import metrics_of, plan_experiment
-from orchestrator.experiments.record import columns_of, to_pandas
+from orchestrator.experiments.record import columns_of
 from orchestrator.experiments.schema import ExperimentSpec, FigureSpec
+from orchestrator.experiments.tables import to_pandas
 from orchestrator.master.fmi import open_unit
 from orchestrator.master.run_loop import OpenInstance
 from orchestrator.master.simulate import simulate_in_memory

@@ -22,7 +22,7 @@ from orchestrator.experiments.ranking_tables import (
     draw_matrix,
     draw_pareto,
 )
-from orchestrator.experiments.record import to_pandas
+from orchestrator.experiments.tables import to_pandas
 from orchestrator.messages import hint
 from orchestrator.planner import Planner
 from orchestrator.results.lock import writing

@@ -94,7 +94,7 @@ def converge(
         measure,
         refinements,
     )
-    from ..experiments.record import to_csv
+    from ..experiments.tables import to_csv
     from ..figures.style import save
     from ..files import write_whole
     from ..pages.page_parts import image_of

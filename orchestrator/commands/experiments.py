@@ -282,7 +282,7 @@ def tune(context: typer.Context, file: TuningFile, options: RunOptions) -> None:
     search is resumed; the same seed gives the same result with any number of workers.
     """
     from ..experiments.experiment import load_experiment
-    from ..experiments.record import to_csv
+    from ..experiments.tables import to_csv
     from ..experiments.tuning import (
         ENTRIES,
         best_of,

@@ -118,7 +118,7 @@ def _write(ranked: RankingResult, folder: Path, command: str, each: Each) -> Non
         draw_pareto,
         draw_run,
     )
-    from ..experiments.record import to_csv
+    from ..experiments.tables import to_csv
     from ..figures.style import save
     from ..files import write_whole
     from ..pages.ranking_page import ranking_page

@@ -36,8 +36,7 @@ from ..scenario.overrides import is_path, swap_of
 from .experiment import LoadedExperiment, NamedRun, experiment_of
 from .judged_schema import text_of
 from .outcome import ExperimentResult
-from .record import TableColumn
-from .tables import Cell, Table, marked, remarks
+from .tables import Cell, Table, TableColumn, marked, remarks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,9 +17,8 @@ from ..results.read import load_results
 from .jobs import STEP_TIME
 from .ranking import SERIES
 from .ranking_scores import Digits, EntryScore, RankingCell, deciding_digits
-from .record import TableColumn
 from .tables import Cell as Words
-from .tables import Table
+from .tables import Table, TableColumn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -5,14 +5,11 @@ The table has one row per case, in the order of the design; equal runs give equa
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any
 
 from .. import checksums
 from ..errors import ResultsError
@@ -23,25 +20,12 @@ from ..results.folder import LARGEST
 from ..results.read import Results
 from .judged_schema import si_number, text_of
 from .outcome import ExperimentResult, limits_of
+from .tables import TableColumn, to_csv
 from .verdict_tables import heading, verdict
 from .verdicts import ClaimResult, Region
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-
 TABLE = "table.csv", "table.parquet"
 VERDICTS = "verdicts.csv"
-
-
-@dataclass(frozen=True)
-class TableColumn:
-    """A column of a table for programs; numbers are in SI units, named in `about`."""
-
-    name: str
-    kind: Literal["int64", "float64", "string"]
-    values: Sequence[Any]
-    about: dict[str, str] = field(default_factory=dict)
 
 
 def columns_of(findings: ExperimentResult) -> list[TableColumn]:
@@ -101,19 +85,6 @@ def verdict_columns(findings: ExperimentResult) -> list[TableColumn]:
     ]
 
 
-def to_pandas(columns: Sequence[TableColumn]) -> pd.DataFrame:
-    """Return columns as a data frame; `attrs["units"]` has the units of its numbers."""
-    import pandas as pd
-
-    frame = pd.DataFrame({one.name: pd.Series(one.values, dtype=_dtype(one)) for one in columns})
-    frame.attrs["units"] = {one.name: one.about["unit"] for one in columns if "unit" in one.about}
-    return frame
-
-
-def _dtype(column: TableColumn) -> str:
-    return "object" if column.kind == "string" else column.kind
-
-
 def write_table(findings: ExperimentResult, out: Path) -> None:
     """Write table and verdicts as CSV, and the table as Parquet with units in the fields' metadata.
 
@@ -131,22 +102,6 @@ def write_table(findings: ExperimentResult, out: Path) -> None:
             raise ResultsError(
                 f"{out / name}: cannot be written: {reason(error)}.", code="results-unwritable"
             ) from None
-
-
-def to_csv(columns: Sequence[TableColumn]) -> str:
-    """Return columns as CSV, with units in the headings."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(f"{c.name} [{c.about['unit']}]" if "unit" in c.about else c.name for c in columns)
-    writer.writerows(map(_plain, zip(*(c.values for c in columns), strict=True)))
-    return text.getvalue()
-
-
-def _plain(row: Sequence[Any]) -> list[str]:
-    """Return a row as text: numbers with all digits, "" for None."""
-    return [
-        "" if x is None else repr(x) if isinstance(x, float) and math.isfinite(x) else str(x) for x in row
-    ]
 
 
 def _parquet(findings: ExperimentResult, columns: Sequence[TableColumn]) -> bytes:

@@ -1,7 +1,9 @@
-"""Tables for people, on the terminal or in a page; and the listings of runs, files, FMUs and signals."""
+"""Tables for people (`Table`) and for programs (`TableColumn`); listings of runs, files, FMUs and signals."""
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 import textwrap
 from collections.abc import Iterable, Sequence
@@ -28,6 +30,7 @@ from ..results.run_record import RunRecord
 from ..scenario import catalogue, yaml_lines
 
 if TYPE_CHECKING:
+    import pandas as pd
     import rich.console
 
     from ..results.read import Results
@@ -87,6 +90,45 @@ def for_terminal(table: Table) -> rich.console.Group:
         shape.add_row(*(Text(cell) for cell in row))
     notes = [Text(printable(note)) for note in table.notes]
     return Group(*([Text(printable(table.title), "bold")] if table.title else []), shape, *notes)
+
+
+@dataclass(frozen=True)
+class TableColumn:
+    """A column of a table for programs; numbers are in SI units, named in `about`."""
+
+    name: str
+    kind: Literal["int64", "float64", "string"]
+    values: Sequence[Any]
+    about: dict[str, str] = field(default_factory=dict)
+
+
+def to_pandas(columns: Sequence[TableColumn]) -> pd.DataFrame:
+    """Return columns as a data frame; `attrs["units"]` has the units of its numbers."""
+    import pandas as pd
+
+    frame = pd.DataFrame({one.name: pd.Series(one.values, dtype=_dtype(one)) for one in columns})
+    frame.attrs["units"] = {one.name: one.about["unit"] for one in columns if "unit" in one.about}
+    return frame
+
+
+def _dtype(column: TableColumn) -> str:
+    return "object" if column.kind == "string" else column.kind
+
+
+def to_csv(columns: Sequence[TableColumn]) -> str:
+    """Return columns as CSV, with units in the headings."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(f"{c.name} [{c.about['unit']}]" if "unit" in c.about else c.name for c in columns)
+    writer.writerows(map(_plain, zip(*(c.values for c in columns), strict=True)))
+    return text.getvalue()
+
+
+def _plain(row: Sequence[Any]) -> list[str]:
+    """Return a row as text: numbers with all digits, "" for None."""
+    return [
+        "" if x is None else repr(x) if isinstance(x, float) and math.isfinite(x) else str(x) for x in row
+    ]
 
 
 def marked(label: str, results: Results) -> str:

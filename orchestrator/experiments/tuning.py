@@ -26,8 +26,7 @@ from ..names import Target
 from .axes import DesignAxisSpec, OverrideSpec, VariantSpec, level_at
 from .experiment import LoadedExperiment
 from .outcome import ExperimentResult, derive
-from .record import TableColumn
-from .tables import Table
+from .tables import Table, TableColumn
 from .verdicts import MetricTable
 
 if TYPE_CHECKING:

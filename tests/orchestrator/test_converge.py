@@ -20,7 +20,7 @@ from orchestrator.experiments.comparison import (
 from orchestrator.experiments.experiment import NamedRun, experiment_of
 from orchestrator.experiments.jobs import Job, Outcome
 from orchestrator.experiments.outcome import judge_results
-from orchestrator.experiments.record import to_csv
+from orchestrator.experiments.tables import to_csv
 from tests.changed import changed
 from tests.sentences import golden, refused
 

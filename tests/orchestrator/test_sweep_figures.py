@@ -15,7 +15,8 @@ from orchestrator.experiments.figures import draw_over_axes
 from orchestrator.experiments.jobs import Job, MeasuredRun, measured
 from orchestrator.experiments.outcome import ExperimentResult, limit_table, limits_of
 from orchestrator.experiments.planning import PlannedExperiment
-from orchestrator.experiments.record import columns_of, to_pandas, write_table
+from orchestrator.experiments.record import columns_of, write_table
+from orchestrator.experiments.tables import to_pandas
 from tests.sentences import golden, refused
 
 from .fakes import Clock, make_plan
