@@ -53,9 +53,9 @@ COMMANDS = {
 class _Commands(TyperGroup):
     """The command group. It reports interruptions itself, because typer treats SIGTERM like Ctrl-C."""
 
-    def make_context(self, *given: Any, **options: Any) -> Any:
+    def make_context(self, *args: Any, **options: Any) -> Any:
         with _interruptible():
-            return super().make_context(*given, **options)
+            return super().make_context(*args, **options)
 
     def invoke(self, context: Any) -> Any:
         with _interruptible():

@@ -110,15 +110,15 @@ def errors_in(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
 
 
 def warnings_in(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
-    """Return the warnings, each once; of those about a time, the earliest of each code, as of four wheels."""
-    found: dict[tuple[str, str], Diagnostic] = {}
-    for one in diagnostics:
-        if one.severity == "warning":
-            time = one.location.time
-            key = (one.code, one.message if time is None else "")
-            if (time or 0.0) < (found.setdefault(key, one).location.time or 0.0):
-                found[key] = one
-    return tuple(found.values())
+    """Return the warnings without duplicates; of those with a time, the earliest of each code."""
+    earliest: dict[tuple[str, str], Diagnostic] = {}
+    for diagnostic in diagnostics:
+        if diagnostic.severity == "warning":
+            time = diagnostic.location.time
+            key = (diagnostic.code, diagnostic.message if time is None else "")
+            if (time or 0.0) < (earliest.setdefault(key, diagnostic).location.time or 0.0):
+                earliest[key] = diagnostic
+    return tuple(earliest.values())
 
 
 class InvalidValueError(ValueError):
@@ -135,7 +135,7 @@ def code_of(error: Exception, default: str = "value-invalid") -> str:
 
 
 Messages = str | Diagnostic | Iterable[str | Diagnostic]
-"""What an error is raised with: sentences, or diagnostics where each has its own code or location."""
+"""Arguments of errors: messages, or diagnostics where each has its own code or location."""
 
 
 def text_of(diagnostics: Iterable[Diagnostic]) -> str:
@@ -144,7 +144,7 @@ def text_of(diagnostics: Iterable[Diagnostic]) -> str:
 
 
 class YawbenchError(Exception):
-    """Base class of all errors; `diagnostics` says what is wrong, with code and location.
+    """Base class of all errors; `diagnostics` are its messages, with code and location.
 
     `code` is that of the first one; `file` and `line` are those of the first that has them, else None.
 
@@ -173,8 +173,8 @@ class YawbenchError(Exception):
 
 
 def _diagnostics(messages: Messages, code: str) -> list[Diagnostic]:
-    given = [messages] if isinstance(messages, (str, Diagnostic)) else messages
-    return [one if isinstance(one, Diagnostic) else Diagnostic(code, one) for one in given]
+    items = [messages] if isinstance(messages, (str, Diagnostic)) else messages
+    return [item if isinstance(item, Diagnostic) else Diagnostic(code, item) for item in items]
 
 
 class YawbenchWarning(UserWarning):

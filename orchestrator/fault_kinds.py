@@ -60,9 +60,9 @@ class Fault:
     def item(self) -> dict[str, float | str]:
         """The fault as in a file, without its location and what it leaves open."""
         times = {"from": self.begin, "until": self.end}
-        given = {"kind": self.kind, "value": self.value, "share": self.share, "every": self.every}
-        given |= {"seed": self.seed} | {name: t if math.isfinite(t) else None for name, t in times.items()}
-        return {name: value for name, value in given.items() if value is not None}
+        options = {"kind": self.kind, "value": self.value, "share": self.share, "every": self.every}
+        options |= {"seed": self.seed} | {name: t if math.isfinite(t) else None for name, t in times.items()}
+        return {name: value for name, value in options.items() if value is not None}
 
     def __str__(self) -> str:
         """The fault in one line, as `--fault` takes it after the location."""

@@ -257,7 +257,7 @@ def open_own(path: Path, flags: int, mode: int = 0o666) -> int:
     if not stat.S_ISREG(status.st_mode):
         problem = "is a pipe, a socket or a device, not a file"
     elif status.st_nlink > 1:
-        problem = "has another name (a hard link), whose content would change, too; copy or remove it"
+        problem = "has another name (a hard link), whose content would change too; copy or remove it"
     else:
         return descriptor
     os.close(descriptor)

@@ -60,13 +60,13 @@ _UNPRINTABLE = re.compile(
 
 def unprintable(text: str) -> str | None:
     """Return the first unprintable character of a text as its escape sequence, None if there is none."""
-    found = _UNPRINTABLE.search(text)
-    return ascii(found[0])[1:-1] if found else None
+    match = _UNPRINTABLE.search(text)
+    return ascii(match[0])[1:-1] if match else None
 
 
 def printable(text: str) -> str:
     """Return a text with unprintable characters replaced by escape sequences, as `\\x1b`."""
-    return _UNPRINTABLE.sub(lambda found: ascii(found[0])[1:-1], text)
+    return _UNPRINTABLE.sub(lambda match: ascii(match[0])[1:-1], text)
 
 
 def closest(name: str, valid: Iterable[str]) -> str | None:
@@ -76,8 +76,8 @@ def closest(name: str, valid: Iterable[str]) -> str | None:
         begins = name[:3].lower()
         alike = [lower for lower in by_lower if lower.startswith(begins)]
         by_lower = {lower: by_lower[lower] for lower in alike[:ALIKE]}
-    found = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=0.65)
-    return by_lower[found[0]] if found else None
+    matches = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=0.65)
+    return by_lower[matches[0]] if matches else None
 
 
 def hint(name: str, valid: Iterable[str], *, lead: str) -> str:

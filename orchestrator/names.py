@@ -41,8 +41,8 @@ def _expression(pattern: str) -> re.Pattern[str]:
 
 def match(pattern: str, name: str) -> str | None:
     """Return the part of a name that the `*` of a pattern matches ("" without `*`), None without a match."""
-    found = _expression(pattern).fullmatch(name)
-    return None if found is None else "".join(found.groups())
+    groups = _expression(pattern).fullmatch(name)
+    return None if groups is None else "".join(groups.groups())
 
 
 def matching(pattern: str, names: Collection[str]) -> dict[str, str]:

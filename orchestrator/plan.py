@@ -242,7 +242,7 @@ class Instance:
         return role_of(self.name, self.fmu.name, self.fmu.role)
 
     def parameter(self, name: str) -> Value | None:
-        """Return the value of a parameter, by default the FMU's start value; None if there is no such one."""
+        """Return the value of a parameter, by default the FMU's start value; None if there is none."""
         variable = self.fmu.variables.get(name)
         return None if variable is None else self.parameters.get(name, variable.start)
 
@@ -274,7 +274,7 @@ class Override:
 
     @classmethod
     def of(cls, target: str, value: Value | FaultList, origin: str) -> Override:
-        """Return the override of a target given as text.
+        """Return the override of a target in text form.
 
         Raises:
             ValueError: the text is not a target.

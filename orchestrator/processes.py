@@ -294,7 +294,7 @@ def _serve(asking: socket.socket) -> None:
 
 
 def _received(asking: socket.socket) -> tuple[ForkRequest, list[int]] | None:
-    """Return a request and its descriptors; None if there is nobody to ask any more."""
+    """Return a request and its descriptors; None if the other side has closed the socket."""
     length, descriptors, _, _ = socket.recv_fds(asking, _SIZE, _MOST)
     data = b""
     while length and len(data) < _number(length):

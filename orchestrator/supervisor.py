@@ -94,7 +94,7 @@ class PipeChannel:
         except (TypeError, ValueError) as error:
             raise ProtocolError(str(error)) from None
         if len(data) > LONGEST:
-            raise ProtocolError(f"{len(data)} bytes cannot be passed on at once, {LONGEST} can")
+            raise ProtocolError(f"{len(data)} bytes exceed the limit of a record, {LONGEST}")
         self._send(kind, data, _LENGTH)
 
     def receive(self) -> Any:
@@ -106,11 +106,11 @@ class PipeChannel:
         """
         length = self._length(_LENGTH)
         if length > LONGEST:
-            raise ProtocolError(f"it announces {length} bytes")
+            raise ProtocolError(f"a record of {length} bytes")
         try:
             return json.loads(self._read(length))
         except (ValueError, RecursionError):
-            raise ProtocolError("what it holds is no record") from None
+            raise ProtocolError("a record is not valid JSON") from None
 
     def _send(self, kind: int, data: bytes, size: int) -> None:
         if os.getpid() != self._process:
@@ -231,7 +231,7 @@ class SupervisedProcess:
     def garbled(self, what: str) -> ProcessLost:
         """Kill the process, whose output can no longer be parsed; return the exception to raise."""
         self.close(kill=True)
-        return ProcessLost(f"wrote into the pipe to the master what is no answer ({what})")
+        return ProcessLost(f"wrote into the pipe to the master something that is not an answer ({what})")
 
     def close(self, *, kill: bool = False) -> int:
         """End the process; return its return code. Later calls do nothing more.

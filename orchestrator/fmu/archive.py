@@ -102,7 +102,7 @@ def read_archive(path: Path) -> bytes:
         if likely:
             more = f"; did you mean {likely!r}?"
         else:
-            more = f"; {path.parent} holds {listed(names)}" if names else ""
+            more = f"; {path.parent} contains {listed(names)}" if names else ""
         if "~" in path.parts:
             more = "; ~ is a folder's name here: write the path of your home folder"
         elif "\\" in path.name:
@@ -126,7 +126,7 @@ def _read_member(path: Path) -> bytes:
             return archive.read(member)
     except KeyError:
         raise ModelDescriptionError(
-            f"{path}: no such FMU: {outer} does not hold it", code="fmu-missing"
+            f"{path}: no such FMU: {outer} does not contain it", code="fmu-missing"
         ) from None
     except _DAMAGE as error:
         raise ModelDescriptionError(f"{path}: cannot read this FMU: {error}", code="fmu-damaged") from None
@@ -187,7 +187,7 @@ def _files(raw: bytes, path: Path) -> dict[str, bytes]:
     except _DAMAGE as error:
         if raw[:2] != b"PK":
             raise ModelDescriptionError(
-                f"{path}: no FMU: this is not a zip archive", code="fmu-damaged"
+                f"{path}: not an FMU: this is not a zip archive", code="fmu-damaged"
             ) from None
         why = reason(error).rstrip(".")
         raise ModelDescriptionError(

@@ -59,7 +59,7 @@ def binary_problem(fmu: Fmu) -> str | None:
     if not _FILE_NAME.fullmatch(identifier) or identifier in (".", ".."):
         return (
             f"modelIdentifier {short(identifier)} cannot name the library of an FMU: "
-            "allowed are letters, digits and _, at most 200"
+            "it may contain letters, digits and _, at most 200"
         )
     missing = binary_of(fmu.fmi, identifier)
     if (fmu.directory / missing).is_file():

@@ -108,7 +108,7 @@ def _reason(v: Any) -> str | None:
     if math.prod(v.shape or ()) > MOST:
         return f"has {math.prod(v.shape)} elements; supported are {MOST}"
     if v.alias and v.causality == "input":
-        return f"is another name of {v.alias.name}: use that"
+        return f"is an alias of {v.alias.name}: use that"
     return None
 
 
@@ -251,7 +251,7 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
         ModelDescriptionError: it is missing, malformed, unusable, or of a kind that is not supported.
     """
     if "modelDescription.xml" not in files:
-        raise ModelDescriptionError(f"{path}: no FMU: the archive holds no modelDescription.xml")
+        raise ModelDescriptionError(f"{path}: not an FMU: the archive contains no modelDescription.xml")
     root = _parsed(files["modelDescription.xml"], path)
     fmi = int(root.get("fmiVersion", "")[0])
     if wrong := _dangling(root, fmi):
@@ -353,7 +353,9 @@ def _parsed(xml: bytes, path: Path) -> ElementTree.Element:
         ) from None
     version = root.get("fmiVersion")
     if root.tag != "fmiModelDescription" or version is None:
-        raise ModelDescriptionError(f"{path}: modelDescription.xml is no FMI model description; {SUPPORTED}")
+        raise ModelDescriptionError(
+            f"{path}: modelDescription.xml is not an FMI model description; {SUPPORTED}"
+        )
     if version != "2.0" and not version.startswith("3.0"):
         raise ModelDescriptionError(f"{path}: an FMU of FMI {version}; {SUPPORTED}", code="fmu-unsupported")
     if root.find("CoSimulation") is None:

@@ -41,7 +41,7 @@ from ..results.recorder import BLOCK, RowBlock
 from ..supervisor import LOG, REPLY, PipeChannel, ProcessLost, ProtocolError
 from .fmi import open_unit
 from .instance import CtypesInstance
-from .ipc import FmuProcess, LogRelay, rebuilt, told
+from .ipc import FmuProcess, LogRelay, error_record, rebuilt
 from .isolation import Isolation
 from .log import MASTER, WARNING, Log
 from .master import WORDS, EndRequested, Master
@@ -181,7 +181,7 @@ def _go(course: RunLoop, opener: OpenInstance) -> dict[str, Any] | None:
         course.go(opener)
     except (YawbenchError, Interrupted) as error:
         unit = getattr(error, "instance", None)
-        return {**told(error), "inputs": course.inputs_of(unit) if unit else {}}
+        return {**error_record(error), "inputs": course.inputs_of(unit) if unit else {}}
     except BaseException:
         return {"kind": "", "traceback": traceback.format_exc(), "inputs": {}}
     return None
@@ -215,7 +215,7 @@ _kept: list[Any] = []
 
 def _whereabouts(thread: int) -> tuple[str, str] | None:
     """Return the instance whose code a thread is executing, and the operation; None outside all instances."""
-    frame, found = sys._current_frames().get(thread), None
+    frame, position = sys._current_frames().get(thread), None
     here = str(Path(__file__).parent)
     while frame is not None:
         if frame.f_code.co_filename.startswith(here):
@@ -228,9 +228,9 @@ def _whereabouts(thread: int) -> tuple[str, str] | None:
                 return operation and (operation.instance, WORDS.get(operation.kind, operation.kind))
             if isinstance(local.get("self"), CtypesInstance):
                 ending = frame.f_code.co_name == CtypesInstance.free.__name__
-                found = local["self"].name, "its end" if ending else "initialization"
+                position = local["self"].name, "its end" if ending else "initialization"
         frame = frame.f_back
-    return found
+    return position
 
 
 KILL_AFTER = 3.0
@@ -367,7 +367,9 @@ class ChildRun(RunLoop, FmuProcess):
         if unit is not None:
             sentence = f"{unit}: {sentence}"
         elif self._suspects:
-            sentence += f"; --isolate tells in which unit (not in Python are {listed(self._suspects)})"
+            sentence += (
+                f"; --isolate shows which instance it was (not in Python are {listed(self._suspects)})"
+            )
         if self._stop.requested:
             return self._stop.interrupted(f": {sentence}", unit=unit, time=now)
         return SimulationError(sentence, instance=unit, time=now, code="fmu-process-died")
@@ -386,7 +388,7 @@ class ChildRun(RunLoop, FmuProcess):
             self._channel.say(FREE)
             self.hear(REPLY)
         except (ProcessLost, OSError) as lost:
-            unit = self._where[0] if self._where else ", ".join(self._suspects) or "the units"
-            text = f"when units were terminated and freed, the process of the run {lost}"
+            unit = self._where[0] if self._where else ", ".join(self._suspects) or "the instances"
+            text = f"while instances were terminated and freed, the process of the run {lost}"
             self.log.add(unit, WARNING, MASTER, text, self.plan.time(max(0, self._shared.completed.value)))
         self.close()

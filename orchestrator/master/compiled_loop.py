@@ -23,7 +23,7 @@ import numpy as np
 WANTED = "YAWBENCH_LOOP"
 """Environment variable: `python` asks for the loop in Python."""
 PAUSE = 20_000_000
-"""Time after which a walk returns to Python [ns]; chosen: nobody notices that Ctrl-C takes this long."""
+"""Time after which a walk returns to Python [ns]; chosen: too short to notice after Ctrl-C."""
 EXACT = 2**53
 """Whole numbers below this are exact in double precision, and their quotients correctly rounded."""
 
@@ -224,12 +224,12 @@ def missing_loop(grid: tuple[int, int, int], n_steps: int) -> str:
     if _unwanted():
         return f"{WANTED} asks for it"
     if max(abs(start), abs(start + n_steps * step), scale) >= EXACT:
-        return "its times are no quotients of numbers of double precision"
+        return "its times are not quotients of double-precision numbers"
     return _library()[1]
 
 
 def slower_because() -> str:
-    """Return why Python makes the steps of runs although nobody asks for it; empty if it does not."""
+    """Return why Python makes the steps of runs without being requested; empty if the compiled loop does."""
     return "" if _unwanted() else _library()[1]
 
 

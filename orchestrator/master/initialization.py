@@ -90,12 +90,12 @@ def initialize(memory: SignalPool, check: StatusCheck, log: Log) -> int:
     return number
 
 
-def _put(station: InstanceSlot, given: Mapping[str, Value], what: str, check: StatusCheck) -> None:
+def _put(station: InstanceSlot, requested: Mapping[str, Value], what: str, check: StatusCheck) -> None:
     """Set variables; the other elements of an array are set to their start values."""
     variables = station.instance.fmu.variables
-    arrays = {variables[name].reference for name in given if variables[name].elements > 1}
+    arrays = {variables[name].reference for name in requested if variables[name].elements > 1}
     others = (v for v in variables.values() if v.reference in arrays) if arrays else ()
-    values = {v.name: v.start for v in others if v.start is not None} | dict(given)
+    values = {v.name: v.start for v in others if v.start is not None} | dict(requested)
     for chosen in by_type(variables[name] for name in values):
         status = station.slave.put([v.place for v in chosen], [values[v.name] for v in chosen])
         check(station.name, what, status)
@@ -125,7 +125,7 @@ def _check_parameters(station: InstanceSlot, check: StatusCheck, log: Log) -> No
             names = listed([v.name for v in chosen][:NAMED]) + (" and others" if len(chosen) > NAMED else "")
             text = f"whether {names} took the value that was set is not known: reading returned"
             log.add(station.name, WARNING, "", f"{text} {STATUS[status]}")
-        differing += [f"{name} is {found}, not {asked}" for name, found, asked in lost]
+        differing += [f"{name} is {actual}, not {expected}" for name, actual, expected in lost]
     if differing:
         more = f" and {len(differing) - NAMED} more" if len(differing) > NAMED else ""
         what = "a parameter" if len(differing) == 1 else "parameters"
@@ -137,32 +137,32 @@ def _check_parameters(station: InstanceSlot, check: StatusCheck, log: Log) -> No
 def _check_constants(station: InstanceSlot, check: StatusCheck, log: Log) -> None:
     """Read constant inputs back; a difference is a warning: an FMU may legally take inputs only in a step."""
     for _, _, lost in _read_back(station, station.instance.constants, check, log):
-        for name, found, asked in lost:
-            log.add(station.name, WARNING, "", f"the constant {name} reads back as {found}, not {asked}")
+        for name, actual, expected in lost:
+            log.add(station.name, WARNING, "", f"the constant {name} reads back as {actual}, not {expected}")
 
 
 def _read_back(
-    station: InstanceSlot, given: Mapping[str, Value], check: StatusCheck, log: Log
+    station: InstanceSlot, requested: Mapping[str, Value], check: StatusCheck, log: Log
 ) -> Iterator[tuple[list[Variable], Status, list[tuple[str, str, str]]]]:
     """Yield variables of one type, the status of reading them, and those that differ: name, read, set."""
-    for chosen in by_type(station.instance.fmu.variables[name] for name in given):
+    for chosen in by_type(station.instance.fmu.variables[name] for name in requested):
         with log.deaf():
             raw, values = station.slave.fetch([v.place for v in chosen])
         status = known(raw)
         if status >= FATAL:
             check(station.name, "reading back what was set", status)
         lost = []
-        for variable, found in zip(chosen, values, strict=True) if status <= WARNING else ():
-            asked = given[variable.name]
-            if not _took(variable, found, asked):
-                lost.append((variable.name, _shown(variable, found), _shown(variable, asked)))
+        for variable, actual in zip(chosen, values, strict=True) if status <= WARNING else ():
+            expected = requested[variable.name]
+            if not _took(variable, actual, expected):
+                lost.append((variable.name, _shown(variable, actual), _shown(variable, expected)))
         yield chosen, status, lost
 
 
-def _took(variable: Variable, found: Value, asked: Value) -> bool:
+def _took(variable: Variable, actual: Value, expected: Value) -> bool:
     if variable.type == "Real":
-        return math.isclose(asked, found, rel_tol=SINGLE)  # type: ignore[arg-type]
-    return asked == found
+        return math.isclose(expected, actual, rel_tol=SINGLE)  # type: ignore[arg-type]
+    return expected == actual
 
 
 def _shown(variable: Variable, value: Value) -> str:
@@ -208,9 +208,9 @@ def _renew_others(
 ) -> bool:
     """Do the same for inputs that are not Real: extend `moving`, return whether an input has changed."""
     changed = set()
-    given = memory.given_others(s)
+    values = memory.given_others(s)
     for variable, wire in s.other_inputs:
-        value, old = given[variable.name], memory.others.get((s.name, variable.name))
+        value, old = values[variable.name], memory.others.get((s.name, variable.name))
         if value == old:
             continue
         memory.others[s.name, variable.name] = value
@@ -220,7 +220,7 @@ def _renew_others(
             moving.append(UnsettledWire(text, "" if old is None else old, value))
     if changed:  # all elements of an array are set together
         names = [v.name for v, _ in s.other_inputs if v.place[:2] in changed]
-        _put(s, {name: given[name] for name in names}, "setting inputs", check)
+        _put(s, {name: values[name] for name in names}, "setting inputs", check)
     return bool(changed)
 
 

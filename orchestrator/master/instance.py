@@ -159,7 +159,7 @@ class CtypesInstance(FmuInstance, ABC):
             errors = log.errors(unit.name)
             reason = errors[0].text if errors else "it gave no reason"
             if unit.fmu.needs_tool:
-                reason += f" (it says that it needs its tool: {unit.fmu.generation_tool or 'not named'})"
+                reason += f" (it requires its tool: {unit.fmu.generation_tool or 'not named'})"
             raise SimulationError(
                 f"{unit.name}: {unit.fmu.path} cannot be instantiated: {reason}",
                 instance=unit.name,

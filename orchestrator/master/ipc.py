@@ -63,18 +63,18 @@ def shared_memory(values: int) -> int:
     return descriptor
 
 
-def told(error: YawbenchError | Interrupted) -> dict[str, Any]:
+def error_record(error: YawbenchError | Interrupted) -> dict[str, Any]:
     """Return an error as JSON-ready data, for `rebuilt` in another process."""
     where = {name: value for name, value in vars(error).items() if name in ("instance", "time", "number")}
-    told = [one.record() for one in error.diagnostics]
-    return {"kind": type(error).__name__, "diagnostics": told, "where": where}
+    diagnostics = [diagnostic.record() for diagnostic in error.diagnostics]
+    return {"kind": type(error).__name__, "diagnostics": diagnostics, "where": where}
 
 
-def rebuilt(told: dict[str, Any]) -> YawbenchError | Interrupted:
-    """Return the error that `told` has described in another process."""
+def rebuilt(record: dict[str, Any]) -> YawbenchError | Interrupted:
+    """Return the error of an `error_record` from another process."""
     kinds = {kind.__name__: kind for kind in (*YawbenchError.__subclasses__(), Interrupted)}
-    kind = kinds.get(told["kind"], YawbenchError)
-    error: YawbenchError | Interrupted = kind(map(Diagnostic.of, told["diagnostics"]), **told["where"])
+    kind = kinds.get(record["kind"], YawbenchError)
+    error: YawbenchError | Interrupted = kind(map(Diagnostic.of, record["diagnostics"]), **record["where"])
     return error
 
 
@@ -131,5 +131,5 @@ class FmuProcess(SupervisedProcess):
             case [str() as unit, int() as status, str() as category, str() as text, float() | None as time]:
                 self.log.add(unit, status, category, text, time)
             case _:
-                raise ProtocolError("a message that is none")
+                raise ProtocolError("an invalid message")
         return None

@@ -28,7 +28,7 @@ from ..supervisor import ANSWER, FAILED, LOG, REPLY, REQUEST, PipeChannel, Proce
 from .fmi import SLAVES, open_unit
 from .guardian import stand_guard
 from .instance import Buffers, CtypesInstance, ExperimentSetup, FmuInstance, Status, StepCalls
-from .ipc import GET, SET, STEP, FmuProcess, LogRelay, SharedBuffer, rebuilt, shared_memory, told
+from .ipc import GET, SET, STEP, FmuProcess, LogRelay, SharedBuffer, error_record, rebuilt, shared_memory
 from .log import FATAL, OK, PROCESS, WARNING, Log, known
 from .process_state import ProcessState, flush_output
 from .step_program import copying
@@ -98,7 +98,7 @@ class InstanceProcess(FmuProcess):
         now, asked = time.monotonic(), stop_requested_at()
         if asked is not None and now - asked > STOP_GRACE:
             self.close()
-            raise ProcessLost("did not come back when the run was to stop", late=True)
+            raise ProcessLost("did not return when the run was asked to stop", late=True)
         if now > self._deadline:
             self.close()
             limit = f"{self._limit:g} s, the limit of a call (--call-limit)"
@@ -250,7 +250,7 @@ class IsolatedInstance:
         """Log how the process was lost."""
         self._process = None
         errors = self._log.errors(self.name)
-        before = f"; before that it said: {' '.join(errors[-1].text.split())}" if errors else ""
+        before = f"; its last message: {' '.join(errors[-1].text.split())}" if errors else ""
         self._log.add(self.name, FATAL, PROCESS, lost.in_(function) + before)
         return FATAL
 
@@ -367,7 +367,7 @@ class InstanceServer:
         try:
             self._slave = open_unit(unit, self._log, set())
         except YawbenchError as error:
-            return told(error)
+            return error_record(error)
         return None
 
     def connect(self, input_places: Sequence[ValueRef], output_places: Sequence[ValueRef]) -> None:

@@ -222,8 +222,8 @@ class Master:
         self._surroundings.restore("", self.log)
         self.completed = self._reached.value = since
         raise SimulationError(
-            f"after t = {time:.9g} s a unit ({listed(among, last='or')}) changed how numbers are rounded, "
-            "flushed to zero or trapped, also for all others; with --isolate it does so for itself alone",
+            f"after t = {time:.9g} s an instance ({listed(among, last='or')}) changed how numbers are "
+            "rounded, flushed to zero or trapped, also for all others; --isolate limits it to its process",
             instance=among[0] if len(among) == 1 else None,
             time=time,
             code="process-state-changed",

@@ -51,7 +51,9 @@ class ProcessState:
         for what in self._restored():
             if (unit, what) not in self._reported:
                 self._reported.add((unit, what))
-                log.add(unit, WARNING, MASTER, f"it changed {what}, which all units share; that was undone")
+                log.add(
+                    unit, WARNING, MASTER, f"it changed {what}, which all instances share; this was undone"
+                )
 
     def _restored(self) -> Iterator[str]:
         """Restore the snapshot; yield a description of each thing that had changed."""

@@ -141,7 +141,7 @@ class RunLoop:
         among = suspects(self.plan.instances)
         raise SimulationError(
             f"by t = {time:.9g} s a unit ({listed(among, last='or')}) had copied the process of the run "
-            "(fork), and the copy went on with it; with --isolate it copies its own process alone",
+            "(fork), and the copy continued it; with --isolate it forks only its own process",
             instance=among[0] if len(among) == 1 else None,
             time=time,
             code="process-copied",

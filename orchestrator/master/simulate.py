@@ -184,17 +184,17 @@ class Simulation:
         """Write the results so far, and the error that ended the run."""
         with contextlib.suppress(SimulationError):  # perhaps the disk is full; rows that fit are kept
             self.course.flush()
-        told = error.diagnostics if isinstance(error, (YawbenchError, Interrupted)) else []
+        diagnostics = error.diagnostics if isinstance(error, (YawbenchError, Interrupted)) else []
         if isinstance(error, SimulationError):
             error.warnings = self.watch.warnings()
         try:
             self._save("interrupted" if isinstance(error, KeyboardInterrupt) else "failed", error)
         except ResultsError as lost:
-            told += lost.diagnostics
+            diagnostics += lost.diagnostics
         else:
             if self.recorder.place is not None:
                 sentence = f"What was recorded until then: {self.recorder.place}"
-                told.append(Diagnostic("results-kept", sentence, "info"))
+                diagnostics.append(Diagnostic("results-kept", sentence, "info"))
 
     def _abandon(self) -> None:
         """Exit at once after a second signal: an FMU may be hanging."""
@@ -202,7 +202,7 @@ class Simulation:
             return
         if self._apart:  # a child process is never waited for long
             return
-        doing = "while its units were freed" if self._saved else "inside a unit"
+        doing = "while its instances were freed" if self._saved else "inside an instance"
         error = self._stop.interrupted(doing, time=self.log.time.value)
         if self.recorder.place is None:  # results in memory: the caller's program must go on
             raise error

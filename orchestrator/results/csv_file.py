@@ -157,7 +157,7 @@ class CsvFile:
                         return f"line {reader.line_num} has {len(row)} values for {len(self.names)} columns"
                     for name, cell in zip(self.names, row, strict=True):
                         if name not in self._texts and not _is_number(cell):
-                            return f"line {reader.line_num}: {short(cell)} in column {name!r} is no number"
+                            return f"line {reader.line_num}: {short(cell)} in column {name!r} is not a number"
             except csv.Error as error:
                 return f"line {reader.line_num}: {error}"
         return None

@@ -171,10 +171,10 @@ def _status(path: Path) -> str:
 def _record(path: Path, *, follow: bool = True) -> dict[str, Any]:
     """Return a record without validating it; an empty dictionary if there is none."""
     try:
-        found = json.loads(read_bytes(path, largest=LARGEST, follow=follow))
+        content = json.loads(read_bytes(path, largest=LARGEST, follow=follow))
     except (OSError, ValueError, RecursionError, MemoryError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return content if isinstance(content, dict) else {}
 
 
 RESULTS = Path("results")
@@ -257,15 +257,17 @@ def _is_name(text: str) -> bool:
 
 def _with_changes(stem: str, changes: Iterable[Override]) -> str:
     """Return a name followed by its overrides, shortened and with a hash where they cannot be written out."""
-    given = list(changes)
-    values = [_text(one.plain) for one in given]
-    of_files = [one.target.names_file for one in given]
+    overrides = list(changes)
+    values = [_text(override.plain) for override in overrides]
+    of_files = [override.target.names_file for override in overrides]
     names = [re.split(r"[/\\]", v)[-1] if file else v for v, file in zip(values, of_files, strict=True)]
-    readable = ",".join([stem, *(f"{one.target}={name}" for one, name in zip(given, names, strict=True))])
+    readable = ",".join(
+        [stem, *(f"{override.target}={name}" for override, name in zip(overrides, names, strict=True))]
+    )
     portable = re.sub(r"[^\w.,=+-]", "_", readable, flags=re.ASCII)
-    if not given or (names == values and portable == readable and len(portable) <= LONGEST):
+    if not overrides or (names == values and portable == readable and len(portable) <= LONGEST):
         return readable
-    exact = repr([(str(one.target), one.plain) for one in given])
+    exact = repr([(str(override.target), override.plain) for override in overrides])
     return f"{portable[: LONGEST - 7].rstrip('.')}~{hashlib.sha256(exact.encode()).hexdigest()[:6]}"
 
 

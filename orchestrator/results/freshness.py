@@ -57,10 +57,10 @@ COMPARED = {
     "step_size": "the communication step has changed",
     "start_time": "the start time has changed",
     "stop_time": "the stop time has changed",
-    "evaluation_order": "the order of the units has changed",
+    "evaluation_order": "the order of the instances has changed",
     "connections": "the wires have changed",
     "faults": "the faults have changed",
-    "units": "what is recorded has changed",
+    "units": "the recorded signals have changed",
     "title": "the scenario has changed",
 }
 """Key of the run record -> explanation if it differs from the plan."""
@@ -106,7 +106,7 @@ def altered(folder: Path) -> str:
         recorded = load_record(folder)
         results = folder / recorded.results
         if results.is_file() and not _whole(results, recorded):
-            return f"{results}: was changed or cut off"
+            return f"{results}: was changed or truncated"
     except ResultsError as error:
         return str(error)
     return "" if recorded.has_checksums else f"{folder / RUN_FILE}: has no checksums"
@@ -129,7 +129,7 @@ def _reason(plan: Plan, recorded: RunRecord) -> str:
         version, earlier = planned.versions[program], recorded.versions.get(program, "an unknown one")
         if version != earlier:
             return f"{program} {version} in place of {earlier}"
-    return "its record is of an earlier kind"
+    return "its record is of an earlier version"
 
 
 def _whole(results: Path, recorded: RunRecord) -> bool:

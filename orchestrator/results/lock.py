@@ -68,7 +68,7 @@ class FolderLock:
             os.write(self._descriptor, json.dumps(asdict(LockHolder.here())).encode())
         except FileExistsError:
             raise ResultsError(
-                f"{folder}: results cannot be written here: it is no folder; name another with --out.",
+                f"{folder}: results cannot be written here: it is not a folder; name another with --out.",
                 code="results-unwritable",
             ) from None
         except BlockingIOError:
@@ -143,8 +143,10 @@ def holder_of(folder: Path) -> LockHolder | None:
 def _holder_in(note: bytes) -> LockHolder:
     """Return the holder that a lock file names; the file may be incomplete."""
     try:
-        said = json.loads(note)
-        holder = LockHolder(str(said["command"]), int(said["process"]), str(said["host"]), str(said["since"]))
+        content = json.loads(note)
+        holder = LockHolder(
+            str(content["command"]), int(content["process"]), str(content["host"]), str(content["since"])
+        )
     except (ValueError, TypeError, KeyError, RecursionError, OverflowError):
         return LockHolder("another run", 0, "this computer", "")
     return holder

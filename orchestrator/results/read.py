@@ -51,12 +51,12 @@ def found_runs(folder: Path) -> list[FoundRun]:
         raise ResultsError(
             f"{folder}: there is no such folder; name one that holds results", code="results-missing"
         )
-    found = [run for place in _folders(folder) for run in _runs_in(place)]
-    if not found:
+    runs = [run for place in _folders(folder) for run in _runs_in(place)]
+    if not runs:
         raise ResultsError(
             f"{folder}: holds no results; make some with 'yawbench run SCENARIO'", code="results-missing"
         )
-    return sorted(found, key=lambda run: (run.record.started or "", run.folder))
+    return sorted(runs, key=lambda run: (run.record.started or "", run.folder))
 
 
 def _folders(folder: Path) -> Iterator[Path]:
@@ -75,7 +75,7 @@ def _runs_in(folder: Path) -> Iterator[FoundRun]:
             record = check_record(going, folder / f"{RUN_FILE}{PART}")
         except ResultsError:  # the run may have died before it had written its record
             record = RunRecord()
-        yield FoundRun(folder, DIED if dead else RUNNING, record, "it ended without a word" if dead else "")
+        yield FoundRun(folder, DIED if dead else RUNNING, record, "it died" if dead else "")
     if going is not None and not os.path.lexists(folder / RUN_FILE):
         return
     try:
@@ -127,8 +127,8 @@ def thinned(
 def _reference(name: str, columns: Sequence[str]) -> str | None:
     """Return the column of a signal's reference if there is exactly one."""
     wanted = f"{SignalName.parse(name).variable}_ref"
-    found = [other for other in columns if SignalName.parse(other).variable == wanted]
-    return found[0] if len(found) == 1 else None
+    matches = [other for other in columns if SignalName.parse(other).variable == wanted]
+    return matches[0] if len(matches) == 1 else None
 
 
 @dataclass(frozen=True)
@@ -196,13 +196,13 @@ class Results:
         Raises:
             ResultsError: no such column, or more than one.
         """
-        found = self.candidates(variable, role=role)
-        if len(found) == 1:
-            return found[0]
-        if not found:
+        columns = self.candidates(variable, role=role)
+        if len(columns) == 1:
+            return columns[0]
+        if not columns:
             raise ResultsError(self._unknown(variable, role), code="signal-unknown")
         raise ResultsError(
-            f"{self.where}: '{variable}' was recorded of more than one unit: {', '.join(found)}.",
+            f"{self.where}: '{variable}' was recorded of more than one instance: {', '.join(columns)}.",
             code="signal-ambiguous",
         )
 
@@ -210,11 +210,11 @@ class Results:
         """Return all columns that `variable` may refer to (see `column`)."""
         if role is None and variable in self.columns:
             return [variable]
-        found = [column for column, name in self.names.items() if name.variable == variable]
+        columns = [column for column, name in self.names.items() if name.variable == variable]
         if role is not None:
             units = self.units_of_role(role)
-            found = [column for column in found if self.names[column].instance in units]
-        return found if found or role is not None else self._feeding(variable)
+            columns = [column for column in columns if self.names[column].instance in units]
+        return columns if columns or role is not None else self._feeding(variable)
 
     def _feeding(self, variable: str) -> list[str]:
         """Return the columns that feed inputs of this name unchanged, apart from a conversion of units."""
@@ -327,7 +327,7 @@ def _in_order(blocks: Iterator[list[np.ndarray]]) -> Iterator[list[np.ndarray]]:
     for block in blocks:
         time = block[0]
         if time.dtype.kind != "f":
-            raise ValueError(f"row {row + 1}: time {short(str(time[0]))} is no number")
+            raise ValueError(f"row {row + 1}: time {short(str(time[0]))} is not a number")
         wrong = np.flatnonzero(~(np.diff(time, prepend=last) > 0))
         if wrong.size:
             at = int(wrong[0])

@@ -272,11 +272,11 @@ class RunRecord(_Part):
     @property
     def overrides(self) -> tuple[Override, ...]:
         """The overrides of the scenario file."""
-        found = []
-        for one in self.changes:
+        overrides = []
+        for item in self.changes:
             with contextlib.suppress(ValueError):  # the record was edited
-                found.append(Override.of(one.place, one.value, one.origin))
-        return tuple(found)
+                overrides.append(Override.of(item.place, item.value, item.origin))
+        return tuple(overrides)
 
     def source(self, instance: str, name: str) -> ValueSource | None:
         """Return the source of a parameter's or constant's value, None for the FMU's default."""
@@ -372,7 +372,7 @@ def warn_if_unchecked(record: RunRecord, folder: Path) -> None:
     """Warn the user of a record without checksums."""
     if not record.has_checksums:
         checksums.warn(
-            f"{folder / RUN_FILE}: has no checksums, it is of an earlier version or was changed; "
+            f"{folder / RUN_FILE}: has no checksums: it is of an earlier version or was changed; "
             "its units and names are taken as they are"
         )
 

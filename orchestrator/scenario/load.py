@@ -163,7 +163,7 @@ def _check_time_grid(document: Document) -> None:
         after = f" from {float(from_start):.12g} s on" if from_start else ""
         document.report(
             key,
-            f"{float(time):.12g} s{after} is no integer multiple of the communication step "
+            f"{float(time):.12g} s{after} is not an integer multiple of the communication step "
             f"{float(step):.12g} s{origin}; nearest allowed: {nearest}",
             "time-grid-invalid",
         )

@@ -93,7 +93,7 @@ class SspArchive:
         try:
             address = urlsplit(source)
         except ValueError:
-            raise SspError(f"source {short(source)} is no address", element) from None
+            raise SspError(f"source {short(source)} is not an address", element) from None
         member = posixpath.normpath(unquote(address.path))
         if address.scheme or address.netloc or not source or member.startswith(("/", "..")):
             raise SspError(f"source {source!r} is not in the archive", element)

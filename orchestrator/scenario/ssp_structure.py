@@ -173,7 +173,7 @@ def _component(archive: SspArchive, element: _Element, path: ElementPath) -> Ssp
     name, kind, source = ".".join(path), element.get("type", FMU_TYPE), element.get("source", "")
     if kind != FMU_TYPE or not source.lower().endswith(".fmu"):
         raise SspError(
-            f"component {name!r} is no FMU (type {kind}, source {source!r}): only FMUs are supported",
+            f"component {name!r} is not an FMU (type {kind}, source {source!r}): only FMUs are supported",
             element,
             code="ssp-unsupported",
         )
@@ -251,7 +251,7 @@ class SspValue:
         if isinstance(value, float):
             return result
         if not result.is_integer():
-            raise SspError(f"{self._name}: {result:g} is no whole number", self.parameter)
+            raise SspError(f"{self._name}: {result:g} is not a whole number", self.parameter)
         return int(result)
 
     def _in_unit_of(self, declared: SspVariable | None) -> Any:
@@ -400,4 +400,4 @@ def number(element: _Element, attribute: str, default: float | None = None) -> f
     try:
         return float(text or "")
     except ValueError:
-        raise SspError(f"{attribute} {text or ''!r} is no number", element) from None
+        raise SspError(f"{attribute} {text or ''!r} is not a number", element) from None

@@ -217,7 +217,7 @@ class _Reading:
     def finish(self, sha256: str) -> TyreFile | None:
         """Return the file, None if there are errors."""
         if not self.entries:
-            self._say(None, "this is no tyre property file: it holds no coefficients", "error")
+            self._say(None, "not a tyre property file: it contains no coefficients", "error")
             return None
         kind = self._kind()
         factors = self._factors()
@@ -242,20 +242,20 @@ class _Reading:
         form = self.texts.get("PROPERTY_FILE_FORMAT")
         name = (form.text or "").upper() if form else ""
         if form and name in OTHER_MODELS:
-            self._refuse(form, f"{form.text} is another tyre model; read are {_known()}")
+            self._refuse(form, f"{form.text} is another tyre model; supported: {_known()}")
             return None
         entry = self.entries.get("FITTYP")
         if entry is None or entry.text is None:
             if name in FORMATS:
                 return FORMATS[name]
-            self._say(None, f"FITTYP is missing, which says the kind; read are {_known()}", "error")
+            self._say(None, f"FITTYP, the kind, is missing; supported: {_known()}", "error")
             return None
         value = self._number(entry)
         if value is None:
             return None
         if value in KINDS:
             return int(value)
-        self._refuse(entry, f"{entry.text} is no kind that is read; read are {_known()}")
+        self._refuse(entry, f"{entry.text} is not a supported kind; supported: {_known()}")
         return None
 
     def _factors(self) -> Callable[[dict[str, int]], float]:
@@ -268,7 +268,7 @@ class _Reading:
             text = entry.text.lower()
             factor = known.get(text, known.get(text.removesuffix("s")))
             if factor is None:
-                self._refuse(entry, f"{entry.text} is no unit of {name.lower()} that is known here")
+                self._refuse(entry, f"{entry.text} is not a known unit of {name.lower()}")
             else:
                 given[name] = factor
         if "ANGLE" in given and given["ANGLE"] != 1.0:

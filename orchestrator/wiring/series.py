@@ -157,7 +157,7 @@ def _parquet(raw: bytes) -> _Table:
     try:
         table = pq.read_table(pa.BufferReader(raw))
     except pa.ArrowInvalid as error:
-        raise ValueError(f"is no Parquet file, or damaged: {error}") from None
+        raise ValueError(f"is not a Parquet file, or damaged: {error}") from None
     units = [(field.metadata or {}).get(b"unit", b"").decode() for field in table.schema]
     return _Table(table.column_names, units, lambda at: table.column(at).to_numpy())
 
@@ -176,7 +176,7 @@ def _mdf(raw: bytes) -> _Table:
             if index != mdf.masters_db.get(group)
         ]
     except Exception as error:  # asammdf raises whatever its parsing meets
-        raise ValueError(f"is no MDF file, or damaged: {' '.join(str(error).split())}") from None
+        raise ValueError(f"is not an MDF file, or damaged: {' '.join(str(error).split())}") from None
 
     def signal(at: int) -> Any:
         group, index, *_ = places[at]
@@ -292,7 +292,7 @@ def _numbers(column: np.ndarray, what: str) -> np.ndarray:
             try:
                 float(cell)
             except (TypeError, ValueError):  # noqa: PERF203 - it is the first
-                raise ValueError(f"{what}: value {row} is no number ({cell!r})") from None
+                raise ValueError(f"{what}: value {row} is not a number ({cell!r})") from None
         raise
     bad = np.flatnonzero(~np.isfinite(numbers))
     if bad.size:

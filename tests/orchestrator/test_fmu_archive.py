@@ -268,7 +268,7 @@ def test_folders_in_each_other_are_unpacked_up_to_a_depth(nested: int, tmp_path:
         ),
         (
             '<html fmiVersion="2.0"/>',
-            "modelDescription.xml is no FMI model description; "
+            "modelDescription.xml is not an FMI model description; "
             "supported are FMI 2.0 and 3.0 for co-simulation",
         ),
         (

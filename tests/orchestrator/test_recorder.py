@@ -153,7 +153,7 @@ def test_a_file_in_place_of_the_folder_is_one_sentence(tmp_path):
     (tmp_path / "out").write_text("")
     with pytest.raises(
         ResultsError,
-        match=r"out: results cannot be written here: it is no folder; name another with --out\.$",
+        match=r"out: results cannot be written here: it is not a folder; name another with --out\.$",
     ):
         Recorder(tmp_path / "out", ["a.x"], [True])
 

@@ -138,10 +138,10 @@ def test_missing_and_broken_files_are_one_sentence(folder, name, text, sentence)
         ("time,a.x\n0.0,1.0\n0.0,1.0\n", "row 2: time 0 s does not follow 0 s"),
         ("time,a.x\n0.1,1.0\n0.0,1.0\n", "row 2: time 0 s does not follow 0.1 s"),
         ("time,a.x\nnan,1.0\n", "row 1: time nan s does not follow -inf s"),
-        ("time,a.x\n0.0,1.0\n0.1,wet\n", "line 3: 'wet' in column 'a.x' is no number"),
-        ("time,a.x\n0.0,1.0\n0.1,\n", "line 3: '' in column 'a.x' is no number"),
+        ("time,a.x\n0.0,1.0\n0.1,wet\n", "line 3: 'wet' in column 'a.x' is not a number"),
+        ("time,a.x\n0.0,1.0\n0.1,\n", "line 3: '' in column 'a.x' is not a number"),
         ("time,a.x\n0.0,1.0\n\n0.1,1.0\n", "line 3 has 0 values for 2 columns"),
-        ("time,a.x\nnoon,1.0\n", "row 1: time 'noon' is no number"),
+        ("time,a.x\nnoon,1.0\n", "row 1: time 'noon' is not a number"),
     ],
 )
 def test_what_is_wrong_in_a_file_of_results_is_named_with_its_place(folder, text, sentence):

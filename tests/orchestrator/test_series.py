@@ -275,7 +275,7 @@ def test_check_and_run_json_tell_of_a_series_and_a_changed_file_makes_results_st
             "{file: data.csv, column: 't_fl [m]'}",
             "data.csv: has no column 't_fl [m]'; did you mean 't_fl'?",
         ),
-        ("{file: data.csv, column: word}", "data.csv: column 'word': value 2 is no number ('high')"),
+        ("{file: data.csv, column: word}", "data.csv: column 'word': value 2 is not a number ('high')"),
         ("{file: data.csv, column: gap}", "data.csv: column 'gap': value 2 is not finite (nan)"),
         (
             "{file: data.csv, column: mass}",

@@ -181,7 +181,7 @@ def test_a_value_at_a_systems_connector_is_converted_on_its_way(tmp_path):
         ("Boolean", '<ssc:LinearTransformation factor="2"/>', "not for Boolean"),
         ("Boolean", "<ssc:BooleanMappingTransformation/>", "BooleanMappingTransformation is not supported"),
         ("Integer", "<ssc:IntegerMappingTransformation/>", "IntegerMappingTransformation is not supported"),
-        ("Real", '<ssc:LinearTransformation factor="much"/>', "factor 'much' is no number"),
+        ("Real", '<ssc:LinearTransformation factor="much"/>', "factor 'much' is not a number"),
     ],
 )
 def test_what_cannot_be_done_to_a_type_is_refused_in_one_sentence(kind, inner, says, tmp_path):

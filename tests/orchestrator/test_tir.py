@@ -145,9 +145,9 @@ def test_without_fzmax_loads_go_to_three_times_the_nominal_or_to_where_a_stiffne
 @pytest.mark.parametrize(
     ("changed", "options", "says"),
     [
-        ({"FITTYP": "51"}, {}, "a.tir:11: FITTYP: 51 is no kind that is read"),
+        ({"FITTYP": "51"}, {}, "a.tir:11: FITTYP: 51 is not a supported kind"),
         ({"FITTYP": "'six'"}, {}, "FITTYP: must be a number (got 'six')"),
-        ({}, {"without": ["FITTYP"]}, "FITTYP is missing"),
+        ({}, {"without": ["FITTYP"]}, "FITTYP, the kind, is missing"),
         ({"PROPERTY_FILE_FORMAT": "'PAC89'"}, {}, "PROPERTY_FILE_FORMAT: PAC89 is another tyre model"),
         ({"FNOMIN": "0"}, {}, "FNOMIN: must be above 0 (got 0)"),
         ({"FNOMIN": "-4000"}, {}, "FNOMIN: must be above 0 (got -4000)"),
@@ -160,8 +160,12 @@ def test_without_fzmax_loads_go_to_three_times_the_nominal_or_to_where_a_stiffne
         ({"PDX1": "1.2 1.3"}, {}, "PDX1: must be a number (got '1.2 1.3')"),
         ({"LFZO": "0"}, {}, "LFZO: must be above 0"),
         ({"INFLPRES": "2.2"}, {}, "INFLPRES: must be in the unit of NOMPRES"),
-        ({}, {"units": UNITS | {"LENGTH": "'furlong'"}}, "a.tir:5: LENGTH: furlong is no unit of length"),
-        ({}, {"units": UNITS | {"FORCE": "'stone'"}}, "FORCE: stone is no unit of force"),
+        (
+            {},
+            {"units": UNITS | {"LENGTH": "'furlong'"}},
+            "a.tir:5: LENGTH: furlong is not a known unit of length",
+        ),
+        ({}, {"units": UNITS | {"FORCE": "'stone'"}}, "FORCE: stone is not a known unit of force"),
     ],
 )
 def test_what_cannot_be_used_is_refused_in_one_sentence_with_key_and_line(tmp_path, changed, options, says):
