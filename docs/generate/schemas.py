@@ -111,9 +111,9 @@ def _kind(annotation: Any, models: list[type[BaseModel]]) -> str:
     if annotation is Target:
         return "text: target of an override"
     if annotation is SignalName:
-        return "text: unit.variable"
+        return "text: instance.variable"
     if annotation is FaultLocation:
-        return "text: unit.variable, unit.output -> unit"
+        return "text: instance.variable, instance.output -> instance"
     if origin is typing.Annotated:
         return _kind(arms[0], models)
     if origin is Literal:

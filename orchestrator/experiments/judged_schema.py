@@ -196,7 +196,7 @@ class MetricSpec(StrictModel):
     """A metric, computed of every run."""
 
     metric: MetricName = Field(description="measure(signal)")
-    window: WindowField | None = Field(None, description="[from, to] in s; left out: the whole run")
+    window: WindowField | None = Field(None, description="[from, to] in s; default: the whole run")
     heading: str = Field("", description="Heading of its column; default: the formula")
 
     def during(self, lead: str = "") -> str:
@@ -218,7 +218,7 @@ class BesideSpec(StrictModel):
     """A run outside a grid, shown with it."""
 
     run: str = Field(min_length=1)
-    says: str = Field(description="What the run is", min_length=1)
+    says: str = Field(description="Description of the run", min_length=1)
     published: float | None = Field(None, description="In SI")
 
 
@@ -229,7 +229,7 @@ class GridSpec(StrictModel):
     metric: str = ""
     run: str = Field("", description="Names of the runs, with {name} for row and column")
     derived: str = Field(
-        "", description="In place of metric and run: keys of `derived`, with {name} for row and column"
+        "", description="Instead of metric and run: keys of `derived`, with {name} for row and column"
     )
     rows: GridAxis
     columns: GridAxis
@@ -276,7 +276,7 @@ def _expression(text: str) -> str:
 class DerivedSpec(StrictModel):
     """A number derived from several runs: an expression of metrics, or a grid's rank correlation."""
 
-    says: str = Field(description="What the number is", min_length=1)
+    says: str = Field(description="Description of the number", min_length=1)
     for_each: dict[str, Alternatives] = Field(
         {}, alias="for", description="Key -> values; one number per combination, named in its key by {key}"
     )
@@ -287,7 +287,7 @@ class DerivedSpec(StrictModel):
         {}, description="Rows or columns of the grid -> those of their values that count"
     )
     unit: str = Field("1", description="Of the expression's value; '%' shows a ratio in per cent")
-    published: QuantityText | None = Field(None, description="What the paper prints, in SI or with its unit")
+    published: QuantityText | None = Field(None, description="The value in the paper, in SI or with its unit")
 
     @model_validator(mode="after")
     def _complete(self) -> DerivedSpec:
@@ -331,7 +331,7 @@ Bound = Annotated[
 class Condition(StrictModel):
     """A comparison of a run's metric, or of a derived number, with exactly one bound."""
 
-    run: str = Field("", description="Name of a run; with `*` every run that fits; left out: every run")
+    run: str = Field("", description="Name of a run; with `*` every run that matches; default: every run")
     metric: str = ""
     derived: str = Field("", description="Key of `derived`, in place of run and metric")
     above: Bound | None = None
@@ -369,7 +369,7 @@ class Condition(StrictModel):
 class Assertion(StrictModel):
     """A statement about runs, and the conditions that decide whether it holds."""
 
-    says: str = Field(description="In words", min_length=1)
+    says: str = Field(description="The statement in words", min_length=1)
     holds_if: list[Condition] = Field(description="All must be true", min_length=1)
 
 
@@ -380,10 +380,10 @@ class Claim(Assertion):
         {}, alias="for", description="Key -> values; one claim per combination, {key} in its texts"
     )
     short: str = Field("", description="The same for the table of runs, e.g. '> 100 %'")
-    source: str = Field("", description="Where it is said: section, figure, table")
+    source: str = Field("", description="Its place in the paper: section, figure, table")
     note: str = Field("", description="What a reader should know about the verdict")
     open_values: list[str] | None = Field(
-        None, description="Those of the region that it depends on; left out: all that touch its runs"
+        None, description="Open values of the region that it depends on; default: all that affect its runs"
     )
     _number: int | None = PrivateAttr(None)
 

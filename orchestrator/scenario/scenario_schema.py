@@ -125,16 +125,16 @@ Share = Annotated[float, PlainValidator(_share)]
 class FaultSpec(StrictModel):
     """A disturbance of a signal for some time."""
 
-    on: FaultLocationText = Field(description="unit.output, unit.input or unit.output -> unit")
-    kind: KindName = Field(description=f"What becomes of the signal: {listed(KINDS, last='or')}")
-    value: FaultValue | None = Field(None, description="As the kind has it, with its unit or in the signal's")
-    share: Share | None = Field(None, description="Of the messages, of dropout and outlier")
-    every: Time | None = Field(
-        None, description="Time from one message to the next, of what is random; default: 10 ms"
+    on: FaultLocationText = Field(
+        description="instance.output, instance.input or instance.output -> instance"
     )
+    kind: KindName = Field(description=f"What becomes of the signal: {listed(KINDS, last='or')}")
+    value: FaultValue | None = Field(None, description="In the unit of the kind, or with a unit")
+    share: Share | None = Field(None, description="Of the messages, of dropout and outlier")
+    every: Time | None = Field(None, description="Time between messages of random faults; default: 10 ms")
     seed: int | None = Field(None, ge=0, description="Of random numbers; default: 0")
-    begin: Instant | None = Field(None, alias="from", description="s; left out: the start of the run")
-    end: Instant | None = Field(None, alias="until", description="s; left out: the end of the run")
+    begin: Instant | None = Field(None, alias="from", description="s; default: the start of the run")
+    end: Instant | None = Field(None, alias="until", description="s; default: the end of the run")
 
     @model_validator(mode="after")
     def _consistent(self) -> FaultSpec:
@@ -267,9 +267,10 @@ class UnitSpec(StrictModel):
 
     fmu: str = Field(description="Name of an FMU in fmus/, or the path of any .fmu", min_length=1)
     step_size: Time | None = Field(None, description="s, an integer multiple of the communication step")
-    parameters: dict[str, ParameterValue] = Field({}, description="Values of this unit's parameters")
+    parameters: dict[str, ParameterValue] = Field({}, description="Values of the instance's parameters")
     tolerance: Tolerance | None = Field(
-        None, description="Relative, of the FMU's own solver; left out: that of its default experiment"
+        None,
+        description="Relative tolerance of the FMU's own solver; default: that of its default experiment",
     )
     validate_: bool = Field(
         True, alias="validate", description="Refuse an FMU whose description is formally wrong; false: warn"
@@ -287,11 +288,11 @@ class SeriesSpec(StrictModel):
     file: str = Field(description="Path, relative to the scenario", min_length=1)
     column: str | None = Field(
         None,
-        description="Its name; a `*` is what that of the key stands for; left out: the input's",
+        description="Name of the column; `*` matches as in the key; default: the input's name",
     )
     time: str = Field("time", description="Column of times, in s if it names no unit; not of MDF")
     interpolation: Literal["linear", "held"] = Field(
-        "linear", description="Between two values; what is no Real is held"
+        "linear", description="Between two values; values that are not Real are held"
     )
     extrapolate: Literal["refuse", "hold"] = Field(
         "refuse", description="What to do in a run beyond the file's times"
@@ -318,8 +319,10 @@ class Connection(StrictModel):
     without a source, whatever outputs there are.
     """
 
-    source: SourceEndpoint = Field(alias="from", description="unit.output, or units in order, or null")
-    target: TargetEndpoint = Field(alias="to", description="unit.input, or units")
+    source: SourceEndpoint = Field(
+        alias="from", description="instance.output, or a list of instances in order, or null"
+    )
+    target: TargetEndpoint = Field(alias="to", description="instance.input, or a list of instances")
     gain: float | None = Field(None, description="Factor in place of the conversion of units")
     offset: float | None = Field(None, description="Added after the factor")
 
@@ -370,23 +373,23 @@ class ScenarioSpec(StrictModel):
     title: str = ""
     source: str = Field("", description="Where the scenario comes from: paper, section, figure")
     vehicle: str | None = Field(None, description="Path of a vehicle file")
-    tyres: Tyres | None = Field(None, description="As in the vehicle file, in place of what that says")
+    tyres: Tyres | None = Field(None, description="As in the vehicle file, which it replaces")
     start_time: Instant = Field(Fraction(0), description="s")
     stop_time: Time = Field(description="s, an integer multiple of the communication step")
     step_size: Time = Field(description="s, communication step")
     algorithm: AlgorithmName = Field(
-        "extrapolated", description=f"How units are coupled: {listed(ALGORITHMS, last='or')}"
+        "extrapolated", description=f"How instances are coupled: {listed(ALGORITHMS, last='or')}"
     )
-    friction: Scalar | None = Field(None, description="Of the road, for all units that have to know it")
-    speed: Scalar | None = Field(None, description="m/s, at the start and to be held")
-    inputs: dict[str, InputValue] = Field({}, description="[unit.]pattern -> constant or time series")
-    units: dict[UnitName, UnitSpec] = Field(description="Name -> unit", min_length=1)
+    friction: Scalar | None = Field(None, description="Friction of the road, for all instances that use it")
+    speed: Scalar | None = Field(None, description="m/s, initial speed, and target of the driver")
+    inputs: dict[str, InputValue] = Field({}, description="[instance.]pattern -> constant or time series")
+    units: dict[UnitName, UnitSpec] = Field(description="Name -> instance", min_length=1)
     connections: list[Connection] = Field([], description="Connections beyond equal names")
     record: list[Variables] | None = Field(
-        None, description="unit.pattern, *.pattern for all units; left out: all outputs but text"
+        None, description="instance.pattern, *.pattern for all instances; default: all outputs but text"
     )
 
-    faults: list[FaultSpec] = Field([], description="What goes wrong with signals, and when")
+    faults: list[FaultSpec] = Field([], description="Disturbances of signals")
 
 
 class LoadedScenario(ScenarioSpec):
