@@ -75,7 +75,7 @@ def _runs_in(folder: Path) -> Iterator[FoundRun]:
             record = check_record(going, folder / f"{RUN_FILE}{PART}")
         except ResultsError:  # the run may have died before it had written its record
             record = RunRecord()
-        yield FoundRun(folder, DIED if dead else RUNNING, record, "it died" if dead else "")
+        yield FoundRun(folder, DIED if dead else RUNNING, record, "it ended without a word" if dead else "")
     if going is not None and not os.path.lexists(folder / RUN_FILE):
         return
     try:

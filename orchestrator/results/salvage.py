@@ -14,7 +14,7 @@ from .formats import FILES, RESULTS_FILE
 from .lock import FolderLock
 from .run_record import check_record
 
-WHY = "the process of this run died"
+WHY = "the process of this run ended without a word"
 
 
 def salvage(folder: Path) -> tuple[Path, int]:
