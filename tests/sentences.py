@@ -67,9 +67,9 @@ class _Sentences:
             (r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\+\d\d:\d\d)?", "<time>"),
             (r"\bprocess \d+", "process <id>"),
             (r"\(\d+\.\d MB\)", "(<size>)"),  # of pages: their scripts grow
-            (r"\b(?=\d*[a-f])(?=[a-f]*\d)[0-9a-f]{12}\b", "<key>"),  # of runs: hashes of the code
+            (r"(rows of \d+ variables in )\d+\.\d\d s", r"\1<time>"),
+            (r"\b(?=\w*\d)[0-9a-f]{12}\b", "<hash>"),
         ]
-        names += [(r"\b(?=\w*\d)[0-9a-f]{12}\b", "<hash>")]
         self.volatile = [(re.compile(pattern), name) for pattern, name in names]
         self.test, self.given = item.nodeid, []
 
