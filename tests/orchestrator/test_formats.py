@@ -19,7 +19,7 @@ from orchestrator.results.read import load_results
 from orchestrator.results.recorder import BLOCK, MemoryRecorder
 from orchestrator.results.run_record import RunRecord
 from tests.fmu_copies import put_fmus
-from tests.sentences import golden, golden_in, refused, texts_of
+from tests.sentences import golden, golden_in, refused
 
 from .fakes import Clock, Function, Stage, make_plan
 from .recorded import car, record_text, write
@@ -155,9 +155,8 @@ def test_a_run_that_fails_keeps_what_it_has_recorded(name, tmp_path):
 
 
 def test_a_run_in_memory_that_fails_says_nothing_of_files():
-    with pytest.raises(SimulationError) as error:
+    with refused(SimulationError):
         simulate_in_memory(plan(), opener=Stage(units(fail_at=0.9)))
-    assert [*texts_of(error.value)] == ["a: y is not a number at t = 0.9 s, on the wire a.y -> b.y"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a limit on the size of files")

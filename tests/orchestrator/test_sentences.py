@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
 from orchestrator.errors import ScenarioError
@@ -46,6 +48,29 @@ def test_a_sentence_that_is_not_asked_for_is_an_error(own):
     with pytest.raises(AssertionError, match="the second"):
         own.end()
     own.of = {}
+
+
+def test_a_sentence_of_a_test_that_does_not_exist_fails_a_whole_run_and_is_removed_by_rewriting(own):
+    here, other = "tests/orchestrator/test_sentences.py", "tests/docs/test_site.py"
+    item = SimpleNamespace(nodeid=f"{here}::test_there")
+
+    def collect(*arguments):
+        sentences.pytest_collection_modifyitems(SimpleNamespace(args=arguments), [item])
+
+    own.of = {item.nodeid: ["kept"], f"{here}::test_gone": ["unused"]}
+    collect(item.nodeid)  # a part of the file
+    with pytest.raises(pytest.UsageError, match="test_gone"):
+        collect("tests")
+    own.of[f"{other}::test_elsewhere"] = ["of a file that is not run"]
+    collect(here)
+    del own.of[f"{other}::test_elsewhere"]
+    own.of["tests/test_that_is_gone.py::test_a"] = ["unused"]
+    with pytest.raises(pytest.UsageError, match="test_that_is_gone"):
+        collect("tests")
+    own.rewriting = True
+    collect("tests")
+    assert own.of == {item.nodeid: ["kept"]}
+    own.rewriting = False
 
 
 def test_rewriting_keeps_a_sentence_that_holds_and_takes_the_line_most_like_one_that_does_not(own):
