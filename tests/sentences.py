@@ -68,7 +68,7 @@ class _Sentences:
             (r"\bprocess \d+", "process <id>"),
             (r"\(\d+\.\d MB\)", "(<size>)"),  # of pages: their scripts grow
             (r"(rows of \d+ variables in )\d+\.\d\d s", r"\1<time>"),
-            (r"\b(?=\w*\d)[0-9a-f]{12}\b", "<hash>"),
+            (r"(?<![0-9A-Za-z])(?=\w*\d)[0-9a-f]{12}(?![0-9A-Za-z])", "<hash>"),
         ]
         self.volatile = [(re.compile(pattern), name) for pattern, name in names]
         self.test, self.given = item.nodeid, []

@@ -185,7 +185,8 @@ class Ranking:
         chosen = arguments.text(kind, "kind")
         if chosen not in drawn:
             raise ScenarioError(
-                f"there is no figure {chosen!r}{hint(chosen, drawn, lead='known')}", code="figure-unknown"
+                f"kind: there is no figure {chosen!r}{hint(chosen, drawn, lead='known')}",
+                code="figure-unknown",
             )
         return shown_in_notebooks(drawn[chosen](self.ranked, "yawbench.rank"))
 

@@ -140,7 +140,7 @@ class RunLoop:
         time = self.plan.time(completed)
         among = suspects(self.plan.instances)
         raise SimulationError(
-            f"by t = {time:.9g} s a unit ({listed(among, last='or')}) had copied the process of the run "
+            f"by t = {time:.9g} s an instance ({listed(among, last='or')}) had copied the process of the run "
             "(fork), and the copy continued it; with --isolate it forks only its own process",
             instance=among[0] if len(among) == 1 else None,
             time=time,

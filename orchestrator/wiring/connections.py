@@ -324,7 +324,7 @@ class Connector:
 
         Facts are not reported: they apply to those inputs of theirs that nothing drives.
         """
-        for target in given.keys() & wires.keys():
+        for target in [one for one in given if one in wires]:
             wire, constant = wires[target][0], given[target]
             if constant.of_fact:
                 continue

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -384,7 +385,9 @@ def test_a_command_that_makes_runs_follows_no_link_where_it_writes(command, proj
         before = snapshot(home)
         status, said = projects(command, "--out", place)
         assert snapshot(home) == before
-        assert golden_in(said)
+        assert golden_in(
+            re.sub(r"speed \d+ m/s", "speed <level>", said)
+        )  # in the order of keys, which are hashes
 
     (work / "locked").mkdir()
     (work / "locked" / LOCK_FILE).symlink_to(home / "precious")

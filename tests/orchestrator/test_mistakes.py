@@ -60,7 +60,7 @@ def in_one_sentence(said, arguments, words):
         ((*RUN, "--set", "plant.initial_speed=3 kg"), ["'3 kg' is not a value in m/s: use m/s or km/h"]),
         ((*RUN, "--set", "plant.initial_speed"), ["write --set UNIT.PARAMETER=VALUE"]),
         ((*RUN, "--set", "friction=-0.3"), ["--set friction=-0.3: must be at least 0 (got -0.3)"]),
-        ((*RUN, "--set", "step_size=1 s"), ["no integer multiple of the communication step 1 s", "1 s"]),
+        ((*RUN, "--set", "step_size=1 s"), ["not an integer multiple of the communication step 1 s", "1 s"]),
         ((*RUN, "--set", "controller.step_size=0.0015"), ["nearest allowed: 0.001 s or 0.002 s"]),
         ((*RUN, "--metric", "peak_sideslp"), ["'peak_sideslp' is not a metric"]),
         ((*RUN, "--metric", "peek(sideslip)"), [f"there is no measure 'peek'; {KNOWN} 'peak'?"]),

@@ -230,7 +230,7 @@ def verdict(run: Running, status: int) -> list[str]:
         problems.append("traceback")
     if "\x1b" in said and "print" not in case.does and "garbage" not in case.does:
         problems.append("an escape sequence reached the terminal")
-    if status != 0 and not any(word in said for word in ("good: ", "bad: ", "the run ", "a unit ")):
+    if status != 0 and not any(word in said for word in ("good: ", "bad: ", "the run ", "an instance ")):
         problems.append("no sentence")
     if case.isolated and run.interrupted is not None:
         problems.append("had to be interrupted")
