@@ -35,7 +35,7 @@ def compare(context: typer.Context, scenario: ScenarioFile, swap: Swaps, options
     fails is reported; the other runs continue.
     """
     from ..experiments.comparison import comparison, comparison_table
-    from ..pages.comparison import comparison_facts, most_different
+    from ..pages.comparison import comparison_facts
     from ..results.folder import default_folder
 
     folder = options.out or default_folder(scenario, options.changes, suffix="-compare")
@@ -44,9 +44,8 @@ def compare(context: typer.Context, scenario: ScenarioFile, swap: Swaps, options
     findings = conduct(comparison(scenario, swap, options.changes), folder, options, each)
     print_tables([comparison_table(findings)])
     command = command_of("compare", scenario, **options.changing | {"swap": swap})
-    view = most_different(findings)
-    views = [view] if view else []
     facts = comparison_facts(findings)
+    views = facts["views"] if facts else []
     chapter = chapter_of(findings, folder, command, shown_in=folder, views=views, comparison=facts)
     write_page([chapter], folder)
     if findings.failed:

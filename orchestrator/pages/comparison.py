@@ -250,7 +250,10 @@ class MetricCell(NamedTuple):
 
 
 def comparison_facts(findings: ExperimentResult) -> dict[str, Any] | None:
-    """Return the template data of a page that compares runs with the first one; None if none has results."""
+    """Return the template data of a page that compares runs with the first one; None if none has results.
+
+    `views`: of its viewer, with the signals that differ most.
+    """
     runs = [
         LabelledRun(run.label, findings.results[name])
         for name, run in findings.experiment.runs.items()
@@ -264,6 +267,7 @@ def comparison_facts(findings: ExperimentResult) -> dict[str, Any] | None:
         "labels": [marked(*run) for run in runs],
         "rows": metric_rows(findings),
         "remarks": remarks(runs),
+        "views": _most_different(found),
         "partings": [_parted(run.label, first.label, one) for run, one in zip(others, found, strict=True)],
         "rule": RULE,
     }
@@ -316,16 +320,15 @@ def _best(values: Sequence[MetricValue | None], apart: Collection[int]) -> int |
     return None if shown(first, unit) == shown(second, unit) else best
 
 
-def most_different(findings: ExperimentResult) -> View | None:
+def _most_different(found: Sequence[RunComparison]) -> list[View]:
     """Return the view of the signals that differ most from the first run, relative to their peaks."""
-    runs = [*findings.results.values()]
     apart: dict[str, float] = {}
-    for parting in (one for other in runs[1:] for one in divergence(runs[0], other).partings):
+    for parting in (parting for one in found for parting in one.partings):
         name = variable_of(parting.signal)
         if "*" not in name and not name.startswith("position_"):  # one line per run in each panel
             apart[name] = max(apart.get(name, 0.0), parting.relative)
     names = sorted(apart, key=lambda name: -apart[name])[:MOST_DIFFERENT]
-    return View("The signals that differ most", names) if names else None
+    return [View("The signals that differ most", names)] if names else []
 
 
 def difference(first: MetricValue | None, other: MetricValue | None) -> str:
