@@ -271,15 +271,20 @@ TuningFile = Annotated[
     Path, named("a tuning file", help="Tuning: YAML file, or a name in scenarios/.", metavar="TUNING")
 ]
 
+TuningSeed = Annotated[
+    int | None, typer.Option("--seed", min=0, help="Seed of the search, in place of the file's.", metavar="N")
+]
+
 
 @takes(*CHANGES, *MAKING, "jobs", "scheduler", "fresh")
-def tune(context: typer.Context, file: TuningFile, options: RunOptions) -> None:
+def tune(context: typer.Context, file: TuningFile, options: RunOptions, seed: TuningSeed = None) -> None:
     """Find the parameters that minimize an objective.
 
     All control laws of the file have the same objective, search (differential evolution) and budget. Without
     --out, results go to results/<folder of the tuning file>/<its name>: report.html; trials.csv, one row per
     trial; the history as a figure; if the file asks for it, entries.yaml for a ranking. An interrupted
-    search is resumed; the same seed gives the same result with any number of workers.
+    search is resumed; the same seed gives the same result with any number of workers. The results of --seed
+    go to a folder of their own, seed_N.
     """
     from ..experiments.experiment import load_experiment
     from ..experiments.tables import to_csv
@@ -293,6 +298,7 @@ def tune(context: typer.Context, file: TuningFile, options: RunOptions) -> None:
         search,
         tuning_of,
         tuning_table,
+        with_seed,
     )
     from ..figures.style import save
     from ..files import write_whole
@@ -301,6 +307,9 @@ def tune(context: typer.Context, file: TuningFile, options: RunOptions) -> None:
 
     experiment = load_experiment(file, changes=options.changes)
     folder = options.out or default_folder(file, options.changes)
+    if seed is not None:
+        experiment = with_seed(experiment, seed)
+        folder = options.out or folder / f"seed_{seed}"
     hold(context, folder)
     each = pooled(context, options)
 
@@ -316,7 +325,7 @@ def tune(context: typer.Context, file: TuningFile, options: RunOptions) -> None:
     table = tuning_table(experiment, found)
     write_whole(folder / "trials.csv", to_csv(columns_of(found)))
     print_tables([table])
-    command = command_of("tune", file, **options.changing)
+    command = command_of("tune", file, **options.changing, seed=None if seed is None else [seed])
     if tuning_of(experiment).entries:
         write_whole(folder / ENTRIES, entries_text(entries_of(experiment, found), command))
     save(history_figure(experiment, found, command), folder / "history")

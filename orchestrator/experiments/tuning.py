@@ -86,6 +86,12 @@ def tuning_of(experiment: LoadedExperiment) -> TuningSpec:
     return experiment.spec.tuning
 
 
+def with_seed(experiment: LoadedExperiment, seed: int) -> LoadedExperiment:
+    """Return the experiment with another seed of its search."""
+    tuning = tuning_of(experiment).model_copy(update={"seed": seed})
+    return replace(experiment, spec=experiment.spec.model_copy(update={"tuning": tuning}))
+
+
 def search(experiment: LoadedExperiment, judged: JudgeExperiment) -> list[TunedLaw]:
     """Search the parameters of every law and return all trials.
 
