@@ -14,7 +14,7 @@ from .messages import hint
 from .names import match
 from .plan import Override, Plan
 from .scenario import yaml_lines
-from .scenario.load import LoadedScenario, load_scenario
+from .scenario.find_and_load import LoadedScenario, load_scenario
 from .scenario.yaml_lines import Document
 from .tyres.stand import cornering_stiffness
 from .wiring.make_plan import make_plan

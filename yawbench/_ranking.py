@@ -25,8 +25,8 @@ from orchestrator.experiments.ranking_tables import (
 from orchestrator.experiments.tables import to_pandas
 from orchestrator.messages import hint
 from orchestrator.planner import Planner
-from orchestrator.results.lock import writing
-from orchestrator.scenario import catalogue
+from orchestrator.results.folder_and_lock import writing
+from orchestrator.scenario import find_and_load
 
 from . import arguments
 from ._calls import make_all
@@ -81,7 +81,7 @@ def rank(
     quick = arguments.flag(quick, "quick")
     workers = None if workers is None else arguments.count(workers, "workers")
     kept_in = None if out is None else arguments.path(out, "out")
-    file = catalogue.find(arguments.path(ranking, "ranking"), "a ranking file")
+    file = find_and_load.find(arguments.path(ranking, "ranking"), "a ranking file")
     more, programs = _entry(controller, arguments.text(name, "name", empty=True))
     loaded = load_ranking(file, more=more, quick=quick, chosen=chosen)
     wanted = set(loaded.entries if others is None else others)

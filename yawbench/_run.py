@@ -18,7 +18,7 @@ from orchestrator.evaluation.trace import trace_of
 from orchestrator.messages import hint, short
 from orchestrator.metrics.run_metrics import STANDARD, MetricValue, evaluate, evaluate_all, metric, why_none
 from orchestrator.plan import Override
-from orchestrator.results.read import Results, load_results
+from orchestrator.results.read_and_salvage import Results, load_results
 
 from . import arguments
 

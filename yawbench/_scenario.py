@@ -26,7 +26,7 @@ from orchestrator.messages import hint, short
 from orchestrator.names import Target
 from orchestrator.plan import Instance, Override, Plan, Value
 from orchestrator.planner import Planner
-from orchestrator.scenario import catalogue, scenario_schema
+from orchestrator.scenario import find_and_load, scenario_schema
 from orchestrator.scenario.overrides import faults_at, setting
 from vocabulary.roles import role_of
 
@@ -49,7 +49,7 @@ def load(source: str | Path) -> Scenario:
     Raises:
         ScenarioError: the scenario does not exist or is invalid.
     """
-    scenario = Scenario(catalogue.find(arguments.path(source, "source"), "a scenario").absolute())
+    scenario = Scenario(find_and_load.find(arguments.path(source, "source"), "a scenario").absolute())
     scenario.loaded  # noqa: B018 - raises now if it is invalid
     return scenario
 

@@ -90,7 +90,7 @@ def cache(action: CacheAction = "show") -> None:
     written. Deleted entries are made again when needed.
     Nothing is deleted while another command uses the cache.
     """
-    from ..cache import alone_in, cache_folders
+    from ..cache_and_checksums import alone_in, cache_folders
     from ..fmu.archive import kept_in, remove
 
     damaged, in_use = 0, False

@@ -36,7 +36,7 @@ def compare(context: typer.Context, scenario: ScenarioFile, swap: Swaps, options
     """
     from ..experiments.comparison import comparison, comparison_table
     from ..pages.comparison import comparison_facts
-    from ..results.folder import default_folder
+    from ..results.folder_and_lock import default_folder
 
     folder = options.out or default_folder(scenario, options.changes, suffix="-compare")
     hold(context, folder)
@@ -97,7 +97,7 @@ def converge(
     from ..figures.style import save
     from ..files import write_whole
     from ..pages.page_parts import image_of
-    from ..results.folder import default_folder
+    from ..results.folder_and_lock import default_folder
 
     for name in algorithm or ():
         if name not in ALGORITHMS:
@@ -151,7 +151,7 @@ def diff(one: One, other: Other) -> None:
     largest value), and the largest difference.
     """
     from ..pages.comparison import differences, differences_table, divergence, partings_table
-    from ..results.read import load_results
+    from ..results.read_and_salvage import load_results
     from .results import distinct
 
     first, second = load_results(one), load_results(other)

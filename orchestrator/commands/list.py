@@ -48,8 +48,8 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
         signals_table,
         units_table,
     )
-    from ..results.read import found_runs
-    from ..scenario import catalogue
+    from ..results.read_and_salvage import found_runs
+    from ..scenario import find_and_load
     from .progress import print_tables
 
     if units:
@@ -72,7 +72,7 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
     elif what == "metrics":
         table = metrics_table()
     elif what == "signals" and place is not None:
-        scenario = catalogue.find(place, "a scenario")
+        scenario = find_and_load.find(place, "a scenario")
         table = recorded_table(plan_of_scenario(scenario, options))
     else:
         found, errors = fmus_in(_folder_of_fmus(place or options.fmus))

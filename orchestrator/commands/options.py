@@ -12,26 +12,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..fault_kinds import KINDS, NO_FAULTS
-from ..results.formats import FORMATS
+from ..results.formats_and_csv import FORMATS
 
 if TYPE_CHECKING:
     from ..plan import Override, Plan
 
 
 def named(kind: str, **settings: Any) -> Any:
-    """Return an argument for a file of a kind, given as a path or a name (see `scenario.catalogue`)."""
+    """Return an argument for a file of a kind, given as a path or a name (see `scenario.find_and_load`)."""
 
     def find(value: Any) -> Any:
-        from ..scenario import catalogue
+        from ..scenario import find_and_load
 
         if isinstance(value, (list, tuple)):
-            return [catalogue.find(name, kind) for name in value]
-        return value and catalogue.find(value, kind)
+            return [find_and_load.find(name, kind) for name in value]
+        return value and find_and_load.find(value, kind)
 
     def complete(incomplete: str) -> list[str]:
-        from ..scenario import catalogue
+        from ..scenario import find_and_load
 
-        return [name for name in catalogue.names(kind) if name.startswith(incomplete)]
+        return [name for name in find_and_load.names(kind) if name.startswith(incomplete)]
 
     return typer.Argument(callback=find, autocompletion=complete, **settings)
 
@@ -165,7 +165,7 @@ class RunOptions:
         if self.fresh and self.no_run:
             raise ScenarioError("--fresh and --no-run are mutually exclusive", code="option-invalid")
         if self.format_ != "csv":  # importing the other formats takes time
-            from ..results.formats import check_format
+            from ..results.formats_and_csv import check_format
 
             check_format(self.format_)
         _ = self.limit, self.changes  # raises now if they are invalid

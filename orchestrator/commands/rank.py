@@ -63,7 +63,7 @@ def rank(
     from ..experiments.ranking_scores import run_ranking
     from ..experiments.ranking_tables import table_of
     from ..messages import hint
-    from ..results.folder import default_folder
+    from ..results.folder_and_lock import default_folder
 
     more = dict(map(_entry, controller or ()))
     ranking = load_ranking(file, more=more, quick=quick, chosen=condition or ())

@@ -38,13 +38,13 @@ def recorded(sources: Sequence[Path], options: RunOptions) -> list[Path]:
     from ..experiments.jobs import Job, execute, ready
     from ..fmu.opener import stale_fmus
     from ..planner import Planner
-    from ..results.folder import default_folder
-    from ..results.freshness import staleness
-    from ..scenario import catalogue
+    from ..results.folder_and_lock import default_folder
+    from ..results.plan_record_and_freshness import staleness
+    from ..scenario import find_and_load
     from .progress import reported, say, stoppable
 
-    sources = [path if os.path.exists(path) else catalogue.named(path) or path for path in sources]
-    scenarios = [path for path in sources if path.suffix in catalogue.ENDINGS and not os.path.isdir(path)]
+    sources = [path if os.path.exists(path) else find_and_load.named(path) or path for path in sources]
+    scenarios = [path for path in sources if path.suffix in find_and_load.ENDINGS and not os.path.isdir(path)]
     if options.changes and not scenarios:
         raise ScenarioError(
             "--swap, --set and --fault apply to scenarios, not to results folders",
@@ -131,7 +131,7 @@ def plot(
     from ..figures.panels import check_panels, shown_by
     from ..figures.plots import OVERVIEW, draw
     from ..figures.style import LabelledRun, save
-    from ..results.read import load_results
+    from ..results.read_and_salvage import load_results
     from .progress import say
 
     folders = recorded(sources, options)
@@ -187,7 +187,7 @@ def write_view(
     from ..files import write_whole
     from ..messages import changed_each
     from ..pages.viewer import SETTINGS, Settings, View, page
-    from ..results.read import load_results
+    from ..results.read_and_salvage import load_results
     from .progress import say
 
     runs = [LabelledRun(name, load_results(folder)) for name, folder in zip(labels, folders, strict=True)]
@@ -221,7 +221,7 @@ def salvage(folders: Folders) -> None:
     instead. Incomplete Parquet and MDF files cannot be recovered.
     """
     from ..messages import counted
-    from ..results.salvage import lost_format, salvage
+    from ..results.read_and_salvage import lost_format, salvage
     from .progress import say
 
     for folder in folders:

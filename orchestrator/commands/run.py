@@ -55,9 +55,8 @@ def run(
     from ..master.log import STATUS, WARNING
     from ..master.simulate import simulate
     from ..messages import changed, with_changes
-    from ..results.folder import default_folder
-    from ..results.formats import size_note
-    from ..results.lock import refuse_below_others
+    from ..results.folder_and_lock import default_folder, refuse_below_others
+    from ..results.formats_and_csv import size_note
 
     if options.out and name:
         raise ScenarioError("--out and --name are mutually exclusive", code="option-invalid")
@@ -98,7 +97,7 @@ def run(
     if metrics:
         from ..experiments.tables import metrics_of_run
         from ..metrics.run_metrics import columns_for
-        from ..results.read import load_results
+        from ..results.read_and_salvage import load_results
         from .progress import print_tables
 
         needed = load_results(folder, only=lambda recorded: columns_for(recorded, metrics))

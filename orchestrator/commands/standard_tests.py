@@ -85,12 +85,12 @@ def drive(
     """
     from ..errors import ScenarioError
     from ..experiments.standard_test_runs import TestDriver
-    from ..results.folder import default_folder
-    from ..scenario import catalogue
+    from ..results.folder_and_lock import default_folder
+    from ..scenario import find_and_load
 
     chosen = DRIVEN[test]
     changes = (*_vehicle(vehicle), *options.changes)
-    one_run = catalogue.find(scenario or f"{GROUND}/{str(test).replace('-', '_')}", "a scenario")
+    one_run = find_and_load.find(scenario or f"{GROUND}/{str(test).replace('-', '_')}", "a scenario")
     folder = options.out or default_folder(one_run, changes, suffix="_series")
     execute = executor_of(folder, str(one_run), options, format="parquet")
     if (angle or slow_steer) and not chosen.needs_angle:
@@ -100,7 +100,7 @@ def drive(
             why = "set by the series itself"
             raise ScenarioError(f"{change.target}: {why}", code="option-invalid")
     steer = f"{GROUND}/slowly_increasing_steer"
-    slow = catalogue.find(slow_steer or steer, "a scenario") if chosen.needs_angle else None
+    slow = find_and_load.find(slow_steer or steer, "a scenario") if chosen.needs_angle else None
     hold(context, folder)
     known = None
     if slow:
@@ -156,11 +156,11 @@ def _vehicle(given: str | None) -> tuple[Override, ...]:
         ScenarioError: the file does not exist.
     """
     from ..plan import Override
-    from ..scenario import catalogue
+    from ..scenario import find_and_load
 
     if given is None:
         return ()
-    return (Override.of("vehicle", str(catalogue.find(given, "a vehicle file").resolve()), "--vehicle"),)
+    return (Override.of("vehicle", str(find_and_load.find(given, "a vehicle file").resolve()), "--vehicle"),)
 
 
 TestName = Literal[tuple(TESTS)]  # type: ignore[valid-type]
@@ -213,7 +213,7 @@ def evaluate(
     if nothing could be judged.
     """
     from ..evaluation.trace import load_mapping, load_trace
-    from ..results.folder import below_results
+    from ..results.folder_and_lock import below_results
     from .progress import say
     from .results import distinct, folder_of_all
 
@@ -297,8 +297,8 @@ class EvaluatedRuns:
 def _runs(source: Path, mapping: MappingSpec | None) -> list[Path]:
     """Return the folders of the runs in and below a folder, or the file itself."""
     from ..errors import ResultsError
-    from ..results.folder import COMPLETED
-    from ..results.read import UNREADABLE, found_runs
+    from ..results.folder_and_lock import COMPLETED
+    from ..results.read_and_salvage import UNREADABLE, found_runs
     from .progress import say
 
     if not source.is_dir():

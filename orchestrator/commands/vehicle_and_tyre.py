@@ -61,15 +61,15 @@ def vehicle(
     """
     from ..errors import ScenarioError
     from ..planner import Planner
-    from ..results.folder import below_results
-    from ..scenario import catalogue, yaml_lines
+    from ..results.folder_and_lock import below_results
+    from ..scenario import find_and_load, yaml_lines
     from ..scenario.scenario_schema import Vehicle
     from ..scenario.validation import validate
     from ..vehicles.handling_and_braking import TestTrack, draw_cars, fitting_plant, handling_of
     from ..wiring.warnings import suspicious_vehicle
     from .progress import print_tables, save_figure, say
 
-    file = catalogue.find(file, "a vehicle file")
+    file = find_and_load.find(file, "a vehicle file")
     document = yaml_lines.read(file, what="vehicle file")
     spec = validate(Vehicle, document)
     if spec is None:
@@ -171,7 +171,7 @@ def tyre(
     longitudinal force over slip at four loads, forces in combined slip at five slip angles, stiffnesses
     and relaxation lengths over load.
     """
-    from ..results.folder import below_results
+    from ..results.folder_and_lock import below_results
     from ..tyres.stand import draw_tyre, put_on_stand
     from .progress import save_figure, say
 

@@ -42,7 +42,7 @@ from ..files import reads
 from ..messages import hint, listed, with_changes
 from ..metrics.measures import si_of
 from ..metrics.run_metrics import columns_of
-from ..results.read import Results, load_results
+from ..results.read_and_salvage import Results, load_results
 from ..results.run_record import FmuRecord
 from ..scenario import yaml_lines
 from ..scenario.quantities import convert, meant_unit, measure_of, parse_unit, spellings

@@ -30,8 +30,8 @@ from ..metrics.run_metrics import MetricValue, metric
 from ..names import SignalName
 from ..plan import Override
 from ..plan import Value as Plain
-from ..results.read import Results
-from ..scenario.load import load_scenario
+from ..results.read_and_salvage import Results
+from ..scenario.find_and_load import load_scenario
 from ..scenario.overrides import is_path, swap_of
 from .experiment import LoadedExperiment, NamedRun, experiment_of
 from .judged_schema import text_of

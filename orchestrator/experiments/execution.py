@@ -17,12 +17,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
-from .. import checksums
+from ..cache_and_checksums import warn_of_record
 from ..errors import ResultsError, ScenarioError
 from ..metrics.run_metrics import metric, results_to_be, unit_in
 from ..plan import Plan
 from ..planner import Planner
-from ..results.freshness import altered, staleness
+from ..results.plan_record_and_freshness import altered, staleness
 from .experiment import Case, LoadedExperiment, NamedRun
 from .jobs import (
     Job,
@@ -238,14 +238,14 @@ def left_to_do(jobs: Sequence[Job], records: Mapping[str, MeasuredRun]) -> list[
         else:
             record = records.get(job.key)
             if record is not None and (words := _other_unit(job, record)):
-                checksums.warn(f"{job.label} will be repeated: {words}")
+                warn_of_record(f"{job.label} will be repeated: {words}")
                 record = None
             made = record is not None and not (job.keep and record.ok and isinstance(read_back(job.out), str))
         if made:
             continue
         left[job.key, job.out] = job
         if words := altered(job.out):
-            checksums.warn(f"{job.label} will be repeated: {words}")
+            warn_of_record(f"{job.label} will be repeated: {words}")
     return list(left.values())
 
 

@@ -14,7 +14,7 @@ from typing import Annotated, Any, NoReturn
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from .. import checksums
+from ..cache_and_checksums import KEY, changed_since, has_checksums, warn_of_record, with_checksums
 from ..errors import Diagnostic, ResultsError
 from ..files import open_own, reason, write_whole
 from ..messages import counted
@@ -35,7 +35,7 @@ class _Line(BaseModel):
 
     def text(self) -> bytes:
         """Return the line as JSON with checksums, without fields at their defaults."""
-        content = checksums.with_checksums(self.model_dump(exclude_defaults=True))
+        content = with_checksums(self.model_dump(exclude_defaults=True))
         return json.dumps(content, ensure_ascii=False).encode("utf-8", "backslashreplace") + b"\n"
 
     @classmethod
@@ -46,12 +46,12 @@ class _Line(BaseModel):
             ValueError: the line was damaged or edited; says how.
         """
         content = _content(line)
-        if not checksums.has_checksums(content):
+        if not has_checksums(content):
             raise ValueError("it has no checksums")
-        if changed := checksums.changed_since(content):
+        if changed := changed_since(content):
             raise ValueError(changed)
         try:
-            return cls.model_validate({key: x for key, x in content.items() if key != checksums.KEY})
+            return cls.model_validate({key: x for key, x in content.items() if key != KEY})
         except ValidationError as errors:
             first = errors.errors(include_url=False)[0]
             raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg'].lower()}") from None
@@ -145,11 +145,11 @@ class Journal:
                 raise ResultsError(
                     f"{self._path}: line 1 is damaged: {error}; --fresh begins anew."
                 ) from None
-            checksums.warn(f"{self._path}: line 1: {error}; the runs below it are kept")
+            warn_of_record(f"{self._path}: line 1: {error}; the runs below it are kept")
         for number, why in list(damaged.items())[:NAMED]:
-            checksums.warn(f"{self._path}: line {number}: {why}; its run will be repeated")
+            warn_of_record(f"{self._path}: line {number}: {why}; its run will be repeated")
         if len(damaged) > NAMED:
-            checksums.warn(f"{self._path}: {counted(len(damaged) - NAMED, 'more line')} like these")
+            warn_of_record(f"{self._path}: {counted(len(damaged) - NAMED, 'more line')} like these")
         if whole != [line + b"\n" for line in lines]:
             self._replace(b"".join(whole))
 

@@ -14,8 +14,8 @@ from ..errors import Diagnostic
 from ..figures.style import digits_of
 from ..messages import counted
 from ..metrics.run_metrics import MetricValue
-from ..results.folder import RUN_FILE
-from ..results.read import Results
+from ..results.folder_and_lock import RUN_FILE
+from ..results.read_and_salvage import Results
 from .axes import RUN, DesignPoint, Level
 from .confidence import interval
 from .experiment import Case, LoadedExperiment, NamedRun

@@ -12,7 +12,7 @@ from ..metrics.run_metrics import STANDARD, metric, results_to_be, unit_in
 from ..names import SignalName, Target
 from ..plan import Fmu, Instance, Plan, Variable
 from ..planner import Planner
-from ..results.read import Results
+from ..results.read_and_salvage import Results
 from ..scenario import quantities
 from ..scenario.yaml_lines import dotted
 from ..wiring.context import FACTS

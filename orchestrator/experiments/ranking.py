@@ -34,7 +34,7 @@ from typing import Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from .. import checksums
+from ..cache_and_checksums import warn_of_record, what_changed
 from ..errors import ResultsError, ScenarioError
 from ..evaluation.sine_with_dwell import AMPLITUDE, SIDES, amplitudes
 from ..evaluation.standard_tests import Evaluation, NotJudged
@@ -117,7 +117,7 @@ class EntriesSpec(StrictModel):
     def edited(self) -> str:
         """Describes what was edited since `yawbench tune` wrote the file; "" if nothing was."""
         if self.checksums:
-            words = checksums.what_changed(self.content, self.checksums)
+            words = what_changed(self.content, self.checksums)
             return f"{words} since `yawbench tune` wrote it" if words else ""
         if any(one.gains == "tuned" for one in self.entries.values()):
             return "has no checksums, so its tuned gains are taken as they are"
@@ -258,7 +258,7 @@ def load_ranking(
             raise ScenarioError(listed.sorted_errors())
         if words := found.edited:
             edited.append(f"{file}: {words}")
-            checksums.warn(edited[-1])
+            warn_of_record(edited[-1])
         for key, one in found.entries.items():
             if key in entries:
                 raise ScenarioError(

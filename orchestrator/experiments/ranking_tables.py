@@ -13,7 +13,7 @@ from ..evaluation.standard_tests import TESTS
 from ..evaluation.trace import trace_of
 from ..figures.style import QUIET, digits_of, frame, literal, new_figure, save, shown
 from ..metrics.run_metrics import MetricValue
-from ..results.read import load_results
+from ..results.read_and_salvage import load_results
 from .jobs import STEP_TIME
 from .ranking import SERIES
 from .ranking_scores import Digits, EntryScore, RankingCell, deciding_digits

@@ -11,13 +11,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from .. import checksums
+from ..cache_and_checksums import changed_since, warn_of_record, with_checksums
 from ..errors import ResultsError
 from ..files import read_bytes, reason, write_whole
 from ..metrics.measures import si
 from ..metrics.run_metrics import MetricValue, metric
-from ..results.folder import LARGEST
-from ..results.read import Results
+from ..results.folder_and_lock import LARGEST
+from ..results.read_and_salvage import Results
 from .judged_schema import si_number, text_of
 from .outcome import ExperimentResult, limits_of
 from .tables import TableColumn, to_csv
@@ -140,7 +140,7 @@ def write_findings(findings: ExperimentResult, drawn: dict[str, str], out: Path)
     """
     write_table(findings, out)
     _warn_if_edited(out / RECORD)
-    content = checksums.with_checksums(_record(findings, drawn))
+    content = with_checksums(_record(findings, drawn))
     write_whole(out / RECORD, json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
 
 
@@ -148,13 +148,13 @@ def _warn_if_edited(file: Path) -> None:
     """Warn if a record that is about to be overwritten was edited since it was written."""
     try:
         found = json.loads(read_bytes(file, largest=LARGEST))
-        words = checksums.changed_since(found) if isinstance(found, dict) else "it is not a record"
+        words = changed_since(found) if isinstance(found, dict) else "it is not a record"
     except FileNotFoundError:
         return
     except (OSError, ValueError, RecursionError):
         words = "it cannot be read"
     if words:
-        checksums.warn(f"{file}: {words} since it was written; it is written anew from the runs")
+        warn_of_record(f"{file}: {words} since it was written; it is written anew from the runs")
 
 
 def _record(findings: ExperimentResult, drawn: dict[str, str]) -> dict[str, Any]:

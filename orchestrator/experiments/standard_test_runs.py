@@ -13,8 +13,8 @@ from ..evaluation.standard_tests import Evaluation, SeriesRun, StandardTest
 from ..evaluation.trace import Trace, trace_of
 from ..names import Target
 from ..plan import Override, Plan
-from ..results.read import load_results
-from ..scenario.load import LoadedScenario
+from ..results.read_and_salvage import load_results
+from ..scenario.find_and_load import LoadedScenario
 from ..scenario.quantities import convert
 from .execution import Executor, highest_passing, side_by_side
 from .experiment import NamedRun

@@ -25,15 +25,15 @@ from ..metrics.measures import catalogue as measures
 from ..metrics.measures import symbol
 from ..metrics.run_metrics import STANDARD, MetricValue, columns_of, evaluate_all, metric
 from ..plan import Fmu, Plan
-from ..results.read import FoundRun, Results
+from ..results.read_and_salvage import FoundRun, Results
 from ..results.run_record import RunRecord
-from ..scenario import catalogue, yaml_lines
+from ..scenario import find_and_load, yaml_lines
 
 if TYPE_CHECKING:
     import pandas as pd
     import rich.console
 
-    from ..results.read import Results
+    from ..results.read_and_salvage import Results
 
 
 MARK = "†"
@@ -210,17 +210,17 @@ def files_table(folder: Path | None, kinds: Sequence[str]) -> Table:
         raise ScenarioError(f"{folder}: there is no such folder", code="file-missing")
     table = Table("", ["name" if folder is None else "file", "kind", "title"])
     rows: dict[str, Sequence[Cell]] = {}
-    for base in catalogue.folders() if folder is None else [folder]:
-        for path, kind in catalogue.files(base, kinds):
+    for base in find_and_load.folders() if folder is None else [folder]:
+        for path, kind in find_and_load.files(base, kinds):
             archive = path.suffix == ".ssp"
             data = None if archive else yaml_lines.read(path, what="file").data
             title = str(data.get("title") or "") if isinstance(data, dict) else ""
-            by_name = folder is None and kind in catalogue.COMMANDS
+            by_name = folder is None and kind in find_and_load.COMMANDS
             name = path.relative_to(base).with_suffix("").as_posix() if by_name else str(path)
             rows.setdefault(name, [name, "SSP archive" if archive else kind.partition(" ")[2], title or None])
     table.rows = [*rows.values()]
     if not table.rows:
-        where = folder or " and ".join(map(str, catalogue.folders()))
+        where = folder or " and ".join(map(str, find_and_load.folders()))
         raise ScenarioError(f"{where}: holds no file that is {' or '.join(kinds)}", code="file-wrong-kind")
     return table
 

@@ -19,7 +19,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from .. import checksums
+from ..cache_and_checksums import checksums_of
 from ..errors import ScenarioError
 from ..metrics.run_metrics import MetricValue
 from ..names import Target
@@ -228,7 +228,7 @@ def entries_text(entries: dict[str, dict[str, Any]], command: str) -> str:
 
     yaml: Any = YAML(typ="safe", pure=True)
     yaml.default_flow_style, yaml.sort_base_mapping_type_on_output, yaml.width = False, False, 110
-    known = checksums.checksums_of(EntriesSpec.model_validate({"entries": entries}).content)
+    known = checksums_of(EntriesSpec.model_validate({"entries": entries}).content)
     yaml.dump({"entries": entries, "checksums": known}, stream := StringIO())
     return f"# Written by: {command}\n{stream.getvalue()}"
 

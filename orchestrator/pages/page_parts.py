@@ -19,8 +19,8 @@ from ..experiments.tables import Table
 from ..experiments.verdict_tables import FAILS, HOLDS, NOT_JUDGED, UNDECIDED
 from ..messages import printable
 from ..plan import Plan
-from ..results.plan_record import versions
-from ..results.read import Results
+from ..results.plan_record_and_freshness import versions
+from ..results.read_and_salvage import Results
 
 CURLY = str.maketrans("'\"", "’”")
 """Typographic quotes for text, so that straight ones occur only in the markup."""

@@ -45,11 +45,11 @@ from ..messages import changed, counted, listed
 from ..metrics.run_metrics import evaluate, metric
 from ..plan import Plan
 from ..planner import Planner
-from ..results.plan_record import run_record
-from ..results.read import Results
+from ..results.plan_record_and_freshness import run_record
+from ..results.read_and_salvage import Results
 from ..results.run_record import RunRecord, load_record
-from ..scenario import catalogue, yaml_lines
-from ..scenario.load import LoadedScenario
+from ..scenario import find_and_load, yaml_lines
+from ..scenario.find_and_load import LoadedScenario
 from .diagram import diagrams, systems_of
 from .page_parts import (
     FigureImage,
@@ -378,7 +378,7 @@ def found_studies(folder: Path = SCENARIOS) -> list[Path]:
         ScenarioError: there are none.
     """
     titles: dict[Path, str] = {}
-    for path, _ in catalogue.files(folder, ["a study file"], depth=2):
+    for path, _ in find_and_load.files(folder, ["a study file"], depth=2):
         data = yaml_lines.read(path, what="study file").data
         titles[path] = str(data.get("title", "")) if isinstance(data, dict) else ""
     if not titles:

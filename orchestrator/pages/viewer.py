@@ -29,7 +29,7 @@ from ..figures.style import LINES, LabelledRun, line_style, shown, shown_unit
 from ..messages import listed
 from ..metrics.measures import words
 from ..metrics.run_metrics import columns_of, evaluate, metric, reference_of
-from ..results.read import Results
+from ..results.read_and_salvage import Results
 from .friction_map import ground_of
 from .page_parts import render
 from .viewer_data import is_numeric, pack

@@ -17,8 +17,7 @@ import numpy as np
 
 from ..errors import ResultsError
 from ..messages import with_changes
-from .csv_file import column_of, values_of
-from .formats import FILES, FORMATS, plain
+from .formats_and_csv import FILES, FORMATS, column_of, plain, values_of
 from .recorder import ColumnRecorder
 from .run_record import RunRecord
 

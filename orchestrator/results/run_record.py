@@ -25,14 +25,14 @@ from pydantic_core import PydanticKnownError
 
 from vocabulary.roles import role_of
 
-from .. import checksums
+from ..cache_and_checksums import KEY, changed_since, warn_of_record, with_checksums
 from ..errors import Diagnostic, Location, ResultsError, Severity, warnings_in
 from ..files import read_bytes, reading, reason
 from ..messages import short
 from ..names import SignalName
 from ..plan import NEUTRAL, Override, ValueSource
-from .folder import FAILED, LARGEST, RUN_FILE, refuse_dead
-from .formats import FILES, RESULTS_FILE
+from .folder_and_lock import FAILED, LARGEST, RUN_FILE, refuse_dead
+from .formats_and_csv import FILES, RESULTS_FILE
 
 
 class _Part(BaseModel):
@@ -267,7 +267,7 @@ class RunRecord(_Part):
     checksum: str = ""  # of that file
     smallest: Mapping[str, float | NotFinite] = {}
     largest: Mapping[str, float | NotFinite] = {}
-    checksums: dict[str, str] = {}  # of the keys of the record itself; see `orchestrator.checksums`
+    checksums: dict[str, str] = {}  # of the keys of the record itself; see `orchestrator.cache_and_checksums`
 
     @property
     def overrides(self) -> tuple[Override, ...]:
@@ -316,7 +316,7 @@ class RunRecord(_Part):
 
     def content(self) -> dict[str, Any]:
         """Return the content of run.json, as JSON represents it: non-finite numbers become text."""
-        return checksums.with_checksums(_plain(self.model_dump(by_alias=True, exclude_unset=True)))
+        return with_checksums(_plain(self.model_dump(by_alias=True, exclude_unset=True)))
 
     def to_json(self) -> str:
         """Return the text of run.json, with its checksums."""
@@ -371,7 +371,7 @@ def load_record(folder: Path, *, settled: bool = False) -> RunRecord:
 def warn_if_unchecked(record: RunRecord, folder: Path) -> None:
     """Warn the user of a record without checksums."""
     if not record.has_checksums:
-        checksums.warn(
+        warn_of_record(
             f"{folder / RUN_FILE}: has no checksums: it is of an earlier version or was changed; "
             "its units and names are taken as they are"
         )
@@ -385,10 +385,10 @@ def check_record(run: Any, file: Path) -> RunRecord:
     """
     if not isinstance(run, dict):
         raise ResultsError(f"{file}: is not the record of a run.")
-    if words := checksums.changed_since(run):
+    if words := changed_since(run):
         raise ResultsError(
             f"{file}: is not what its run has written: {words}; run it again, or remove "
-            f"{checksums.KEY!r} if you have changed the file yourself.",
+            f"{KEY!r} if you have changed the file yourself.",
             code="results-changed",
         )
     try:

@@ -21,7 +21,7 @@ from ..master.simulate import simulate_in_memory
 from ..messages import listed
 from ..names import SignalName
 from ..plan import Fmu, InputSeries, Instance, Plan, Value
-from ..scenario.load import load_scenario
+from ..scenario.find_and_load import load_scenario
 from ..scenario.overrides import is_path
 from ..wiring.make_plan import make_plan
 

@@ -18,7 +18,7 @@ from itertools import pairwise
 from ..messages import fold, hint, listed
 from ..names import SignalName, matching
 from ..plan import DEFAULT, InputSeries, Value, Variable, Wire
-from ..scenario.load import Connection
+from ..scenario.find_and_load import Connection
 from ..scenario.quantities import conversion, measure_of
 from ..scenario.yaml_lines import KeyPath, dotted
 from .constants import Constant, Input, constants

@@ -24,7 +24,7 @@ from ..messages import fold_sentences
 from ..names import FACTS as NAMES
 from ..names import match
 from ..plan import Fmu, Instance, Value, ValueOrigin, Variable
-from ..scenario.load import LoadedScenario
+from ..scenario.find_and_load import LoadedScenario
 from ..scenario.yaml_lines import MOST_ERRORS, Document, KeyPath
 
 

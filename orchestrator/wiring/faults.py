@@ -11,7 +11,7 @@ from ..fault_kinds import KINDS, Fault, FaultLocation, FaultySignal
 from ..messages import fold, hint, listed
 from ..names import match, matching
 from ..plan import Variable, Wire
-from ..scenario.load import LoadedScenario
+from ..scenario.find_and_load import LoadedScenario
 from ..scenario.quantities import convert
 from ..scenario.yaml_lines import KeyPath, dotted
 from .context import WiringContext

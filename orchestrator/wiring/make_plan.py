@@ -28,7 +28,7 @@ from ..fmu.opener import Opener, find_fmu, find_folder, host_needs, stale_fmus
 from ..messages import closest, fold, hint, listed
 from ..names import SignalName, match
 from ..plan import Fmu, InputSeries, Instance, Plan, Value, ValueOrigin, Variable, Wire
-from ..scenario.load import LoadedScenario
+from ..scenario.find_and_load import LoadedScenario
 from ..scenario.overrides import is_path
 from .connections import Connector
 from .context import WiringContext

@@ -23,7 +23,7 @@ from ..fmu.binary import integer_limits
 from ..messages import closest, fold, hint, listed, short
 from ..plan import DEFAULT, LITERATURE, VARIED, Fmu, Value, ValueOrigin, ValueSource, Variable
 from ..scenario import quantities
-from ..scenario.load import LoadedScenario
+from ..scenario.find_and_load import LoadedScenario
 from ..scenario.scenario_schema import TextSpec
 from ..scenario.yaml_lines import Document, KeyPath
 from .context import WiringContext, facts_of

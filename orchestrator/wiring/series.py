@@ -22,12 +22,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import checksums
+from ..cache_and_checksums import changed_since, has_checksums, warn_of_record
 from ..errors import ScenarioError
 from ..files import read_bytes, reading, reason
 from ..messages import hint
 from ..plan import InputSeries, Value, Variable
-from ..scenario.load import LoadedScenario
+from ..scenario.find_and_load import LoadedScenario
 from ..scenario.quantities import Unit, gain_and_offset, measure_of
 from ..scenario.scenario_schema import SeriesSpec
 from .parameters import value_for
@@ -207,11 +207,11 @@ def _units_beside(path: Path) -> Mapping[str, str]:
         raise ValueError(f"the {BESIDE} beside it cannot be read: {reason(error)}") from None
     if not isinstance(record, dict) or record.get("results", "results.csv") != path.name:
         return {}
-    if words := checksums.changed_since(record):
+    if words := changed_since(record):
         raise ValueError(f"the {BESIDE} beside it is not what the run has written: {words}")
     units = record.get("units")
-    if isinstance(units, dict) and not checksums.has_checksums(record):
-        checksums.warn(f"{beside}: has no checksums; its units are taken as they are")
+    if isinstance(units, dict) and not has_checksums(record):
+        warn_of_record(f"{beside}: has no checksums; its units are taken as they are")
     return {str(name): str(unit) for name, unit in units.items() if unit} if isinstance(units, dict) else {}
 
 

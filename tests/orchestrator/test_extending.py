@@ -25,7 +25,7 @@ from orchestrator.experiments.planning import PlannedExperiment
 from orchestrator.experiments.schema import FIGURE_KINDS, FigureKind
 from orchestrator.fault_kinds import KINDS, FaultKind
 from orchestrator.master.simulate import simulate_in_memory
-from orchestrator.results import formats
+from orchestrator.results import formats_and_csv
 from orchestrator.results.recorder import ColumnRecorder
 from orchestrator.scenario.overrides import read_changes
 from tests.commands import status_of
@@ -83,16 +83,16 @@ class NpzFile:
         self.names = list(self._columns)
 
     def blocks(self, columns):
-        yield [formats.plain(self._columns[name]) for name in columns]
+        yield [formats_and_csv.plain(self._columns[name]) for name in columns]
 
 
 def test_a_format_is_a_module_and_an_entry(steered, monkeypatch):
     module = ModuleType("orchestrator.results.npz")
     module.NpzRecorder, module.NpzFile = NpzRecorder, NpzFile
     monkeypatch.setitem(sys.modules, module.__name__, module)
-    entry = formats.Format("results.npz", "NumPy's archive", "npz:NpzRecorder", "npz:NpzFile", 8)
-    monkeypatch.setitem(formats.FORMATS, "npz", entry)
-    monkeypatch.setitem(formats.FILES, "npz", entry.file)
+    entry = formats_and_csv.Format("results.npz", "NumPy's archive", "npz:NpzRecorder", "npz:NpzFile", 8)
+    monkeypatch.setitem(formats_and_csv.FORMATS, "npz", entry)
+    monkeypatch.setitem(formats_and_csv.FILES, "npz", entry.file)
     for name in ("npz", "csv"):
         assert status_of("run", "steered.yaml", "--format", name, "--out", name) == 0
     assert sorted(path.name for path in Path("npz").iterdir()) == ["results.npz", "run.json"]

@@ -8,7 +8,7 @@ import pytest
 from orchestrator.errors import Interrupted, SimulationError
 from orchestrator.master.log import DISCARD, ERROR, FATAL, OK, PENDING, WARNING
 from orchestrator.master.simulate import simulate
-from orchestrator.results.read import load_results
+from orchestrator.results.read_and_salvage import load_results
 from tests.sentences import golden, golden_in
 
 from .fakes import Behaviour, Clock, Echo, FakeSlave, Function, Mixed, Stage, make_plan

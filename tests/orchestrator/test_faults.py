@@ -24,9 +24,9 @@ from orchestrator.master.log import Log
 from orchestrator.master.master import Master
 from orchestrator.master.simulate import simulate, simulate_in_memory
 from orchestrator.plan import Override
-from orchestrator.results.freshness import key_of, staleness
-from orchestrator.results.read import load_results
-from orchestrator.scenario.load import load_scenario
+from orchestrator.results.plan_record_and_freshness import key_of, staleness
+from orchestrator.results.read_and_salvage import load_results
+from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.scenario.overrides import read_changes
 from orchestrator.wiring.make_plan import make_plan as plan_of_scenario
 from tests.sentences import golden, golden_in, texts_of

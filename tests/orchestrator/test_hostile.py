@@ -18,7 +18,7 @@ from orchestrator.master import isolation
 from orchestrator.master.isolation import InstanceProcess
 from orchestrator.master.log import Log
 from orchestrator.processes import Child
-from orchestrator.results.read import load_results
+from orchestrator.results.read_and_salvage import load_results
 from orchestrator.supervisor import FAILED, LOG, REPLY, PipeChannel, ProcessLost, ProtocolError
 from tests.sentences import golden_in
 

@@ -16,8 +16,8 @@ from orchestrator.commands.new import begin
 from orchestrator.errors import SimulationError
 from orchestrator.master.isolation import Isolation
 from orchestrator.master.simulate import simulate
-from orchestrator.results.read import load_results
-from orchestrator.scenario.load import load_scenario
+from orchestrator.results.read_and_salvage import load_results
+from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.sentences import golden_in
@@ -101,7 +101,7 @@ def test_units_end_when_the_master_is_killed(fmus, tmp_path):
     code = (
         "import sys, os, signal; from pathlib import Path\n"
         "from orchestrator.plan import Override\n"
-        "from orchestrator.scenario.load import load_scenario\n"
+        "from orchestrator.scenario.find_and_load import load_scenario\n"
         "from orchestrator.wiring.make_plan import make_plan\n"
         "from orchestrator.master.isolation import Isolation\n"
         "from orchestrator.master.simulate import simulate\n"

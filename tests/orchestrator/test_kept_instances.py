@@ -20,7 +20,7 @@ from orchestrator.experiments.jobs import Job, execute, keyed, ready, run_job
 from orchestrator.fmu.binary import WANTED, is_native
 from orchestrator.master import fmi
 from orchestrator.master.log import Log
-from orchestrator.results.folder import RUN_FILE
+from orchestrator.results.folder_and_lock import RUN_FILE
 from tests.changed import changed
 
 from .test_isolation import STEP

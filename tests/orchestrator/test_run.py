@@ -16,8 +16,8 @@ from orchestrator.cli import main
 from orchestrator.master import log
 from orchestrator.master.fmi import open_unit
 from orchestrator.master.simulate import simulate
-from orchestrator.results.read import load_results
-from orchestrator.scenario.load import load_scenario
+from orchestrator.results.read_and_salvage import load_results
+from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.fmu_copies import put_fmus
 from tests.sentences import golden, golden_in

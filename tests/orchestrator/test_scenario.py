@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator.errors import Diagnostic, ScenarioError
 from orchestrator.names import SignalName
-from orchestrator.scenario.load import ScenarioSpec, load_scenario
+from orchestrator.scenario.find_and_load import ScenarioSpec, load_scenario
 from tests.changed import changed
 from tests.sentences import golden, golden_in, places_of
 

@@ -17,9 +17,9 @@ from orchestrator.errors import RecordWarning, ResultsError, YawbenchError
 from orchestrator.interop.ssp_write import write_ssp
 from orchestrator.master.simulate import simulate
 from orchestrator.plan import InputSeries, Plan
-from orchestrator.results.freshness import staleness
-from orchestrator.results.read import load_results
-from orchestrator.scenario.load import load_scenario
+from orchestrator.results.plan_record_and_freshness import staleness
+from orchestrator.results.read_and_salvage import load_results
+from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from orchestrator.wiring.series import SeriesFile
 from tests.sentences import golden, golden_in, refused, texts_of

@@ -6,7 +6,8 @@ import shutil
 
 import pytest
 
-from orchestrator import cache
+from orchestrator import cache_and_checksums as module
+from orchestrator.cache_and_checksums import OF_METRICS, OF_RESULTS, sources_hash
 
 from .test_imports import ORCHESTRATOR, SOURCES, imported_by, stage_of
 
@@ -14,17 +15,17 @@ from .test_imports import ORCHESTRATOR, SOURCES, imported_by, stage_of
 @pytest.fixture
 def copy(tmp_path, monkeypatch):
     """A copy of the code in place of the program's own."""
-    here = cache._HERE
+    here = module._HERE
     shutil.copytree(here, tmp_path / "copy", ignore=shutil.ignore_patterns("__pycache__"))
-    monkeypatch.setattr(cache, "_HERE", tmp_path / "copy")
-    cache.sources_hash.cache_clear()
+    monkeypatch.setattr(module, "_HERE", tmp_path / "copy")
+    sources_hash.cache_clear()
     yield tmp_path / "copy"
-    cache.sources_hash.cache_clear()
+    sources_hash.cache_clear()
 
 
 def hashes():
-    cache.sources_hash.cache_clear()
-    return cache.sources_hash(cache.OF_RESULTS), cache.sources_hash(cache.OF_METRICS)
+    sources_hash.cache_clear()
+    return sources_hash(OF_RESULTS), sources_hash(OF_METRICS)
 
 
 def test_code_that_has_a_say_in_the_numbers_changes_the_hash_and_no_other(copy):
@@ -40,9 +41,9 @@ def test_code_that_has_a_say_in_the_numbers_changes_the_hash_and_no_other(copy):
 
 
 def test_all_that_these_parts_import_has_a_say_or_cannot_change_a_number():
-    harmless = {"cache", "checksums", "errors", "files", "labels", "messages"}
+    harmless = {"cache_and_checksums", "errors", "files", "labels", "messages"}
     harmless |= {"interrupts", "processes", "supervisor", "workers"}
-    own = {part.removesuffix(".py") for part in cache.OF_RESULTS}
+    own = {part.removesuffix(".py") for part in OF_RESULTS}
     for path in SOURCES:
         if path.relative_to(ORCHESTRATOR).parts[0].removesuffix(".py") in own:
             used = {stage_of(dotted) for _, dotted in imported_by(path)} - {None, "metrics", "figures"}

@@ -17,10 +17,9 @@ from orchestrator.evaluation.lane_change import evaluate_lane_change, judge_entr
 from orchestrator.evaluation.standard_tests import Evaluation, Verdict
 from orchestrator.evaluation.steering_tests import evaluate_step, evaluate_sweep, evaluate_understeer
 from orchestrator.evaluation.trace import Trace, trace_of
-from orchestrator.results.read import Results
+from orchestrator.results.read_and_salvage import Results
 from orchestrator.results.run_record import RunRecord
-from orchestrator.scenario.catalogue import SHIPPED
-from orchestrator.scenario.load import load_scenario
+from orchestrator.scenario.find_and_load import SHIPPED, load_scenario
 from orchestrator.tyres.stand import cornering_stiffness
 from orchestrator.wiring.make_plan import make_plan
 from tests.sentences import golden, golden_in

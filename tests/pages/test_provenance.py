@@ -8,13 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.checksums import checksum
+from orchestrator.cache_and_checksums import checksum
 from orchestrator.pages.provenance import groups_of
 from orchestrator.plan import CHOSEN, ERRATUM, LITERATURE, NEUTRAL, PAPER, ValueSource
-from orchestrator.results.freshness import key_of, staleness
-from orchestrator.results.plan_record import run_record
+from orchestrator.results.plan_record_and_freshness import key_of, run_record, staleness
 from orchestrator.results.run_record import RunRecord
-from orchestrator.scenario.load import load_scenario
+from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.fmu_copies import put_fmus

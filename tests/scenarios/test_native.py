@@ -13,7 +13,7 @@ import pytest
 from fmus.build import HERE as FMUS
 from fmus.build import build_all, find_components
 from orchestrator.fmu.binary import NATIVE, runs_as
-from orchestrator.scenario.catalogue import names
+from orchestrator.scenario.find_and_load import names
 
 SHORT = ("--set", "stop_time=1.2")
 RUNS = {

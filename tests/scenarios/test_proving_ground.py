@@ -13,7 +13,7 @@ from orchestrator.evaluation.standard_tests import Evaluation, Verdict
 from orchestrator.evaluation.steering_tests import evaluate_slow_steer
 from orchestrator.evaluation.trace import trace_of
 from orchestrator.plan import Override
-from orchestrator.scenario.catalogue import SHIPPED
+from orchestrator.scenario.find_and_load import SHIPPED
 from yawbench._scenario import Scenario
 
 pytestmark = pytest.mark.exhaustive

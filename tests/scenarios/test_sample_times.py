@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from orchestrator.scenario.catalogue import SHIPPED, files
-from orchestrator.scenario.load import load_scenario
+from orchestrator.scenario.find_and_load import SHIPPED, files, load_scenario
 from tests.components.test_conformance import COMPONENTS
 
 SCENARIOS = [path for path, _ in files(SHIPPED, ["a scenario"])]

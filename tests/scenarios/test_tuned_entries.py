@@ -13,7 +13,7 @@ from orchestrator.cli import main
 from orchestrator.experiments.axes import level_at
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.tuning import DIGITS, tuning_of
-from orchestrator.scenario.catalogue import SHIPPED
+from orchestrator.scenario.find_and_load import SHIPPED
 from tests.checkout import ROOT
 
 HERE = SHIPPED / "proving_ground"

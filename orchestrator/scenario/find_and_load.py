@@ -1,20 +1,23 @@
-"""Loads a scenario file: applies overrides, validates it, and reports all errors at once."""
+"""Finds scenario, study and sweep files by name (`fnn_sideslip/25mps`); loads scenarios with overrides."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Collection, Iterator, Sequence
 from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from ..errors import ScenarioError
-from ..files import reads
-from ..messages import hint, listed
+from ..files import TEXT, read_bytes, reads
+from ..messages import hint, listed, short
 from ..plan import Override
 from . import overrides, quantities, validation, yaml_lines
 from .scenario_schema import Connection, LoadedScenario, ScenarioSpec, Vehicle, endpoint
 from .tir import TyreFile, read_tir
+from .validation import KINDS
 from .yaml_lines import Document, KeyPath
 
 STEPS = 1_000_000_000
@@ -208,3 +211,132 @@ def _units_in(value: object) -> list[str]:
         return [endpoint(value).instance]
     except ValueError:
         return []
+
+
+FOLDER = "scenarios"
+SHIPPED = Path(__file__).resolve().parents[2] / FOLDER
+"""Folder of the scenarios that come with this program."""
+YAML = (".yaml", ".yml")
+ENDINGS = (*YAML, ".ssp")
+LOOKED_AT = 20_000
+"""Maximum number of examined entries of a folder. Chosen: a second, and more than real folders have."""
+COMMANDS = {
+    "a scenario": "run",
+    "a study file": "study",
+    "a sweep file": "sweep",
+    "a tuning file": "tune",
+    "a ranking file": "rank",
+}
+"""Kind of file -> the command that takes it."""
+HOMES = {"a vehicle file": "vehicles"}
+"""Kind of file -> its folder, which names may omit: `van` for `vehicles/van`."""
+_KEY = re.compile(rf"^[\"']?({'|'.join(KINDS)})[\"']?[ \t]*:", re.MULTILINE)
+
+
+def folders() -> list[Path]:
+    """Return the folders of scenarios: the nearest in the working folder or above, then this program's."""
+    here = Path.cwd()
+    near = [folder / FOLDER for folder in (here, *here.parents) if (folder / FOLDER).is_dir()]
+    return list(dict.fromkeys([*(_from_here(folder) for folder in near[:1]), _from_here(SHIPPED)]))
+
+
+def kind_of(path: Path) -> str:
+    """Guess the kind of a file (`validation.KINDS`) from its keys, without parsing it; "" if unknown."""
+    if path.suffix == ".ssp":
+        return "a scenario"
+    try:
+        keys = _KEY.findall(read_bytes(path, largest=TEXT).decode("utf-8-sig"))
+    except (OSError, ValueError):
+        return ""
+    return next((kind for key, (kind, *_) in KINDS.items() if key in keys), "")
+
+
+def files(folder: Path, kinds: Collection[str], *, depth: int | None = None) -> Iterator[tuple[Path, str]]:
+    """Yield (path, kind) of every file of some kinds in a folder, in alphabetical order.
+
+    Args:
+        folder: where to search; only the first `LOOKED_AT` entries are examined.
+        kinds: of `validation.KINDS`.
+        depth: 1: files in the folder itself, 2: files in its subfolders; None: all below.
+    """
+    for path in sorted(islice(_below(folder, depth), LOOKED_AT)):
+        if path.suffix in ENDINGS and (kind := kind_of(path)) in kinds:
+            yield path, kind
+
+
+def _below(folder: Path, depth: int | None) -> Iterator[Path]:
+    """Yield the readable entries below a folder; links to folders are not followed."""
+    for above, inside, names in os.walk(folder):
+        place = Path(above)
+        level = len(place.relative_to(folder).parts) + 1
+        if depth is None or level == depth:
+            yield from (place / name for name in (*inside, *names))
+        if level == depth:
+            inside.clear()
+        inside.sort()
+
+
+def names(kind: str) -> list[str]:
+    """Return the names that `find` accepts for a kind of file, without duplicates."""
+    found = (
+        path.relative_to(folder).with_suffix("").as_posix()
+        for folder in folders()
+        for path, _ in files(folder, [kind], depth=2)
+    )
+    return list(dict.fromkeys(found))
+
+
+def named(name: str | Path, kind: str = "") -> Path | None:
+    """Return the file with a name, in the working folder or a folder of scenarios, None if there is none."""
+    bases = [Path(), *folders()]
+    if kind in HOMES:
+        bases += [folder / HOMES[kind] for folder in folders()]
+    candidates = (base / f"{name}{ending}" for base in bases for ending in ENDINGS)
+    return next((path for path in candidates if os.path.isfile(path)), None)
+
+
+def find(source: str | Path, kind: str) -> Path:
+    """Find a file by its path, or by its name in a folder of scenarios.
+
+    A path with the suffix of such a file is returned unchanged even if the file does not exist.
+
+    Raises:
+        ScenarioError: there is no such file; the message names existing ones.
+    """
+    path = Path(source)
+    if os.path.isdir(path):
+        raise ScenarioError(f"{source}: {_what_is_in(path, kind)}", code="scenario-unknown")
+    if os.path.exists(path):
+        return path
+    known = [name.removeprefix(f"{HOMES.get(kind)}/") for name in names(kind)]
+    elsewhere = [name for name in known if path.stem == name.rpartition("/")[2]]
+    if path.suffix in ENDINGS and not elsewhere:
+        return path
+    if file := named(source, kind):
+        return file
+    for folder in (base / path for base in folders()):
+        if os.path.isdir(folder):
+            raise ScenarioError(f"{source}: {_what_is_in(folder, kind)}", code="scenario-unknown")
+    others = hint(str(source), elsewhere or known, lead="by name there are")
+    what = kind.partition(" ")[2]
+    raise ScenarioError(f"there is no {what} {short(str(source))}{others}", code="scenario-unknown")
+
+
+def _what_is_in(folder: Path, kind: str) -> str:
+    """Describe a folder that was given instead of a file, and suggest what could be meant."""
+    if (folder / "run.json").is_file():
+        return f"these are the results of a run, not {kind}; 'yawbench plot {folder}' draws them"
+    for depth in (1, 2):
+        if found := [str(path) for path, _ in files(folder, [kind], depth=depth)]:
+            return f"a folder, not {kind}; in it there are: {listed(found)}"
+    for other, command in COMMANDS.items():
+        if found := [str(path) for path, _ in files(folder, [other])]:
+            return f"a folder without {kind}; 'yawbench {command}' takes {listed(found, last='or')}"
+    known = names(kind)
+    return f"a folder without {kind}{f'; by name there are: {listed(known)}' if known else ''}"
+
+
+def _from_here(path: Path) -> Path:
+    """Return a path relative to the working folder if it is below it."""
+    here = Path.cwd()
+    return path.relative_to(here) if path.is_relative_to(here) else path
