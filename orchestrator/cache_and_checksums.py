@@ -205,7 +205,7 @@ def _hash(content: bytes) -> bytes:
 
 OF_RESULTS = (
     *("names.py", "plan.py", "coupling.py", "fault_kinds.py"),
-    *("scenario", "fmu", "wiring", "master", "results", "tyres"),
+    *("scenario", "fmu", "wiring", "master", "results", "tyre_stand.py"),
 )
 """Modules and packages that determine what a run records; FMUs are hashed separately."""
 OF_METRICS = (*OF_RESULTS, "metrics")

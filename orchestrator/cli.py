@@ -24,13 +24,13 @@ from .messages import cut, printable
 
 COMMANDS = {
     "new": "new",
-    "build": "build",
+    "build": "build_and_list",
     "check": "check",
-    "run": "run",
-    "compare": "compare_and_diff",
+    "run": "run_and_compare",
+    "compare": "run_and_compare",
     "plot": "results",
     "animate": "results",
-    "converge": "compare_and_diff",
+    "converge": "run_and_compare",
     "study": "experiments",
     "report": "experiments",
     "sweep": "experiments",
@@ -38,14 +38,14 @@ COMMANDS = {
     "drive": "standard_tests",
     "tune": "experiments",
     "rank": "rank",
-    "list": "list",
-    "diff": "compare_and_diff",
+    "list": "build_and_list",
+    "diff": "run_and_compare",
     "salvage": "results",
     "export-ssp": "interop",
     "second-opinion": "interop",
     "tyre": "vehicle_and_tyre",
     "vehicle": "vehicle_and_tyre",
-    "cache": "build",
+    "cache": "build_and_list",
 }
 """Command -> its module in `orchestrator.commands`; the function has the same name, `_` for `-`."""
 

@@ -16,7 +16,7 @@ from .plan import Override, Plan
 from .scenario import yaml_lines
 from .scenario.find_and_load import LoadedScenario, load_scenario
 from .scenario.yaml_lines import Document
-from .tyres.stand import cornering_stiffness
+from .tyre_stand import cornering_stiffness
 from .wiring.make_plan import make_plan
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from orchestrator.errors import YawbenchError
 from orchestrator.experiments.jobs import Job, Outcome, execute
 from orchestrator.master.fmi import open_unit
-from orchestrator.master.log import Log
+from orchestrator.master.log_and_process_state import Log
 from orchestrator.plan import Instance
 
 from ._controller import PythonComponent

@@ -197,7 +197,7 @@ def _derived(plan: Plan) -> Iterable[Sequence[str]]:
 def _beside_tyres(plan: Plan) -> Iterable[Sequence[str]]:
     """Yield the deviation of stiffnesses stated for the axles from those of the scenario's tyres."""
     from ..errors import YawbenchError
-    from ..tyres.stand import cornering_stiffness
+    from ..tyre_stand import cornering_stiffness
     from ..wiring.make_plan import TYRE_FORCES
     from ..wiring.parameters import STATIC_LOADS, STIFFNESSES, known_car
 

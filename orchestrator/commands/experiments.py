@@ -302,7 +302,7 @@ def tune(context: typer.Context, file: TuningFile, options: RunOptions, seed: Tu
     )
     from ..figures.style import save
     from ..files import write_whole
-    from ..pages.page_parts import image_of
+    from ..pages.page_parts_and_provenance import image_of
     from ..results.folder_and_lock import default_folder
 
     experiment = load_experiment(file, changes=options.changes)

@@ -172,7 +172,7 @@ def tyre(
     and relaxation lengths over load.
     """
     from ..results.folder_and_lock import below_results
-    from ..tyres.stand import draw_tyre, put_on_stand
+    from ..tyre_stand import draw_tyre, put_on_stand
     from .progress import save_figure, say
 
     stand = put_on_stand(source, friction=friction, fmus=options.fmus, build=options.build)

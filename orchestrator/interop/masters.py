@@ -42,7 +42,7 @@ import numpy as np
 from ..interrupts import StopFlag
 from ..master.fmi import open_unit
 from ..master.instance import FmuInstance
-from ..master.log import Log
+from ..master.log_and_process_state import Log
 from ..master.master import Master
 from ..names import SignalName
 from ..plan import Override

@@ -6,7 +6,7 @@ same values. Setting inputs is deferred until the step, and outputs come back wi
 one exchange per step.
 
 `InstanceServer` is the other end: it does with the FMU what the master asks for, and nothing else. Its
-process ends when the master does, and with it everything that the FMU has started (see `guardian`).
+process ends when the master does, and with it everything that the FMU has started (see `ipc_and_guardian`).
 """
 
 from __future__ import annotations
@@ -26,11 +26,20 @@ from ..plan import Instance, Plan, Value, ValueRef
 from ..processes import start
 from ..supervisor import ANSWER, FAILED, LOG, REPLY, REQUEST, PipeChannel, ProcessLost
 from .fmi import SLAVES, open_unit
-from .guardian import stand_guard
 from .instance import Buffers, CtypesInstance, ExperimentSetup, FmuInstance, Status, StepCalls
-from .ipc import GET, SET, STEP, FmuProcess, LogRelay, SharedBuffer, error_record, rebuilt, shared_memory
-from .log import FATAL, OK, PROCESS, WARNING, Log, known
-from .process_state import ProcessState, flush_output
+from .ipc_and_guardian import (
+    GET,
+    SET,
+    STEP,
+    FmuProcess,
+    LogRelay,
+    SharedBuffer,
+    error_record,
+    rebuilt,
+    shared_memory,
+    stand_guard,
+)
+from .log_and_process_state import FATAL, OK, PROCESS, WARNING, Log, ProcessState, flush_output, known
 from .step_program import copying
 
 T = TypeVar("T")

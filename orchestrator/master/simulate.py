@@ -31,7 +31,7 @@ from ..results.recorder import MemoryRecorder, Recorder
 from ..results.run_record import DiagnosticRecord, EndRecord, ErrorRecord, WarningRecord
 from .child_run import ChildRun, can_be_apart
 from .fmi import keeps, open_unit
-from .log import STATUS, Log, Message
+from .log_and_process_state import STATUS, Log, Message
 from .run_loop import OpenInstance, RunLoop, RunProgress
 
 WRITTEN = 100

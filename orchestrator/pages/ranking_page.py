@@ -31,7 +31,7 @@ from ..experiments.ranking_tables import (
 from ..experiments.tables import Table
 from ..messages import changed
 from ..plan import Override
-from .page_parts import FigureImage, anchor, image_of, made_by, render, style
+from .page_parts_and_provenance import FigureImage, anchor, image_of, made_by, render, style
 
 STATES = {
     "passed": "passed",

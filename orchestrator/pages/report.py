@@ -50,18 +50,19 @@ from ..results.read_and_salvage import Results
 from ..results.run_record import RunRecord, load_record
 from ..scenario import find_and_load, yaml_lines
 from ..scenario.find_and_load import LoadedScenario
-from .diagram import diagrams, systems_of
-from .page_parts import (
+from .diagram_and_friction_map import diagrams, systems_of
+from .page_parts_and_provenance import (
     FigureImage,
     anchor,
+    count_kinds,
     fmus_of,
+    groups_of,
     image_of,
     made_by,
     programs_of,
     render,
     style,
 )
-from .provenance import count_kinds, groups_of
 from .viewer import MOST, PANELS, Settings, View, assets, viewer
 
 

@@ -30,8 +30,8 @@ from ..messages import listed
 from ..metrics.measures import words
 from ..metrics.run_metrics import columns_of, evaluate, metric, reference_of
 from ..results.read_and_salvage import Results
-from .friction_map import ground_of
-from .page_parts import render
+from .diagram_and_friction_map import ground_of
+from .page_parts_and_provenance import render
 from .viewer_data import is_numeric, pack
 
 SCRIPTS = ("data", "panels", "draw", "scene", "close_up", "road", "")

@@ -37,7 +37,7 @@ from ..planner import Planner
 from ..results.read_and_salvage import Results
 from ..scenario import yaml_lines
 from ..scenario.overrides import is_path
-from ..tyres.stand import KNOWN_BY, open_role
+from ..tyre_stand import KNOWN_BY, open_role
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

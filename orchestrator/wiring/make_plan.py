@@ -136,7 +136,7 @@ def make_plan(
         opener: opens the FMUs; default: an opener that builds nothing.
         isolated: whether each instance will run in its own process (see `master.isolation`).
         measure: measures the cornering stiffness of tyres, for instances that need it if the vehicle file
-            does not give it (see `tyres.stand.cornering_stiffness`).
+            does not give it (see `tyre_stand.cornering_stiffness`).
 
     Raises:
         ModelDescriptionError: FMUs are missing, damaged or not supported.

@@ -6,7 +6,7 @@ import signal
 import pytest
 
 from orchestrator.errors import Interrupted, SimulationError
-from orchestrator.master.log import DISCARD, ERROR, FATAL, OK, PENDING, WARNING
+from orchestrator.master.log_and_process_state import DISCARD, ERROR, FATAL, OK, PENDING, WARNING
 from orchestrator.master.simulate import simulate
 from orchestrator.results.read_and_salvage import load_results
 from tests.sentences import golden, golden_in

@@ -20,7 +20,7 @@ from orchestrator.fault_kinds import KINDS, CountedNoise, Fault, FaultLocation, 
 from orchestrator.figures.panels import FAULTY, LabelledRun
 from orchestrator.figures.plots import draw
 from orchestrator.interrupts import StopFlag
-from orchestrator.master.log import Log
+from orchestrator.master.log_and_process_state import Log
 from orchestrator.master.master import Master
 from orchestrator.master.simulate import simulate, simulate_in_memory
 from orchestrator.plan import Override

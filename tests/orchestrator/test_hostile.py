@@ -16,7 +16,7 @@ import pytest
 from orchestrator import supervisor
 from orchestrator.master import isolation
 from orchestrator.master.isolation import InstanceProcess
-from orchestrator.master.log import Log
+from orchestrator.master.log_and_process_state import Log
 from orchestrator.processes import Child
 from orchestrator.results.read_and_salvage import load_results
 from orchestrator.supervisor import FAILED, LOG, REPLY, PipeChannel, ProcessLost, ProtocolError

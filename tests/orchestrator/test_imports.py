@@ -27,7 +27,7 @@ STAGES = (
     {"metrics"},
     {"master"},  # hands rows to a recorder of `results`, has `metrics` look at them
     {"figures"},
-    {"tyres"},  # measures for plans what units want to know of their tyres
+    {"tyre_stand"},  # measures for plans what units want to know of their tyres
     {"planner"},
     {"evaluation"},
     {"experiments"},

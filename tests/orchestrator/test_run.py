@@ -13,7 +13,7 @@ import pytest
 
 from fmus.build import build_component
 from orchestrator.cli import main
-from orchestrator.master import log
+from orchestrator.master import log_and_process_state as log
 from orchestrator.master.fmi import open_unit
 from orchestrator.master.simulate import simulate
 from orchestrator.results.read_and_salvage import load_results

@@ -8,6 +8,7 @@ from collections import namedtuple
 import pytest
 
 from orchestrator.cli import main
+from orchestrator.results import formats_and_csv
 from orchestrator.results.formats_and_csv import expected_size, size_note
 from tests.fmu_copies import put_fmus
 from tests.sentences import golden, golden_in

@@ -36,7 +36,7 @@ def test_code_that_has_a_say_in_the_numbers_changes_the_hash_and_no_other(copy):
         file.write("# changed")
     assert hashes()[0] == results
     assert hashes()[1] != metrics
-    (copy / "master" / "log.py").rename(copy / "master" / "logs.py")
+    (copy / "master" / "fmi.py").rename(copy / "master" / "fmi_2.py")
     assert hashes()[0] != results
 
 

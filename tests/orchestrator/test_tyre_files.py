@@ -16,7 +16,7 @@ from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.planning import plan_experiment
 from orchestrator.interop.ssp_write import write_ssp
 from orchestrator.names import Target
-from orchestrator.pages.provenance import groups_of
+from orchestrator.pages.page_parts_and_provenance import groups_of
 from orchestrator.results.folder_and_lock import default_folder
 from orchestrator.results.plan_record_and_freshness import key_of, run_record
 from orchestrator.results.read_and_salvage import load_results

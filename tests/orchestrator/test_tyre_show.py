@@ -7,7 +7,7 @@ import pytest
 
 from components.tyres.magic_formula_62 import MagicFormula62
 from orchestrator.scenario.tir import read_tir
-from orchestrator.tyres.stand import WheelState, draw_tyre, put_on_stand, stiffnesses
+from orchestrator.tyre_stand import WheelState, draw_tyre, put_on_stand, stiffnesses
 from tests.commands import status_of
 from tests.components.stand import Stand as Bench
 from tests.sentences import golden, golden_in

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.figures.style import LabelledRun
-from orchestrator.pages.friction_map import MOST, clipped, ground_of
+from orchestrator.pages.diagram_and_friction_map import MOST, clipped, ground_of
 from orchestrator.pages.viewer import viewer
 from tests.orchestrator.recorded import noted
 from tests.sentences import golden_in

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.cache_and_checksums import checksum
-from orchestrator.pages.provenance import groups_of
+from orchestrator.pages.page_parts_and_provenance import groups_of
 from orchestrator.plan import CHOSEN, ERRATUM, LITERATURE, NEUTRAL, PAPER, ValueSource
 from orchestrator.results.plan_record_and_freshness import key_of, run_record, staleness
 from orchestrator.results.run_record import RunRecord

@@ -17,7 +17,7 @@ from orchestrator.errors import WiringError, warnings_in
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.planner import Planner
 from orchestrator.scenario.find_and_load import load_scenario
-from orchestrator.tyres.stand import cornering_stiffness
+from orchestrator.tyre_stand import cornering_stiffness
 from orchestrator.vehicles import handling_and_braking as handling
 from orchestrator.vehicles.handling_and_braking import (
     SAMPLE,

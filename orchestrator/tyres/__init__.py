@@ -1,1 +1,0 @@
-"""Tyre FMUs on a test stand."""
