@@ -200,7 +200,6 @@ def _folder_of_fmus(folder: Path | None) -> Path:
 
     from ..errors import ModelDescriptionError
     from ..fmu.opener import HOME, Opener, find_folder
-    from .build import report_build
 
     if folder is None:
         folder = find_folder(Path("here"), opener=Opener(build=True))

@@ -93,7 +93,10 @@ def test_a_command_imports_what_it_needs_itself():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = set(done.stderr.split())
     assert "orchestrator.commands.build_and_list" in loaded
-    assert not {f"orchestrator.commands.{name}" for name in COMMANDS.values() if name != "list"} & loaded
+    assert (
+        not {f"orchestrator.commands.{name}" for name in COMMANDS.values() if name != COMMANDS["list"]}
+        & loaded
+    )
 
 
 def test_a_working_folder_that_is_gone_is_one_sentence(tmp_path):
