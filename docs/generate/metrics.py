@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from orchestrator.metrics import catalogue, run_metrics
+from orchestrator.metrics import run_metrics
+from orchestrator.metrics.measures import catalogue
 
 from .text import NOTE, cell, code, docstring, table
 

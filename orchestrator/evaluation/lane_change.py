@@ -22,8 +22,9 @@ import numpy as np
 from vocabulary.lane_change import Lane, lanes_of
 
 from ..figures.style import CHANGED, QUIET, frame, line_style, new_figure
+from ..metrics.verdict import Status, compare, not_judged
 from .sine_with_dwell_figures import MARKS
-from .standard_tests import Evaluation, SeriesDriver, SeriesRun, TestSeries, Verdict, evaluation
+from .standard_tests import Evaluation, SeriesDriver, SeriesRun, TestSeries, evaluation
 from .trace import Trace, at, first_crossing
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+CLEAN = "clean"
 TOUCH = 1e-9
 """Overrun above which a cone counts as hit [m]."""
 
@@ -58,14 +60,14 @@ def evaluate_lane_change(judged: Evaluation, trace: Trace) -> None:
     judged.add("overrun", "largest distance beyond the cones", float(over[worst]), "m")
     if over[worst] > TOUCH:
         place = x[worst] - (start if isinstance(start, (int, float)) else 0.0)
-        said = f"{over[worst]:.3f} m beyond the cones, {place:.1f} m after the first cones"
-        judged.rule("clean", False, said)
+        why = f"{over[worst]:.3f} m beyond the cones, {place:.1f} m after the first cones"
+        judged.rule(CLEAN, compare(float(over[worst]), "at_most", 0.0, "m", why=why))
     elif instant is None:
-        judged.rule("clean", None, "the car has not reached the first cones")
+        judged.rule(CLEAN, not_judged("the car has not reached the first cones"))
     elif through < 0:
-        judged.rule("clean", None, "the record ends before the car has passed the last cones")
+        judged.rule(CLEAN, not_judged("the record ends before the car has passed the last cones"))
     else:
-        judged.rule("clean", True, "no cone was touched")
+        judged.rule(CLEAN, compare(0.0, "at_most", 0.0, "m", why="no cone was touched"))
     if "sideslip" in trace:
         judged.add("sideslip", "peak sideslip", float(np.abs(trace["sideslip"]).max()), "rad")
     a_y = float(np.abs(trace["acceleration_y"]).max())
@@ -73,9 +75,6 @@ def evaluate_lane_change(judged: Evaluation, trace: Trace) -> None:
     if "steering_wheel_angle" in trace:
         hand = float(np.abs(trace["steering_wheel_angle"]).max())
         judged.add("hand", "largest hand-wheel angle", hand, "rad")
-
-
-CLEAN = "clean"
 
 
 KMH = 1.0 / 3.6
@@ -115,8 +114,7 @@ def judge_entry_speeds(runs: Sequence[Evaluation]) -> TestSeries:
 
 def is_clean(run: Evaluation) -> bool:
     """Return whether a run was driven without touching a cone."""
-    ruling = run.rulings.get(CLEAN)
-    return ruling is not None and ruling.verdict is Verdict.PASSED
+    return CLEAN in run.criteria and run.criteria[CLEAN].holds is True
 
 
 EVERY = 5.0
@@ -156,12 +154,11 @@ def draw_run(trace: Trace, judged: Evaluation) -> Figure:
         axes[0].set_xlim(-AROUND, min(end + AROUND, float(x.max()) - start))
         axes[-1].set_xlabel("Distance from the first cones [m]")
         entry = judged["entry"]
-        ruling = judged.rulings[CLEAN]
+        clean = judged.criteria[CLEAN]
         speed = "" if entry is None else f", {3.6 * entry:.1f} km/h at the first cones"
         note = " · ".join([*filter(None, [trace.title, trace.name]), *judged.notes])
-        frame(
-            figure, 1.45 * sum(heights), [], f"Lane change{speed}: {ruling.verdict.value}, {ruling.why}", note
-        )
+        title = f"Lane change{speed}: {clean.status.value}, {clean.why}"
+        frame(figure, 1.45 * sum(heights), [], title, note)
     return figure
 
 
@@ -203,11 +200,11 @@ def draw_series(series: TestSeries, note: str) -> Figure:
     with new_figure() as figure:
         grid = figure.subplots(2, 2, sharex=True, squeeze=False)
         for axes, (key, says, factor) in zip(grid.flat, panels, strict=True):
-            for verdict, marker in ((Verdict.PASSED, "o"), (Verdict.FAILED, "X"), (Verdict.NOT_JUDGED, "s")):
-                runs = [run for run in series.runs if run.rulings[CLEAN].verdict is verdict]
+            for status, marker in ((Status.PASSED, "o"), (Status.FAILED, "X"), (Status.NOT_JUDGED, "s")):
+                runs = [run for run in series.runs if run.criteria[CLEAN].status is status]
                 points = [(3.6 * (run["entry"] or 0.0), run[key]) for run in runs]
                 shown = [(v, factor * value) for v, value in points if value is not None]
-                style: dict[str, Any] = {"color": MARKS[verdict], "markersize": 6.0, "linestyle": ""}
+                style: dict[str, Any] = {"color": MARKS[status], "markersize": 6.0, "linestyle": ""}
                 axes.plot([v for v, _ in shown], [value for _, value in shown], marker=marker, **style)
             axes.set_title(says)
             if (highest := series.found["highest_clean_entry_speed"]) is not None:

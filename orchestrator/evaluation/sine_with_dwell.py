@@ -32,20 +32,19 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..figures.style import shown
 from ..metrics.measures import running_integral
+from ..metrics.verdict import Status, Verdict, compare, not_judged, worst
 from .standard_tests import (
-    CriterionResult,
     Evaluation,
     NotJudged,
     SeriesDriver,
     SeriesRun,
     TestSeries,
-    Verdict,
     evaluation,
 )
 from .trace import Trace, at, first_crossing, likeness, opposed, prepared, refuse_opposed, running_mean
@@ -228,7 +227,7 @@ def evaluate_dwell(judged: Evaluation, trace: Trace, angle: float | None = None)
         course = course_of(trace)
     except NotJudged as why:
         for criterion in ("stability", "responsiveness"):
-            judged.rule(criterion, None, str(why))
+            judged.rule(criterion, not_judged(str(why)))
         return
     judged.notes += course.notes
     steered = np.abs(trace["steering_wheel_angle"] - _zero_of(trace, course))
@@ -258,22 +257,23 @@ def _stability(judged: Evaluation, course: DwellCourse) -> None:
     judged.add("peak", "second peak of the yaw rate", None if value is None else course.side * value, "rad/s")
     judged.add("peak_at", "instant of the second peak", course.peak, "s")
     short = last > t[-1] + 1e-9
-    held, said = [], []
+    ratios = []
     for late, most in RATIOS:
         known = value is not None and course.end + late <= t[-1] + 1e-9
         ratio = at(t, r, course.end + late) / value if known and value else None
         name = f"yaw-rate ratio at COS + {late:.3f} s"
         judged.add(f"ratio_{round(1000 * late)}", name, ratio, "%", "signed, over the second peak")
         if ratio is not None:
-            held.append(ratio <= most)
-            said.append(f"{percent(ratio)} of at most {100 * most:g} % at COS + {late:g} s")
+            why = f"{percent(ratio)} of at most {100 * most:g} % at COS + {late:g} s"
+            ratios.append(compare(ratio, "at_most", most, "%", why=why))
     if short:
         why = f"the record ends {t[-1] - course.end:.2f} s after completion of steer; "
-        judged.rule("stability", None, f"{why}{RATIOS[-1][0]:g} s are needed")
-    elif value is None:
-        judged.rule("stability", False, "the yaw rate has no second peak after the reversal")
+        judged.rule("stability", not_judged(f"{why}{RATIOS[-1][0]:g} s are needed"))
+    elif (deciding := worst(ratios)) is None:
+        why = "the yaw rate has no second peak after the reversal"
+        judged.rule("stability", Verdict(Status.FAILED, why=why))
     else:
-        judged.rule("stability", all(held), "; ".join(said))
+        judged.rule("stability", replace(deciding, why="; ".join(ratio.why for ratio in ratios)))
 
 
 def _responsiveness(
@@ -286,16 +286,18 @@ def _responsiveness(
     judged.add("displacement", f"lateral displacement at BOS + {AT:g} s", found, "m", reading)
     criterion = "responsiveness"
     if angle is None:
-        judged.rule(criterion, None, "A is unknown: give runs of slowly increasing steer")
+        judged.rule(criterion, not_judged("A is unknown: give runs of slowly increasing steer"))
     elif amplitude < FROM * angle * (1.0 - SLIGHT):
         return  # the criterion does not apply to this run
     elif found is None:
-        judged.rule(criterion, None, f"the record ends before BOS + {AT:g} s")
+        judged.rule(criterion, not_judged(f"the record ends before BOS + {AT:g} s"))
     elif trace.friction is not None and trace.friction < DRY * (1.0 - SLIGHT):
-        judged.rule(criterion, None, f"friction {trace.friction:g}; a dry road, {DRY:g}, is required")
+        why = f"friction {trace.friction:g}; a dry road, {DRY:g}, is required"
+        judged.rule(criterion, not_judged(why))
     else:
         least = FAR_HEAVY if trace.mass is not None and trace.mass > HEAVY else FAR
-        judged.rule(criterion, found >= least, f"{found:.2f} m of at least {least:g} m")
+        why = f"{found:.2f} m of at least {least:g} m"
+        judged.rule(criterion, compare(found, "at_least", least, "m", why=why))
         if trace.mass is None:
             judged.notes.append(f"mass unknown: assumed to be at most {HEAVY:g} kg")
 
@@ -307,7 +309,7 @@ def _add_notes(judged: Evaluation, course: DwellCourse, trace: Trace) -> None:
         peak = float(np.abs(trace["sideslip"][after]).max())
         judged.add("sideslip", "peak sideslip", peak, "rad", "from BOS to the end of the record")
         if peak > SPUN:
-            stable = judged.rulings["stability"].verdict.value
+            stable = judged.criteria["stability"].status.value
             judged.notes.append(f"sideslip reaches {math.degrees(peak):.0f} degrees (stability: {stable})")
     else:
         judged.notes.append("sideslip was not recorded: a spin may pass the ratios undetected")
@@ -317,8 +319,8 @@ def _add_notes(judged: Evaluation, course: DwellCourse, trace: Trace) -> None:
         judged.add("speed_end", "speed at COS", at(trace.time, trace["velocity_x"], course.end), "m/s")
         if abs(speed - SPEED) > SLACK:
             why = f"{3.6 * speed:.1f} km/h at BOS; 80 +- 2 km/h are required"
-            for criterion in judged.rulings:
-                judged.rule(criterion, None, why)
+            for criterion in judged.criteria:
+                judged.rule(criterion, not_judged(why))
 
 
 FIRST, STEP, LAST = 1.5, 0.5, 6.5
@@ -383,33 +385,29 @@ def judge_series(runs: Sequence[Evaluation], angle: float) -> TestSeries:
         for wanted in amplitudes(angle)
         if not any(abs(_amplitude(run) - side * wanted) <= NEAR for run in runs)
     ]
-    rulings = {criterion: _ruling(criterion, ordered, missing) for criterion in CRITERIA}
-    passed = all(ruling.verdict is Verdict.PASSED for ruling in rulings.values())
-    verdict = Verdict.PASSED if passed else Verdict.FAILED
-    criteria = {name: asdict(ruling) for name, ruling in rulings.items()}
-    found = {"A": angle, "verdict": verdict, "criteria": criteria}
-    return TestSeries(ordered, f"A = {shown(angle, 'rad')}; the series has {verdict.value}.", found, rulings)
+    criteria = {criterion: _over_runs(criterion, ordered, missing) for criterion in CRITERIA}
+    passed = all(verdict.holds for verdict in criteria.values())
+    status = Status.PASSED if passed else Status.FAILED
+    data = {name: verdict.as_data() for name, verdict in criteria.items()}
+    found = {"A": angle, "verdict": status, "criteria": data}
+    return TestSeries(ordered, f"A = {shown(angle, 'rad')}; the series has {status.value}.", found, criteria)
 
 
-def _ruling(criterion: str, runs: Sequence[Evaluation], missing: Sequence[float]) -> CriterionResult:
+def _over_runs(criterion: str, runs: Sequence[Evaluation], missing: Sequence[float]) -> Verdict:
     """Return the verdict on a criterion over all runs; `missing`: amplitudes [deg] without a run."""
-    asked = [run for run in runs if criterion in run.rulings]
-    failed = [run for run in asked if run.rulings[criterion].verdict is Verdict.FAILED]
-    if failed:
-        return CriterionResult(
-            Verdict.FAILED, f"{len(failed)} of {len(asked)} runs fail, {_failures(failed)}"
-        )
-    reasons = [one.why for run in asked if (one := run.rulings[criterion]).verdict is Verdict.NOT_JUDGED]
-    if reasons:
-        said = f"{len(reasons)} of {len(asked)} runs are not judged: {reasons[0]}"
-    elif missing:
-        lacking = ", ".join(f"{x:+.1f}" for x in missing)
-        said = f"{len(missing)} runs are missing, of {lacking} degrees"
-    elif not asked:
-        said = "no run is required"
-    else:
-        return CriterionResult(Verdict.PASSED, f"all {len(asked)} runs pass")
-    return CriterionResult(Verdict.NOT_JUDGED, said)
+    verdicts = [run.criteria[criterion] for run in runs if criterion in run.criteria]
+    deciding = worst(verdicts)
+    if deciding and deciding.holds is False:
+        failed = [run for run in runs if criterion in run.criteria and run.criteria[criterion].holds is False]
+        return replace(deciding, why=f"{len(failed)} of {len(verdicts)} runs fail, {_failures(failed)}")
+    if reasons := [verdict.why for verdict in verdicts if verdict.holds is None]:
+        return not_judged(f"{len(reasons)} of {len(verdicts)} runs are not judged: {reasons[0]}")
+    if missing:
+        degrees = ", ".join(f"{x:+.1f}" for x in missing)
+        return not_judged(f"{len(missing)} runs are missing, of {degrees} degrees")
+    if deciding is None:
+        return not_judged("no run is required")
+    return replace(deciding, why=f"all {len(verdicts)} runs pass")
 
 
 def _amplitude(run: Evaluation) -> float:

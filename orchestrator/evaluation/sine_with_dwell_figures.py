@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..figures.style import CHANGED, QUIET, frame, line_style, new_figure
-from .sine_with_dwell import AT, FAR, FAR_HEAVY, HEAVY, RATIOS, DwellCourse, course_of, percent
-from .standard_tests import Evaluation, NotJudged, TestSeries, Verdict
+from ..metrics.verdict import Status
+from .sine_with_dwell import AT, FAR, RATIOS, DwellCourse, course_of, percent
+from .standard_tests import Evaluation, NotJudged, TestSeries
 from .trace import Trace, at
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MARKS = {Verdict.PASSED: "#009E73", Verdict.FAILED: "#D55E00", Verdict.NOT_JUDGED: QUIET}
+MARKS = {Status.PASSED: "#009E73", Status.FAILED: "#D55E00", Status.NOT_JUDGED: QUIET}
 """Colours of verdicts."""
 RESPONSE = "responsiveness"
 
@@ -62,7 +63,7 @@ def draw_run(trace: Trace, judged: Evaluation) -> Figure | None:
 
 
 def _verdicts(judged: Evaluation) -> str:
-    return ", ".join(f"{name} {ruling.verdict.value}" for name, ruling in judged.rulings.items())
+    return ", ".join(f"{name} {verdict.status.value}" for name, verdict in judged.criteria.items())
 
 
 def _label(axes: Axes, x: float, y: float, text: str, place: tuple[float, float], **more: Any) -> None:
@@ -85,7 +86,7 @@ def _yaw_rate(axes: Axes, course: DwellCourse, judged: Evaluation) -> None:
     axes.set_title("Yaw rate [°/s]")
     if course.peak is None:
         axes.text(0.99, 0.06, "no peak after the reversal", transform=axes.transAxes, ha="right",
-                  color=MARKS[Verdict.FAILED])  # fmt: skip
+                  color=MARKS[Status.FAILED])  # fmt: skip
         return
     value = math.degrees(at(course.time, course.yaw_rate, course.peak))
     axes.plot([course.peak], [value], "o", color="#111111", markersize=5, zorder=4)
@@ -103,7 +104,7 @@ def _yaw_rate(axes: Axes, course: DwellCourse, judged: Evaluation) -> None:
         if ratio is None:
             continue
         good = ratio <= most
-        colour = MARKS[Verdict.PASSED if good else Verdict.FAILED]
+        colour = MARKS[Status.PASSED if good else Status.FAILED]
         axes.plot([instant], [ratio * value], "D", color=colour, markersize=5.5, zorder=4)
         text = f"{percent(ratio)} at\nCOS + {late:g} s"
         axes.text(instant, 0.97, text, transform=axes.get_xaxis_transform(), fontsize=8, color=colour,
@@ -117,15 +118,15 @@ def _displaced(axes: Axes, course: DwellCourse, judged: Evaluation, trace: Trace
     found, instant = judged["displacement"], course.begin + AT
     if found is None:
         return
-    ruling = judged.rulings.get(RESPONSE)
-    colour = MARKS[ruling.verdict] if ruling else QUIET
+    verdict = judged.criteria.get(RESPONSE)
+    colour = MARKS[verdict.status] if verdict else QUIET
     axes.axvline(instant, color=QUIET, linewidth=0.8, linestyle=(0, (1, 2)), zorder=1)
     axes.plot([instant], [found], "D", color=colour, markersize=5.5, zorder=4)
-    asked = "" if ruling else ", not required at this amplitude"
+    asked = "" if verdict else ", not required at this amplitude"
     text = f"{found:.2f} m at BOS + {AT:g} s{asked}"
     _label(axes, instant, found, text, (-7, 4), color=colour, ha="right")
-    if ruling and ruling.verdict is not Verdict.NOT_JUDGED:
-        least = FAR_HEAVY if trace.mass is not None and trace.mass > HEAVY else FAR
+    if verdict and verdict.bound is not None:
+        least = verdict.bound
         axes.plot([instant, instant + 0.35], [least] * 2, color=CHANGED, linewidth=2.2, zorder=3)
         _label(axes, instant + 0.35, least, f"at least {least:g} m", (4, -3), color=CHANGED)
 
@@ -161,8 +162,8 @@ def draw_series(series: TestSeries, note: str) -> Figure:
                     color=CHANGED,
                     ha="right",
                 )
-        asked = [run for run in series.runs if RESPONSE in run.rulings]
-        judged = [run for run in asked if run.rulings[RESPONSE].verdict is not Verdict.NOT_JUDGED]
+        asked = [run for run in series.runs if RESPONSE in run.criteria]
+        judged = [run for run in asked if run.criteria[RESPONSE].holds is not None]
         if judged:
             x = [math.degrees(abs(run["amplitude"] or 0.0)) for run in judged]
             grid[1, 0].plot([min(x), max(x)], [FAR] * 2, color=CHANGED, linewidth=1.5)
@@ -175,7 +176,7 @@ def draw_series(series: TestSeries, note: str) -> Figure:
             Line2D([], [], label=name, marker="os"[k], **line_style(k))
             for k, name in enumerate(("left first", "right first"))
         ]
-        said = "; ".join(f"{name} {one.verdict.value}: {one.why}" for name, one in series.rulings.items())
+        said = "; ".join(f"{name} {one.status.value}: {one.why}" for name, one in series.criteria.items())
         angle, verdict = math.degrees(series.found["A"]), series.found["verdict"].value
         title = f"Sine with dwell, A = {angle:.1f}°: the series has {verdict}"
         frame(figure, 5.0, handles, title, f"{said} · {note}")

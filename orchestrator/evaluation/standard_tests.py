@@ -1,17 +1,18 @@
 """Standard tests: their registry, and their results, the quantities and verdicts of a run and of a series.
 
-A verdict is passed, failed or not judged, and has a reason. A quantity that does not exist in a run is listed
+A criterion is passed, failed or not judged, with a reason. A quantity that does not exist in a run is listed
 without a number, and a criterion that needs it is not judged, never passed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from enum import Enum
 from functools import wraps
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Protocol
+
+from ..metrics.verdict import Verdict, worst
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,14 +21,6 @@ if TYPE_CHECKING:
     from .trace import Trace
 
 P = ParamSpec("P")
-
-
-class Verdict(str, Enum):
-    """The verdict on a criterion."""
-
-    PASSED = "passed"
-    FAILED = "failed"
-    NOT_JUDGED = "not judged"
 
 
 @dataclass(frozen=True)
@@ -40,17 +33,6 @@ class TestQuantity:
     reading: str = ""  # our reading of the standard
 
 
-@dataclass(frozen=True)
-class CriterionResult:
-    """The verdict on a criterion, and the reason."""
-
-    verdict: Verdict
-    why: str
-
-    def __str__(self) -> str:
-        return f"{self.verdict.value}. {self.why}"
-
-
 class NotJudged(Exception):
     """Raised when a run cannot be judged; the message is the reason."""
 
@@ -61,33 +43,32 @@ class Evaluation:
 
     label: str
     quantities: dict[str, TestQuantity] = field(default_factory=dict)  # key -> quantity
-    rulings: dict[str, CriterionResult] = field(default_factory=dict)  # by criterion
+    criteria: dict[str, Verdict] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
     def add(self, key: str, name: str, value: float | None, unit: str, reading: str = "") -> None:
         """Add a quantity."""
         self.quantities[key] = TestQuantity(name, None if value is None else float(value), unit, reading)
 
-    def rule(self, criterion: str, holds: bool | None, why: str) -> None:
-        """Add the verdict on a criterion; `holds` None: not judged."""
-        verdict = Verdict.NOT_JUDGED if holds is None else Verdict.PASSED if holds else Verdict.FAILED
-        self.rulings[criterion] = CriterionResult(verdict, why)
+    def rule(self, criterion: str, verdict: Verdict) -> None:
+        """Add the verdict on a criterion, made by `metrics.verdict.compare` or `not_judged`."""
+        self.criteria[criterion] = verdict
 
     def __getitem__(self, key: str) -> float | None:
-        found = self.quantities.get(key)
-        return found.value if found else None
+        quantity = self.quantities.get(key)
+        return quantity.value if quantity else None
 
     @property
     def verdict(self) -> Verdict | None:
-        """The verdict over all criteria; None if the test has none."""
-        return overall(ruling.verdict for ruling in self.rulings.values())
+        """The worst verdict of all criteria; None if the test has none."""
+        return worst(self.criteria.values())
 
     @property
     def judges_nothing(self) -> bool:
         """Whether nothing could be judged: no criterion or, in a test without criteria, no quantity."""
-        if self.rulings:
-            return all(one.verdict is Verdict.NOT_JUDGED for one in self.rulings.values())
-        return all(one.value is None for one in self.quantities.values())
+        if self.criteria:
+            return all(verdict.holds is None for verdict in self.criteria.values())
+        return all(quantity.value is None for quantity in self.quantities.values())
 
     def as_data(self) -> dict[str, Any]:
         """Return the evaluation as plain data for files, in SI units."""
@@ -95,9 +76,9 @@ class Evaluation:
 
         return {
             "label": self.label,
-            "verdict": self.verdict,
+            "verdict": self.verdict and self.verdict.status,
             "quantities": {key: asdict(one) | {"unit": si(one.unit)} for key, one in self.quantities.items()},
-            "criteria": {name: asdict(one) for name, one in self.rulings.items()},
+            "criteria": {name: verdict.as_data() for name, verdict in self.criteria.items()},
             "notes": self.notes,
         }
 
@@ -129,7 +110,7 @@ class TestSeries:
     runs: list[Evaluation]  # in their order
     summary: str  # in a sentence
     found: dict[str, Any]  # plain data, for files
-    rulings: dict[str, CriterionResult] = field(default_factory=dict)
+    criteria: dict[str, Verdict] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -171,15 +152,6 @@ class SeriesDriver(Protocol):
         most: float,
     ) -> None:
         """Search the highest value that passes: from `first` in steps, then by bisection."""  # fmt: skip
-
-
-def overall(verdicts: Iterable[Verdict]) -> Verdict | None:
-    """Return the worst verdict: failed, then not judged, then passed; None if there are none."""
-    found = set(verdicts)
-    for verdict in (Verdict.FAILED, Verdict.NOT_JUDGED, Verdict.PASSED):
-        if verdict in found:
-            return verdict
-    return None
 
 
 @dataclass(frozen=True)

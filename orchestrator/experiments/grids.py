@@ -7,9 +7,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from ..figures.style import digits_of, shown
+from .claims import MetricTable
 from .judged_schema import GridSpec, rank_correlation
 from .tables import Cell, Table
-from .verdicts import MetricTable
 
 
 @dataclass(frozen=True)

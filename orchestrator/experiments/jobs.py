@@ -252,7 +252,7 @@ def measured(results: Results, metrics: MetricRequests, test: TestRequest | None
 
 
 def _judged(results: Results, name: str, angle: float | None) -> MetricValues:
-    from ..evaluation.standard_tests import TESTS, Verdict
+    from ..evaluation.standard_tests import TESTS
     from ..evaluation.trace import trace_of
 
     judged = TESTS[name].evaluate(trace_of(results, name), angle)
@@ -260,8 +260,8 @@ def _judged(results: Results, name: str, angle: float | None) -> MetricValues:
         key: None if one.value is None else (one.value, one.unit) for key, one in judged.quantities.items()
     }
     verdicts = {
-        key: None if one.verdict is Verdict.NOT_JUDGED else (float(one.verdict is Verdict.PASSED), "1")
-        for key, one in judged.rulings.items()
+        criterion: None if verdict.holds is None else (float(verdict.holds), "1")
+        for criterion, verdict in judged.criteria.items()
     }
     return quantities | verdicts
 

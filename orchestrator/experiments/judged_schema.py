@@ -15,7 +15,7 @@ import operator
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, PlainValidator, PrivateAttr, Tag, model_validator
@@ -23,6 +23,7 @@ from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Priva
 from ..errors import ScenarioError
 from ..messages import listed, short
 from ..metrics.run_metrics import during, metric, window_of
+from ..metrics.verdict import SYMBOLS, Relation
 from ..scenario.quantities import convert
 from ..scenario.validation import StrictModel
 
@@ -156,8 +157,6 @@ def rank_correlation(x: Sequence[float], y: Sequence[float]) -> float | None:
 
 CELLS = 10_000
 """Largest number of cells in a grid. Chosen: a hundred times our largest."""
-OPERATORS = {"above": ">", "at_least": "≥", "below": "<", "at_most": "≤"}
-"""Operator of a condition -> its symbol."""
 
 
 def alternatives(value: object) -> dict[str, str]:
@@ -341,21 +340,21 @@ class Condition(StrictModel):
 
     @model_validator(mode="after")
     def _complete(self) -> Condition:
-        if sum(getattr(self, name) is not None for name in OPERATORS) != 1:
-            raise ValueError(f"needs exactly one of {listed(OPERATORS, last='or')}")
+        if sum(getattr(self, name) is not None for name in SYMBOLS) != 1:
+            raise ValueError(f"needs exactly one of {listed(SYMBOLS, last='or')}")
         if bool(self.derived) == bool(self.metric) or (self.derived and self.run):
             raise ValueError("needs run and metric, or derived in place of both")
         return self
 
     @property
-    def operator(self) -> str:
-        """The operator of the condition."""
-        return next(name for name in OPERATORS if getattr(self, name) is not None)
+    def relation(self) -> Relation:
+        """The relation in which the metric must be to the bound."""
+        return next(name for name in get_args(Relation) if getattr(self, name) is not None)
 
     @property
     def bound(self) -> Any:
         """The bound that the metric is compared with."""
-        return getattr(self, self.operator)
+        return getattr(self, self.relation)
 
     def __str__(self) -> str:
         bound = self.bound
@@ -363,7 +362,7 @@ class Condition(StrictModel):
             factor = "" if bound.times == 1 else f"{bound.times:g} × "
             bound = factor + (bound.run if bound.metric == self.metric else f"{bound.metric} of {bound.run}")
         of = self.derived or (f"{self.run}: {self.metric}" if self.run else self.metric)
-        return f"{of} {OPERATORS[self.operator]} {bound}"
+        return f"{of} {SYMBOLS[self.relation]} {bound}"
 
 
 class Assertion(StrictModel):

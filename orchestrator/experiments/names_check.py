@@ -125,8 +125,8 @@ def _names_of_conditions(
             yield "run", condition.run, (*key, "run")
         yield "metric", condition.metric, (*key, "metric")
         if isinstance(condition.bound, MetricReference):
-            yield "run", condition.bound.run, (*key, condition.operator, "run")
-            yield "metric", condition.bound.metric, (*key, condition.operator, "metric")
+            yield "run", condition.bound.run, (*key, condition.relation, "run")
+            yield "metric", condition.bound.metric, (*key, condition.relation, "metric")
 
 
 def _patterns(spec: ExperimentSpec) -> Iterator[tuple[Sequence[str], KeyPath]]:

@@ -14,9 +14,11 @@ from ..errors import Diagnostic
 from ..figures.style import digits_of
 from ..messages import counted
 from ..metrics.run_metrics import MetricValue
+from ..metrics.verdict import Status, Verdict, not_judged, worst
 from ..results.folder_and_lock import RUN_FILE
 from ..results.read_and_salvage import Results
 from .axes import RUN, DesignPoint, Level
+from .claims import ClaimResult, Judgement, MetricTable, Region, judge
 from .confidence import interval
 from .experiment import Case, LoadedExperiment, NamedRun
 from .grids import correlation
@@ -25,7 +27,6 @@ from .judged_schema import Claim, LimitSpec, calculate
 from .planning import PlannedExperiment, metrics_of
 from .schema import ExperimentSpec
 from .tables import Cell, Table
-from .verdicts import ClaimResult, MetricTable, Region, judge
 
 K = TypeVar("K")
 Each = Callable[..., Iterable[Any]]
@@ -175,34 +176,37 @@ class ExperimentResult:
     @cached_property
     def claims(self) -> list[ClaimResult]:
         """The judged claims of the paper."""
-        return self._all_judged("claims", self.spec.claims)
+        return self._judged("claims", self.spec.claims)
 
     @cached_property
     def checks(self) -> list[ClaimResult]:
         """Our own checks, judged."""
-        return self._all_judged("checks", self.spec.checks)
+        return self._judged("checks", self.spec.checks)
 
     @property
     def judgements(self) -> list[ClaimResult]:
         """Claims and checks."""
         return [*self.claims, *self.checks]
 
-    def _all_judged(self, group: str, said: Sequence[Claim]) -> list[ClaimResult]:
+    def _judged(self, group: str, claims: Sequence[Claim]) -> list[ClaimResult]:
         return [
-            replace(self.judged(one), region=self.regions.get((group, i)), group=group)
-            for i, one in enumerate(said)
+            ClaimResult(
+                **vars(self.judge(claim)), claim=claim, region=self.regions.get((group, i)), group=group
+            )
+            for i, claim in enumerate(claims)
         ]
 
-    def judged(self, claim: Claim) -> ClaimResult:
+    def judge(self, claim: Claim) -> Judgement:
         """Judge a claim; with axes it must hold at every setting."""
         words = {run.name: run.row for run in self.experiment.runs.values()}
         every = [judge(claim, values, words, self.derived_at[at]) for at, values in self.at.items()]
         if len(every) == 1:
             return every[0]
-        verdicts = [one.holds for one in every]
-        holds = False if False in verdicts else None if None in verdicts else True
-        text = f"holds at {verdicts.count(True)} of {counted(len(every), 'point')}"
-        return ClaimResult(claim, holds, (text,))
+        verdicts = [judgement.verdict for judgement in every]
+        holding = sum(verdict.holds is True for verdict in verdicts)
+        verdict = worst(verdicts) or Verdict(Status.PASSED)
+        text = f"holds at {holding} of {counted(len(every), 'point')}"
+        return Judgement(replace(verdict, margin=None), measured=(text,))
 
     def light(self) -> ExperimentResult:
         """Return a reduced copy with what figures over axes need, cheap to send to other processes."""
@@ -285,7 +289,7 @@ class Limit:
     others: dict[str, Level]  # axis -> level; "run" -> the run, if named
     largest: float | None  # up to which all values hold; None: not even the first
     beyond: float | None  # the next value, which fails; None: all hold
-    lacks: str = ""  # why the run beyond has no metric: "failed", "not made"
+    verdict: Verdict  # at that value, else at the largest; not judged: why the run has no metric
 
 
 def limits_of(findings: ExperimentResult, spec: LimitSpec) -> list[Limit]:
@@ -308,16 +312,18 @@ def limits_of(findings: ExperimentResult, spec: LimitSpec) -> list[Limit]:
 def _limit(
     findings: ExperimentResult, spec: LimitSpec, others: dict[str, Level], cases: list[Case], at: int
 ) -> Limit:
-    run, largest = cases[0].run, None
+    run, largest, verdict = cases[0].run, None, Verdict(Status.PASSED)
     settings = {findings.experiment.setting(case.point) for case in cases}
     for setting in sorted(settings, key=lambda setting: float(setting[at].value)):
         here = float(setting[at].value)
-        if not judge(spec, findings.at[setting], {run.name: run.row}).holds:
-            cases_here = (findings.record(case) for case in findings.cases_of(run, setting))
-            lacks = next((record.status for record in cases_here if not record.ok), "")
-            return Limit(others, largest, here, lacks)
+        verdict = judge(spec, findings.at[setting], {run.name: run.row}).verdict
+        if not verdict.holds:
+            records = (findings.record(case) for case in findings.cases_of(run, setting))
+            if status := next((record.status for record in records if not record.ok), ""):
+                verdict = not_judged(status)
+            return Limit(others, largest, here, verdict)
         largest = here
-    return Limit(others, largest, None)
+    return Limit(others, largest, None, verdict)
 
 
 def limit_table(findings: ExperimentResult, name: str) -> Table:
@@ -331,7 +337,7 @@ def limit_table(findings: ExperimentResult, name: str) -> Table:
         words: list[Cell] = [level.words for level in limit.others.values()]
         up_to = "-" if limit.largest is None else digits_of(limit.largest)
         beyond = "-" if limit.beyond is None else digits_of(limit.beyond)
-        lacks = {"": "", "failed": " (the run failed)"}.get(limit.lacks, f" ({limit.lacks})")
-        table.rows.append([*words, up_to, f"{beyond}{lacks}"])
+        why = {"failed": "the run failed"}.get(limit.verdict.why, limit.verdict.why)
+        table.rows.append([*words, up_to, f"{beyond} ({why})" if why else beyond])
     table.numbers = {len(others), len(others) + 1}
     return table

@@ -18,11 +18,11 @@ from ..metrics.measures import si
 from ..metrics.run_metrics import MetricValue, metric
 from ..results.folder_and_lock import LARGEST
 from ..results.read_and_salvage import Results
+from .claims import ClaimResult, Region
 from .judged_schema import si_number, text_of
 from .outcome import ExperimentResult, limits_of
 from .tables import TableColumn, to_csv
 from .verdict_tables import heading, verdict
-from .verdicts import ClaimResult, Region
 
 TABLE = "table.csv", "table.parquet"
 VERDICTS = "verdicts.csv"
@@ -71,7 +71,7 @@ def verdict_columns(findings: ExperimentResult) -> list[TableColumn]:
     flips = [region and region.flip for region in regions]
     return [
         TableColumn("group", "string", [one.group for one in every]),
-        TableColumn("says", "string", [one.said.says for one in every]),
+        TableColumn("says", "string", [one.claim.says for one in every]),
         TableColumn("verdict", "string", [verdict(one) for one in every]),
         TableColumn("margin", "float64", [one.margin for one in every], {"unit": "1"}),
         TableColumn("spread", "float64", [region and region.spread for region in regions], {"unit": "1"}),
@@ -209,6 +209,7 @@ def _record(findings: ExperimentResult, drawn: dict[str, str]) -> dict[str, Any]
                     "at": {axis: level.value for axis, level in one.others.items()},
                     "up_to": one.largest,
                     "not_at": one.beyond,
+                    **one.verdict.as_data(),
                 }
                 for one in limits_of(findings, limit)
             ]
@@ -231,15 +232,15 @@ def _value(value: MetricValue) -> dict[str, Any]:
 
 def _judgement(one: ClaimResult) -> dict[str, Any]:
     return {
-        "says": one.said.says,
-        "source": one.said.source,
-        "holds_if": [str(condition) for condition in one.said.holds_if],
+        "says": one.claim.says,
+        "source": one.claim.source,
+        "holds_if": [str(condition) for condition in one.claim.holds_if],
         "measured": list(one.measured),
-        "holds": one.holds,
+        "holds": one.verdict.holds,
         "verdict": verdict(one),
-        "margin": _finite(one.margin),
+        "margin": _finite(one.verdict.margin),
         "region": one.region and _region(one.region),
-        "note": one.said.note,
+        "note": one.claim.note,
     }
 
 
@@ -253,18 +254,18 @@ def _region(region: Region) -> dict[str, Any]:
         "spread": _finite(region.spread),
         "decided": region.decided,
         "robust": region.robust,
-        "flip": flip and {"open_value": flip.open_value, "at": flip.place, "words": flip.words,
+        "flip": flip and {"open_value": flip.open_value, "at": flip.number, "words": flip.words,
                           "chosen": flip.chosen or None},
         "margins": [_finite(one.margin) for one in region.points],
         "open_values": {
             line.open_value: {
-                "chosen": line.chosen.place,
+                "chosen": line.chosen.number,
                 "levels": [
-                    {"at": one.words if one.place is None else one.place, "holds": one.spot.holds,
-                     "margin": _finite(one.spot.margin)}
-                    for one in line.stops
+                    {"at": level.words if level.number is None else level.number,
+                     "holds": level.verdict.holds, "margin": _finite(level.verdict.margin)}
+                    for level in line.levels
                 ],
-                "flip": line.flip and (line.flip.words if line.flip.place is None else line.flip.place),
+                "flip": line.flip and (line.flip.words if line.flip.number is None else line.flip.number),
             }
             for line in region.lines
         },

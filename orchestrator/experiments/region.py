@@ -15,18 +15,19 @@ from pathlib import Path
 from ..errors import Diagnostic, Location, ScenarioError
 from ..messages import hint, listed
 from ..metrics.run_metrics import MetricValue
+from ..metrics.verdict import Verdict
 from ..names import OF_RUN, Target
 from ..plan import DEFAULT, Override, Plan
 from ..plan import Value as Given
 from ..planner import Planner
 from .axes import Level, OpenValueSpec, OpenVariantSpec, changes_at, latin_hypercube, levels_of
+from .claims import TIMES, ClaimResult, LevelVerdict, OpenValueScan, Region, judge
 from .experiment import RUNS, LoadedExperiment, NamedRun
 from .grids import ranked
 from .jobs import Job, MeasuredRun, keyed, ready
 from .judged_schema import Claim, MetricReference
 from .outcome import ExperimentResult, derive
 from .planning import PlannedExperiment, metrics_of, number_of, reached
-from .verdicts import TIMES, ClaimResult, LevelVerdict, OpenValueScan, PointVerdict, Region, judge
 
 ORIGIN = "region"
 """Origin of overrides that open values make."""
@@ -346,7 +347,7 @@ def _judged(
     runs = plan.runs
     words = {run.name: run.row for run in findings.experiment.runs.values()}
 
-    def spot(place: RegionPoint) -> PointVerdict:
+    def verdict_at(place: RegionPoint) -> Verdict:
         values = {}
         for name in asked.runs:
             cell = runs.cell(name, place)
@@ -362,27 +363,30 @@ def _judged(
                 )
                 if value is not None:
                     values[name, key] = value
-        found = judge(asked.claim, values, words, derive(findings.spec, values))
-        return PointVerdict(found.holds, found.margin_from(chosen))
+        return judge(asked.claim, values, words, derive(findings.spec, values)).scaled(chosen)
 
-    here = PointVerdict(chosen.holds, chosen.margin)
     lines = []
     for key, levels in asked.lines.items():
         one = runs.open_values[key]
-        stops = []
+        judged = []
         for level in levels:
             place = ((key, level),)
             if any(runs.cell(name, place)[1] for name in asked.runs):  # otherwise this is the chosen level
                 number = runs.number(key, level) if one.numeric else None
-                stops.append(LevelVerdict(level.words, number, spot(place)))
+                judged.append(LevelVerdict(level.words, number, verdict_at(place)))
         unit, factor = _shown(runs, key, asked.runs) if one.numeric else ("", 1.0)
         at = runs.chosen_number(key, asked.runs) if one.numeric else None
         lines.append(
             OpenValueScan(
-                key, one.says or key, unit, factor, LevelVerdict("as chosen", at, here), tuple(stops)
+                key,
+                one.says or key,
+                unit,
+                factor,
+                LevelVerdict("as chosen", at, chosen.verdict),
+                tuple(judged),
             )
         )
-    return Region(here, tuple(spot(place) for place in asked.points), tuple(lines))
+    return Region(chosen.verdict, tuple(verdict_at(place) for place in asked.points), tuple(lines))
 
 
 def _shown(runs: RegionRuns, key: str, names: Iterable[str]) -> tuple[str, float]:

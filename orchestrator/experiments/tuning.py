@@ -24,10 +24,10 @@ from ..errors import ScenarioError
 from ..metrics.run_metrics import MetricValue
 from ..names import Target
 from .axes import DesignAxisSpec, OverrideSpec, VariantSpec, level_at
+from .claims import MetricTable
 from .experiment import LoadedExperiment
 from .outcome import ExperimentResult, derive
 from .tables import Table, TableColumn
-from .verdicts import MetricTable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

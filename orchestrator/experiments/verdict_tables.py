@@ -13,17 +13,18 @@ from ..evaluation.standard_tests import Evaluation, StandardTest, TestQuantity, 
 from ..figures.style import shown
 from ..messages import changed
 from ..metrics.run_metrics import MetricValue, metric
+from ..metrics.verdict import Status, Verdict
 from .axes import levels_of
+from .claims import ClaimResult
 from .experiment import NamedRun
 from .grids import cells, grid_tables, side_by_side
 from .jobs import NOT_MADE
-from .judged_schema import Claim, GridSpec, MetricReference, MetricSpec, si_number
+from .judged_schema import GridSpec, MetricReference, MetricSpec, si_number
 from .outcome import ExperimentResult, limit_table
 from .schema import TableSpec
 from .tables import Cell, Table, marked, remarks
-from .verdicts import ClaimResult
 
-HOLDS, UNDECIDED, NOT_JUDGED = "holds", "undecided", "not judged"
+HOLDS, UNDECIDED, NOT_JUDGED = "holds", Status.UNDECIDED.value, Status.NOT_JUDGED.value
 CARRIES = ("margin", "region", "nearest flip")
 """Headings about the robustness of a verdict; the last two need a region."""
 FAILS = {"claims": "does not reproduce", "checks": "does not hold"}
@@ -55,7 +56,7 @@ def _grid_tables(findings: ExperimentResult, grid: GridSpec) -> list[Table]:
     """Return the tables of a grid: measured numbers with signs of verdicts, and published numbers."""
     signs: dict[tuple[str, str], str] = {}
     for one in findings.judgements if grid.holds else ():
-        about = {(c.run, c.derived or c.metric) for c in one.said.holds_if}
+        about = {(c.run, c.derived or c.metric) for c in one.claim.holds_if}
         if len(about) == 1:
             word = verdict(one)
             (key,) = about
@@ -94,17 +95,14 @@ def heading(spec: MetricSpec) -> str:
 
 
 def verdict(judgement: ClaimResult) -> str:
-    """Return the verdict as text."""
-    if judgement.holds is None:
-        return NOT_JUDGED
-    if not judgement.sure or (judgement.region and not judgement.region.decided):
-        return UNDECIDED
-    return HOLDS if judgement.holds else FAILS[judgement.group]
+    """Return the verdict on a claim or check as text."""
+    words = {Status.PASSED: HOLDS, Status.FAILED: FAILS[judgement.group]}
+    return words.get(judgement.status, judgement.status.value)
 
 
-def margin_words(judgement: ClaimResult) -> str | None:
-    """Return the margin at the chosen point, `14 %`, negative where the claim fails; None if missing."""
-    return None if judgement.margin is None else share(judgement.margin)
+def margin_words(verdict: Verdict) -> str | None:
+    """Return a margin as text, `14 %`, negative where the claim fails; None if missing."""
+    return None if verdict.margin is None else share(verdict.margin)
 
 
 def share(ratio: float) -> str:
@@ -201,7 +199,7 @@ def _run_table(findings: ExperimentResult, spec: TableSpec) -> Table:
                 )
             if some:
                 cells[1:1] = _beside(said[run.name], len(carries))
-                table.notes += [f"{run.row}: {j.said.note}" for j in said[run.name] if j.said.note]
+                table.notes += [f"{run.row}: {j.claim.note}" for j in said[run.name] if j.claim.note]
         results = findings.results.get(run.name)
         table.rows.append([marked(row, results) if results else row, *cells])
         table.notes += remarks([(row, results)]) if results else []
@@ -211,7 +209,7 @@ def _run_table(findings: ExperimentResult, spec: TableSpec) -> Table:
 def _beside(judged: Sequence[ClaimResult], carries: int) -> list[Cell]:
     """Return the cells of a run's claims: claim, verdict, robustness; several claims share the cells."""
     rows = [
-        [f"{one.said.short} ({one.said.source})", verdict(one), *_carries(one, carries)] for one in judged
+        [f"{one.claim.short} ({one.claim.source})", verdict(one), *_carries(one, carries)] for one in judged
     ]
     columns: Iterable[Sequence[str | None]] = zip(*rows, strict=True) if rows else [()] * (2 + carries)
     return ["; ".join(filter(None, column)) or None for column in columns]
@@ -222,12 +220,11 @@ def _said_of(findings: ExperimentResult, run: NamedRun, table: TableSpec) -> lis
     return [
         judgement
         for judgement in findings.claims
-        if isinstance(judgement.said, Claim)
-        and judgement.said.short
+        if judgement.claim.short
         and all(
             (condition.run, condition.metric) == (run.name, table.metrics[0])
             and not isinstance(condition.bound, MetricReference)
-            for condition in judgement.said.holds_if
+            for condition in judgement.claim.holds_if
         )
     ]
 
@@ -235,7 +232,7 @@ def _said_of(findings: ExperimentResult, run: NamedRun, table: TableSpec) -> lis
 def _carries(judgement: ClaimResult, columns: int) -> list[str | None]:
     """Return the cells of `CARRIES`."""
     how_far: list[str | None] = [*region_words(judgement)] or [None, None]
-    return [margin_words(judgement), *how_far][:columns]
+    return [margin_words(judgement.verdict), *how_far][:columns]
 
 
 def line_table(judgement: ClaimResult) -> Table:
@@ -264,7 +261,7 @@ def region_table(findings: ExperimentResult) -> Table:
         unit = one.unit or (line.unit if line and line.unit != "1" and not one.times else "")
         ends = [levels[0].words, levels[-1].words] if one.start is not None else [one.words for one in levels]
         words = " to ".join(ends) if one.start is not None else ", ".join(ends)
-        chosen = line.words(line.chosen.place) if line and line.chosen.place is not None else None
+        chosen = line.words(line.chosen.number) if line and line.chosen.number is not None else None
         rows.append([
             one.says or name, None if one.times else chosen,
             f"{words} × as chosen" if one.times else f"{words} {unit}".rstrip(), one.because,
@@ -291,8 +288,8 @@ def claim_tables(findings: ExperimentResult) -> list[Table]:
         )
         for one in judged:
             if id(one) not in beside:
-                says = f"{one.said.says} ({one.said.source})" if one.said.source else one.said.says
-                note = f"\n{one.said.note}" if one.said.note else ""
+                says = f"{one.claim.says} ({one.claim.source})" if one.claim.source else one.claim.says
+                note = f"\n{one.claim.note}" if one.claim.note else ""
                 carries = _carries(one, len(table.headings) - 3)
                 table.rows.append([f"{says}{note}", "\n".join(one.measured), verdict(one), *carries])
         if not findings.regions and judged is findings.claims and (only := reach(findings)):
@@ -310,7 +307,7 @@ def _cell(quantity: TestQuantity | None) -> Cell:
 def run_table(judged: Evaluation, title: str) -> Table:
     """Return the table of a standard test's run: a row per quantity with its reading, verdicts as notes."""
     rows: list[Sequence[Cell]] = [[one.name, _cell(one), one.reading] for one in judged.quantities.values()]
-    notes = [f"{name}: {one}" for name, one in judged.rulings.items()]
+    notes = [f"{name}: {one}" for name, one in judged.criteria.items()]
     return Table(f"{judged.label}: {title}", ["quantity", "value", "reading"], rows, notes + judged.notes)
 
 
@@ -318,14 +315,14 @@ def runs_table(runs: Sequence[Evaluation], test: StandardTest, series: TestSerie
     """Return the table of a standard test's runs, in the given order, with the series' verdict as notes."""
     keys = [key for key in test.columns if any(key in run.quantities for run in runs)]
     names = {key: run.quantities[key].name for run in reversed(runs) for key in keys if key in run.quantities}
-    criteria = list(dict.fromkeys(name for run in runs for name in run.rulings))
+    criteria = list(dict.fromkeys(name for run in runs for name in run.criteria))
     rows: list[Sequence[Cell]] = []
     for run in runs:
-        words = [run.rulings[name].verdict.value if name in run.rulings else "-" for name in criteria]
+        words = [run.criteria[name].status.value if name in run.criteria else "-" for name in criteria]
         rows.append([run.label, *(_cell(run.quantities.get(key)) for key in keys), *words])
     notes = []
     if series:
-        notes += [f"{name}: {one}" for name, one in series.rulings.items()]
+        notes += [f"{name}: {one}" for name, one in series.criteria.items()]
         notes.append(series.summary)
     notes += [f"{run.label}: {'; '.join(run.notes)}" for run in runs if run.notes]
     return Table(test.says, ["run", *(names[key] for key in keys), *criteria], rows, notes)

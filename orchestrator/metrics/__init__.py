@@ -1,5 +1,1 @@
-"""Metrics of runs and plausibility warnings."""
-
-from .measures import MeasureEntry, catalogue
-
-__all__ = ["MeasureEntry", "catalogue"]
+"""Metrics of runs, verdicts, and plausibility warnings."""

@@ -15,6 +15,7 @@ from typing import Any
 from markupsafe import Markup
 
 from ..errors import ResultsError, ScenarioError
+from ..experiments.claims import ClaimResult
 from ..experiments.confidence import LEVEL
 from ..experiments.experiment import FIGURES
 from ..experiments.figures import runs_of, title_of
@@ -38,7 +39,6 @@ from ..experiments.verdict_tables import (
     run_tables,
     verdict,
 )
-from ..experiments.verdicts import ClaimResult
 from ..figures.portrait import signals_of
 from ..figures.style import LabelledRun
 from ..messages import changed, counted, listed
@@ -95,7 +95,7 @@ def chapter(
 
     def link(one: ClaimResult) -> str:
         """Return the address that shows a claim's runs in the viewer; "" if it has none of them."""
-        shown = [numbers[run] for run in runs_of_claim(experiment, one.said) if run in numbers]
+        shown = [numbers[run] for run in runs_of_claim(experiment, one.claim) if run in numbers]
         return f"#{name}{VIEW}?shown={shown}&baseline={shown[0]}".replace(" ", "") if shown else ""
 
     return {
@@ -207,17 +207,17 @@ def answer(findings: ExperimentResult) -> str:
 def judged(one: ClaimResult) -> dict[str, Any]:
     """Return a claim with its measured values and verdict."""
     return {
-        "says": one.said.says,
-        "source": one.said.source,
+        "says": one.claim.says,
+        "source": one.claim.source,
         "measured": one.measured,
-        "conditions": [str(condition) for condition in one.said.holds_if],
+        "conditions": [str(condition) for condition in one.claim.holds_if],
         "verdict": verdict(one),
-        "margin": margin_words(one),
+        "margin": margin_words(one.verdict),
         "region": region_words(one),
         "agreeing": one.region and 100 * one.region.agreeing,
         "robust": one.region is not None and one.region.robust,
         "lines": line_table(one) if one.region else None,
-        "note": one.said.note,
+        "note": one.claim.note,
     }
 
 
@@ -253,7 +253,7 @@ def viewer_of(
     overlays = [spec for spec in findings.spec.figures if spec.what.shows == "runs"]
     named: dict[str, LabelledRun] = {}
     wanted = [run.name for spec in overlays for run in findings.experiment.matching(spec.runs)]
-    wanted += [name for one in findings.judgements for name in runs_of_claim(findings.experiment, one.said)]
+    wanted += [name for one in findings.judgements for name in runs_of_claim(findings.experiment, one.claim)]
     for run in (findings.experiment.runs[name] for name in wanted):
         results = findings.results.get(run.name)
         if results is not None and results.time.size and len(named) < MOST:

@@ -25,6 +25,7 @@ from orchestrator.experiments.planning import PlannedExperiment
 from orchestrator.experiments.schema import FIGURE_KINDS, FigureKind
 from orchestrator.fault_kinds import KINDS, FaultKind
 from orchestrator.master.simulate import simulate_in_memory
+from orchestrator.metrics.verdict import compare
 from orchestrator.results import formats_and_csv
 from orchestrator.results.recorder import ColumnRecorder
 from orchestrator.scenario.overrides import read_changes
@@ -120,7 +121,7 @@ def test_a_standard_test_with_its_series_is_a_module_and_an_entry(steered, monke
     @evaluation
     def evaluate(judged, trace):
         judged.add("angle", "largest angle", np.max(np.abs(trace["steering_wheel_angle"])), "rad")
-        judged.rule("some", judged["angle"] > 0.15, "larger than 0.15 rad")
+        judged.rule("some", compare(judged["angle"], "above", 0.15, "rad", why="larger than 0.15 rad"))
 
     def drive(driver):
         runs = [SeriesRun(f"{a:g}", f"{a:g} rad", {"driver.amplitude": a}, "wiggle") for a in (0.1, 0.2)]

@@ -12,13 +12,16 @@ from lxml import html
 
 from orchestrator.cli import main
 from orchestrator.errors import Diagnostic, ScenarioError
+from orchestrator.experiments.claims import Judgement, Region, judge
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.jobs import MeasuredRun
+from orchestrator.experiments.judged_schema import Claim
 from orchestrator.experiments.outcome import ExperimentResult
 from orchestrator.experiments.planning import plan_experiment
 from orchestrator.experiments.region import judge_region, plan_region, runs_of
 from orchestrator.experiments.verdict_tables import region_words, verdict
-from orchestrator.experiments.verdicts import Gap, PointVerdict, Region, margin
+from orchestrator.metrics.run_metrics import MetricValue
+from orchestrator.metrics.verdict import Status, Verdict, compare, not_judged, worst
 from orchestrator.planner import Planner
 from tests.checkout import ROOT
 from tests.sentences import golden, golden_in, refused
@@ -98,12 +101,12 @@ def judged(tmp_path, fmus):
 
 def test_a_flip_lies_where_the_closed_form_has_it_and_is_named_in_the_units_of_the_run(judged):
     (below, *_) = judged().claims
-    assert below.margin == pytest.approx(1 / 6)
+    assert below.verdict.margin == pytest.approx(1 / 6)
     amplitude, ratio = below.region.lines
-    assert amplitude.flip.place == pytest.approx(1.2)  # 0.06 rad; the margin is linear in the amplitude
+    assert amplitude.flip.number == pytest.approx(1.2)  # 0.06 rad; the margin is linear in the amplitude
     assert amplitude.flip.words == "0.0600 rad"
     worse = (0.06 - 0.1) / 0.06  # at the level 0.5
-    assert ratio.flip.place == pytest.approx(1 - 0.5 * (1 / 6) / (1 / 6 - worse))
+    assert ratio.flip.number == pytest.approx(1 - 0.5 * (1 / 6) / (1 / 6 - worse))
     assert ratio.margins == (pytest.approx(worse), pytest.approx((0.06 - 0.025) / 0.06))
     assert below.region.flip == ratio.flip  # a fifth of its range against 0.067 of it
     assert golden(region_words(below)[1])
@@ -127,7 +130,7 @@ def test_a_claim_is_decided_exactly_if_its_margin_is_larger_than_the_spread(judg
     findings = judged()
     for one in (*findings.claims, *findings.checks):
         if one.region:
-            assert one.region.decided == (abs(one.margin) > one.region.spread), one.said.says
+            assert one.region.decided == (abs(one.verdict.margin) > one.region.spread), one.claim.says
     verdicts = [verdict(one) for one in findings.claims]
     assert verdicts == ["undecided", "holds", "undecided", "undecided"]
 
@@ -140,13 +143,13 @@ def test_a_claim_depends_on_what_touches_its_runs_or_on_what_it_names(judged):
     assert amplitude.flip is None
     assert amplitude.unit == "× as chosen"
     assert ratio.flip.words == "0.500"  # where plain and double come to the same
-    assert len(ratio.stops) == 2  # that of the chosen value is the named run itself
+    assert len(ratio.levels) == 2  # that of the chosen value is the named run itself
 
 
 def test_a_check_is_judged_over_the_region_where_the_runs_of_claims_are_all_it_needs(judged):
     both, doubled = judged().checks
     assert both.region.robust
-    assert both.margin == pytest.approx(1.0)  # of the number itself, where the threshold is 0
+    assert both.verdict.margin == pytest.approx(1.0)  # of the number itself, where the threshold is 0
     assert both.region.lines[0].margins == (pytest.approx(0.5), pytest.approx(1.5))
     assert doubled.region.agreeing == pytest.approx(0.6)  # 0.1 times more than 0.9, of 0.5 to 1.5
     unknown = [
@@ -189,7 +192,10 @@ def test_a_variant_may_put_another_scenario_in_place_of_a_runs(judged):
     )
     below = judged((ratio, other), ("[ratio]", "[other]")).claims[0]
     line = below.region.lines[1]
-    assert [(stop.words, stop.spot.holds) for stop in line.stops] == [("doubled", False), ("long", True)]
+    assert [(level.words, level.verdict.holds) for level in line.levels] == [
+        ("doubled", False),
+        ("long", True),
+    ]
     assert line.flip.words == "doubled"
 
 
@@ -222,27 +228,64 @@ def test_runs_of_one_claim_that_differ_in_an_open_value_need_factors(judged):
 
 
 def test_a_margin_is_a_share_of_the_threshold_and_of_the_number_where_that_is_zero():
-    def over(number, bound, upwards=True):
-        return Gap(number, bound, upwards)
+    assert compare(114, "above", 100).margin == pytest.approx(0.14)
+    assert compare(114, "below", 100).margin == pytest.approx(-0.14)
+    assert compare(-0.5, "at_least", -1).margin == 0.5
+    assert compare(2, "above", 0).scaled(compare(4, "above", 0)).margin == 0.5
+    assert compare(0, "at_most", 0).margin == 0.0
+    assert compare(math.inf, "above", 1).margin == math.inf
+    assert compare(1, "below", math.inf).margin == 1.0
+    assert compare(None, "above", 2).margin is None
+    assert compare(None, "above", 2).status is compare(1, "above", None).status is Status.NOT_JUDGED
 
-    assert margin([over(114, 100)]) == pytest.approx(0.14)
-    assert margin([over(114, 100, False)]) == pytest.approx(-0.14)
-    assert margin([over(-0.5, -1)]) == 0.5
-    assert margin([over(114, 100), over(1.016, 1)]) == pytest.approx(0.016)
-    assert margin([over(2, 0)], [over(4, 0)]) == 0.5
-    assert margin([over(0, 0)]) == 0.0
-    assert margin([over(math.inf, 1)]) == math.inf
-    assert margin([over(1, math.inf, False)]) == 1.0
-    assert margin([over(1, 2), None]) is None
-    assert margin([]) is None
+
+def test_the_verdict_on_a_claim_is_that_of_its_deciding_condition_and_a_missing_number_decides():
+    values = {("a", "x"): MetricValue(114.0, "N"), ("a", "y"): MetricValue(1.016, "m")}
+
+    def verdict_on(**bounds):
+        conditions = [{"run": "a", "metric": key, "above": bound} for key, bound in bounds.items()]
+        claim = Claim.model_validate({"says": "More.", "holds_if": conditions})
+        return judge(claim, values, {"a": ""}).verdict
+
+    near = verdict_on(x=100, y=1)
+    assert (near.holds, near.value, near.bound, near.relation, near.unit) == (True, 1.016, 1, "above", "m")
+    assert near.margin == pytest.approx(0.016)
+    assert verdict_on(x=120, y=1).margin == pytest.approx(-0.05)
+    assert verdict_on(x=120, z=1).status is Status.NOT_JUDGED
+    assert verdict_on(x=120, z=1).margin is None
+
+
+def test_of_several_verdicts_the_worst_counts_and_of_equal_ones_that_with_the_smallest_margin():
+    near, far = compare(1.1, "above", 1.0), compare(3.0, "above", 1.0)
+    missed, unknown = compare(0.5, "above", 1.0), not_judged("the record ends early")
+    assert worst([]) is None
+    assert worst([far, near]) is near
+    assert worst([near, unknown]) is unknown
+    assert worst([unknown, near, missed]) is missed
+    assert missed.as_data() == {
+        "verdict": "failed", "why": "", "value": 0.5, "bound": 1.0, "margin": -0.5, "relation": "above",
+        "unit": "1",
+    }  # fmt: skip
+
+
+def test_a_verdict_within_its_confidence_interval_is_not_certain():
+    assert compare(1.1, "above", 1.0, half=0.05).certain
+    assert not compare(1.1, "above", 1.0, half=0.2).certain
+    failing = compare(0.9, "above", 1.0, half=0.2)
+    assert not Judgement(failing, (failing, compare(2.0, "above", 1.0))).certain
+    assert Judgement(failing, (failing, compare(0.5, "above", 1.0))).certain
+
+
+def at_margin(margin: float) -> Verdict:
+    return Verdict(Status.PASSED if margin > 0 else Status.FAILED, margin=margin)
 
 
 def test_the_spread_is_how_far_the_worst_tenth_comes_towards_the_threshold():
-    points = tuple(PointVerdict(m > 0, m) for m in (0.5, 0.4, 0.3, 0.2, 0.1, -0.1, 0.6, 0.7, 0.8, 0.9))
-    assert Region(PointVerdict(True, 0.5), points, ()).spread == pytest.approx(0.6)
-    assert not Region(PointVerdict(True, 0.5), points, ()).decided
-    assert Region(PointVerdict(True, 0.05), points[:5] * 2, ()).spread == 0.0
-    assert Region(PointVerdict(False, -0.5), points, ()).spread == pytest.approx(1.4)
+    points = tuple(at_margin(m) for m in (0.5, 0.4, 0.3, 0.2, 0.1, -0.1, 0.6, 0.7, 0.8, 0.9))
+    assert Region(at_margin(0.5), points, ()).spread == pytest.approx(0.6)
+    assert not Region(at_margin(0.5), points, ()).decided
+    assert Region(at_margin(0.05), points[:5] * 2, ()).spread == 0.0
+    assert Region(at_margin(-0.5), points, ()).spread == pytest.approx(1.4)
 
 
 def test_study_makes_the_runs_of_the_region_once_and_quick_leaves_them_out(

@@ -12,10 +12,11 @@ import pytest
 
 from components.drivers.sine_with_dwell import SineWithDwellParameters, sine_with_dwell
 from orchestrator.evaluation.sine_with_dwell import amplitudes, evaluate_dwell, is_series, judge_series
-from orchestrator.evaluation.standard_tests import TESTS, Evaluation, NotJudged, Verdict
+from orchestrator.evaluation.standard_tests import TESTS, Evaluation, NotJudged
 from orchestrator.evaluation.steering_tests import G, characteristic_angle, evaluate_slow_steer
 from orchestrator.evaluation.trace import Trace, load_mapping, load_trace
 from orchestrator.figures.style import save
+from orchestrator.metrics.verdict import Status, Verdict, not_judged
 from tests.commands import status_of
 from tests.sentences import golden, golden_in
 from vocabulary.units import UNITS
@@ -73,7 +74,7 @@ def trace(
 
 
 def verdicts(judged: Evaluation) -> dict[str, str]:
-    return {name: ruling.verdict.value for name, ruling in judged.rulings.items()}
+    return {name: verdict.status.value for name, verdict in judged.criteria.items()}
 
 
 @as_sampled
@@ -110,7 +111,7 @@ def test_the_limit_of_35_per_cent_decides(width, verdict):
         return fall(t, width) * 0.5 * (1.0 - np.tanh((t - END - 1.4) / 0.1))  # good at 1.75 s
 
     judged = evaluate_dwell(trace(yaw_rate=yaw_rate), A)
-    assert judged.rulings["stability"].verdict.value == verdict
+    assert judged.criteria["stability"].status.value == verdict
     assert (judged["ratio_1000"] > 0.35) == (verdict == "failed")
 
 
@@ -121,14 +122,14 @@ def test_the_limit_of_20_per_cent_decides_at_1_75_seconds():
     judged = evaluate_dwell(trace(yaw_rate=yaw_rate), A)
     assert judged["ratio_1000"] < 0.35 < 1.0
     assert judged["ratio_1750"] > 0.20
-    assert judged.rulings["stability"].verdict is Verdict.FAILED
+    assert judged.criteria["stability"].status is Status.FAILED
 
 
 def test_a_yaw_rate_that_never_falls_has_no_second_peak_and_is_unstable():
     judged = evaluate_dwell(trace(yaw_rate=lambda t: -PEAK * 0.5 * (1 + np.tanh(t - PEAK_AT))), A)
     assert judged["peak"] is None
-    assert judged.rulings["stability"].verdict is Verdict.FAILED
-    assert golden_in(judged.rulings["stability"].why)
+    assert judged.criteria["stability"].status is Status.FAILED
+    assert golden_in(judged.criteria["stability"].why)
 
 
 def test_a_ratio_is_signed_and_a_spin_that_passes_is_flagged():
@@ -136,7 +137,7 @@ def test_a_ratio_is_signed_and_a_spin_that_passes_is_flagged():
     made.signals["sideslip"][made.time > END] = radians(60.0)
     judged = evaluate_dwell(made, A)
     assert judged["ratio_1000"] < 0.0
-    assert judged.rulings["stability"].verdict is Verdict.PASSED
+    assert judged.criteria["stability"].status is Status.PASSED
     assert judged["sideslip"] == radians(60.0)
     assert golden_in(judged.notes)
 
@@ -163,9 +164,9 @@ def test_below_26_8_degrees_the_zeroing_range_ends_at_the_first_instant_above_75
 )
 def test_what_cannot_be_judged_says_why_and_passes_nothing(changes, why):
     judged = evaluate_dwell(trace(**changes), radians(4.0))
-    assert judged.rulings["stability"].verdict is Verdict.NOT_JUDGED
-    assert why in judged.rulings["stability"].why
-    assert judged.verdict is Verdict.NOT_JUDGED
+    assert judged.criteria["stability"].status is Status.NOT_JUDGED
+    assert why in judged.criteria["stability"].why
+    assert judged.verdict.status is Status.NOT_JUDGED
 
 
 def noise(size: float, seed: int = 1):
@@ -203,14 +204,14 @@ def test_a_car_that_does_not_answer_the_steering_is_not_judged(made, why):
     judged = evaluate_dwell(made, A)
     assert set(verdicts(judged)) == {"stability", "responsiveness"}
     assert set(verdicts(judged).values()) == {"not judged"}
-    assert all(why in ruling.why for ruling in judged.rulings.values())
+    assert all(why in verdict.why for verdict in judged.criteria.values())
     assert judged.judges_nothing
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_noise_is_no_answer_and_passes_nothing(seed):
     judged = evaluate_dwell(unanswered(trace(), noise(0.01, seed)), A)
-    assert judged.rulings["stability"].verdict is not Verdict.PASSED
+    assert judged.criteria["stability"].status is not Status.PASSED
 
 
 def test_a_second_peak_that_comes_later_than_the_first_ratio_is_none():
@@ -220,7 +221,7 @@ def test_a_second_peak_that_comes_later_than_the_first_ratio_is_none():
     assert evaluate_dwell(trace(yaw_rate=yaw_rate(0.8)), A)["peak_at"] == pytest.approx(END + 0.8, abs=0.005)
     judged = evaluate_dwell(trace(yaw_rate=yaw_rate(1.2)), A)
     assert judged["peak"] is None
-    assert judged.rulings["stability"].verdict is Verdict.FAILED
+    assert judged.criteria["stability"].status is Status.FAILED
 
 
 def test_a_slow_steer_whose_acceleration_opposes_it_has_no_angle():
@@ -230,7 +231,7 @@ def test_a_slow_steer_whose_acceleration_opposes_it_has_no_angle():
 
 
 def test_responsiveness_is_asked_from_5_a_on_a_dry_road_at_80_km_h():
-    assert "responsiveness" not in evaluate_dwell(trace(4.99 * A), A).rulings
+    assert "responsiveness" not in evaluate_dwell(trace(4.99 * A), A).criteria
     assert verdicts(evaluate_dwell(trace(5.0 * A), A))["responsiveness"] == "passed"
     assert verdicts(evaluate_dwell(trace(friction=0.4), A)) == {
         "stability": "passed",
@@ -274,20 +275,20 @@ def test_a_series_passes_only_if_no_run_is_missing_fails_or_is_not_judged():
             for amplitude in amplitudes(A):
                 judged = Evaluation(f"{degrees(side * amplitude):.0f}")
                 judged.add("amplitude", "amplitude", side * amplitude, "rad")
-                judged.rule("stability", True, "")
-                judged.rule("responsiveness", True, "")
+                judged.rule("stability", Verdict(Status.PASSED))
+                judged.rule("responsiveness", Verdict(Status.PASSED))
                 made.append(judged)
         if spoil is not None:
-            made[5].rule("stability", spoil[0], spoil[1])
+            made[5].rule("stability", spoil)
         return [one for k, one in enumerate(made) if k != without]
 
-    assert judge_series(runs(), A).found["verdict"] is Verdict.PASSED
+    assert judge_series(runs(), A).found["verdict"] is Status.PASSED
     missing = judge_series(runs(without=3), A)
-    assert missing.found["verdict"] is Verdict.FAILED
-    assert golden(missing.rulings["stability"].why)
-    failed = judge_series(runs(spoil=(False, "")), A)
-    assert golden(failed.rulings["stability"].why)
-    assert judge_series(runs(spoil=(None, "too short")), A).found["verdict"] is Verdict.FAILED
+    assert missing.found["verdict"] is Status.FAILED
+    assert golden(missing.criteria["stability"].why)
+    failed = judge_series(runs(spoil=Verdict(Status.FAILED)), A)
+    assert golden(failed.criteria["stability"].why)
+    assert judge_series(runs(spoil=not_judged("too short")), A).found["verdict"] is Status.FAILED
 
 
 def test_runs_of_one_amplitude_are_no_series():

@@ -14,9 +14,10 @@ import yawbench as yb
 from components.drivers.sine_sweep import SineSweepParameters, sweep
 from orchestrator.evaluation.braking_and_wind import evaluate_turn
 from orchestrator.evaluation.lane_change import evaluate_lane_change, judge_entry_speeds
-from orchestrator.evaluation.standard_tests import Evaluation, Verdict
+from orchestrator.evaluation.standard_tests import Evaluation
 from orchestrator.evaluation.steering_tests import evaluate_step, evaluate_sweep, evaluate_understeer
 from orchestrator.evaluation.trace import Trace, trace_of
+from orchestrator.metrics.verdict import Status, Verdict
 from orchestrator.results.read_and_salvage import Results
 from orchestrator.results.run_record import RunRecord
 from orchestrator.scenario.find_and_load import SHIPPED, load_scenario
@@ -158,7 +159,7 @@ def test_the_lane_changes_of_iso_3888_are_driven_clean_without_control_to_either
     base = yb.load(f"proving_ground/{name}").set({"speed": speed / 3.6, "stop_time": 8.0})
     for side in (3.5, -3.5):
         judged = evaluate_lane_change(trace_of(base.set({"driver.lane_offset": side}).run().results))
-        assert judged.rulings["clean"].verdict is Verdict.PASSED
+        assert judged.criteria["clean"].status is Status.PASSED
         assert judged["entry"] == pytest.approx(speed / 3.6, rel=0.005)
 
 
@@ -176,25 +177,32 @@ def test_a_lane_change_that_touches_a_cone_says_where():
     judged = evaluate_lane_change(made)
     assert judged["entry"] == pytest.approx(20.0 - 0.1 * 23.0 / 20.0)
     assert judged["exit"] == pytest.approx(20.0 - 0.1 * (25.0 + 125.0 + 3.0) / 20.0, abs=0.001)
-    assert golden(judged.rulings["clean"].why)
+    assert golden(judged.criteria["clean"].why)
     signals["cone_overrun"][:] = 0.0
-    assert evaluate_lane_change(made).verdict is Verdict.PASSED
+    assert evaluate_lane_change(made).verdict.status is Status.PASSED
     longer = Trace("cones", t, signals, facts=facts | {"cg_to_rear_end": 10.0})
-    assert golden(evaluate_lane_change(longer).rulings["clean"].why)
+    assert golden(evaluate_lane_change(longer).criteria["clean"].why)
     stopped = Trace("cones", t, {**signals, "position_x": 0.0 * t}, facts=facts)
-    assert evaluate_lane_change(stopped).verdict is Verdict.NOT_JUDGED
+    assert evaluate_lane_change(stopped).verdict.status is Status.NOT_JUDGED
     plain = evaluate_lane_change(Trace("no lanes", t, signals, facts={"track_start": 25.0}))
     assert plain["exit"] == pytest.approx(20.0 - 0.1 * 7.99)
 
 
 def test_a_series_counts_no_clean_run_above_one_that_was_not():
-    def run(speed, clean):
+    def run(speed, status):
         judged = Evaluation(f"{speed}")
         judged.add("entry", "speed", speed, "m/s")
-        judged.rule("clean", clean, "")
+        judged.rule("clean", Verdict(status))
         return judged
 
-    series = judge_entry_speeds([run(18.0, True), run(16.0, True), run(17.0, None), run(15.0, True)])
+    series = judge_entry_speeds(
+        [
+            run(18.0, Status.PASSED),
+            run(16.0, Status.PASSED),
+            run(17.0, Status.NOT_JUDGED),
+            run(15.0, Status.PASSED),
+        ]
+    )
     assert series.found == {"highest_clean_entry_speed": 16.0, "lowest_not_clean": 17.0}
     assert golden(series.summary)
     assert golden(judge_entry_speeds([run(15.0, False)]).summary)

@@ -15,6 +15,7 @@ from lxml import html
 from rich.console import Console
 
 from orchestrator.errors import Diagnostic, ScenarioError
+from orchestrator.experiments.claims import judge
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.figures import draw_all
 from orchestrator.experiments.grids import correlation
@@ -25,7 +26,6 @@ from orchestrator.experiments.planning import jobs_of
 from orchestrator.experiments.record import write_findings
 from orchestrator.experiments.tables import Table, for_terminal
 from orchestrator.experiments.verdict_tables import claim_tables, derived_tables, run_tables, share
-from orchestrator.experiments.verdicts import judge
 from orchestrator.figures.style import shown
 from orchestrator.metrics.run_metrics import MetricValue
 from orchestrator.pages.report import chapter, report_page, viewer_of
@@ -158,7 +158,7 @@ def test_numbers_that_decide_a_verdict_read_differently(value, bound, expected):
         {("a", "far"): MetricValue(value, "m"), ("b", "far"): MetricValue(bound, "m")},
         {"a": "held", "b": "free"},
     )
-    assert (found.holds, found.measured) == (value < bound, (expected,))
+    assert (found.verdict.holds, found.measured) == (value < bound, (expected,))
 
 
 def test_a_number_beside_a_threshold_that_it_misses_by_little_is_told_from_it():
@@ -166,7 +166,7 @@ def test_a_number_beside_a_threshold_that_it_misses_by_little_is_told_from_it():
         {"says": "No more.", "holds_if": [{"run": "a", "metric": "x", "at_most": "5 %"}]}
     )
     found = judge(claim, {("a", "x"): MetricValue(0.0500004, "%")}, {"a": "held"})
-    assert (found.holds, found.measured) == (False, ("5.00004 % (held)",))
+    assert (found.verdict.holds, found.measured) == (False, ("5.00004 % (held)",))
     angle = Claim.model_validate(
         {"says": "No more.", "holds_if": [{"run": "a", "metric": "x", "at_most": "0.0002 deg"}]}
     )
@@ -280,7 +280,7 @@ def test_a_missing_study_file_is_one_sentence(tmp_path):
 
 
 def verdicts(judgements):
-    return [one.holds for one in judgements]
+    return [judgement.verdict.holds for judgement in judgements]
 
 
 def test_claims_are_judged_by_the_results_on_disk(study, out):
@@ -316,7 +316,7 @@ def test_operators_and_factors_compare_as_they_say():
 
     def holds(**condition):
         claim = Claim(says="x", holds_if=[{"run": "a", "metric": "m", **condition}])
-        return judge(claim, values, {"a": "", "b": ""}).holds
+        return judge(claim, values, {"a": "", "b": ""}).verdict.holds
 
     assert [holds(above=1.0), holds(at_least=1.0), holds(below=1.0), holds(at_most=1.0)] == [
         False, True, False, True,
@@ -397,7 +397,7 @@ def test_a_grid_stands_beside_the_published_numbers_with_its_rank_correlation(wi
     assert grid.notes[0].endswith(", the paper: 0.00100")
     assert golden(grid.notes[1])
     assert golden(numbers.text())
-    assert findings.checks[0].holds
+    assert findings.checks[0].verdict.holds
     assert findings.checks[0].measured == ("0.900",)
 
 
@@ -430,7 +430,7 @@ def test_without_a_run_there_is_neither_correlation_nor_verdict(with_grid, out):
     )
     findings = judge_results(with_grid(), out, [lost])
     assert findings.derived == {}
-    assert findings.checks[0].holds is None
+    assert findings.checks[0].verdict.holds is None
     grid, numbers = derived_tables(findings)
     assert grid.text()[0] == ["15", "-", "0.0200", "15", "3.00", "0.0100"]
     assert golden(grid.notes[1])
@@ -448,7 +448,7 @@ def test_a_grid_without_published_numbers_is_a_plain_table(with_grid, out):
     grid, _ = derived_tables(findings)
     assert grid.text() == [["15", "1.40", "0.0200"], ["25", "2.00", "0.0400"]]
     assert len(grid.notes) == 1
-    assert findings.checks[0].holds
+    assert findings.checks[0].verdict.holds
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,10 @@ import pytest
 import yawbench as yb
 from orchestrator.evaluation.lane_change import evaluate_lane_change
 from orchestrator.evaluation.sine_with_dwell import evaluate_dwell
-from orchestrator.evaluation.standard_tests import Evaluation, Verdict
+from orchestrator.evaluation.standard_tests import Evaluation
 from orchestrator.evaluation.steering_tests import evaluate_slow_steer
 from orchestrator.evaluation.trace import trace_of
+from orchestrator.metrics.verdict import Status
 from orchestrator.plan import Override
 from orchestrator.scenario.find_and_load import SHIPPED
 from yawbench._scenario import Scenario
@@ -46,10 +47,10 @@ def test_a_of_the_cars(vehicle):
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_saloon75_fails_from_5_a_on_and_is_stable_with_fuzzy_pid(side):
-    assert dwell(side * 4.5 * A["saloon75"]).rulings["stability"].verdict is Verdict.PASSED
-    assert dwell(side * 5.0 * A["saloon75"]).rulings["stability"].verdict is Verdict.FAILED
+    assert dwell(side * 4.5 * A["saloon75"]).criteria["stability"].status is Status.PASSED
+    assert dwell(side * 5.0 * A["saloon75"]).criteria["stability"].status is Status.FAILED
     held = dwell(side * 270.0, "fuzzy_pid")
-    assert {ruling.verdict for ruling in held.rulings.values()} == {Verdict.PASSED}
+    assert {verdict.status for verdict in held.criteria.values()} == {Status.PASSED}
 
 
 def test_ratios_do_not_depend_on_the_step():
@@ -69,6 +70,6 @@ def test_left_and_right_are_mirrors():
 def test_hard_takes_iso_3888_2_at_60_km_per_h_clean_with_fuzzy_pid_and_not_without_control():
     """Without control it is clean up to 59.0 km/h, with fuzzy PID up to 61.6."""
     settings = {"step_size": 0.002, "controller.step_size": 0.004, "allocator.step_size": 0.004}
-    for controller, verdict in (("off", Verdict.FAILED), ("fuzzy_pid", Verdict.PASSED)):
+    for controller, verdict in (("off", Status.FAILED), ("fuzzy_pid", Status.PASSED)):
         run = scenario("iso_3888_2", "hard").swap(controller=f"controller_{controller}").set(settings).run()
-        assert evaluate_lane_change(trace_of(run.results)).rulings["clean"].verdict is verdict
+        assert evaluate_lane_change(trace_of(run.results)).criteria["clean"].status is verdict

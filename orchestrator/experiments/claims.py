@@ -1,0 +1,289 @@
+"""Claims, checks and limits judged by the metrics of runs; how robust a verdict is over open values.
+
+The verdict on a claim is that of the condition that decides it: all conditions must be true, so its margin is
+the smallest of theirs. Where the bound is another run's metric, it is the value of that metric at the same
+point; where a bound is 0, the margin is relative to the number at the chosen point (see `metrics.verdict`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from itertools import pairwise
+
+from ..errors import ScenarioError
+from ..figures.style import DIGITS, digits_apart, digits_of, shown
+from ..metrics.run_metrics import MetricValue
+from ..metrics.verdict import Status, Verdict, compare, worst
+from .judged_schema import Assertion, Claim, Condition, MetricReference, si_number
+
+ONE_IN = 10
+"""A verdict is undecided if it differs at one in ten points of a region, or at more. Chosen: fewer are
+exceptions that can be named."""
+TIMES = "× as chosen"
+"""Unit of an open value that is a factor, where the runs have different chosen values."""
+
+
+@dataclass(frozen=True)
+class LevelVerdict:
+    """Verdict at a level of one open value, with all others as chosen."""
+
+    words: str
+    number: float | None  # in the unit of the scan; None: not numeric
+    verdict: Verdict
+
+
+@dataclass(frozen=True)
+class Flip:
+    """The level of one open value at which a verdict changes."""
+
+    open_value: str
+    says: str  # label of the open value
+    words: str  # the level of the flip, with its unit
+    number: float | None  # interpolated linearly by margins; None: not numeric
+    distance: float  # from the chosen value, relative to the range
+    chosen: str = ""  # the chosen value with its unit; "" if the runs differ in it
+
+
+@dataclass(frozen=True)
+class OpenValueScan:
+    """Verdicts along one open value, from end to end of its range."""
+
+    open_value: str
+    says: str
+    unit: str  # unit of the numbers; "" if they have none
+    factor: float  # of a level's number to the displayed one
+    chosen: LevelVerdict
+    levels: tuple[LevelVerdict, ...]  # without the chosen one
+
+    @property
+    def margins(self) -> tuple[float, float] | None:
+        """The smallest and the largest margin of the scan, including the chosen point."""
+        every = [level.verdict.margin for level in (self.chosen, *self.levels)]
+        known = [margin for margin in every if margin is not None]
+        return (min(known), max(known)) if known else None
+
+    @property
+    def flip(self) -> Flip | None:
+        """The flip nearest to the chosen value; levels without a result are ignored."""
+        chosen = self.chosen.verdict.holds
+        known = [level for level in self.levels if level.verdict.holds is not None]
+        others = [level for level in known if level.verdict.holds != chosen]
+        if not others or chosen is None:
+            return None
+        if self.chosen.number is None:
+            return Flip(self.open_value, self.says, others[0].words, None, 1.0)
+        start = self.chosen.number
+        ascending = sorted((self.chosen, *known), key=lambda level: level.number or 0.0)
+        flips = []
+        for pair in pairwise(ascending):
+            near, far = sorted(pair, key=lambda level: abs((level.number or 0.0) - start))
+            if near.verdict.holds != far.verdict.holds:
+                flips.append(_between(near, far))
+        nearest = min(flips, key=lambda flip: abs(flip - start))
+        numbers = [level.number or 0.0 for level in ascending]
+        distance = abs(nearest - start) / (max(numbers) - min(numbers))
+        words = "" if self.unit == TIMES else self.words(start)
+        return Flip(self.open_value, self.says, self.words(nearest), nearest, distance, words)
+
+    def words(self, number: float) -> str:
+        """Return a number of the scan as text, in the display unit."""
+        unit = f" {self.unit}" if self.unit not in ("", "1") else ""
+        return f"{digits_of(number * self.factor)}{unit}"
+
+
+def _between(a: LevelVerdict, b: LevelVerdict) -> float:
+    """Return where the margin is zero between two levels, by linear interpolation."""
+    assert a.number is not None
+    assert b.number is not None
+    first, last = a.verdict.margin, b.verdict.margin
+    if first is None or last is None or not math.isfinite(first - last) or first == last:
+        return b.number
+    return a.number + (b.number - a.number) * min(max(first / (first - last), 0.0), 1.0)
+
+
+@dataclass(frozen=True)
+class Region:
+    """Verdicts on one claim over a region of open values."""
+
+    chosen: Verdict
+    points: tuple[Verdict, ...]  # of a Latin hypercube over all open values together
+    lines: tuple[OpenValueScan, ...]  # of one open value each
+
+    @property
+    def holding(self) -> int:
+        """The number of points at which the claim holds."""
+        return sum(point.holds is True for point in self.points)
+
+    @property
+    def without_result(self) -> int:
+        """The number of points without a verdict because a run failed; they count as changed verdicts."""
+        return sum(point.holds is None for point in self.points)
+
+    @property
+    def agreeing(self) -> float:
+        """The share of points with the same verdict as the chosen point."""
+        return sum(point.holds == self.chosen.holds for point in self.points) / len(self.points)
+
+    @property
+    def spread(self) -> float | None:
+        """How much the margin shrinks in the worst tenth of the points [1].
+
+        The distance from the margin at the chosen point to the best one of that tenth: infinite if runs
+        failed there, 0 if it is larger than at the chosen point.
+        """
+        if self.chosen.margin is None or self.chosen.holds is None:
+            return None
+        sign = 1.0 if self.chosen.holds else -1.0
+        margins = sorted(-math.inf if at.margin is None else sign * at.margin for at in self.points)
+        worst_tenth = margins[(len(margins) - 1) // ONE_IN]
+        return max(sign * self.chosen.margin - worst_tenth, 0.0)
+
+    @property
+    def decided(self) -> bool:
+        """Whether more than nine tenths of the points have the verdict of the chosen point.
+
+        Equivalently: the margin exceeds its spread.
+        """
+        others = sum(point.holds != self.chosen.holds for point in self.points)
+        return ONE_IN * others < len(self.points)
+
+    @property
+    def flip(self) -> Flip | None:
+        """The flip nearest to the chosen point, by distance relative to each range."""
+        flips = [flip for line in self.lines if (flip := line.flip)]
+        return min(flips, key=lambda flip: flip.distance, default=None)
+
+    @property
+    def robust(self) -> bool:
+        """Whether the verdict flips neither at a point nor along any open value."""
+        return self.agreeing == 1.0 and self.flip is None
+
+
+MetricTable = Mapping[tuple[str, str], MetricValue]
+"""(run, metric key) -> value, where there is one."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """An assertion compared with the metrics of runs."""
+
+    verdict: Verdict
+    parts: tuple[Verdict, ...] = ()  # one per condition and run
+    measured: tuple[str, ...] = ()  # the numbers of each condition in words
+
+    @property
+    def certain(self) -> bool:
+        """Whether the verdict is beyond chance: no deciding bound lies within a confidence interval."""
+        if self.verdict.holds is False:
+            return any(part.certain for part in self.parts if part.holds is False) or not self.parts
+        return self.verdict.holds is None or all(part.certain for part in self.parts)
+
+    def scaled(self, chosen: Judgement) -> Verdict:
+        """Return the verdict with its margin relative to the numbers at the chosen point."""
+        parts = zip(self.parts, chosen.parts, strict=True)
+        return _all([part.scaled(at) for part, at in parts])
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClaimResult(Judgement):
+    """A claim or check with its verdict at the chosen point and over the region."""
+
+    claim: Claim
+    region: Region | None = None
+    group: str = "claims"  # `claims` of a paper, or our own `checks`
+
+    @property
+    def status(self) -> Status:
+        """Status of the verdict; undecided if chance or the region could change it."""
+        undecided = not self.certain or (self.region is not None and not self.region.decided)
+        return Status.UNDECIDED if undecided and self.verdict.holds is not None else self.verdict.status
+
+
+def judge(
+    assertion: Assertion,
+    values: MetricTable,
+    runs: Mapping[str, str],
+    derived: Mapping[str, MetricValue] | None = None,
+) -> Judgement:
+    """Judge a claim, check or limit by the metrics of runs.
+
+    Args:
+        assertion: all its conditions must be true for every run they name.
+        values: metrics of the runs.
+        runs: name -> label of all runs, including those without values.
+        derived: key -> derived number, where there is one.
+
+    Raises:
+        ScenarioError: a bound has a unit that does not fit its metric.
+    """
+    compared = [_compare(condition, values, runs, derived or {}) for condition in assertion.holds_if]
+    parts = [part for verdicts, _ in compared for part in verdicts]
+    return Judgement(_all(parts), tuple(parts), tuple(dict.fromkeys(text for _, text in compared)))
+
+
+def _all(parts: Sequence[Verdict]) -> Verdict:
+    """Return the verdict on conditions that must all be true; not judged if a number is missing."""
+    missing = next((part for part in parts if part.status is Status.NOT_JUDGED), None)
+    margins = [part.margin for part in parts if part.margin is not None]
+    deciding = missing or worst(parts) or Verdict(Status.PASSED)
+    return replace(deciding, margin=None if missing else min(margins, default=None))
+
+
+def _compare(
+    condition: Condition, values: MetricTable, runs: Mapping[str, str], derived: Mapping[str, MetricValue]
+) -> tuple[list[Verdict], str]:
+    """Return the verdict for each run that a condition names, and all values as text."""
+    bound = condition.bound
+    if condition.derived:
+        named, measured = [""], [("", derived.get(condition.derived))]
+    else:
+        named = [run for run in runs if fnmatchcase(run, condition.run or "*")]
+        measured = [(runs[run], values.get((run, condition.metric))) for run in named]
+    known = sorted(((v, run) for run, v in measured if v is not None), key=lambda pair: pair[0].number)
+    unit = known[0][0].unit if known else ""
+    limit: float | None
+    if isinstance(bound, MetricReference):
+        other = values.get((bound.run, bound.metric))
+        limit = None if other is None else bound.times * other.number
+        half = 0.0 if other is None else abs(bound.times) * other.half
+    else:
+        limit, half = _number(bound, unit) if known else None, 0.0
+    near = [(value.number, limit) for value, _ in known] if limit is not None else []
+    digits = digits_apart(near, unit) if known else DIGITS
+    text = _range(known, len(known) < len(measured), digits)
+    if isinstance(bound, MetricReference):
+        times = f"{bound.times:g} × " if other and bound.times != 1.0 else ""
+        text += (
+            f" against {times}{_range([(other, runs[bound.run])] if other else [], other is None, digits)}"
+        )
+    itself = (bound.run, bound.metric) if isinstance(bound, MetricReference) else None
+    verdicts = []
+    for run, (_, value) in zip(named, measured, strict=True):
+        number = None if value is None else value.number
+        spread = half + (0.0 if value is None else value.half)
+        verdict = compare(number, condition.relation, limit, unit, half=spread)
+        if (run, condition.metric) == itself and verdict.holds is not None:
+            verdict = Verdict(verdict.status)  # its distance to itself says nothing
+        verdicts.append(verdict)
+    if not verdicts and limit is None:
+        verdicts = [Verdict(Status.NOT_JUDGED)]
+    return verdicts, text
+
+
+def _range(known: Sequence[tuple[MetricValue, str]], missing: bool, digits: int) -> str:
+    """Return the value as text, or the smallest and largest with their runs where they read differently."""
+    ends: dict[str, str] = {}
+    for value, run in (*known[:1], *known[-1:]):
+        ends.setdefault(shown(value.number, value.unit, digits=digits, half=value.half), run)
+    text = " to ".join(f"{number} ({run})" if run else number for number, run in ends.items())
+    return " and ".join(filter(None, [text, "no result" if missing else ""]))
+
+
+def _number(bound: float | str, unit: str) -> float:
+    try:
+        return si_number(bound, unit)
+    except ValueError as error:
+        raise ScenarioError(f"a condition's bound: {error}", code="unit-mismatch") from None

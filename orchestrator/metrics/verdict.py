@@ -1,0 +1,131 @@
+"""Verdicts: numbers compared with bounds, and how far from the opposite verdict.
+
+A claim, a criterion of a standard test and a limit all come to a `Verdict`: the number x, its bound b, and
+whether x is on the side of b where it should be. The margin is how far x lies beyond b on that side, relative
+to |b|, or to |x| where b is 0; it is negative on the other side, and zero where the verdict flips.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Any, Literal
+
+Relation = Literal["above", "at_least", "below", "at_most"]
+SYMBOLS: dict[str, str] = {"above": ">", "at_least": "≥", "below": "<", "at_most": "≤"}
+"""Relation -> its symbol."""
+_COMPARE: dict[str, Callable[[float, float], bool]] = {
+    "above": operator.gt,
+    "at_least": operator.ge,
+    "below": operator.lt,
+    "at_most": operator.le,
+}
+_UPWARDS = ("above", "at_least")
+
+
+class Status(str, Enum):
+    """Status of a verdict."""
+
+    PASSED = "passed"
+    FAILED = "failed"
+    UNDECIDED = "undecided"  # it would change by chance, or within the region of open values
+    NOT_JUDGED = "not judged"
+
+
+WORST_FIRST = (Status.FAILED, Status.NOT_JUDGED, Status.UNDECIDED, Status.PASSED)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The verdict on a claim, criterion or limit, with the number and the bound that decide it."""
+
+    status: Status
+    value: float | None = None  # in SI; None: judged by more than a number, or not judged
+    bound: float | None = None
+    relation: Relation | None = None  # in which the value has to be to the bound
+    unit: str = ""  # of both; "%" marks a ratio that is shown in per cent
+    margin: float | None = None  # [1], as defined above
+    half: float = 0.0  # half width of the confidence interval of value - bound, as means over repeats
+    why: str = ""  # the reason in words
+
+    @property
+    def holds(self) -> bool | None:
+        """Whether it passed; None unless it passed or failed."""
+        return {Status.PASSED: True, Status.FAILED: False}.get(self.status)
+
+    @property
+    def beyond(self) -> float | None:
+        """How far the value lies beyond its bound on the side where it should be, in its unit."""
+        if self.value is None or self.bound is None:
+            return None
+        return _beyond(self.value, self.bound, self.relation in _UPWARDS)
+
+    @property
+    def certain(self) -> bool:
+        """Whether the bound lies outside the confidence interval of the value."""
+        beyond = self.beyond
+        return beyond is None or not abs(beyond) < self.half
+
+    def scaled(self, chosen: Verdict) -> Verdict:
+        """Return the verdict with its margin relative to |x| of `chosen` where the bound is 0."""
+        beyond = self.beyond
+        if beyond is None or self.margin is None or self.bound:
+            return self
+        return replace(self, margin=_relative(beyond, abs(chosen.value or 0.0)))
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the verdict as plain data for files, in SI units; numbers that are not finite as text."""
+        numbers = {"value": self.value, "bound": self.bound, "margin": self.margin}
+        data = {key: x if x is None or math.isfinite(x) else str(x) for key, x in numbers.items()}
+        unit = "1" if self.unit == "%" else self.unit or None
+        return {"verdict": self.status, "why": self.why, **data, "relation": self.relation, "unit": unit}
+
+    def __str__(self) -> str:
+        return f"{self.status.value}. {self.why}"
+
+
+def compare(
+    value: float | None,
+    relation: Relation,
+    bound: float | None,
+    unit: str = "1",
+    *,
+    half: float = 0.0,
+    why: str = "",
+) -> Verdict:
+    """Compare a number with a bound in the same unit; not judged if either is missing."""
+    if value is None or bound is None:
+        return Verdict(Status.NOT_JUDGED, value, bound, relation, unit, why=why)
+    status = Status.PASSED if _COMPARE[relation](value, bound) else Status.FAILED
+    margin = _relative(_beyond(value, bound, relation in _UPWARDS), abs(bound) or abs(value))
+    return Verdict(status, value, bound, relation, unit, margin, half, why)
+
+
+def not_judged(why: str) -> Verdict:
+    """Return a verdict that could not be reached, with the reason."""
+    return Verdict(Status.NOT_JUDGED, why=why)
+
+
+def worst(verdicts: Iterable[Verdict]) -> Verdict | None:
+    """Return the worst verdict: failed, not judged, undecided, passed; then by margin. None without any."""
+
+    def badness(verdict: Verdict) -> tuple[int, float]:
+        return WORST_FIRST.index(verdict.status), math.inf if verdict.margin is None else verdict.margin
+
+    return min(verdicts, key=badness, default=None)
+
+
+def _beyond(value: float, bound: float, upwards: bool) -> float:
+    if value == bound:
+        return 0.0
+    return value - bound if upwards else bound - value
+
+
+def _relative(beyond: float, scale: float) -> float:
+    """Return a distance relative to a scale; ±1 if that is infinite, ±infinite if it is 0."""
+    if math.isinf(scale) or scale == 0.0:
+        return math.copysign(1.0 if scale else math.inf, beyond) if beyond else 0.0
+    return beyond / scale
