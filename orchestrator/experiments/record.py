@@ -73,7 +73,7 @@ def verdict_columns(findings: ExperimentResult) -> list[TableColumn]:
         TableColumn("group", "string", [one.group for one in every]),
         TableColumn("says", "string", [one.claim.says for one in every]),
         TableColumn("verdict", "string", [verdict(one) for one in every]),
-        TableColumn("margin", "float64", [one.margin for one in every], {"unit": "1"}),
+        TableColumn("margin", "float64", [one.verdict.margin for one in every], {"unit": "1"}),
         TableColumn("spread", "float64", [region and region.spread for region in regions], {"unit": "1"}),
         TableColumn("points", "int64", [region and len(region.points) for region in regions]),
         TableColumn("holds at", "int64", [region and region.holding for region in regions]),
@@ -231,6 +231,7 @@ def _value(value: MetricValue) -> dict[str, Any]:
 
 
 def _judgement(one: ClaimResult) -> dict[str, Any]:
+    deciding = one.verdict.as_data()
     return {
         "says": one.claim.says,
         "source": one.claim.source,
@@ -238,7 +239,7 @@ def _judgement(one: ClaimResult) -> dict[str, Any]:
         "measured": list(one.measured),
         "holds": one.verdict.holds,
         "verdict": verdict(one),
-        "margin": _finite(one.verdict.margin),
+        **{key: deciding[key] for key in ("value", "relation", "bound", "unit", "margin")},
         "region": one.region and _region(one.region),
         "note": one.claim.note,
     }

@@ -114,7 +114,7 @@ def test_tables_have_a_row_for_all_repeats_together(findings):
 
 
 def test_a_threshold_within_confidence_leaves_the_verdict_open(load, findings):
-    assert golden([(one.said.says, verdict(one)) for one in findings.checks])
+    assert golden([(one.claim.says, verdict(one)) for one in findings.checks])
     sure = load(("at_least: 90 %", "at_least: 75 %"))
     judged = replace(findings, experiment=sure).checks
     assert golden([verdict(one) for one in judged])
