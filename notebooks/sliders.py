@@ -14,12 +14,11 @@ app = marimo.App(width="medium", app_title="A car under sliders")
 @app.cell
 def _():
     import marimo as mo
-    import matplotlib.pyplot as plt
     import numpy as np
 
     import yawbench as yb
 
-    return mo, np, plt, yb
+    return mo, np, yb
 
 
 @app.cell
@@ -72,17 +71,8 @@ def _(mo, np, runs):
 
 
 @app.cell
-def _(np, plt, runs):
-    figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(8, 6), layout="constrained")
-    for name, run in runs.items():
-        above.plot(run.time, np.degrees(run["sideslip"]), label=name)
-        below.plot(run.time, np.degrees(run["yaw_rate"]))
-    above.plot(run.time, np.degrees(run["sideslip_ref"]), "k--", linewidth=1, label="reference")
-    below.plot(run.time, np.degrees(run["yaw_rate_ref"]), "k--", linewidth=1)
-    above.set_ylabel("sideslip in degrees")
-    above.legend()
-    below.set(xlabel="time in s", ylabel="yaw rate in degrees per s")
-    figure
+def _(runs, yb):
+    yb.view(runs, "sideslip", "yaw_rate", height=600)
     return
 
 

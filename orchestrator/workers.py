@@ -171,7 +171,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
                     raise finished.error
                 results[finished.number] = finished.value
         except BaseException:
-            self._end(terminate=True)  # do not wait for other calls
+            self.end()  # do not wait for other calls
             raise
         return [results[number] for number in range(len(results))]
 
@@ -185,7 +185,8 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
         self._workers.append(Worker(self._preload))
         return self._workers[-1]
 
-    def _end(self, *, terminate: bool) -> None:
+    def end(self, *, terminate: bool = True) -> None:
+        """End all processes; `terminate`: without waiting for their calls. Further calls start new ones."""
         workers, self._workers = self._workers, []
         for worker in workers:
             if terminate:
@@ -194,7 +195,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
             worker.close()
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        self._end(terminate=kind is not None)
+        self.end(terminate=kind is not None)
 
 
 def _answering(busy: Sequence[Worker]) -> list[Worker]:

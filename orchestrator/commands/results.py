@@ -1,4 +1,4 @@
-"""`yawbench plot`, `animate` and `salvage`: commands on recorded runs.
+"""`yawbench plot`, `animate`, `serve` and `salvage`: commands on recorded runs.
 
 A run is given by its results folder, or by a scenario, which is run first if its results are missing or out
 of date.
@@ -206,6 +206,40 @@ def write_view(
             f"{file}: cannot write the page: {error.strerror or error}", code="results-unwritable"
         ) from None
     say(f"{file}: {len(text.encode()) / 1000:.0f} kB")
+
+
+Served = Annotated[Path, typer.Argument(help="Folder of results.", metavar="FOLDER")]
+Port = Annotated[int, typer.Option("--port", min=0, max=65535, help="Port; default: any free one.")]
+Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")]
+
+
+@takes("no_build")
+def serve(
+    options: RunOptions, folder: Served = Path("results"), port: Port = 0, browser: Browser = True
+) -> None:
+    """Show the results below a folder in the browser, with a bench to run scenarios under sliders.
+
+    The address that is printed works on this machine only, until Ctrl-C. It has a random token; whoever has
+    it can read the files below the folder and make runs.
+    """
+    import webbrowser
+    from contextlib import closing
+
+    from ..errors import ResultsError
+    from ..pages.bench import Bench
+    from ..pages.server import ResultsServer
+    from .progress import say
+
+    with closing(Bench(build=options.build)) as bench:
+        try:
+            server = ResultsServer(folder, bench, port)
+        except OSError as error:
+            raise ResultsError(f"--port {port}: {error.strerror}", code="option-invalid") from None
+        with server:
+            say(f"{folder}: {server.address} (Ctrl-C ends)")
+            if browser:
+                webbrowser.open(server.address)
+            server.serve_forever()
 
 
 Folders = Annotated[

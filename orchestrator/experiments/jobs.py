@@ -8,6 +8,7 @@ from __future__ import annotations
 import sys
 import traceback
 from collections.abc import Callable, Hashable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -239,6 +240,17 @@ def run_job(job: Job, opener: OpenInstance | None = None) -> MeasuredRun:
     return replace(record, id=run)
 
 
+def recorded(job: Job) -> Results:
+    """Execute one run in this process and return its results, which are not written.
+
+    Raises:
+        YawbenchError: the scenario is wrong or the run failed.
+    """
+    from ..master.simulate import simulate_in_memory
+
+    return simulate_in_memory(job.plan or planned(job)[1])
+
+
 def measured(results: Results, metrics: MetricRequests, test: TestRequest | None = None) -> MeasuredRun:
     """Compute the metrics of a finished run; of a test its quantities, and its verdicts as 1, 0 or None."""
     values: MetricValues = {}
@@ -291,6 +303,8 @@ def execute(
     workers: int | None = None,
     done: Callable[[Outcome], None] = lambda outcome: None,
     run: Callable[[Job], Any] = run_job,
+    pool: Pool | None = None,
+    stop: StopFlag | None = None,
 ) -> list[Outcome]:
     """Execute all jobs in worker processes and return their outcomes in order.
 
@@ -305,13 +319,15 @@ def execute(
         done: called with each outcome as it arrives, once per job.
         run: function that a process calls with its job, importable by name. Its return value becomes the
             outcome's value.
+        pool: the worker processes, kept by the caller; default: one that ends with the last run.
+        stop: requests the end of all runs; default: Ctrl-C and SIGTERM do.
 
     Raises:
-        Interrupted: Ctrl-C or SIGTERM, after all processes have ended.
+        Interrupted: Ctrl-C or SIGTERM, after all processes have ended; or `stop`.
         YawbenchError: the limit of open files is too low.
     """
     outcomes: dict[int, Outcome] = {}
-    stop = StopFlag()
+    stop = stop or StopFlag()
 
     def look() -> None:
         if stop.requested:
@@ -319,7 +335,8 @@ def execute(
 
     preload = (*NEEDED, *(FOR_TESTS if any(job.test for job in jobs) else ()))
     left = list(range(len(jobs)))
-    with interrupts(stop, lambda: None), Pool(workers, preload=preload, lasting=LASTING) as pool:
+    own = nullcontext(pool) if pool else Pool(workers, preload=preload, lasting=LASTING)
+    with interrupts(stop, lambda: None), own as pool:
         for tries in reversed(range(TRIES)):
             again = []
             keep = tries == TRIES - 1

@@ -29,10 +29,17 @@ from ..figures.style import LINES, LabelledRun, line_style, shown, shown_unit
 from ..messages import listed
 from ..metrics.measures import words
 from ..metrics.run_metrics import columns_of, evaluate, metric, reference_of
+<<<<<<< HEAD
 from ..results.read_and_salvage import Results
 from .diagram_and_friction_map import ground_of
 from .page_parts_and_provenance import render
 from .viewer_data import is_numeric, pack
+=======
+from ..results.read import Results
+from .friction_map import ground_of
+from .page_parts import render
+from .viewer_data import PackedRun, is_numeric, pack
+>>>>>>> 6b7936d (Add yawbench serve: results below a folder in the browser, and a bench with sliders)
 
 SCRIPTS = ("data", "panels", "draw", "scene", "close_up", "road", "")
 MOST = 200
@@ -90,6 +97,7 @@ class Settings:
         exact: keep all samples as 32-bit floats.
         largest: size of the samples [bytes]; beyond it, the page carries the signals of the views and of the
             road alone. 0: no limit.
+        ghosts: numbers of runs that are drawn faintly behind the others.
     """
 
     views: Sequence[View] = (View(),)
@@ -98,6 +106,7 @@ class Settings:
     limits: Sequence[tuple[str, float, str]] = ()
     exact: bool = False
     largest: int = 0
+    ghosts: Sequence[int] = ()
 
 
 SETTINGS = Settings()
@@ -116,7 +125,12 @@ class CarOutline:
 
 
 def viewer(
-    runs: Sequence[LabelledRun], settings: Settings = SETTINGS, *, name: str = "view", alone: bool = False
+    runs: Sequence[LabelledRun],
+    settings: Settings = SETTINGS,
+    *,
+    name: str = "view",
+    alone: bool = False,
+    packed: Sequence[PackedRun] | None = None,
 ) -> Markup:
     """Return the viewer of runs as part of a page.
 
@@ -125,6 +139,7 @@ def viewer(
         settings: what it shows.
         name: its anchor, which the page's address refers to; letters, digits and hyphens.
         alone: whether it is the only one, so that keys need no focus.
+        packed: the runs' samples; default: packed here.
 
     Raises:
         ResultsError: there are no runs, more than `MOST`, or one without samples.
@@ -138,7 +153,7 @@ def viewer(
     roads = [_road(run.results, grounds) for run in runs]
     drawn = [_drawn(view, results) for view in settings.views]
     views = [view for view in drawn if view["panels"]] or drawn[:1]
-    packed = pack(results, exact=settings.exact)
+    packed = packed or pack(results, exact=settings.exact)
     if partial := 0 < settings.largest < sum(len(one.block) for one in packed):
         needed = _needed(views, roads)
         results = [
@@ -165,26 +180,28 @@ def viewer(
                 "faults": [[span.begin, span.end, span.label] for span in spans_of([run])],
                 "notes": _notes(run.results, road),
                 "road": road,
+                "ghost": number in settings.ghosts,
                 **block.header,
             }
-            for run, road, block in zip(runs, roads, packed, strict=True)
+            for number, (run, road, block) in enumerate(zip(runs, roads, packed, strict=True))
         ],
     }
     rows = [(metric(one).title, values) for one in settings.metrics if any(values := _values(runs, one))]
     text = render(
-        "viewer.html.j2", name=name, data=data, blocks=[block.block for block in packed], metrics=rows,
+        "viewer.html.j2", name=name, data=data, blocks=packed, metrics=rows,
         placed=any(roads), key=_key(roads, grounds), partial=partial,
     )  # fmt: skip
     return Markup(text)
 
 
-def assets() -> Markup:
-    """Return the style and the scripts that all viewers of a page share."""
+def assets(*scripts: str) -> Markup:
+    """Return the style and the scripts that all viewers of a page share, and further scripts of `static/`."""
     static = files(__package__) / "static"
     foreign = Path(str(distribution("uplot-python").locate_file("uplot/static")))
     plotter = (foreign / "uPlot.iife.js").read_text(encoding="utf-8")
     styles = [(foreign / "uPlot.min.css").read_text(encoding="utf-8"), _static(static, "viewer.css")]
-    script = "\n".join(_static(static, f"viewer_{part}.js" if part else "viewer.js") for part in SCRIPTS)
+    names = [f"viewer_{part}.js" if part else "viewer.js" for part in SCRIPTS]
+    script = "\n".join(_static(static, name) for name in (*names, *scripts))
     return Markup(
         "<style>\n{}</style>\n<script>\n(() => {{\n'use strict';\n"
         "const makeUPlot = (devicePixelRatio) => {{\n{}\nreturn uPlot;\n}};\n{}}})();\n</script>"

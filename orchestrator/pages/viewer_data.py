@@ -17,6 +17,7 @@ import math
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ CLOSE = 0.01
 
 @dataclass(frozen=True)
 class PackedRun:
-    """A run's samples: where each column is in the block, and the block in base64.
+    """A run's samples: a block of bytes, and where each column is in it.
 
     `columns`: name -> [form, offset in bytes, ...]. The forms are ["q", offset, first, step, order, bytes]:
     codes as differences of that order, a sample is (first + code) step; ["f", offset]: 32-bit floats; and
@@ -42,8 +43,15 @@ class PackedRun:
 
     rows: int
     time: list[Any]
-    block: str
+    data: bytes
     columns: dict[str, list[Any]] = field(default_factory=dict)
+    address: str = ""
+    """Where the page gets the bytes; "": it carries them."""
+
+    @cached_property
+    def block(self) -> str:
+        """The bytes as a page carries them: compressed, in base64."""
+        return base64.b64encode(gzip.compress(self.data, 9, mtime=0)).decode("ascii")
 
     @property
     def header(self) -> dict[str, Any]:
@@ -117,7 +125,7 @@ def _packed(run: Results, ranges: dict[str, tuple[float, float]], fine: set[str]
             first = math.floor(low / step)
             order, planes = _code_planes(np.rint(values / step) - first, size)
             columns[name] = ["q", block.add(planes), first, step, order, size]
-    return PackedRun(run.time.size, time, block.text(), columns)
+    return PackedRun(run.time.size, time, block.data(), columns)
 
 
 class _Block:
@@ -134,9 +142,9 @@ class _Block:
             self._size += len(planes)
         return self._offsets[planes]
 
-    def text(self) -> str:
-        """Return all bytes, compressed, in base64."""
-        return base64.b64encode(gzip.compress(b"".join(self._offsets), 9, mtime=0)).decode("ascii")
+    def data(self) -> bytes:
+        """Return all bytes."""
+        return b"".join(self._offsets)
 
 
 def _packed_time(time: np.ndarray, block: _Block) -> list[Any]:

@@ -19,19 +19,31 @@ class Viewer {
     this.restore();
     this.shift();
     this.panels = [];
+    this.removal = new AbortController();
     this.listen();
     this.road = this.find('road') ? new Road(this) : null;
     this.refresh();
+    const {signal} = this.removal;
     window.addEventListener('hashchange', () => {
       if (!this.restore()) return;
       this.refresh();
       root.scrollIntoView({block: 'nearest'});
-    });
-    new ResizeObserver(() => this.resized()).observe(root);
-    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.refresh());
-    addEventListener('beforeprint', () => this.print());
-    addEventListener('afterprint', () => this.refresh());
+    }, {signal});
+    this.observer = new ResizeObserver(() => this.resized());
+    this.observer.observe(root);
+    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.refresh(), {signal});
+    addEventListener('beforeprint', () => this.print(), {signal});
+    addEventListener('afterprint', () => this.refresh(), {signal});
     root.classList.add('yv-ready');
+  }
+
+  // Stop listening, before another viewer takes its place.
+  remove() {
+    clearTimeout(this.later);
+    this.remember();
+    if (this.road) this.road.pause();
+    this.removal.abort();
+    this.observer.disconnect();
   }
 
   initial() {
@@ -116,7 +128,10 @@ class Viewer {
     return Math.max(this.state.shown.indexOf(run.number), 0) % styles;
   }
 
-  colour(run) { return this.theme.runs[this.style(run)]; }
+  colour(run) {
+    const colour = this.theme.runs[this.style(run)];
+    return run.ghost ? colour + (colour.length === 4 ? '7' : '73') : colour; // a hexadecimal alpha
+  }
 
   dash(run) { return this.data.dashes[this.style(run)]; }
 
@@ -358,7 +373,7 @@ class Viewer {
     this.find('link').addEventListener('click', (event) => this.copyLink(event.target));
     this.find('slider').addEventListener('input', (event) => this.seek(Number(event.target.value)));
     const keys = this.data.alone ? document : this.root; // several viewers of a page: the one with the focus
-    keys.addEventListener('keydown', (event) => this.pressed(event));
+    keys.addEventListener('keydown', (event) => this.pressed(event), {signal: this.removal.signal});
   }
 
   setDifference(on) {
@@ -466,14 +481,17 @@ class Viewer {
   }
 }
 
+let bytesOf = (block) => inflate(block.textContent); // a served page has its own
+
+async function startViewer(root) {
+  root.classList.add('yv-started');
+  const data = JSON.parse(root.querySelector('script[type="application/json"]').textContent);
+  const bytes = await Promise.all([...root.querySelectorAll('script[type="text/plain"]')].map((block) => bytesOf(block)));
+  root.viewer = new Viewer(root, data, data.runs.map((run, k) => new Run(run, bytes[k], k)));
+}
+
 async function startAll() {
-  for (const root of document.querySelectorAll('.yv:not(.yv-started)')) {
-    root.classList.add('yv-started');
-    const data = JSON.parse(root.querySelector('script[type="application/json"]').textContent);
-    const blocks = [...root.querySelectorAll('script[type="text/plain"]')];
-    const bytes = await Promise.all(blocks.map((block) => inflate(block.textContent)));
-    root.viewer = new Viewer(root, data, data.runs.map((run, k) => new Run(run, bytes[k], k)));
-  }
+  for (const root of document.querySelectorAll('.yv:not(.yv-started)')) await startViewer(root);
 }
 
 if (document.readyState === 'loading') document.addEventListener('DOMContentLoaded', startAll);

@@ -1,0 +1,340 @@
+"""Bench: a page with sliders, and the runs that it asks for while they move.
+
+The page states a scenario and its changes; the bench plans the run, makes it in a worker process that keeps
+its FMUs open, and returns the viewer of this run with the earlier ones as ghosts. Runs are kept by their
+keys, so that a slider that returns to a position shows its run at once.
+"""
+
+from __future__ import annotations
+
+import shlex
+import threading
+from collections import OrderedDict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from vocabulary.vehicle import CAR
+
+from ..errors import Interrupted, ScenarioError, YawbenchError
+from ..experiments.jobs import LASTING, NEEDED, Job, execute, keyed, planned, recorded
+from ..figures.style import LabelledRun
+from ..fmu.opener import find_folder
+from ..interrupts import StopFlag
+from ..messages import hint, short
+from ..plan import Instance, Plan, Variable
+from ..planner import Planner
+from ..results.read import Results
+from ..scenario import catalogue
+from ..scenario.overrides import is_path, read_changes
+from ..scenario.scenario_schema import LoadedScenario
+from ..wiring.context import FACTS
+from ..workers import Pool, default_workers
+from .page_parts import made_by, render, style
+from .viewer import Settings, assets, viewer
+from .viewer_data import PackedRun, pack
+
+KEPT = 24
+"""Runs kept in memory. Chosen: a slider's way there and back; 0.4 GB at 64 signals of 8,001 rows, twice."""
+PATIENCE = 0.5
+"""Time [s] for which the latest run waits for the one before it, which then is stopped. Chosen: longer than
+the papers' runs take, so that the worker keeps its FMUs."""
+FACT_RANGES = {"friction": (0.1, 1.1), "speed": (5.0, 50.0)}
+"""Usual ranges of facts. Chosen: wet ice to racing tyres; a car park to 180 km/h."""
+SHOWN = ("mass", "cg_height")
+"""Quantities of the car with a slider at first, beside the facts and what the scenario sets of its driver."""
+FIRST = 6
+"""Number of sliders at first; chosen: they fit above the fold."""
+
+
+class Superseded(YawbenchError):
+    """A later run of the same page has taken the place of this one."""
+
+
+@dataclass(frozen=True)
+class Knob:
+    """A value that a slider changes.
+
+    Attributes:
+        target: as `--set` takes it.
+        unit: of measurement; "" if it has none.
+        value: of the scenario, in that unit.
+        low, high: usual range.
+        says: what the value is.
+        usual: whether the range is that of the vocabulary or the FMU, not just around the value.
+    """
+
+    target: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    says: str
+    usual: bool = True
+
+    @property
+    def step(self) -> float:
+        """The least move of the slider, about a two-hundredth of its range."""
+        return float(f"{(self.high - self.low) / 200:.0e}")
+
+
+def knobs_of(scenario: LoadedScenario, plan: Plan) -> list[Knob]:
+    """Return what sliders can change: facts, quantities of the vehicle file, parameters of instances."""
+    found = {knob.target: knob for knob in _facts(scenario, plan)}
+    for instance in plan.instances:
+        for variable in instance.fmu.of("parameter"):
+            value = instance.parameter(variable.name)
+            if variable.type != "Real" or not isinstance(value, (int, float)):
+                continue
+            of_car = variable.name in CAR and variable.name in scenario.vehicle_file.parameters
+            target = f"vehicle.{variable.name}" if of_car else f"{instance.name}.{variable.name}"
+            if any(
+                knob.target in FACTS and variable.name in FACTS[knob.target].parameters
+                for knob in found.values()
+            ):
+                continue  # the fact sets it
+            found.setdefault(target, _knob(target, variable, float(value)))
+    return list(found.values())
+
+
+def _facts(scenario: LoadedScenario, plan: Plan) -> Iterator[Knob]:
+    for name, fact in FACTS.items():
+        values = [
+            value
+            for instance in plan.instances
+            for one in (*fact.parameters, *fact.inputs)
+            if isinstance(value := instance.constants.get(one, instance.parameter(one)), float)
+        ]
+        if getattr(scenario, name) is not None and values:
+            low, high = FACT_RANGES[name]
+            unit = "" if fact.unit == "1" else fact.unit
+            yield Knob(
+                name, unit, values[0], min(low, values[0]), max(high, values[0]), f"{name} for all instances"
+            )
+
+
+def _knob(target: str, variable: Variable, value: float) -> Knob:
+    quantity = CAR.get(variable.name)
+    plausible = quantity.plausible if quantity else None
+    if plausible is None and variable.minimum is not None and variable.maximum is not None:
+        plausible = variable.minimum, variable.maximum
+    around = (min(0.0, 2 * value), max(0.0, 2 * value)) if value else (-1.0, 1.0)
+    low, high = plausible or around
+    if variable.minimum is not None:
+        low = max(low, variable.minimum)
+    if variable.maximum is not None:
+        high = min(high, variable.maximum)
+    unit = "" if variable.unit in (None, "1") else str(variable.unit)
+    low, high = min(low, value), max(high, value)
+    return Knob(target, unit, value, low, high, variable.description, plausible is not None)
+
+
+def shown_first(knobs: Sequence[Knob], plan: Plan) -> list[str]:
+    """Return the targets with a slider at first: facts, what the scenario sets of the driver, mass."""
+    stated = {
+        f"{instance.name}.{name}"
+        for instance in plan.instances
+        if instance.role == "driver"
+        for name, origin in instance.origins.items()
+        if origin.kind == "scenario"
+    }
+    wanted = (
+        *FACTS,
+        *sorted(stated),
+        *(f"vehicle.{name}" for name in SHOWN),
+        *(f"plant.{name}" for name in SHOWN),
+    )
+    known = {knob.target for knob in knobs}
+    return [target for target in wanted if target in known][:FIRST]
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A run that a page asks for.
+
+    Attributes:
+        page: the page that asks; of its runs, only the latest counts.
+        label: in the viewer.
+        scenario: by name or path.
+        settings, swaps, faults: as `--set`, `--swap` and `--fault` take them.
+    """
+
+    page: str
+    label: str
+    scenario: str
+    settings: tuple[str, ...] = ()
+    swaps: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
+
+    @property
+    def command(self) -> str:
+        """The command that makes the run."""
+        options = (("--set", self.settings), ("--swap", self.swaps), ("--fault", self.faults))
+        given = [part for option, values in options for value in values for part in (option, value)]
+        return shlex.join(["yawbench", "run", self.scenario, *given])
+
+
+class Bench:
+    """Makes the runs of bench pages, one at a time; all its processes end with `close`.
+
+    Args:
+        options: of the `Planner`.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        self._planner = Planner(**options)
+        self._planning = threading.Lock()
+        self._turn = threading.Lock()
+        self._pool = Pool(1, preload=NEEDED, lasting=LASTING)
+        self._latest: dict[str, StopFlag] = {}
+        self._kept: OrderedDict[str, tuple[Results, PackedRun]] = OrderedDict()
+        threading.Thread(target=self._warm, daemon=True).start()
+
+    def _warm(self) -> None:
+        """Start the worker before the first run asks for it."""
+        with self._turn:
+            for _ in self._pool.each(default_workers, [()]):
+                pass
+
+    def page(self, scenario: str, others: Sequence[str]) -> str:
+        """Return the page of a scenario; `others`: the names of scenarios to choose from.
+
+        Raises:
+            YawbenchError: the scenario or an FMU is wrong.
+        """
+        path = self._scenario(scenario)
+        with self._planning:
+            loaded, plan = planned(Job(scenario, path, Path()), self._planner)
+            archives = self._planner.opener.names(find_folder(path, opener=self._planner.opener))
+        knobs = knobs_of(loaded, plan)
+        swaps = [(one, choices) for one in plan.instances if len(choices := _alternatives(one, archives)) > 1]
+        data = {
+            "scenario": scenario,
+            "shown": shown_first(knobs, plan),
+            "knobs": {
+                one.target: {
+                    "unit": one.unit, "value": one.value, "low": one.low, "high": one.high, "step": one.step,
+                    "says": one.says, "usual": one.usual,
+                }
+                for one in knobs
+            },
+        }  # fmt: skip
+        return render(
+            "bench.html.j2", title=plan.title or scenario, scenario=scenario, data=data, knobs=knobs,
+            swaps=swaps, others=others,
+            wires=[f"{one.source}.{one.output} -> {one.target}" for one in plan.wires],
+            style=style(), assets=assets("bench.js"), **made_by(),
+        )  # fmt: skip
+
+    @staticmethod
+    def _scenario(name: str) -> Path:
+        """Return the scenario of a name; a path is refused."""
+        known = catalogue.names("a scenario")
+        if name not in known:
+            others = hint(name, known, lead="by name there are")
+            raise ScenarioError(f"there is no scenario {short(name)}{others}", code="scenario-unknown")
+        return catalogue.find(name, "a scenario")
+
+    def run(self, wanted: Wanted) -> tuple[str, list[str]]:
+        """Make a run unless it is kept; return its key and the warnings about its course.
+
+        Raises:
+            Superseded: a later call for the same page has come.
+            YawbenchError: the scenario or a change is wrong, or the run failed.
+        """
+        stop, earlier = StopFlag(), self._latest.get(wanted.page)
+        self._latest[wanted.page] = stop
+        changes = read_changes(wanted.swaps, wanted.settings, wanted.faults)
+        if files := [
+            str(one)
+            for one in changes
+            if one.target.names_file and (not one.swaps or is_path(str(one.value)))
+        ]:
+            raise ScenarioError(f"{files[0]}: the bench takes names, no files", code="option-invalid")
+        path = self._scenario(wanted.scenario)
+        with self._planning:
+            job = Job(wanted.scenario, path, Path(), changes)
+            job = keyed(replace(job, plan=planned(job, self._planner)[1]))
+        if job.key not in self._kept:
+            self._make(job, wanted.page, stop, earlier)
+        self._kept.move_to_end(job.key)
+        return job.key, [str(one) for one in self._kept[job.key][0].record.course_warnings]
+
+    def _make(self, job: Job, page: str, stop: StopFlag, earlier: StopFlag | None) -> None:
+        """Make a run when it is its turn, and keep it."""
+        if not self._turn.acquire(timeout=PATIENCE):
+            if earlier:
+                earlier.request()
+            self._turn.acquire()
+        try:
+            if self._latest.get(page) is not stop:
+                raise Superseded("a later run has taken the place of this one", code="run-superseded")
+            (outcome,) = execute([job], run=recorded, pool=self._pool, stop=stop)
+        except Interrupted:
+            self._pool.end()
+            raise Superseded("a later run has taken the place of this one", code="run-superseded") from None
+        finally:
+            self._turn.release()
+        if not outcome.ok:
+            raise YawbenchError(list(outcome.diagnostics))
+        (packed,) = pack([outcome.value], exact=True)
+        self._kept[job.key] = outcome.value, replace(packed, address=f"block/{job.key}")
+        while len(self._kept) > KEPT:
+            self._kept.popitem(last=False)
+
+    def viewer(self, runs: Sequence[tuple[str, str]]) -> str:
+        """Return the viewer of kept runs by (key, label): the first, and the others as ghosts."""
+        kept = [(label, *self._kept[key]) for key, label in runs if key in self._kept]
+        labelled = [LabelledRun(label, results) for label, results, _ in kept]
+        settings = Settings(ghosts=range(1, len(kept)))
+        return viewer(labelled, settings, name="run", alone=True, packed=[packed for *_, packed in kept])
+
+    def block(self, key: str) -> bytes | None:
+        """Return the samples of a kept run."""
+        return self._kept[key][1].data if key in self._kept else None
+
+    def close(self) -> None:
+        """End all processes."""
+        for stop in self._latest.values():
+            stop.request()
+        self._pool.end()
+
+
+def _alternatives(instance: Instance, archives: Sequence[str]) -> list[str]:
+    """Return the names of the FMUs that can take the place of an instance's: those of its role."""
+    return sorted({instance.fmu.name, *(name for name in archives if name.startswith(f"{instance.role}_"))})
+
+
+def wanted_of(data: Any) -> tuple[Wanted, list[tuple[str, str]]]:
+    """Return the run that a request describes, and (key, label) of the earlier ones to show beside it.
+
+    Raises:
+        ScenarioError: the request is malformed.
+    """
+    try:
+        return _Request.model_validate(data).wanted
+    except ValidationError:
+        raise ScenarioError(
+            "the request for a run is not one of the bench's page", code="value-invalid"
+        ) from None
+
+
+class _Request(BaseModel, extra="forbid", strict=True):
+    """A request for a run, as the page sends it."""
+
+    page: str
+    label: str
+    scenario: str
+    settings: list[str]
+    swaps: list[str]
+    faults: list[str]
+    earlier: list[list[str]]
+
+    @property
+    def wanted(self) -> tuple[Wanted, list[tuple[str, str]]]:
+        changes = map(tuple, (self.settings, self.swaps, self.faults))
+        earlier = [(one[0], one[1]) for one in self.earlier if len(one) == 2]
+        return Wanted(self.page, self.label, self.scenario, *changes), earlier

@@ -1,0 +1,307 @@
+"""Server of the results below a folder, for one user on this machine.
+
+    /TOKEN/                     pages and runs below the folder
+    /TOKEN/files/PATH           a page, or a file beside it
+    /TOKEN/view?run=PATH&...    the viewer of runs
+    /TOKEN/bench?scenario=NAME  the bench (see `bench`); it posts to /TOKEN/run and gets /TOKEN/block/KEY
+
+The server listens on 127.0.0.1. Every address begins with a random token, which other users and other pages
+do not know. `Host` must be the server's own, against names that other sites have pointed here; `Origin`, if
+sent, too, and must be sent with a request for a run. Paths are opened part by part below the folder, and no
+link is followed. Pages from the folder run sandboxed: their scripts cannot ask the server for runs or other
+files.
+"""
+
+from __future__ import annotations
+
+import errno
+import hmac
+import json
+import os
+import secrets
+import stat
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, suppress
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from mimetypes import guess_type
+from pathlib import Path
+from urllib.parse import parse_qs, quote, unquote, urlsplit
+
+from ..errors import ResultsError, YawbenchError
+from ..figures.style import LabelledRun
+from ..files import NO_FOLLOW
+from ..messages import changed_each, printable
+from ..results.folder import RUN_FILE
+from ..results.formats import FILES
+from ..results.read import FoundRun, found_runs, load_results
+from ..scenario import catalogue
+from .bench import Bench, Superseded, wanted_of
+from .page_parts import made_by, render, style
+from .viewer import page
+
+LARGEST = 500_000_000
+"""Largest file that is served [bytes]. Chosen: far more than a page or its side files have."""
+REQUEST = 100_000
+"""Largest request for a run [bytes]. Chosen: a hundred changes take a tenth of it."""
+SANDBOX = "sandbox allow-scripts allow-downloads allow-popups"
+OWN = (
+    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; "
+    "img-src data: blob:; connect-src 'self'"
+)
+"""Content security policies: of pages from the folder, and of the server's own."""
+
+
+def open_below(folder: Path, path: str) -> int:
+    """Open a regular file below a folder for reading, without following links; return its descriptor.
+
+    Raises:
+        OSError: there is no such file, a part of the path is a link or leaves the folder.
+    """
+    parts = path.split("/")
+    if not all(part and part not in (".", "..") and "\0" not in part and "\\" not in part for part in parts):
+        raise OSError(errno.ENOENT, "leaves the folder", path)
+    with ExitStack() as opened:
+        place = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        for part in parts[:-1]:
+            opened.callback(os.close, place)
+            place = os.open(part, os.O_RDONLY | os.O_DIRECTORY | NO_FOLLOW, dir_fd=place)
+        opened.callback(os.close, place)
+        file = os.open(parts[-1], os.O_RDONLY | os.O_NONBLOCK | NO_FOLLOW, dir_fd=place)
+    status = os.fstat(file)
+    if not stat.S_ISREG(status.st_mode) or status.st_size > LARGEST:
+        os.close(file)
+        raise OSError(errno.EINVAL, "is no file that is served", path)
+    return file
+
+
+def run_folder(folder: Path, path: str) -> Path:
+    """Return a run's folder below a folder, none of whose files is a link.
+
+    Raises:
+        ResultsError: there is no run, or a part of the path or a file is a link or leaves the folder.
+    """
+    place = folder / path
+    try:
+        os.close(open_below(folder, f"{path}/{RUN_FILE}" if path != "." else RUN_FILE))
+        links = [name for name in FILES.values() if (place / name).is_symlink()]
+    except OSError:
+        links = [RUN_FILE]
+    if links:
+        raise ResultsError(
+            f"{path}: holds no results below the folder that is served", code="results-missing"
+        )
+    return place
+
+
+class ResultsServer(ThreadingHTTPServer):
+    """Serves the results below a folder until it is closed.
+
+    Args:
+        folder: it may not exist yet.
+        bench: makes the runs.
+        port: 0: any free port.
+
+    Attributes:
+        address: of the first page, with the token.
+    """
+
+    daemon_threads = True
+
+    def __init__(self, folder: Path, bench: Bench, port: int = 0) -> None:
+        super().__init__(("127.0.0.1", port), Request)
+        self.folder, self.bench = folder, bench
+        self.token = secrets.token_urlsafe(24)
+        self.hosts = {f"{name}:{self.server_port}" for name in ("127.0.0.1", "localhost")}
+        self.address = f"http://127.0.0.1:{self.server_port}/{self.token}/"
+
+
+class Refused(Exception):
+    """A request that is answered with a status and a sentence."""
+
+    def __init__(self, status: HTTPStatus, sentence: str) -> None:
+        super().__init__(sentence)
+        self.status = status
+
+
+Query = dict[str, list[str]]
+
+
+class Request(BaseHTTPRequestHandler):
+    """A request of a browser."""
+
+    server: ResultsServer
+    protocol_version = "HTTP/1.1"
+    server_version, sys_version = "yawbench", ""
+    timeout = 60  # of an idle connection [s]; chosen: the browser opens another
+
+    def do_GET(self) -> None:
+        """Answer a request for a page or a file."""
+        self._answer(
+            {
+                "": self._index,
+                "files": self._file,
+                "view": self._view,
+                "bench": self._bench,
+                "block": self._block,
+            }
+        )
+
+    def do_POST(self) -> None:
+        """Answer a request for a run."""
+        self._answer({"run": self._run})
+
+    def _answer(self, answers: dict[str, Callable[[str, Query], None]]) -> None:
+        """Answer by the first part of the path below the token, or say why not."""
+        try:
+            path, query = self._checked()
+            kind, _, rest = path.partition("/")
+            if kind not in answers:
+                raise Refused(HTTPStatus.NOT_FOUND, "there is no such page")
+            answers[kind](rest, query)
+        except Refused as why:
+            self._send_text(why.status, str(why))
+        except Superseded as why:
+            self._send_text(HTTPStatus.CONFLICT, str(why))
+        except YawbenchError as error:
+            self._send_text(HTTPStatus.UNPROCESSABLE_ENTITY, str(error))
+        except ConnectionError:
+            self.close_connection = True
+        except OSError:
+            self._send_text(HTTPStatus.NOT_FOUND, "there is no such file below the folder")
+
+    def _checked(self) -> tuple[str, Query]:
+        """Return the path below the token and the query, after the checks of `Host`, `Origin` and token."""
+        hosts = self.server.hosts
+        if self.headers.get("Host") not in hosts:
+            raise Refused(HTTPStatus.FORBIDDEN, "the request is for another host")
+        origin = self.headers.get("Origin")
+        if (origin is not None or self.command == "POST") and origin not in {
+            f"http://{host}" for host in hosts
+        }:
+            raise Refused(HTTPStatus.FORBIDDEN, "the request comes from another site")
+        parts = urlsplit(self.path)
+        token, _, rest = parts.path.removeprefix("/").partition("/")
+        if not hmac.compare_digest(token.encode(), self.server.token.encode()):
+            raise Refused(
+                HTTPStatus.FORBIDDEN, "the address lacks the token that 'yawbench serve' has printed"
+            )
+        return unquote(rest), parse_qs(parts.query)
+
+    def _index(self, rest: str, query: Query) -> None:
+        """Send the list of pages and runs below the folder."""
+        folder = self.server.folder
+        pages = [(path, f"files/{quote(path)}") for path in pages_below(folder)]
+        runs = list(runs_below(folder))
+        text = render(
+            "results.html.j2", title=f"Results in {folder}", pages=pages, runs=runs,
+            scenarios=catalogue.names("a scenario"), style=style(), assets="", **made_by(),
+        )  # fmt: skip
+        self._send_own(text)
+
+    def _file(self, path: str, query: Query) -> None:
+        """Send a file from the folder."""
+        with open(open_below(self.server.folder, path), "rb") as file:
+            content = file.read()
+        kind = guess_type(path)[0] or "application/octet-stream"
+        self._send(
+            HTTPStatus.OK, content, f"{kind}; charset=utf-8" if kind.startswith("text/") else kind, SANDBOX
+        )
+
+    def _view(self, rest: str, query: Query) -> None:
+        """Send the viewer of recorded runs."""
+        paths = query.get("run", [])
+        if not paths:
+            raise Refused(HTTPStatus.UNPROCESSABLE_ENTITY, "choose a run")
+        loaded = [load_results(run_folder(self.server.folder, path)) for path in paths]
+        titles = dict.fromkeys(
+            results.record.title or path for path, results in zip(paths, loaded, strict=True)
+        )
+        changed = changed_each(
+            [(path, one.record.overrides) for path, one in zip(paths, loaded, strict=True)]
+        )
+        runs = [LabelledRun(path, results) for path, results in zip(paths, loaded, strict=True)]
+        self._send_own(page(runs, title="; ".join(titles), below=", ".join(paths), changed=changed))
+
+    def _bench(self, rest: str, query: Query) -> None:
+        """Send the bench of a scenario."""
+        names = catalogue.names("a scenario")
+        scenario = query.get("scenario", names)[0]
+        self._send_own(self.server.bench.page(scenario, names))
+
+    def _block(self, key: str, query: Query) -> None:
+        """Send the samples of a run of the bench."""
+        data = self.server.bench.block(key)
+        if data is None:
+            raise Refused(HTTPStatus.NOT_FOUND, "this run is not kept any more")
+        self._send(HTTPStatus.OK, data, "application/octet-stream", OWN)
+
+    def _run(self, rest: str, query: Query) -> None:
+        """Make a run of the bench, and send its key and the viewer with it and the earlier ones."""
+        began = time.perf_counter()
+        length = self.headers.get("Content-Length", "")
+        if not length.isdecimal() or int(length) > REQUEST:
+            self.close_connection = True
+            raise Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "the request is too large")
+        try:
+            asked = json.loads(self.rfile.read(int(length)))
+        except ValueError:
+            asked = None
+        wanted, earlier = wanted_of(asked)
+        key, made = self.server.bench.run(wanted)
+        html = self.server.bench.viewer([(key, wanted.label), *earlier])
+        answer = {
+            "key": key, "html": html, "command": wanted.command, "warnings": made,
+            "milliseconds": round(1000 * (time.perf_counter() - began)),
+        }  # fmt: skip
+        self._send(HTTPStatus.OK, json.dumps(answer).encode(), "application/json", OWN)
+
+    def _send_own(self, text: str) -> None:
+        self._send(HTTPStatus.OK, text.encode(), "text/html; charset=utf-8", OWN)
+
+    def _send_text(self, status: HTTPStatus, sentence: str) -> None:
+        self._send(status, f"{printable(sentence)}\n".encode(), "text/plain; charset=utf-8", OWN)
+
+    def _send(self, status: HTTPStatus, content: bytes, kind: str, policy: str) -> None:
+        if self.command == "POST" and status is not HTTPStatus.OK:
+            self.close_connection = True  # its content may not have been read
+        self.send_response(status)
+        headers = {
+            "Content-Type": kind, "Content-Length": str(len(content)), "Content-Security-Policy": policy,
+            "X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer",
+            "Cache-Control": "no-store", "X-Frame-Options": "DENY",
+        }  # fmt: skip
+        if policy is OWN:  # to a sandboxed page, the files beside it are of another origin
+            headers["Cross-Origin-Resource-Policy"] = "same-origin"
+        for name, value in headers.items():
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(content)
+
+    def log_message(self, format: str, *arguments: object) -> None:
+        """Print nothing: the address in each line has the token."""
+
+
+def pages_below(folder: Path) -> Iterator[str]:
+    """Yield the paths of the HTML pages below a folder that are no links, in alphabetical order."""
+    found = [
+        path.relative_to(folder).as_posix()
+        for place, _, files in os.walk(folder)
+        for path in (Path(place, name) for name in files if name.endswith(".html"))
+        if not path.is_symlink()
+    ]
+    yield from sorted(found)
+
+
+def runs_below(folder: Path) -> Iterator[tuple[str, FoundRun]]:
+    """Yield path and run of the results below a folder, the latest first; none whose files are links."""
+    try:
+        found = found_runs(folder)
+    except ResultsError:
+        return
+    for run in reversed(found):
+        path = run.folder.relative_to(folder).as_posix()
+        with suppress(ResultsError):
+            run_folder(folder, path)
+            yield path, run
