@@ -11,6 +11,7 @@ import shlex
 import threading
 from collections import OrderedDict
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -189,15 +190,20 @@ class Bench:
         self._planning = threading.Lock()
         self._turn = threading.Lock()
         self._pool = Pool(1, preload=NEEDED, lasting=LASTING)
+        self._closing = StopFlag()
         self._latest: dict[str, StopFlag] = {}
         self._kept: OrderedDict[str, tuple[Results, PackedRun]] = OrderedDict()
         threading.Thread(target=self._warm, daemon=True).start()
 
     def _warm(self) -> None:
         """Start the worker before the first run asks for it."""
-        with self._turn:
-            for _ in self._pool.each(default_workers, [()]):
+        with self._turn, suppress(Interrupted):
+            for _ in self._pool.each(default_workers, [()], look=self._look):
                 pass
+
+    def _look(self) -> None:
+        if self._closing.requested:
+            raise Interrupted
 
     def page(self, scenario: str, others: Sequence[str]) -> str:
         """Return the page of a scenario; `others`: the names of scenarios to choose from.
@@ -270,7 +276,7 @@ class Bench:
                 earlier.request()
             self._turn.acquire()
         try:
-            if self._latest.get(page) is not stop:
+            if self._latest.get(page) is not stop or self._closing.requested:
                 raise Superseded("a later run has taken the place of this one", code="run-superseded")
             (outcome,) = execute([job], run=recorded, pool=self._pool, stop=stop)
         except Interrupted:
@@ -298,9 +304,10 @@ class Bench:
 
     def close(self) -> None:
         """End all processes."""
-        for stop in self._latest.values():
+        for stop in (self._closing, *self._latest.values()):
             stop.request()
-        self._pool.end()
+        with self._turn:
+            self._pool.end()
 
 
 def _alternatives(instance: Instance, archives: Sequence[str]) -> list[str]:
