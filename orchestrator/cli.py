@@ -30,6 +30,7 @@ COMMANDS = {
     "compare": "run_and_compare",
     "plot": "results",
     "animate": "results",
+    "serve": "results",
     "converge": "run_and_compare",
     "study": "experiments",
     "report": "experiments",

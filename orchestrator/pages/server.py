@@ -38,7 +38,7 @@ from ..results.formats import FILES
 from ..results.read import FoundRun, found_runs, load_results
 from ..scenario import catalogue
 from .bench import Bench, Superseded, wanted_of
-from .page_parts import made_by, render, style
+from .page_parts_and_provenance import made_by, render, style
 from .viewer import page
 
 LARGEST = 500_000_000

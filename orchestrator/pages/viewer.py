@@ -29,17 +29,10 @@ from ..figures.style import LINES, LabelledRun, line_style, shown, shown_unit
 from ..messages import listed
 from ..metrics.measures import words
 from ..metrics.run_metrics import columns_of, evaluate, metric, reference_of
-<<<<<<< HEAD
 from ..results.read_and_salvage import Results
 from .diagram_and_friction_map import ground_of
 from .page_parts_and_provenance import render
-from .viewer_data import is_numeric, pack
-=======
-from ..results.read import Results
-from .friction_map import ground_of
-from .page_parts import render
 from .viewer_data import PackedRun, is_numeric, pack
->>>>>>> 6b7936d (Add yawbench serve: results below a folder in the browser, and a bench with sliders)
 
 SCRIPTS = ("data", "panels", "draw", "scene", "close_up", "road", "")
 MOST = 200
