@@ -28,8 +28,8 @@ from ..interrupts import StopFlag
 from ..messages import hint, short
 from ..plan import Instance, Plan, Variable
 from ..planner import Planner
-from ..results.read import Results
-from ..scenario import catalogue
+from ..results.read_and_salvage import Results
+from ..scenario import find_and_load
 from ..scenario.overrides import is_path, read_changes
 from ..scenario.scenario_schema import LoadedScenario
 from ..wiring.context import FACTS
@@ -238,11 +238,11 @@ class Bench:
     @staticmethod
     def _scenario(name: str) -> Path:
         """Return the scenario of a name; a path is refused."""
-        known = catalogue.names("a scenario")
+        known = find_and_load.names("a scenario")
         if name not in known:
             others = hint(name, known, lead="by name there are")
             raise ScenarioError(f"there is no scenario {short(name)}{others}", code="scenario-unknown")
-        return catalogue.find(name, "a scenario")
+        return find_and_load.find(name, "a scenario")
 
     def run(self, wanted: Wanted) -> tuple[str, list[str]]:
         """Make a run unless it is kept; return its key and the warnings about its course.

@@ -33,10 +33,10 @@ from ..errors import ResultsError, YawbenchError
 from ..figures.style import LabelledRun
 from ..files import NO_FOLLOW
 from ..messages import changed_each, printable
-from ..results.folder import RUN_FILE
-from ..results.formats import FILES
-from ..results.read import FoundRun, found_runs, load_results
-from ..scenario import catalogue
+from ..results.folder_and_lock import RUN_FILE
+from ..results.formats_and_csv import FILES
+from ..results.read_and_salvage import FoundRun, found_runs, load_results
+from ..scenario import find_and_load
 from .bench import Bench, Superseded, wanted_of
 from .page_parts_and_provenance import made_by, render, style
 from .viewer import page
@@ -196,7 +196,7 @@ class Request(BaseHTTPRequestHandler):
         runs = list(runs_below(folder))
         text = render(
             "results.html.j2", title=f"Results in {folder}", pages=pages, runs=runs,
-            scenarios=catalogue.names("a scenario"), style=style(), assets="", **made_by(),
+            scenarios=find_and_load.names("a scenario"), style=style(), assets="", **made_by(),
         )  # fmt: skip
         self._send_own(text)
 
@@ -226,7 +226,7 @@ class Request(BaseHTTPRequestHandler):
 
     def _bench(self, rest: str, query: Query) -> None:
         """Send the bench of a scenario."""
-        names = catalogue.names("a scenario")
+        names = find_and_load.names("a scenario")
         scenario = query.get("scenario", names)[0]
         self._send_own(self.server.bench.page(scenario, names))
 
