@@ -331,7 +331,13 @@ def test_the_bench_fits_a_phone(server, chromium: Browser):
 
 def test_ctrl_c_ends_the_command_and_its_processes(folder):
     command = [sys.executable, "-m", "yawbench", "serve", "--no-browser", str(folder)]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    process = subprocess.Popen(
+        command,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell may have it ignored
+    )
     assert process.stderr
     address = re.search(r"http://127\.0\.0\.1:\d+/\S+/", process.stderr.readline())
     assert address
