@@ -217,7 +217,7 @@ Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the 
 def serve(
     options: RunOptions, folder: Served = Path("results"), port: Port = 0, browser: Browser = True
 ) -> None:
-    """Show results in the browser, and run scenarios under sliders.
+    """Show results in the browser; run scenarios by sliders.
 
     The address that is printed works on this machine only, until Ctrl-C. It has a random token; whoever has
     it can read the files below the folder and make runs.
