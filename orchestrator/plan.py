@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 from fractions import Fraction
+from math import copysign
+from operator import is_
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,7 +15,7 @@ if TYPE_CHECKING:
 
 from vocabulary.roles import role_of
 
-from .errors import Diagnostic
+from .errors import Diagnostic, Location
 from .fault_kinds import FaultList, FaultySignal
 from .messages import cut
 from .names import SignalName, Target
@@ -119,6 +121,8 @@ class Fmu:
     """Functions of the standard that the library does not export."""
     tolerance: float | None = None
     """Relative tolerance of the default experiment."""
+    runs_as: str | None = None
+    """Of plain Python, which has no archive that says so: "native", or "Python: " and why."""
     needs_tool: bool = False
     """Whether it needs the tool that exported it (`needsExecutionTool`)."""
 
@@ -333,3 +337,36 @@ class Plan:
     def time(self, k: int) -> float:
         """Return the time [s] of communication point `k`, correctly rounded."""
         return float(self.start + k * self.step)
+
+    def sharing(self, other: Plan | None) -> Plan:
+        """Return this plan with parts of another in place of equal ones, to save memory."""
+        shared: Plan = _shared(self, other)
+        return shared
+
+
+def _shared(new: Any, old: Any) -> Any:
+    """Return `old` if it has the same content as `new`, else `new` with every part of which this is true."""
+    kind = type(new)
+    if new is old or kind is not type(old):
+        return new
+    if kind in (str, int, bool, Fraction):
+        return old if new == old else new
+    if kind is float:
+        return old if new == old and copysign(1.0, new) == copysign(1.0, old) else new
+    if kind is dict:
+        found = {key: _shared(value, old.get(key)) for key, value in new.items()}
+        same = list(new) == list(old) and all(map(is_, found.values(), old.values()))
+        return old if same else found
+    if issubclass(kind, tuple):
+        parts = [*map(_shared, new, old), *new[len(old) :]]
+        if len(new) == len(old) and all(map(is_, parts, old)):
+            return old
+        return kind(*parts) if hasattr(kind, "_make") else kind(parts)
+    if kind in (Plan, Instance, Wire, Override, ValueOrigin, ValueSource, Diagnostic, Location, Target):
+        fields = {name: _shared(value, getattr(old, name)) for name, value in vars(new).items()}
+        if all(value is getattr(old, name) for name, value in fields.items()):
+            return old
+        copied = object.__new__(kind)
+        vars(copied).update(fields)
+        return copied
+    return new

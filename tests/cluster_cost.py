@@ -1,9 +1,9 @@
 """What short runs on a Dask cluster of this machine cost: `python -m tests.cluster_cost [--runs 5000]`.
 
-Starts a scheduler and two workers, runs a sweep there by the command line, and prints the processor time of
-the command, the scheduler and the workers with the processes that they start, from the first run to the last;
-what the scheduler needs without runs, measured while the command plans; and the memory of both as the number
-of finished runs grows.
+Starts a scheduler and two workers, runs a sweep there by the command line, and prints the memory of the
+command and the scheduler and the scheduler's share of the time as the number of finished runs grows; the
+processor time of the command, the scheduler and the workers with the processes that they start, from the
+first run to the last; and what the scheduler needs without runs, measured while the command plans.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .bench import DEFAULT
 
 WORKERS = 2
 PARTS = 8
-"""Points at which the memory is read, in equal parts of the runs."""
+"""Equal parts of the runs, after each of which the memory is read."""
 
 
 @contextmanager
@@ -50,9 +50,15 @@ def processor_time(process: psutil.Process) -> float:
         return sum(one.user + one.system + one.children_user + one.children_system for one in everyone)
 
 
-def finished(journal: Path) -> int:
-    """Return the number of runs in a journal, whose first line is its head."""
-    return max(0, journal.read_bytes().count(b"\n") - 1) if journal.is_file() else 0
+def finished(journal: Path) -> Iterator[int]:
+    """Yield the number of runs in a journal, whose first line is its head, reading what has been added."""
+    while not journal.is_file():
+        yield 0
+    lines = 0
+    with journal.open("rb") as file:
+        while True:
+            lines += file.read().count(b"\n")
+            yield max(0, lines - 1)
 
 
 def main() -> None:
@@ -75,23 +81,27 @@ def main() -> None:
             address = client.scheduler.address
         command = [sys.executable, "-m", "orchestrator.cli", "sweep", str(file), "--out", str(out)]
         planning, idle = perf_counter(), processor_time(scheduler)
-        memory: list[tuple[int, int, int]] = []
         with subprocess.Popen([*command, "--scheduler", address], stderr=subprocess.DEVNULL) as running:
             everyone = psutil.Process(running.pid), scheduler, *workers
-            while not (done := finished(out / "runs.jsonl")):
+            made = finished(out / "runs.jsonl")
+            while not (done := next(made)):
                 assert running.poll() is None
                 before, began = [*map(processor_time, everyone)], perf_counter()
                 sleep(0.05)
             idle = (before[1] - idle) / (began - planning)
-            while done < chosen.runs:
-                assert running.poll() is None
-                if done >= len(memory) * chosen.runs / PARTS:
-                    memory.append((done, *(process.memory_info().rss for process in everyone[:2])))
-                sleep(0.05)
-                done = finished(out / "runs.jsonl")
-            wall = perf_counter() - began
-            spent = [processor_time(process) - start for process, start in zip(everyone, before, strict=True)]
-            memory.append((done, *(process.memory_info().rss for process in everyone[:2])))
+            for part in range(PARTS + 1):
+                while done < part * chosen.runs // PARTS:
+                    assert running.poll() is None
+                    sleep(0.05)
+                    done = next(made)
+                wall = perf_counter() - began
+                spent = [processor_time(one) - start for one, start in zip(everyone, before, strict=True)]
+                memory = [one.memory_info().rss / 1e6 for one in everyone[:2]]
+                print(
+                    f"after {done:6d} runs, {wall:.0f} s: command {memory[0]:.0f} MB, scheduler "
+                    f"{memory[1]:.0f} MB and {spent[1] / wall:.1%} of the time",
+                    flush=True,
+                )
         assert running.wait() == 0
     print(f"{chosen.runs} runs, planned in {began - planning:.0f} s, made in {wall:.0f} s")
     for what, seconds in (
@@ -100,8 +110,6 @@ def main() -> None:
     ):  # fmt: skip
         print(f"{what:18s}{seconds:8.1f} s of processor time, {1e3 * seconds / chosen.runs:6.2f} ms a run")
     print(f"scheduler: {spent[1] / wall:.1%} of the time, {idle:.1%} without runs")
-    for done, ours, theirs in memory:
-        print(f"after {done:6d} runs: command {ours / 1e6:.0f} MB, scheduler {theirs / 1e6:.0f} MB")
 
 
 if __name__ == "__main__":

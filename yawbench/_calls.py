@@ -8,6 +8,7 @@ from typing import Any
 
 from orchestrator.errors import YawbenchError
 from orchestrator.experiments.jobs import Job, Outcome, execute
+from orchestrator.fmu.binary import NATIVE
 from orchestrator.master.fmi import open_unit
 from orchestrator.master.log_and_process_state import Log
 from orchestrator.plan import Instance
@@ -20,9 +21,13 @@ def opener_of(programs: Mapping[Path, PythonComponent]) -> Callable[[Instance, L
 
     def opener(unit: Instance, log: Log, corrupted: set[Path]) -> Any:
         program = programs.get(unit.fmu.path)
-        return program.open(unit, log) if program else open_unit(unit, log, corrupted)
+        return program.open(unit, log) if program and _in_python(unit) else open_unit(unit, log, corrupted)
 
     return opener
+
+
+def _in_python(unit: Instance) -> bool:
+    return unit.fmu.runs_as != NATIVE
 
 
 def make_all(
@@ -41,7 +46,10 @@ def make_all(
         workers, done, run: see `execute`; `run` also takes an `opener`.
     """
     here = [
-        any(unit.fmu.path in programs for unit in job.plan.instances) if job.plan else False for job in jobs
+        any(unit.fmu.path in programs and _in_python(unit) for unit in job.plan.instances)
+        if job.plan
+        else False
+        for job in jobs
     ]
     apart = [job for job, plain in zip(jobs, here, strict=True) if not plain]
     outcomes_apart = iter(execute(apart, workers=workers, done=done, run=run) if apart else ())

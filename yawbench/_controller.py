@@ -10,10 +10,9 @@ import copy
 import functools
 import hashlib
 import inspect
-import io
 import math
 import sys
-import zipfile
+import uuid
 from collections import namedtuple
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -36,6 +35,7 @@ from vocabulary.roles import ROLES
 from vocabulary.wheels import wheels
 
 from . import arguments
+from ._native import in_native_code, of_function, of_object, zipped
 
 __all__ = ["Controller", "ControllerLike", "PythonComponent", "output", "parameter", "signal"]
 
@@ -105,9 +105,9 @@ class PythonComponent:
     def __init__(self, program: object, *, unit: str, role: str) -> None:
         self.program = program
         try:
-            self.component = _component(program, role)
+            self.component, self._translated = _component(program, role)
             self.step_size = _step_size(program)
-            xml = ElementTree.tostring(self._made(unit).to_xml())
+            self._xml = _described(self._made(unit).to_xml())
         except ScenarioError as error:
             raise ScenarioError(f"{unit}: {error}", code="controller-invalid") from None
         except (TypeError, ValueError) as error:
@@ -118,12 +118,19 @@ class PythonComponent:
             ) from error
         name = self.component.fmu_name
         self.path = HOME / f"{name}.fmu"
-        digest = hashlib.sha256(xml + _source(program)).hexdigest()
-        described = describe({"modelDescription.xml": xml}, _archived(xml), self.path)
+        digest = hashlib.sha256(self._xml + _source(program)).hexdigest()
+        files = {"modelDescription.xml": self._xml}
+        described = describe(files, zipped(files), self.path)
         self.fmu: Fmu = replace(described, sha256=digest, generation_tool="Python, no FMU", role=role)
 
+    def as_now(self) -> Fmu:
+        """Return its FMU with a native library, if what it is now can be translated, or why it has none."""
+        if isinstance(self._translated, str):
+            return replace(self.fmu, runs_as=f"Python: {self._translated}")
+        return in_native_code(self.component, self._translated, self.fmu, self._xml)
+
     def open(self, unit: Instance, log: Log) -> PythonInstance:
-        """Return an instance of the component for a run."""
+        """Return an instance of the component for a run, in Python."""
         return PythonInstance(unit, self._made(unit.name), log)
 
     def _made(self, unit: str) -> Component:
@@ -204,19 +211,23 @@ class PythonInstance:
         return OK if stepped and not self._component._failed else ERROR
 
 
-def _archived(xml: bytes) -> bytes:
-    """Return an FMU archive that contains only a model description."""
-    archive = io.BytesIO()
-    with zipfile.ZipFile(archive, "w") as members:
-        members.writestr("modelDescription.xml", xml)
-    return archive.getvalue()
+def _described(description: ElementTree.Element) -> bytes:
+    """Return a model description as text, without its date; its GUID follows from the rest."""
+    description.attrib.pop("generationDateAndTime", None)
+    description.set("guid", "")
+    digest = hashlib.sha256(ElementTree.tostring(description)).digest()
+    description.set("guid", f"{{{uuid.UUID(bytes=digest[:16])}}}")
+    return ElementTree.tostring(description)
 
 
-def _component(program: Any, role: str) -> type[Component]:
-    """Return the component class made from a function, an object or a class."""
+def _component(program: Any, role: str) -> tuple[type[Component], type[Component] | str]:
+    """Return the component class made from a function, an object or a class.
+
+    Beside it, there is the class for the translator, or why there is none.
+    """
     if arguments.is_a(program, type):
         if issubclass(program, Component):
-            return _reporting(program)
+            return _reporting(program), program
         raise ScenarioError(
             f"{_name(program)} is a class; give an object of it, {_name(program)}()",
             code="controller-invalid",
@@ -232,8 +243,8 @@ def _component(program: Any, role: str) -> type[Component]:
     )
 
 
-def _of_function(function: Callable[..., Any], role: str) -> type[Component]:
-    """Return a component class that calls a function of signals; its outputs are those of the role."""
+def _of_function(function: Callable[..., Any], role: str) -> tuple[type[Component], type[Component]]:
+    """Return component classes that call a function of signals; its outputs are those of the role."""
     known = {item.name: item.outputs for item in ROLES.values()}
     if role not in known:
         raise ScenarioError(
@@ -257,11 +268,13 @@ def _of_function(function: Callable[..., Any], role: str) -> type[Component]:
         result = function(**values, t=t) if "t" in names else function(**values)
         return _numbers(result, outputs)
 
-    return _class(function, inputs, known[role], {"output": compute})
+    both = {"output": compute, "_fail": _fail}, of_function(function, inputs, "t" in names)
+    checked, bare = (_class(function, inputs, known[role], members) for members in both)
+    return checked, bare
 
 
-def _of_object(program: Any) -> type[Component]:
-    """Return a component class; each of its instances uses a copy of the object."""
+def _of_object(program: Any) -> tuple[type[Component], type[Component] | str]:
+    """Return component classes; each instance of the first uses a copy of the object."""
     for wanted in ("inputs", "outputs"):
         if not hasattr(program, wanted):
             raise ScenarioError(
@@ -278,14 +291,17 @@ def _of_object(program: Any) -> type[Component]:
                 f"{_name(program)} cannot be copied for a run: {error}", code="controller-invalid"
             ) from error
 
-    members = {"__init__": __init__}
+    members = {"__init__": __init__, "_fail": _fail}
     for method in ("output", "advance", "start"):
         if hasattr(program, method):
             if not callable(getattr(program, method)):
                 arguments.refuse(method, "a method", getattr(program, method))
             members[method] = _passing_on(method)
     component = _class(program, program.inputs, program.outputs, members)
-    return component
+    try:
+        return component, _class(program, program.inputs, program.outputs, of_object(program))
+    except Exception as error:  # it is not made to be one
+        return component, f"not translated: {_name(program)}: {arguments.error_text(error)}"
 
 
 def _passing_on(method: str) -> Callable[..., Any]:
@@ -314,7 +330,6 @@ def _class(
         "fmu_name": _name(program),
         "__doc__": inspect.getdoc(program) or f"{_name(program)}, plain Python.",
         "_named": staticmethod(namedtuple("Inputs", scalars)),
-        "_fail": _fail,
     }
     return type(_name(program), (Component,), members)
 

@@ -159,8 +159,8 @@ class Experiment:
     def run(self, *, workers: int | None = None, keep: bool = True, progress: bool = False) -> Runs:
         """Make all runs and return their results; nothing is written.
 
-        Runs are made by worker processes; those with plain Python run in this process, one by one. A failed
-        run has a row with its reason in the table. All warnings are issued as one `YawbenchWarning`.
+        Runs are made by worker processes; those with plain Python that is not native run here, one by one.
+        A failed run has a row with its reason in the table. All warnings are issued as one `YawbenchWarning`.
 
         Args:
             workers: number of processes; default: the number of cores.

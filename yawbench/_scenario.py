@@ -211,7 +211,8 @@ class Scenario:
         notes = tuple(
             Diagnostic(
                 "instance-in-python",
-                f"{unit.name}: {unit.fmu.name} is plain Python of this process, not an FMU",
+                f"{unit.name}: {unit.fmu.name} is plain Python of this process, not an FMU; runs as "
+                f"{unit.fmu.runs_as}",
                 "info",
             )
             for unit in plan.instances
@@ -221,7 +222,7 @@ class Scenario:
 
     def _planner(self) -> Planner:
         """Return a planner that builds FMUs silently if out of date and knows the plain Python components."""
-        opened = {path: program.fmu for path, program in self.programs.items()}
+        opened = {path: program.as_now() for path, program in self.programs.items()}
         return Planner(build=True, tell=lambda text: None, opened=opened)
 
     def run(self, *, progress: Callable[[int, int], None] | None = None) -> Run:
@@ -246,13 +247,27 @@ class Scenario:
 
         plan = self.plan()
         try:
-            run = Run(simulate_in_memory(plan, opener=opener, progress=progress))
+            try:
+                run = Run(simulate_in_memory(plan, opener=opener, progress=progress))
+            except SimulationError:
+                if (again := self._in_python(plan)) == plan:
+                    raise
+                opened.clear()
+                run = Run(simulate_in_memory(again, opener=opener))  # fails, too, with an exception to show
         except SimulationError as error:
             warn(plan.title, (*plan.diagnostics, *error.warnings))
             causes = [getattr(slave, "error", None) for slave in opened if slave.name == error.instance]
             raise error from next(iter(causes), None)
         warn(run.title, run.diagnostics)
         return run
+
+    def _in_python(self, plan: Plan) -> Plan:
+        """Return a plan in which plain Python runs as Python."""
+        units = [
+            replace(unit, fmu=self.programs[unit.fmu.path].fmu) if unit.fmu.path in self.programs else unit
+            for unit in plan.instances
+        ]
+        return replace(plan, instances=tuple(units))
 
     @property
     def title(self) -> str:

@@ -94,16 +94,24 @@ def _digests(*files: Path) -> str:
 
 
 def native(
-    component: type[Any], home: Path, *, source: str, guid: str, resources: Path, hurry: bool = False
+    component: type[Any],
+    home: Path,
+    *others: Path,
+    source: str,
+    guid: str,
+    resources: Path,
+    translated: type[Any] | None = None,
+    hurry: bool = False,
 ) -> Native:
     """Return the native libraries of a component, or why there are none.
 
     Args:
         component: its class, imported.
-        home: folder of its package.
+        home, others: where its functions are (see `Sources`).
         source: its file, as a comment names it.
         guid: of the FMU.
         resources: folder that an instance is told of.
+        translated: a class for the translator that gives the same; default: the component.
         hurry: leave it for later if it took longer than `LONGEST` the last time.
     """
     if sys.platform != "linux" or platform.machine() != "x86_64":
@@ -114,7 +122,7 @@ def native(
         if hurry and float(recall(EFFORTS, entry) or 0.0) > LONGEST:
             return Native(why_not=LATER)
         began = _processor_time()
-        text = emit(specialise(component, home), source, guid)
+        text = emit(specialise(translated or component, home, *others), source, guid)
         made, new = _let_through(text, component, guid, resources)
         if new:
             keep(EFFORTS, entry, str(_processor_time() - began).encode())

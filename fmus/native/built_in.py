@@ -47,7 +47,9 @@ def _is_pure(function: Any) -> bool:
     if any(function is pure for pure in _PURE):
         return True
     owner = getattr(function, "__self__", None)
-    if isinstance(owner, (str, bytes, int, float, tuple, range, frozenset, dict)):
+    if isinstance(owner, dict):
+        return function.__name__ in ("get", "keys", "values", "items", "copy")
+    if isinstance(owner, (str, bytes, int, float, tuple, range, frozenset)):
         return True
     return getattr(function, "__module__", "") in ("math", "_operator", "_bisect", "itertools")
 
@@ -154,6 +156,9 @@ class BuiltIn(Looping):
         if isinstance(value, tuple):
             return all(map(self._is_constant, value))
         return not isinstance(value, (ir.Var, Box, Union, Picked, Closure, Bound, Text, Bytes, Span))
+
+    def _python_setattr(self, owner: Any, name: str, value: Any) -> None:
+        self.set_attribute(owner, name, value)
 
     def _python_len(self, value: Any) -> Any:
         if isinstance(value, Ring):

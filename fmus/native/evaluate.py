@@ -72,6 +72,10 @@ class Evaluation(Merging):
     def where(self) -> str:
         return f"{self.calls[-1].source.file}:{self.calls[-1].line}" if self.calls else ""
 
+    def raised_at(self) -> str:
+        inner = next((call for call in reversed(self.calls) if call.source.of_package), None)
+        return f"{inner.source.file}:{inner.line}" if inner else ""
+
     def at(self, node: ast.AST) -> None:
         """Take note of the line that is being evaluated."""
         self.calls[-1].line = node.lineno  # type: ignore[attr-defined]

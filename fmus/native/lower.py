@@ -120,6 +120,10 @@ class Lowering:
         """Return file and line of what is being evaluated."""
         raise NotImplementedError
 
+    def raised_at(self) -> str:
+        """Return the file and line that an exception names: within the package."""
+        return self.where()
+
     def new(self, type: str) -> ir.Var:
         """Return a new variable."""
         self._count += 1
@@ -133,7 +137,7 @@ class Lowering:
 
     def fail(self, kind: str, *message: ir.Part) -> None:
         """Raise on the path that is being followed."""
-        self.out.append(ir.Raise(kind, message, self.where()))
+        self.out.append(ir.Raise(kind, message, self.raised_at()))
 
     def require(self, condition: ir.Operand, kind: str, message: str) -> None:
         """Raise unless a condition holds.
@@ -149,7 +153,7 @@ class Lowering:
             raise Unreachable
         failing = self.negation(condition)
         assert isinstance(failing, ir.Var)
-        self.out.append(ir.If(failing, [ir.Raise(kind, (message,), self.where())]))
+        self.out.append(ir.If(failing, [ir.Raise(kind, (message,), self.raised_at())]))
         self.facts.learn(condition, True)
 
     def settled(self, value: ir.Operand, facts: Facts) -> ir.Operand:

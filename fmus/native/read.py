@@ -5,11 +5,12 @@ from __future__ import annotations
 import ast
 import contextlib
 import inspect
+import linecache
 from collections import Counter
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from types import FunctionType
+from types import CodeType, FunctionType
 from typing import Any
 
 from .values import Refused
@@ -24,12 +25,14 @@ class Source:
     Attributes:
         node: its syntax tree.
         file: as sentences name it, from the folder of the package.
+        of_package: whether Python names it, too, where it raises (see `components.fmi.component`).
         names: of the module.
         cells: variables of the functions around it.
     """
 
     node: Tree
     file: str
+    of_package: bool
     names: dict[str, Any]
     cells: dict[str, Any]
 
@@ -58,22 +61,48 @@ def names_within(node: ast.AST) -> Counter[tuple[str, type[ast.expr_context]]]:
     return Counter((x.id, type(x.ctx)) for x in ast.walk(node) if isinstance(x, ast.Name))
 
 
-class Sources:
-    """The functions of one package, whose folder is `home`."""
+@cache
+def _codes(file: str, content: bytes) -> dict[tuple[int, str], CodeType]:
+    """Return the code of every function in a file, by its first line and name."""
+    found: dict[tuple[int, str], CodeType] = {}
+    waiting = [compile(content, file, "exec", dont_inherit=True)]
+    while waiting:
+        within = [x for x in waiting.pop().co_consts if isinstance(x, CodeType)]
+        found |= {(code.co_firstlineno, code.co_name): code for code in within}
+        waiting += within
+    return found
 
-    def __init__(self, home: Path) -> None:
+
+def content_of(file: str) -> bytes | None:
+    """Return the text of a source file, or of the cell of a notebook; None if there is none."""
+    if Path(file).is_file():
+        return Path(file).read_bytes()
+    return "".join(linecache.getlines(file)).encode() or None
+
+
+class Sources:
+    """The functions that are followed: of a package, and of other files.
+
+    Args:
+        home: folder of the package.
+        others: further folders and files.
+    """
+
+    def __init__(self, home: Path, *others: Path) -> None:
         self.home = home.resolve()
+        self.others = others
         self._known: dict[FunctionType, Source] = {}
 
     def contains(self, function: FunctionType) -> bool:
-        """Return whether a function is of the package."""
-        return Path(function.__code__.co_filename).is_relative_to(self.home)
+        """Return whether a function is followed."""
+        file = Path(function.__code__.co_filename)
+        return any(file.is_relative_to(folder) for folder in (self.home, *self.others))
 
     def of(self, function: FunctionType) -> Source:
         """Return the source of a function.
 
         Raises:
-            Refused: it has none, or is not the only one in its line.
+            Refused: it has none, is not the only one in its line, or was edited since it was imported.
         """
         if function not in self._known:
             self._known[function] = self._found(function)
@@ -82,17 +111,21 @@ class Sources:
     def _found(self, function: FunctionType) -> Source:
         code = function.__code__
         file = Path(code.co_filename)
-        shown = file.relative_to(self.home).as_posix() if self.contains(function) else file.name
+        of_package = file.is_relative_to(self.home)
+        shown = file.relative_to(self.home).as_posix() if of_package else file.name
         where = f"{shown}:{code.co_firstlineno}"
-        if not file.is_file():
+        content = content_of(str(file))
+        if content is None:
             raise Refused(f"{function.__qualname__} has no source", where)
-        nodes = _functions(str(file), file.read_bytes()).get((code.co_firstlineno, code.co_name), [])
+        nodes = _functions(str(file), content).get((code.co_firstlineno, code.co_name), [])
         if len(nodes) != 1:
             raise Refused(f"{function.__qualname__} cannot be told from others in its line", where)
+        if not of_package and _codes(str(file), content).get((code.co_firstlineno, code.co_name)) != code:
+            raise Refused(f"{function.__qualname__} was edited since it was imported", where)
         if code.co_flags & (inspect.CO_GENERATOR | inspect.CO_COROUTINE):
             raise Refused(f"{function.__qualname__} is a generator", where)
         cells = {}
         for name, cell in zip(code.co_freevars, function.__closure__ or (), strict=True):
             with contextlib.suppress(ValueError):  # not filled yet
                 cells[name] = cell.cell_contents
-        return Source(nodes[0], shown, function.__globals__, cells)
+        return Source(nodes[0], shown, of_package, function.__globals__, cells)

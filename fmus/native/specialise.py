@@ -51,8 +51,12 @@ class Program:
     rings: list[int] = field(default_factory=list)
 
 
-def specialise(component: type[Any], home: Path) -> Program:
-    """Return a component, whose package lies in the folder `home`, as a program.
+def specialise(component: type[Any], home: Path, *others: Path) -> Program:
+    """Return a component as a program.
+
+    Args:
+        component: its class.
+        home, others: where its functions are (see `Sources`).
 
     Raises:
         Refused: what cannot be translated, with file and line.
@@ -62,7 +66,7 @@ def specialise(component: type[Any], home: Path) -> Program:
 
     def run() -> None:
         try:
-            found.append(_Specialising(component, Sources(home)).program())
+            found.append(_Specialising(component, Sources(home, *others)).program())
         except BaseException as error:
             found.append(error)
 

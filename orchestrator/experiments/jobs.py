@@ -186,9 +186,11 @@ def ready(
     """
     planner, found = planner or Planner(), []
     errors: dict[Hashable, Diagnostic] = {}
+    plan: Plan | None = None
     for number, job in enumerate(jobs, start=1):
         try:
-            found.append(replace(job, plan=planned(job, planner)[1]))
+            plan = planned(job, planner)[1].sharing(plan)
+            found.append(replace(job, plan=plan))
         except BuildError:
             raise
         except YawbenchError as error:

@@ -95,6 +95,11 @@ WANTED = "YAWBENCH_UNITS"
 NATIVE = "native"
 
 
+def python_wanted() -> bool:
+    """Return whether the environment asks for units in Python."""
+    return os.environ.get(WANTED) == "python"
+
+
 def runs_as(archive: Path) -> str | None:
     """Return "native", or "Python: " and why; None for an FMU that was not built from Python here."""
     try:
@@ -105,14 +110,14 @@ def runs_as(archive: Path) -> str | None:
         return None
     if reason:
         return f"Python: {reason}"
-    if os.environ.get(WANTED) == "python":
+    if python_wanted():
         return f"Python: {WANTED} asks for it"
     return NATIVE if sys.platform == "linux" else "Python: the native library is for Linux"
 
 
 def is_native(directory: Path) -> bool:
     """Return whether the FMU unpacked in a folder was built here and runs natively in this process."""
-    if sys.platform != "linux" or os.environ.get(WANTED) == "python":
+    if sys.platform != "linux" or python_wanted():
         return False
     try:
         return (directory / REASON).stat().st_size == 0

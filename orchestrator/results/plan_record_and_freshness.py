@@ -126,7 +126,7 @@ def _fmu(unit: Instance, plan: Plan, sources: dict[ValueSource, int]) -> FmuReco
         generation_tool=fmu.generation_tool,
         fmi_version=f"{fmu.fmi}.0",
         built=None if fmu.built is None else asdict(fmu.built),
-        runs_as=runs_as(fmu.path),
+        runs_as=fmu.runs_as or runs_as(fmu.path),
         step_size=float(unit.period * plan.step),
         tolerance=unit.tolerance or fmu.tolerance,
         parameters=dict(unit.parameters),

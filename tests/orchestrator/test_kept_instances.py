@@ -100,6 +100,28 @@ def kinds(fmus, foreign, tmp_path_factory):
     return [keyed(job, job.metrics) for job in ready(made)]
 
 
+def test_plans_share_what_is_equal_and_differ_as_before(fmus, tmp_path):
+    masses = [("plant.mass=1700",), ("plant.mass=1800",)]
+    some = [Job("", PAPER_A, tmp_path, changed(settings=one), fmus=fmus) for one in masses]
+    alone = [ready([job])[0] for job in some]
+    one, other = together = ready(some)
+    assert together == alone
+    assert [keyed(job).key for job in together] == [keyed(job).key for job in alone]
+    assert other.plan.wires is one.plan.wires and other.plan.record is one.plan.record
+    same = [new is old for new, old in zip(other.plan.instances, one.plan.instances, strict=True)]
+    assert 0 < sum(same) < len(same)
+
+
+@pytest.mark.parametrize(("old", "new"), [(0.0, -0.0), (1.0, 1), (True, 1)])
+def test_plans_do_not_share_numbers_that_only_compare_equal(old, new, fmus, tmp_path):
+    plan = ready([Job("", PAPER_A, tmp_path, fmus=fmus)])[0].plan
+
+    def holding(value):
+        return replace(plan, scenario={**plan.scenario, "x": value})
+
+    assert repr(holding(new).sharing(holding(old)).scenario["x"]) == repr(new)
+
+
 def shown(job: Job, outcome) -> object:
     """Return all that a run gave, without what differs from time to time."""
     files = {}

@@ -2,7 +2,9 @@
 
 import json
 import re
+import sys
 import warnings
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 
@@ -158,6 +160,83 @@ def test_a_run_without_an_fmu_says_so(base):
     assert golden(run.record["fmus"]["controller"]["generation_tool"])
     (note,) = (one for one in run.diagnostics if one.code == "instance-in-python")
     assert note.severity == "info" and note.message.startswith("controller: ")
+
+
+LAWS = {
+    "a function": proportional,
+    "a lambda": lambda yaw_rate_ref, yaw_rate, t: 2e4 * (yaw_rate_ref - yaw_rate) if t > 0.1 else 0,
+    "an object": Counting(),
+    "a component": Fnn,
+}
+
+
+@pytest.mark.parametrize("what", LAWS)
+def test_plain_python_runs_natively_with_the_same_bits(what, base, monkeypatch):
+    scenario = base.swap(controller=LAWS[what])
+    native = scenario.run()
+    monkeypatch.setenv("YAWBENCH_UNITS", "python")
+    in_python = scenario.run()
+    assert native.record["fmus"]["controller"]["runs_as"] == "native"
+    assert golden(in_python.record["fmus"]["controller"]["runs_as"])
+    assert equal(native, in_python)
+
+
+def with_numpy(yaw_rate_ref, yaw_rate):
+    return 2e4 * np.tanh(yaw_rate_ref - yaw_rate)
+
+
+@dataclass
+class Remembering:
+    """A law with a list, which belongs to the object."""
+
+    inputs = ("yaw_rate",)
+    outputs = ("yaw_moment",)
+    past: list = field(default_factory=list)
+
+    def output(self, t, u):
+        return len(self.past)
+
+
+UNTRANSLATED = {
+    "numpy": with_numpy,
+    "a list": Remembering(),
+    "no source": eval("lambda yaw_rate: -1e3 * yaw_rate"),
+}
+
+
+@pytest.mark.parametrize("what", UNTRANSLATED)
+def test_plain_python_that_is_not_translated_says_why(what, base):
+    run = base.swap(controller=UNTRANSLATED[what]).set({"stop_time": 0.01}).run()
+    (note,) = (one for one in run.diagnostics if one.code == "instance-in-python")
+    assert golden(re.sub(r"(py|>):\d+", r"\1:LINE", note.message))
+
+
+def test_a_value_of_the_module_counts_as_it_is_when_a_run_begins(base, monkeypatch):
+    scenario = base.swap(controller=with_gain).set({"stop_time": 0.01})
+    before = scenario.run()
+    monkeypatch.setattr(sys.modules[__name__], "GAIN", 300.0)
+    after = scenario.run()
+    assert {run.record["fmus"]["controller"]["runs_as"] for run in (before, after)} == {"native"}
+    assert [run["controller.yaw_moment"][-1] for run in (before, after)] == [200.0, 300.0]
+
+
+GAIN = 200.0
+
+
+def with_gain(yaw_rate):
+    return GAIN
+
+
+def test_code_that_was_edited_since_it_was_imported_is_not_translated(base, monkeypatch, tmp_path):
+    file = tmp_path / "edited_law.py"
+    file.write_text("def law(yaw_rate):\n    return 1.0\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    import edited_law
+
+    file.write_text("def law(yaw_rate):\n    return 2.0\n")
+    run = base.swap(controller=edited_law.law).set({"stop_time": 0.01}).run()
+    assert run["controller.yaw_moment"][-1] == 1.0
+    assert golden(run.record["fmus"]["controller"]["runs_as"])
 
 
 def test_every_run_begins_with_a_copy_of_the_object(base):
