@@ -89,9 +89,9 @@ def hint(name: str, valid: Iterable[str], *, lead: str) -> str:
     return f"; {lead}: {listed(names) or 'none'}"
 
 
-def counted(number: int, noun: str) -> str:
-    """Return "1 run", "2 runs"."""
-    return f"{number} {noun}{'s' * (number != 1)}"
+def counted(number: int, noun: str, several: str = "") -> str:
+    """Return "1 run", "2 runs"; `several`: a plural that is not formed with s."""
+    return f"{number} {noun if number == 1 else several or f'{noun}s'}"
 
 
 def fold(names: Sequence[str]) -> list[str]:

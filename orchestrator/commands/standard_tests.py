@@ -190,11 +190,13 @@ EvaluationFigures = Annotated[bool, typer.Option("--figures/--no-figures", help=
 OutFile = Annotated[
     Path | None,
     typer.Option(
-        "--out", metavar="DIR", help="Folder for evaluation.json and figures. Default: that of the runs."
+        "--out",
+        metavar="DIR",
+        help="Folder for evaluation.json, evaluation.html and figures. Default: that of the runs.",
     ),
 ]
 
-FILE = "evaluation.json"
+FILE, PAGE = "evaluation.json", "evaluation.html"
 
 
 def evaluate(
@@ -247,7 +249,7 @@ class EvaluatedRuns:
     folder: Path  # for evaluation.json and the figure of the series
 
     def conclude(self, *, each: bool, together: bool = False) -> None:
-        """Draw, write and print the evaluations.
+        """Draw, write and print the evaluations; write their page.
 
         Args:
             each: draw every run, too.
@@ -256,6 +258,7 @@ class EvaluatedRuns:
         from ..experiments.verdict_tables import run_table, runs_table
         from ..files import write_whole
         from ..messages import counted
+        from ..pages.evaluation_page import evaluation_page
         from .progress import print_tables, say
 
         drawn = self._draw(each=each, together=together)
@@ -271,8 +274,10 @@ class EvaluatedRuns:
         else:
             table = runs_table(self.series.runs if self.series else self.judged, self.test, self.series)
         print_tables([table])
+        page = evaluation_page(self.test, self.traces, self.judged, self.series)
+        write_whole(self.folder / PAGE, page)
         also = f", {counted(drawn, 'figure')}" if drawn else ""
-        say(f"{self.folder / FILE}{also}")
+        say(f"{self.folder / FILE}, {PAGE}{also}")
 
     def _draw(self, *, each: bool, together: bool) -> int:
         """Draw the runs, next to their results or together, and the series; return the number of figures."""

@@ -41,6 +41,8 @@ from ..metrics.measures import running_integral
 from ..metrics.verdict import Status, Verdict, compare, not_judged, worst
 from .standard_tests import (
     Evaluation,
+    Limit,
+    Mark,
     NotJudged,
     SeriesDriver,
     SeriesRun,
@@ -243,6 +245,22 @@ def evaluate_dwell(judged: Evaluation, trace: Trace, angle: float | None = None)
     _stability(judged, course)
     _responsiveness(judged, course, trace, angle, amplitude)
     _add_notes(judged, course, trace)
+
+
+def marks_of(judged: Evaluation) -> tuple[list[Mark], list[Limit]]:
+    """Return the instants at which a run is judged, and the largest yaw rates [rad/s] allowed then."""
+    begin, end, peak = judged["begin"], judged["end"], judged["peak"]
+    marks: list[Mark] = []
+    if begin is not None:
+        marks += [(begin, "beginning of steer"), (begin + AT, f"beginning of steer + {AT:g} s")]
+    if end is not None:
+        marks += [(end, "completion of steer")]
+        marks += [(end + late, f"completion of steer + {late:g} s") for late, _ in RATIOS]
+    limits = [] if peak is None else [
+        ("yaw_rate", most * peak, f"{100 * most:g} % of the second peak, {late:g} s after steering")
+        for late, most in RATIOS
+    ]  # fmt: skip
+    return marks, limits
 
 
 def _zero_of(trace: Trace, course: DwellCourse) -> float:

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from .trace import Trace
 
 P = ParamSpec("P")
+Mark = tuple[float, str]
+"""An instant [s] and what it is."""
+Limit = tuple[str, float, str]
+"""A signal, a level in SI units, and what it is."""
 
 
 @dataclass(frozen=True)
@@ -164,6 +168,7 @@ class StandardTest:
     columns: tuple[str, ...]  # keys of the quantities in tables of several runs
     needs_angle: bool = False  # whether the function takes A
     drawing: str = ""  # module in this package with `draw_run` and `draw_series`
+    marking: str = ""  # "module:function" that returns the instants and limits of a run
     together: str = ""  # "module:function" that judges several recorded runs as a series
     driving: str = ""  # "module:function" that makes and judges a series of runs
     driven_as: tuple[str, ...] = ()  # names for `yawbench drive`; their scenarios are named alike
@@ -188,6 +193,11 @@ class StandardTest:
         """Return the figure of a run, None if there is nothing to draw."""
         figure: Figure | None = _named(f"{self.drawing}:draw_run")(trace, judged) if self.drawing else None
         return figure
+
+    def marks(self, judged: Evaluation) -> tuple[list[Mark], list[Limit]]:
+        """Return the instants and limits of an evaluated run, to be drawn with its signals."""
+        found: tuple[list[Mark], list[Limit]] = _named(self.marking)(judged) if self.marking else ([], [])
+        return found
 
     def draw_series(self, series: TestSeries, note: str) -> Figure:
         """Return the figure of a series; only for tests with a drawing module."""
@@ -215,6 +225,7 @@ TESTS: dict[str, StandardTest] = {
             ("amplitude", "ratio_1000", "ratio_1750", "displacement", "sideslip", "speed_end"),
             needs_angle=True,
             drawing="sine_with_dwell_figures",
+            marking="sine_with_dwell:marks_of",
             together="sine_with_dwell:judge_together",
             driving="sine_with_dwell:drive_series",
             driven_as=("sine-with-dwell",),

@@ -26,6 +26,7 @@ from vocabulary.wheels import WHEEL_NAMES, WHEELS
 from ..experiments.tables import Table
 from ..experiments.verdict_tables import FAILS, HOLDS, NOT_JUDGED, UNDECIDED
 from ..messages import fold, printable
+from ..metrics.verdict import Status
 from ..plan import (
     CHOSEN,
     ERRATUM,
@@ -121,6 +122,8 @@ def anchor(text: str) -> str:
 
 SIGNS = {
     HOLDS: ("good", "✓"),
+    Status.PASSED.value: ("good", "✓"),
+    Status.FAILED.value: ("bad", "✗"),
     UNDECIDED: ("unsure", "?"),
     NOT_JUDGED: ("open", "–"),
     **{word: ("bad", "✗") for word in FAILS.values()},
