@@ -6,7 +6,7 @@ The viewer shows at first the runs that decide, with the instants and limits of 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from vocabulary.signals import SIGNALS
@@ -26,17 +26,18 @@ from .viewer import MOST, Settings, View, assets, viewer
 LARGEST = 2_000_000
 """Size of the samples in a page [bytes]; beyond it, the page carries the signals of the test alone. Chosen:
 a series of sine with dwell opens in a second."""
-PANELS = ("steering_wheel_angle", "steer_angle", "yaw_rate", "sideslip", "acceleration_y")
+PANELS = ("steering_wheel_angle", "yaw_rate", "sideslip", "acceleration_y")
 """Signals shown first; chosen: what most tests judge."""
 
 
 @dataclass(frozen=True)
 class CriterionRow:
-    """A criterion: the verdict on it, and the run that decides."""
+    """A criterion: the verdict on it, and the run that decides with its numbers."""
 
     name: str
     verdict: Verdict
     run: str  # label, "" if there is only one
+    why: str
     value: str
     limit: str
 
@@ -60,7 +61,9 @@ def criteria_of(judged: Sequence[Evaluation], series: TestSeries | None) -> list
         assert deciding is not None
         label = next(label for label, verdict in own.items() if verdict is deciding)
         verdict = series.criteria.get(name, deciding) if series else deciding
-        found.append(CriterionRow(name, verdict, label if len(judged) > 1 else "", *_numbers(verdict)))
+        number = verdict if verdict.beyond is not None else replace(deciding, status=verdict.status)
+        row = CriterionRow(name, number, label if len(judged) > 1 else "", verdict.why, *_numbers(number))
+        found.append(row)
     return found
 
 
