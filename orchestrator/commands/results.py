@@ -7,10 +7,11 @@ of date.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -113,6 +114,48 @@ Panels = Annotated[
 AsPage = Annotated[bool, typer.Option("--page", help="Write view.html, an interactive page, instead.")]
 
 
+FileFormat = Annotated[
+    Literal["pdf", "svg", "png", "pgf"] | None,
+    typer.Option("--format", help="Format of the figure; default: SVG and PNG, or that of --out FILE."),
+]
+Size = Annotated[
+    str | None,
+    typer.Option("--size", metavar="WxHmm", help="Size of the figure: 88x60mm, 9x6cm or 3.5x2.4in."),
+]
+Style = Annotated[
+    Literal["ieee", "elsevier", "slides"] | None,
+    typer.Option(
+        "--style", help="Fonts, line widths and column width of a publisher, without title and note."
+    ),
+]
+_SIZE = re.compile(r"(\d+(?:\.\d+)?)x(\d+(?:\.\d+)?)(mm|cm|in)")
+_INCH = {"mm": 25.4, "cm": 2.54, "in": 1.0}
+LARGEST_SIZE = 100.0
+"""Largest width or height of a figure [inches]. Chosen: a poster, and its pixels fit into memory."""
+
+
+def _settings(style: str | None, size: str | None) -> Any:
+    """Return the settings of matplotlib for a style and a size.
+
+    Raises:
+        ScenarioError: the size is malformed.
+    """
+    from ..errors import ScenarioError
+    from ..figures.style import STYLES
+
+    settings = dict(STYLES[style]) if style else {}
+    if size is not None:
+        match = _SIZE.fullmatch(size)
+        sides = [float(one) / _INCH[match[3]] for one in match.groups()[:2]] if match else []
+        if not match or not all(0.5 <= side <= LARGEST_SIZE for side in sides):
+            raise ScenarioError(
+                f"--size {size}: write width x height, such as 88x60mm, of 0.5 to {LARGEST_SIZE:g} inches",
+                code="option-invalid",
+            )
+        settings["figure.figsize"] = sides
+    return settings
+
+
 @takes(*CHANGES, *MAKING)
 def plot(
     sources: RunSources,
@@ -120,20 +163,29 @@ def plot(
     label: Labels = None,
     panel: Panels = None,
     page: AsPage = False,
+    format: FileFormat = None,
+    size: Size = None,
+    style: Style = None,
 ) -> None:
     """Draw one run, or several overlaid.
 
-    Figures are written as SVG and PNG; with --page, an interactive page is written instead. A scenario is
-    run first if its results (those of `yawbench run` without --out) are missing or out of date. Without
-    --out, the figure of one run goes into its folder, that of several into their common parent folder.
+    Figures are written as SVG and PNG; --format, or a file such as --out fig.pdf, chooses one format.
+    With --style or --size, they are made for a publication: no title, no note, fonts embedded. With
+    --page, an interactive page is written instead. A scenario is run first if its results (those of
+    `yawbench run` without --out) are missing or out of date. Without --out, the figure of one run goes
+    into its folder, that of several into their common parent folder.
     """
+    import matplotlib
+
     from ..experiments.comparison import FIGURES
     from ..figures.panels import check_panels, shown_by
     from ..figures.plots import OVERVIEW, draw
-    from ..figures.style import LabelledRun, save
+    from ..figures.style import KINDS, LabelledRun, save
     from ..results.read_and_salvage import load_results
     from .progress import say
 
+    settings = _settings(style, size)
+    file = options.out if options.out and options.out.suffix[1:] in KINDS and not page else None
     folders = recorded(sources, options)
     labels = labels_of(folders, label)
     if page:
@@ -145,11 +197,16 @@ def plot(
     ]
     check_panels(runs, panel or ())
     figures: dict[str, Sequence[str]] = {"overview": panel or OVERVIEW}
-    if len(runs) > 1 and not panel:
+    if file:
+        figures = {file.stem: panel or OVERVIEW}
+    elif len(runs) > 1 and not panel:
         figures = {name: panels for name, panels in FIGURES.items() if shown_by(runs, panels)}
     for name, panels in figures.items():
-        paths = save(draw(runs, panels), (options.out or folder_of_all(folders)) / name)
-        say(f"{paths[0]}, {paths[1].name}")
+        folder = file.parent if file else options.out or folder_of_all(folders)
+        kinds = [format or file.suffix[1:]] if file else [format] if format else ["svg", "png"]
+        with matplotlib.rc_context(settings):
+            first, *others = save(draw(runs, panels), folder / name, kinds)
+        say(", ".join([str(first), *(path.name for path in others)]))
 
 
 Page = Annotated[Path | None, typer.Option("--out", metavar="FILE.html", help="Page to write.")]

@@ -13,7 +13,18 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ResultsError
 from ..messages import changed_each
 from .panels import SPAN, Panel, in_legend, shown_by, spans_of
-from .style import REFERENCE, ROW, LabelledRun, digits_of, frame, line_style, new_figure, reference_words
+from .style import (
+    NARROW,
+    REFERENCE,
+    ROW,
+    LabelledRun,
+    digits_of,
+    frame,
+    line_style,
+    new_figure,
+    own_size,
+    reference_words,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,7 +73,8 @@ def draw(
         raise ResultsError(
             f"{where}: nothing to draw, no run recorded any of {', '.join(panels)}.", code="nothing-to-draw"
         )
-    rows = _rows(selected)
+    size = own_size()
+    rows = [[panel] for panel in selected] if size and size[0] < NARROW else _rows(selected)
     with new_figure() as figure:
         heights = [max(panel.rows for panel in row) for row in rows]
         grid = figure.add_gridspec(len(rows), 2, height_ratios=heights)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import math
+import sys
 import textwrap
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
@@ -64,10 +65,36 @@ RC: Any = {
     "path.simplify_threshold": 0.2,
     "svg.hashsalt": "yawbench",
     "svg.fonttype": "path",
+    "pdf.fonttype": 42,
     "savefig.dpi": 150,
 }
 WIDTH, ROW = 10.0, 2.25
 """Width of a figure and height of a row of panels [inches]."""
+KINDS: dict[str, dict[str, None]] = {
+    "svg": {"Date": None}, "png": {"Software": None}, "pdf": {"CreationDate": None}, "pgf": {},
+}  # fmt: skip
+"""Format of a figure's file -> metadata to be left out, so that equal figures give equal files."""
+STYLES: dict[str, dict[str, Any]] = {
+    "ieee": {
+        "font.family": "serif", "font.serif": ["Times New Roman", "Liberation Serif", "STIXGeneral"],
+        "mathtext.fontset": "stix", "font.size": 8, "axes.titlesize": 8, "lines.linewidth": 1.0,
+        "figure.figsize": (3.5, 2.4), "savefig.dpi": 600, "pdf.fonttype": 42,
+    },
+    "elsevier": {
+        "font.family": "sans-serif", "font.sans-serif": ["Arial", "Liberation Sans", "DejaVu Sans"],
+        "font.size": 7, "axes.titlesize": 7, "lines.linewidth": 1.0,
+        "figure.figsize": (3.54, 2.4), "savefig.dpi": 500, "pdf.fonttype": 42,
+    },
+    "slides": {
+        "font.size": 16, "axes.titlesize": 17, "lines.linewidth": 2.4,
+        "figure.figsize": (10.0, 5.6), "savefig.dpi": 150, "pdf.fonttype": 42,
+    },
+}  # fmt: skip
+"""Style of a figure to be published -> settings of matplotlib. Widths [inches] are one column of IEEE,
+88.9 mm, and of Elsevier, 90 mm; font sizes and resolutions follow their instructions for authors; slides:
+chosen."""
+NARROW = 6.0
+"""Width [inches] below which panels are not placed side by side; chosen: two columns of a paper."""
 QUIET = "#666666"
 """Colour of secondary text and lines: provenance, guides."""
 CHANGED = "#A33B00"
@@ -80,8 +107,34 @@ NOTE_WIDTH = 72
 
 
 def line_style(number: int) -> dict[str, Any]:
-    """Return the line style of a run by its number, counted from 0; styles repeat after the last."""
-    return dict(LINES[number % len(LINES)])
+    """Return the line style of a run by its number, counted from 0; styles repeat after the last.
+
+    Widths, and colours if the caller has set a cycle of them, are matplotlib's in use.
+    """
+    style = dict(LINES[number % len(LINES)])
+    if "matplotlib" in sys.modules:
+        from matplotlib import rcParams, rcParamsDefault
+
+        style["linewidth"] *= rcParams["lines.linewidth"] / rcParamsDefault["lines.linewidth"]
+        if rcParams["axes.prop_cycle"] != rcParamsDefault["axes.prop_cycle"]:
+            cycle = list(rcParams["axes.prop_cycle"])
+            style |= cycle[number % len(cycle)]
+    return style
+
+
+def _own() -> Any:
+    """Return the settings of the common style, without those that the caller has set."""
+    from matplotlib import rcParams, rcParamsDefault
+
+    return {name: value for name, value in RC.items() if rcParams[name] == rcParamsDefault[name]}
+
+
+def own_size() -> tuple[float, float] | None:
+    """Return the size of a figure [inches] that the caller has set; None if none was set."""
+    from matplotlib import rcParams, rcParamsDefault
+
+    width, height = rcParams["figure.figsize"]
+    return (width, height) if [width, height] != list(rcParamsDefault["figure.figsize"]) else None
 
 
 @contextmanager
@@ -91,31 +144,35 @@ def new_figure() -> Iterator[Figure]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(RC):
+    with matplotlib.rc_context(_own()):
         figure = Figure(layout="constrained")
         FigureCanvasAgg(figure)
         yield figure
 
 
-def save(figure: Figure, stem: Path) -> list[Path]:
-    """Write `stem.svg` and `stem.png` and return both paths; equal figures give equal files.
+def save(figure: Figure, stem: Path, kinds: Sequence[str] = ("svg", "png")) -> list[Path]:
+    """Write a figure in some formats of `KINDS` and return the paths; equal figures give equal files.
 
     Raises:
-        ResultsError: they cannot be written.
+        ResultsError: they cannot be written, or PGF is asked for and there is no LaTeX.
     """
-    paths = [stem.with_name(f"{stem.name}.{kind}") for kind in ("svg", "png")]
+    paths = [stem.with_name(f"{stem.name}.{kind}") for kind in kinds]
     import matplotlib
 
-    with matplotlib.rc_context(RC), warnings.catch_warnings():
+    with matplotlib.rc_context(_own()), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from font")  # it is shown as a box
         if (layout := figure.get_layout_engine()) is not None:
             layout.execute(figure)  # once, not once per file
             figure.set_layout_engine("none")
         try:
-            for path, metadata in zip(paths, ({"Date": None}, {"Software": None}), strict=True):
+            for path, kind in zip(paths, kinds, strict=True):
                 content = io.BytesIO()
-                figure.savefig(content, format=path.suffix[1:], metadata=metadata)
+                figure.savefig(content, format=kind, metadata=KINDS[kind] or None)
                 write_whole(path, content.getvalue())
+        except RuntimeError as error:  # of matplotlib, which measures texts with LaTeX
+            raise ResultsError(
+                f"{stem}: PGF needs LaTeX (xelatex), which is not installed", code="package-missing"
+            ) from error
         except OSError as error:
             raise ResultsError(
                 f"{stem}: the figure cannot be written: {reason(error)}.", code="results-unwritable"
@@ -157,6 +214,9 @@ def frame(
         title, note: broken into lines as needed.
         changed: overrides of the scenario that the title names; shown below the title.
     """
+    if size := own_size():
+        _frame_bare(figure, size, handles)
+        return
     titles, notes = textwrap.wrap(cut(title, LONGEST), 95), textwrap.wrap(cut(note, LONGEST), 165)
     changes = textwrap.wrap(cut(f"changed: {changed}", LONGEST), 110) if changed else []
     for handle in handles:
@@ -180,6 +240,23 @@ def frame(
         figure.legend(
             handles=handles, loc="upper left", bbox_to_anchor=(left, 1 - above / total),
             ncols=columns, borderaxespad=0.0, borderpad=0.0,
+        )  # fmt: skip
+
+
+def _frame_bare(figure: Figure, size: tuple[float, float], handles: Sequence[Artist]) -> None:
+    """Give a figure its size and a legend; its title and provenance belong into the caption."""
+    from matplotlib import rcParams
+
+    figure.set_size_inches(*size)
+    line = rcParams["font.size"] / 72  # inches
+    widths = [0.5 * line * len(str(handle.get_label())) + 5 * line for handle in handles]
+    columns = max(1, min(len(handles), int(size[0] / max(widths, default=1.0))))
+    head = 1.5 * line * math.ceil(len(handles) / columns) / size[1]
+    figure.get_layout_engine().set(rect=(0, 0, 1, 1 - head))  # type: ignore[union-attr, call-arg]
+    if handles:
+        figure.legend(
+            handles=handles, loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=columns,
+            borderaxespad=0.2, borderpad=0.0, columnspacing=1.0, handlelength=2.6,
         )  # fmt: skip
 
 

@@ -1,0 +1,86 @@
+"""Figures for publication: format, size, fonts, and the caller's settings of matplotlib."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import matplotlib
+import pytest
+from PIL import Image
+
+from orchestrator.figures.plots import draw
+from orchestrator.figures.style import LINES, STYLES, LabelledRun
+from tests.commands import status_of
+from tests.sentences import golden
+
+from .recorded import car, write
+
+SINGLE = ("--panel", "yaw_rate")
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    write(car(), tmp_path / "run")
+    return Path("run")
+
+
+def test_a_pdf_has_the_size_and_embedded_truetype_fonts(run):
+    assert status_of("plot", run, *SINGLE, "--size", "88x60mm", "--style", "ieee", "--out", "fig.pdf") == 0
+    text = Path("fig.pdf").read_bytes()
+    box = [float(one) for one in re.search(rb"/MediaBox \[([^]]*)\]", text)[1].split()]
+    assert box[2:] == pytest.approx([88 / 25.4 * 72, 60 / 25.4 * 72], abs=0.01)
+    assert b"/FontFile2" in text and b"/Type3" not in text
+    assert [path.name for path in Path().iterdir() if path.is_file()] == ["fig.pdf"]
+
+
+@pytest.mark.skipif(not shutil.which("pdffonts"), reason="pdffonts is not installed")
+@pytest.mark.parametrize("style", STYLES)
+def test_every_font_is_embedded(run, style):
+    assert status_of("plot", run, *SINGLE, "--style", style, "--out", "fig.pdf") == 0
+    listed = subprocess.run(["pdffonts", "fig.pdf"], capture_output=True, text=True, check=True).stdout
+    fonts = listed.splitlines()[2:]
+    assert fonts and all(" yes yes " in font for font in fonts)
+
+
+@pytest.mark.parametrize("kind", ["svg", "png", "pdf"])
+def test_the_format_is_that_of_the_option_or_the_file(run, kind):
+    assert status_of("plot", run, *SINGLE, "--format", kind, "--out", "folder") == 0
+    assert status_of("plot", run, *SINGLE, "--out", f"one.{kind}") == 0
+    assert [path.name for path in Path("folder").iterdir()] == [f"overview.{kind}"]
+    assert Path(f"one.{kind}").read_bytes() == Path(f"folder/overview.{kind}").read_bytes()
+
+
+def test_a_png_has_the_pixels_of_its_size(run):
+    assert status_of("plot", run, *SINGLE, "--size", "4x3in", "--style", "slides", "--out", "fig.png") == 0
+    assert Image.open("fig.png").size == (600, 450)
+
+
+def test_a_size_that_is_none_is_refused(run, capsys):
+    for size in ("88", "88x60", "0x60mm", "88x9999mm"):
+        assert status_of("plot", run, *SINGLE, "--size", size) == 2
+    assert golden(capsys.readouterr().err)
+
+
+@pytest.mark.skipif(bool(shutil.which("xelatex")), reason="LaTeX is installed")
+def test_pgf_without_latex_is_refused_in_a_sentence(run, capsys):
+    assert status_of("plot", run, *SINGLE, "--format", "pgf") == 2
+    assert golden(capsys.readouterr().err)
+
+
+def test_the_callers_settings_of_matplotlib_hold():
+    runs = [LabelledRun("a", car()), LabelledRun("b", car(2.0))]
+    own = {"figure.figsize": (4.0, 3.0), "axes.grid": False, "font.size": 6, "lines.linewidth": 0.75}
+    with matplotlib.rc_context({**own, "axes.prop_cycle": matplotlib.cycler(color=["#123456", "#654321"])}):
+        figure = draw(runs, ["yaw_rate"])
+    assert figure.get_size_inches().tolist() == [4.0, 3.0]
+    lines = [line for line in figure.axes[0].get_lines() if line.get_color() in ("#123456", "#654321")]
+    assert len(lines) == 2
+    assert lines[0].get_linewidth() == pytest.approx(LINES[0]["linewidth"] / 2)
+    assert not figure.texts
+    with_ours = draw(runs, ["yaw_rate"])
+    assert with_ours.get_size_inches()[0] == 10.0 and with_ours.texts
+    assert [one.get_color() for one in with_ours.axes[0].get_lines()].count(LINES[0]["color"]) == 1
