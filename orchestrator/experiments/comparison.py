@@ -36,7 +36,7 @@ from ..scenario.overrides import is_path, swap_of
 from .experiment import LoadedExperiment, NamedRun, experiment_of
 from .judged_schema import text_of
 from .outcome import ExperimentResult
-from .tables import Cell, Table, TableColumn, marked, remarks
+from .tables import Cell, Table, column, marked, remarks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -282,18 +282,20 @@ def convergence_table(rows: Sequence[ConvergenceRow], title: str) -> Table:
     return table
 
 
-def columns_of(rows: Sequence[ConvergenceRow]) -> list[TableColumn]:
+def columns_of(rows: Sequence[ConvergenceRow]) -> Table:
     """Return the rows as columns, in SI units."""
     numbers = (("step_size", "s", "step"), ("error", "1", "error"), ("order", "1", "order"),
                ("wall_time", "s", "wall_time"))  # fmt: skip
-    return [
-        TableColumn("algorithm", "string", [row.algorithm for row in rows]),
-        *(
-            TableColumn(n, "float64", [getattr(row, part) for row in rows], {"unit": u})
-            for n, u, part in numbers
-        ),
-        TableColumn("failed", "string", [row.failed for row in rows]),
-    ]
+    return Table.of_columns(
+        [
+            column("algorithm", "string", [row.algorithm for row in rows]),
+            *(
+                column(n, "float64", [getattr(row, part) for row in rows], {"unit": u})
+                for n, u, part in numbers
+            ),
+            column("failed", "string", [row.failed for row in rows]),
+        ]
+    )
 
 
 def convergence_figure(rows: Sequence[ConvergenceRow], signal: str, title: str, note: str) -> Figure:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from ..figures.style import digits_of, shown
 from .claims import MetricTable
 from .judged_schema import GridSpec, rank_correlation
-from .tables import Cell, Table
+from .tables import Cell, Column, Table
 
 
 @dataclass(frozen=True)
@@ -131,9 +131,8 @@ def side_by_side(tables: Sequence[Table]) -> Table:
         return tables[0]
     ours, theirs = tables
     rows = [[*one, *other] for one, other in zip(ours.rows, theirs.rows, strict=True)]
-    headings = [*ours.headings, "the paper:", *theirs.headings[1:]]
-    numbers = ours.numbers | {len(ours.headings) + number for number in theirs.numbers}
-    return Table(ours.title, headings, [*rows], theirs.notes, numbers)
+    columns = [*ours.columns, Column("the paper:"), *theirs.columns[1:]]
+    return Table(ours.title, columns, rows, theirs.notes)
 
 
 def _display_table(spec: GridSpec, values: MetricTable, verdicts: Mapping[tuple[str, str], str]) -> Table:

@@ -332,12 +332,12 @@ def limit_table(findings: ExperimentResult, name: str) -> Table:
     assert planned is not None
     found = limits_of(findings, spec)
     others = [one if one == RUN else f"{one}{planned.axis_unit(one)}" for one in found[0].others]
-    table = Table(f"{spec.says}{planned.axis_unit(spec.of)}", [*others, "up to", "not any more at"])
+    title, headings = f"{spec.says}{planned.axis_unit(spec.of)}", [*others, "up to", "not any more at"]
+    table = Table(title, headings, numbers={len(others), len(others) + 1})
     for limit in found:
         words: list[Cell] = [level.words for level in limit.others.values()]
         up_to = "-" if limit.largest is None else digits_of(limit.largest)
         beyond = "-" if limit.beyond is None else digits_of(limit.beyond)
         why = {"failed": "the run failed"}.get(limit.verdict.why, limit.verdict.why)
         table.rows.append([*words, up_to, f"{beyond} ({why})" if why else beyond])
-    table.numbers = {len(others), len(others) + 1}
     return table

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,8 +17,7 @@ from ..results.read_and_salvage import load_results
 from .jobs import STEP_TIME
 from .ranking import SERIES
 from .ranking_scores import Digits, EntryScore, RankingCell, deciding_digits
-from .tables import Cell as Words
-from .tables import Table, TableColumn
+from .tables import Cell, Column, Table, column
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -170,7 +169,7 @@ UNITS = {
 """Numbers of a cell -> unit; controllers have their means over conditions."""
 
 
-def words_of(number: float | None, unit: str) -> Words:
+def words_of(number: float | None, unit: str) -> Cell:
     """Return a number as a table cell; None if missing."""
     if number is None:
         return None
@@ -186,7 +185,7 @@ def spread(one: ConfidenceInterval | None, words: Callable[[float], str]) -> str
     return f"{words(one.mean)} ± {words(one.half)}" if one.half else words(one.mean)
 
 
-def row_of(one: EntryScore, digits: Digits) -> dict[str, Words]:
+def row_of(one: EntryScore, digits: Digits) -> dict[str, Cell]:
     """Return the row of a controller: heading -> cell; `digits`: of the numbers that decide places."""
     slip = one.mean("sideslip")
     means = {
@@ -194,7 +193,7 @@ def row_of(one: EntryScore, digits: Digits) -> dict[str, Words]:
     }
     if slip is not None:
         means["sideslip"] = shown(slip, "rad", digits=digits.sideslip)
-    row: dict[str, Words] = {
+    row: dict[str, Cell] = {
         "place": place_words(one),
         "controller": one.spec.title,
         "gains": one.spec.gains,
@@ -207,7 +206,7 @@ def row_of(one: EntryScore, digits: Digits) -> dict[str, Words]:
     if one.place:
         return row
     kept = {"place", "controller", "gains"}
-    lacking: dict[str, Words] = {heading: row[heading] if heading in kept else None for heading in row}
+    lacking: dict[str, Cell] = {heading: row[heading] if heading in kept else None for heading in row}
     return {**lacking, "passed": f"{one.missing} missing"}
 
 
@@ -227,7 +226,7 @@ def runs_table(cell: RankingCell) -> Table:
     repeated = len({one.repeat for one in cell.runs}) > 1
     mirrored = any(one.amplitude < 0 for one in cell.runs)
     units = {"displacement": "m", **{key: unit for key, unit in UNITS.items() if unit != "points"}}
-    rows: list[dict[str, Words]] = [
+    rows: list[dict[str, Cell]] = [
         {
             "amplitude": degrees(one.amplitude),
             "over A": f"{one.multiple:.2f}",
@@ -245,41 +244,43 @@ def runs_table(cell: RankingCell) -> Table:
     return Table("", headings, [[*row.values()] for row in rows], numbers=set(map(headings.index, texts)))
 
 
-def _ratio(found: float | None) -> Words:
+def _ratio(found: float | None) -> Cell:
     return None if found is None else percent(found)
 
 
-def _text(name: str, values: Iterable[object]) -> TableColumn:
-    return TableColumn(name, "string", [None if value is None else str(value) for value in values])
+def _text(name: str, values: Iterable[object]) -> tuple[Column, Sequence[Cell]]:
+    return column(name, "string", [None if value is None else str(value) for value in values])
 
 
-def _counts(name: str, values: Iterable[int | None]) -> TableColumn:
-    return TableColumn(name, "int64", list(values))
+def _counts(name: str, values: Iterable[int | None]) -> tuple[Column, Sequence[Cell]]:
+    return column(name, "int64", list(values))
 
 
-def _numbers(name: str, unit: str, values: Iterable[float | None]) -> TableColumn:
-    return TableColumn(name, "float64", list(values), {"unit": unit})
+def _numbers(name: str, unit: str, values: Iterable[float | None]) -> tuple[Column, Sequence[Cell]]:
+    return column(name, "float64", list(values), {"unit": unit})
 
 
-def columns_of_entries(ranked: RankingResult) -> list[TableColumn]:
+def columns_of_entries(ranked: RankingResult) -> Table:
     """Return columns with a row per controller, in SI units."""
     rows = ranked.scores
-    return [
-        _text("entry", (one.entry for one in rows)),
-        _text("title", (one.spec.title for one in rows)),
-        _text("gains", (one.spec.gains for one in rows)),
-        _counts("place", (one.place for one in rows)),
-        _counts("conditions", (len(one.cells) for one in rows)),
-        _counts("passed", (one.count("passed") for one in rows)),
-        _counts("spun", (one.count("spun") for one in rows)),
-        _counts("missing", (one.missing for one in rows)),
-        _numbers("share", "1", (None if one.missing else one.share for one in rows)),
-        *(_numbers(key, unit, [one.mean(key) for one in rows]) for key, unit in UNITS.items()),
-        _numbers("step_time", "s", (one.step_time for one in rows)),
-    ]
+    return Table.of_columns(
+        [
+            _text("entry", (one.entry for one in rows)),
+            _text("title", (one.spec.title for one in rows)),
+            _text("gains", (one.spec.gains for one in rows)),
+            _counts("place", (one.place for one in rows)),
+            _counts("conditions", (len(one.cells) for one in rows)),
+            _counts("passed", (one.count("passed") for one in rows)),
+            _counts("spun", (one.count("spun") for one in rows)),
+            _counts("missing", (one.missing for one in rows)),
+            _numbers("share", "1", (None if one.missing else one.share for one in rows)),
+            *(_numbers(key, unit, [one.mean(key) for one in rows]) for key, unit in UNITS.items()),
+            _numbers("step_time", "s", (one.step_time for one in rows)),
+        ]
+    )
 
 
-def columns_of_cells(ranked: RankingResult) -> list[TableColumn]:
+def columns_of_cells(ranked: RankingResult) -> Table:
     """Return columns with a row per controller and condition, in SI units."""
     cells = [cell for one in ranked.scores for cell in one.cells.values()]
     numbers = []
@@ -289,31 +290,35 @@ def columns_of_cells(ranked: RankingResult) -> list[TableColumn]:
             over = [getattr(one, key) for one in cells]
             numbers.append(_numbers(f"{key}_half_width", unit, [one and one.half for one in over]))
     least = _numbers("displacement", "m", (None if one.missing else one.displacement for one in cells))
-    return [
-        _text("entry", (one.entry for one in cells)),
-        _text("condition", (one.condition for one in cells)),
-        _text("state", (one.state for one in cells)),
-        _counts("runs", (len(one.runs) for one in cells)),
-        _counts("passed", (sum(run.passed for run in one.runs) for one in cells)),
-        *numbers[:4],
-        least,
-        *numbers[4:],
-    ]
+    return Table.of_columns(
+        [
+            _text("entry", (one.entry for one in cells)),
+            _text("condition", (one.condition for one in cells)),
+            _text("state", (one.state for one in cells)),
+            _counts("runs", (len(one.runs) for one in cells)),
+            _counts("passed", (sum(run.passed for run in one.runs) for one in cells)),
+            *numbers[:4],
+            least,
+            *numbers[4:],
+        ]
+    )
 
 
-def columns_of_runs(ranked: RankingResult) -> list[TableColumn]:
+def columns_of_runs(ranked: RankingResult) -> Table:
     """Return columns with a row per run, in SI units."""
     runs = [run for one in ranked.scores for cell in one.cells.values() for run in cell.runs]
     units = {
         "ratio_1000": "1", "ratio_1750": "1", "displacement": "m", "sideslip": "rad", "speed": "m/s",
         "speed_end": "m/s", "intervention": "N.m.s", "effort": "N.m.s", "chatter": "N.m/s",
     }  # fmt: skip
-    return [
-        _text("entry", (run.entry for run in runs)),
-        _text("condition", (run.condition for run in runs)),
-        _numbers("amplitude", "rad", (run.amplitude for run in runs)),
-        _text("repeat", (run.repeat for run in runs)),
-        _text("verdict", (run.verdict for run in runs)),
-        *(_numbers(key, unit, [run[key] for run in runs]) for key, unit in units.items()),
-        _text("key", (run.job and run.job.key for run in runs)),
-    ]
+    return Table.of_columns(
+        [
+            _text("entry", (run.entry for run in runs)),
+            _text("condition", (run.condition for run in runs)),
+            _numbers("amplitude", "rad", (run.amplitude for run in runs)),
+            _text("repeat", (run.repeat for run in runs)),
+            _text("verdict", (run.verdict for run in runs)),
+            *(_numbers(key, unit, [run[key] for run in runs]) for key, unit in units.items()),
+            _text("key", (run.job and run.job.key for run in runs)),
+        ]
+    )

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,68 +20,66 @@ from ..results.read_and_salvage import Results
 from .claims import ClaimResult, Region
 from .judged_schema import si_number, text_of
 from .outcome import ExperimentResult, limits_of
-from .tables import TableColumn, to_csv
+from .tables import Table, column, to_csv
 from .verdict_tables import heading, verdict
 
 TABLE = "table.csv", "table.parquet"
 VERDICTS = "verdicts.csv"
 
 
-def columns_of(findings: ExperimentResult) -> list[TableColumn]:
+def columns_of(findings: ExperimentResult) -> Table:
     """Return the columns of the table: run, axes, status, reason, warnings, metrics, key."""
     cases, spec, planned = findings.experiment.cases, findings.spec, findings.planned
     records = findings.records
     if spec.runs:
-        columns = [
-            TableColumn("run", "string", [case.run.name for case in cases], {"description": "its name"})
-        ]
+        columns = [column("run", "string", [case.run.name for case in cases], {"description": "its name"})]
     else:
         numbers = [case.number + 1 for case in cases]
-        columns = [TableColumn("run", "int64", numbers, {"description": "number of the run, from 1"})]
+        columns = [column("run", "int64", numbers, {"description": "number of the run, from 1"})]
     for i, (name, axis) in enumerate(spec.axes.items()):
         varied = ", ".join(map(str, axis.targets))
         about = {"description": axis.says or varied, "varies": varied}
         if axis.numeric and planned:
             levels = [planned.number(name, case.point[i]) for case in cases]
-            columns.append(TableColumn(name, "float64", levels, about | {"unit": planned.units[name]}))
+            columns.append(column(name, "float64", levels, about | {"unit": planned.units[name]}))
         else:
-            columns.append(TableColumn(name, "string", [case.point[i].words for case in cases], about))
+            columns.append(column(name, "string", [case.point[i].words for case in cases], about))
     codes = {"description": "codes of the warnings about the run, see docs/diagnostics.md"}
     columns += [
-        TableColumn("status", "string", [one.status for one in records]),
-        TableColumn("reason", "string", [one.reason for one in records]),
-        TableColumn("warnings", "string", [", ".join(one.warning_codes) or None for one in records], codes),
+        column("status", "string", [one.status for one in records]),
+        column("reason", "string", [one.reason for one in records]),
+        column("warnings", "string", [", ".join(one.warning_codes) or None for one in records], codes),
     ]
     for key, one in spec.metrics.items():
         chosen, unit = metric(one.metric), findings.unit(key)
         about = {"metric": chosen.name, "description": f"{chosen.definition}{one.during()}", "unit": si(unit)}
         values = [findings.value(case, key) for case in cases]
-        columns.append(
-            TableColumn(key, "float64", [value.number if value else None for value in values], about)
-        )
+        columns.append(column(key, "float64", [value.number if value else None for value in values], about))
     keys = [job.key for job in planned.jobs] if planned else [None] * len(cases)
-    return [*columns, TableColumn("key", "string", keys)]
+    return Table.of_columns([*columns, column("key", "string", keys)])
 
 
-def verdict_columns(findings: ExperimentResult) -> list[TableColumn]:
+def verdict_columns(findings: ExperimentResult) -> Table:
     """Return columns with verdict, margin and region, a row per claim and check."""
     every = findings.judgements
     regions = [one.region for one in every]
-    flips = [region and region.flip for region in regions]
-    return [
-        TableColumn("group", "string", [one.group for one in every]),
-        TableColumn("says", "string", [one.claim.says for one in every]),
-        TableColumn("verdict", "string", [verdict(one) for one in every]),
-        TableColumn("margin", "float64", [one.verdict.margin for one in every], {"unit": "1"}),
-        TableColumn("spread", "float64", [region and region.spread for region in regions], {"unit": "1"}),
-        TableColumn("points", "int64", [region and len(region.points) for region in regions]),
-        TableColumn("holds at", "int64", [region and region.holding for region in regions]),
-        TableColumn("without result", "int64", [region and region.without_result for region in regions]),
-        TableColumn("flips by", "string", [flip and flip.open_value for flip in flips]),
-        TableColumn("flips at", "string", [flip and flip.words for flip in flips]),
-        TableColumn("chosen", "string", [(flip and flip.chosen) or None for flip in flips]),
-        TableColumn("robust", "string", [region and text_of(region.robust) for region in regions]),
-    ]
+    flips = [region.flip if region else None for region in regions]
+    return Table.of_columns(
+        [
+            column("group", "string", [one.group for one in every]),
+            column("says", "string", [one.claim.says for one in every]),
+            column("verdict", "string", [verdict(one) for one in every]),
+            column("margin", "float64", [one.verdict.margin for one in every], {"unit": "1"}),
+            column("spread", "float64", [at.spread if at else None for at in regions], {"unit": "1"}),
+            column("points", "int64", [len(region.points) if region else None for region in regions]),
+            column("holds at", "int64", [region.holding if region else None for region in regions]),
+            column("without result", "int64", [at.without_result if at else None for at in regions]),
+            column("flips by", "string", [flip.open_value if flip else None for flip in flips]),
+            column("flips at", "string", [flip.words if flip else None for flip in flips]),
+            column("chosen", "string", [(flip.chosen or None) if flip else None for flip in flips]),
+            column("robust", "string", [text_of(region.robust) if region else None for region in regions]),
+        ]
+    )
 
 
 def write_table(findings: ExperimentResult, out: Path) -> None:
@@ -91,8 +88,8 @@ def write_table(findings: ExperimentResult, out: Path) -> None:
     Raises:
         ResultsError: a file cannot be written.
     """
-    columns = columns_of(findings)
-    contents: dict[str, str | bytes] = {TABLE[0]: to_csv(columns), TABLE[1]: _parquet(findings, columns)}
+    table = columns_of(findings)
+    contents: dict[str, str | bytes] = {TABLE[0]: to_csv(table), TABLE[1]: _parquet(findings, table)}
     if findings.spec.claims or findings.spec.checks:
         contents[VERDICTS] = to_csv(verdict_columns(findings))
     for name, content in contents.items():
@@ -104,13 +101,17 @@ def write_table(findings: ExperimentResult, out: Path) -> None:
             ) from None
 
 
-def _parquet(findings: ExperimentResult, columns: Sequence[TableColumn]) -> bytes:
+def _parquet(findings: ExperimentResult, table: Table) -> bytes:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    fields = [pa.field(c.name, getattr(pa, c.kind)(), metadata=c.about or None) for c in columns]
+    kinds = [getattr(pa, table.kind(k))() for k in range(len(table.columns))]
+    fields = [
+        pa.field(column.heading, kind, metadata=column.about or None)
+        for column, kind in zip(table.columns, kinds, strict=True)
+    ]
     schema = pa.schema(fields, metadata={"experiment": _encodable(_description(findings))})
-    arrays = [pa.array(map(_encodable, c.values), type=f.type) for c, f in zip(columns, fields, strict=True)]
+    arrays = [pa.array(map(_encodable, table.values(k)), type=kind) for k, kind in enumerate(kinds)]
     content = pa.BufferOutputStream()
     pq.write_table(pa.Table.from_arrays(arrays, schema=schema), content, compression="zstd")
     written: bytes = content.getvalue().to_pybytes()

@@ -1,4 +1,4 @@
-"""Tables for people (`Table`) and for programs (`TableColumn`); listings of runs, files, FMUs and signals."""
+"""Tables, shown on the terminal and on pages and written to files; listings of runs, files, FMUs, signals."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import csv
 import io
 import math
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -22,7 +22,7 @@ from ..fmu.archive import open_fmu
 from ..fmu.binary import runs_as
 from ..messages import changed, printable, star, with_changes
 from ..metrics.measures import catalogue as measures
-from ..metrics.measures import symbol
+from ..metrics.measures import si, symbol
 from ..metrics.run_metrics import STANDARD, MetricValue, columns_of, evaluate_all, metric
 from ..plan import Fmu, Plan
 from ..results.read_and_salvage import FoundRun, Results
@@ -41,33 +41,108 @@ MARK = "†"
 MIN_HEADING = 12
 """Characters after which a heading over numbers is wrapped."""
 
-Cell = str | MetricValue | None
-"""A table cell: text, a number with its unit, or None if empty."""
+Cell = str | MetricValue | float | None
+"""A table cell: text, a number with its unit or in that of its column, or None if empty."""
+Kind = Literal["int64", "float64", "string"]
 
 
-@dataclass
+@dataclass(frozen=True)
+class Column:
+    """A column of a table, without its cells."""
+
+    heading: str
+    kind: Kind | None = None  # of all cells; None: as they are
+    about: dict[str, str] = field(default_factory=dict)  # for programs; `unit`: SI unit of plain numbers
+    number: bool = False  # numbers formatted as text, aligned right
+
+
 class Table:
-    """A table: headings, rows of cells, and notes below."""
+    """A table, shown on the terminal and on pages, and written as CSV, Parquet and data frames.
 
-    title: str
-    headings: list[str]
-    rows: list[Sequence[Cell]] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    numbers: set[int] = field(default_factory=set)  # columns of numbers formatted as text
+    Args:
+        title: above it.
+        columns: columns, or headings of columns of any cells.
+        rows: a cell per column.
+        notes: below it.
+        numbers: indices of the headings over numbers that are formatted as text.
+    """
+
+    def __init__(
+        self,
+        title: str,
+        columns: Iterable[str | Column],
+        rows: Iterable[Sequence[Cell]] = (),
+        notes: Iterable[str] = (),
+        numbers: Collection[int] = (),
+    ) -> None:
+        self.title = title
+        self.columns = [
+            entry if isinstance(entry, Column) else Column(entry, number=k in numbers)
+            for k, entry in enumerate(columns)
+        ]
+        self.rows = list(rows)
+        self.notes = list(notes)
+
+    @classmethod
+    def of_columns(cls, columns: Iterable[tuple[Column, Sequence[Cell]]]) -> Table:
+        """Return a table of columns with their cells."""
+        listed = list(columns)
+        return cls("", [about for about, _ in listed], zip(*(cells for _, cells in listed), strict=True))
+
+    @property
+    def headings(self) -> list[str]:
+        """The headings of all columns."""
+        return [column.heading for column in self.columns]
 
     def text(self) -> list[list[str]]:
         """Return the cells of all rows as text."""
-        return [[_shown(cell) for cell in row] for row in self.rows]
+        units = [column.about.get("unit", "") for column in self.columns]
+        return [[_shown(cell, unit) for cell, unit in zip(row, units, strict=True)] for row in self.rows]
 
     def is_number(self, column: int) -> bool:
         """Return whether a column has numbers, and so is aligned right."""
-        return column in self.numbers or any(isinstance(row[column], MetricValue) for row in self.rows)
+        return self.columns[column].number or any(
+            isinstance(row[column], (MetricValue, float, int)) for row in self.rows
+        )
+
+    def unit(self, column: int) -> str | None:
+        """Return the SI unit of a column's numbers; None if it has none, or several."""
+        if unit := self.columns[column].about.get("unit"):
+            return unit
+        cells = [row[column] for row in self.rows if row[column] is not None]
+        units = {si(cell.unit) if isinstance(cell, MetricValue) else None for cell in cells}
+        return units.pop() if len(units) == 1 else None
+
+    def values(self, column: int) -> list[str | float | None]:
+        """Return a column for programs: numbers in SI units if all have the same, else text."""
+        cells = [row[column] for row in self.rows]
+        if self.unit(column) is None:
+            return [_shown(cell) if isinstance(cell, MetricValue) else cell for cell in cells]
+        return [cell.number if isinstance(cell, MetricValue) else cell for cell in cells]
+
+    def kind(self, column: int) -> Kind:
+        """Return the kind of a column's values."""
+        known = [value for value in self.values(column) if value is not None]
+        numbers = bool(known) and not any(isinstance(value, str) for value in known)
+        return self.columns[column].kind or ("float64" if numbers else "string")
 
 
-def _shown(cell: Cell) -> str:
+def column(
+    heading: str, kind: Kind, cells: Sequence[Cell], about: dict[str, str] | None = None
+) -> tuple[Column, Sequence[Cell]]:
+    """Return a column of one kind with its cells, for `Table.of_columns`."""
+    return Column(heading, kind, about or {}), cells
+
+
+def _shown(cell: Cell, unit: str = "") -> str:
     if cell is None:
         return "-"
-    return shown(cell.number, cell.unit, half=cell.half) if isinstance(cell, MetricValue) else printable(cell)
+    if isinstance(cell, str):
+        return printable(cell)
+    if isinstance(cell, int):
+        return str(cell)
+    value = cell if isinstance(cell, MetricValue) else MetricValue(cell, unit or "1")
+    return shown(value.number, value.unit, half=value.half)
 
 
 def for_terminal(table: Table) -> rich.console.Group:
@@ -92,36 +167,70 @@ def for_terminal(table: Table) -> rich.console.Group:
     return Group(*([Text(printable(table.title), "bold")] if table.title else []), shape, *notes)
 
 
-@dataclass(frozen=True)
-class TableColumn:
-    """A column of a table for programs; numbers are in SI units, named in `about`."""
-
-    name: str
-    kind: Literal["int64", "float64", "string"]
-    values: Sequence[Any]
-    about: dict[str, str] = field(default_factory=dict)
-
-
-def to_pandas(columns: Sequence[TableColumn]) -> pd.DataFrame:
-    """Return columns as a data frame; `attrs["units"]` has the units of its numbers."""
+def to_pandas(table: Table) -> pd.DataFrame:
+    """Return a table as a data frame; `attrs["units"]` has the units of its numbers."""
     import pandas as pd
 
-    frame = pd.DataFrame({one.name: pd.Series(one.values, dtype=_dtype(one)) for one in columns})
-    frame.attrs["units"] = {one.name: one.about["unit"] for one in columns if "unit" in one.about}
+    kinds = {"string": "object"}
+    series = {
+        heading: pd.Series(table.values(k), dtype=kinds.get(table.kind(k), table.kind(k)))
+        for k, heading in enumerate(table.headings)
+    }
+    frame = pd.DataFrame(series)
+    units = {heading: table.unit(k) for k, heading in enumerate(table.headings)}
+    frame.attrs["units"] = {heading: unit for heading, unit in units.items() if unit}
     return frame
 
 
-def _dtype(column: TableColumn) -> str:
-    return "object" if column.kind == "string" else column.kind
-
-
-def to_csv(columns: Sequence[TableColumn]) -> str:
-    """Return columns as CSV, with units in the headings."""
+def to_csv(table: Table) -> str:
+    """Return a table as CSV, with units in the headings."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(f"{c.name} [{c.about['unit']}]" if "unit" in c.about else c.name for c in columns)
-    writer.writerows(map(_plain, zip(*(c.values for c in columns), strict=True)))
+    units = [table.unit(k) for k in range(len(table.columns))]
+    writer.writerow(
+        f"{heading} [{unit}]" if unit else heading
+        for heading, unit in zip(table.headings, units, strict=True)
+    )
+    writer.writerows(map(_plain, zip(*map(table.values, range(len(table.columns))), strict=True)))
     return text.getvalue()
+
+
+def to_latex(table: Table) -> str:
+    """Return a table for LaTeX with the package booktabs; its notes as a paragraph below."""
+    shape = "".join("r" if table.is_number(k) else "l" for k in range(len(table.columns)))
+    rows = [" & ".join(map(_latex, row)) + r" \\" for row in table.text()]
+    lines = [
+        *([rf"\caption{{{_latex(table.title)}}}"] if table.title else []),
+        rf"\begin{{tabular}}{{{shape}}}", r"\toprule",
+        " & ".join(map(_latex, table.headings)) + r" \\", r"\midrule",
+        *rows, r"\bottomrule", r"\end{tabular}",
+        *(rf"\par {_latex(note)}" for note in table.notes),
+    ]  # fmt: skip
+    return "\n".join([r"\begin{table}", r"\centering", *lines, r"\end{table}", ""])
+
+
+def to_markdown(table: Table) -> str:
+    """Return a table for Markdown."""
+
+    def line(cells: Iterable[str]) -> str:
+        escaped = (cell.replace("|", r"\|").replace("\n", "<br>") for cell in cells)
+        return f"| {' | '.join(escaped)} |"
+
+    marks = ["---:" if table.is_number(k) else "---" for k in range(len(table.columns))]
+    title = [f"**{table.title}**", ""] if table.title else []
+    notes = [text for note in table.notes for text in ("", note)]
+    return "\n".join([*title, line(table.headings), line(marks), *map(line, table.text()), *notes, ""])
+
+
+_LATEX = str.maketrans({
+    "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "\n": r" \newline ",
+    **{sign: f"\\{sign}" for sign in "&%$#_{}"},
+})  # fmt: skip
+
+
+def _latex(text: str) -> str:
+    """Return text with the characters escaped that mean something to LaTeX."""
+    return text.translate(_LATEX)
 
 
 def _plain(row: Sequence[Any]) -> list[str]:

@@ -27,7 +27,7 @@ from .axes import DesignAxisSpec, OverrideSpec, VariantSpec, level_at
 from .claims import MetricTable
 from .experiment import LoadedExperiment
 from .outcome import ExperimentResult, derive
-from .tables import Table, TableColumn
+from .tables import Table, column
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -233,19 +233,21 @@ def entries_text(entries: dict[str, dict[str, Any]], command: str) -> str:
     return f"# Written by: {command}\n{stream.getvalue()}"
 
 
-def columns_of(found: Sequence[TunedLaw]) -> list[TableColumn]:
+def columns_of(found: Sequence[TunedLaw]) -> Table:
     """Return all trials as columns: law, generation, objective, and every varied target."""
     rows = [(one.law, trial) for one in found for trial in one.trials]
     targets = dict.fromkeys(target for _, trial in rows for target in trial.values)
-    return [
-        TableColumn("law", "string", [law for law, _ in rows]),
-        TableColumn("generation", "int64", [trial.generation for _, trial in rows]),
-        TableColumn("objective", "float64", [trial.objective for _, trial in rows]),
-        *(
-            TableColumn(str(target), "float64", [trial.values.get(target) for _, trial in rows])
-            for target in targets
-        ),
-    ]
+    return Table.of_columns(
+        [
+            column("law", "string", [law for law, _ in rows]),
+            column("generation", "int64", [trial.generation for _, trial in rows]),
+            column("objective", "float64", [trial.objective for _, trial in rows]),
+            *(
+                column(str(target), "float64", [trial.values.get(target) for _, trial in rows])
+                for target in targets
+            ),
+        ]
+    )
 
 
 def history_figure(experiment: LoadedExperiment, found: Sequence[TunedLaw], note: str) -> Figure:

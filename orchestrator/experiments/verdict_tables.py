@@ -22,7 +22,7 @@ from .jobs import NOT_MADE
 from .judged_schema import GridSpec, MetricReference, MetricSpec, si_number
 from .outcome import ExperimentResult, limit_table
 from .schema import TableSpec
-from .tables import Cell, Table, marked, remarks
+from .tables import Cell, Column, Table, marked, remarks
 
 HOLDS, UNDECIDED, NOT_JUDGED = "holds", Status.UNDECIDED.value, Status.NOT_JUDGED.value
 CARRIES = ("margin", "region", "nearest flip")
@@ -182,7 +182,7 @@ def _run_table(findings: ExperimentResult, spec: TableSpec) -> Table:
     if some and not findings.regions and (only := reach(findings)):
         table.notes.append(f"verdicts: {only}")
     if some:  # next to the first metric, which the claims are about
-        table.headings[2:2] = ["the paper says", "verdict", *carries]
+        table.columns[2:2] = map(Column, ["the paper says", "verdict", *carries])
     for run, setting in itertools.product(runs, study.settings):
         row = ", ".join(filter(None, [run.row, *(level.words for level in setting)]))
         if not findings.made(run, setting):
@@ -238,12 +238,11 @@ def _carries(judgement: ClaimResult, columns: int) -> list[str | None]:
 def line_table(judgement: ClaimResult) -> Table:
     """Return a table of the open values that a claim depends on: range of margins, flips."""
     assert judgement.region is not None
-    table = Table("", ["open value", "margin, from", "to", "flips at"])
+    table = Table("", ["open value", "margin, from", "to", "flips at"], numbers={1, 2})
     for line in judgement.region.lines:
         ends = line.margins
         flip = line.flip.words if line.flip else None
         table.rows.append([line.says, *map(share, ends or ()), *([] if ends else [None, None]), flip])
-    table.numbers = {1, 2}
     if (spread := judgement.region.spread) is not None:
         words = share(spread) if spread <= 1.0 else "more than 100 %"
         table.notes = [f"spread of the margin over all of them: {words}"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import shlex
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +53,7 @@ def ranking_page(ranked: RankingResult, folder: Path, command: str) -> str:
     ranking = ranked.ranking
     digits = deciding_digits(ranked.scores)
     after = ["margin", "sideslip", "intervention", "time per step"]
+    table = table_of(ranked)
     return render(
         "ranking.html.j2",
         title=ranking.spec.title,
@@ -71,7 +71,7 @@ def ranking_page(ranked: RankingResult, folder: Path, command: str) -> str:
         rows=[_row(ranked, one, after, digits) for one in ranked.scores],
         states=STATES,
         pareto=_image(folder / FIGURES / "pareto.svg", "Stability over intervention"),
-        table=replace(table_of(ranked), title="", notes=[]),
+        table=Table("", table.columns, table.rows),
         described=_conditions(ranked),
         entries=_entries(ranked),
         cells=[_cell(ranked, one, cell, folder) for one in ranked.scores for cell in one.cells.values()],
