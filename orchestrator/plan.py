@@ -270,7 +270,11 @@ class Wire:
 
 @dataclass(frozen=True)
 class Override:
-    """A value that replaces one of the scenario file."""
+    """A value that replaces one of the scenario file.
+
+    >>> [(str(one.target), one.value, one.origin) for one in base.set({"stop_time": 2}).changes]
+    [('stop_time', 2, 'set')]
+    """
 
     target: Target
     value: Value | FaultList
@@ -317,9 +321,17 @@ class Override:
         return f"{self.origin} {cut(str(self.target))}={cut(value)}"
 
 
+Override.__module__ = "yawbench"  # where users import it from
+
+
 @dataclass(frozen=True)
 class Plan:
-    """A run to be executed: instances in evaluation order, wires, and the time grid in integers."""
+    """A run to be executed: instances in evaluation order, wires, and the time grid in integers.
+
+    >>> plan = base.plan()
+    >>> float(plan.step), plan.n_steps, plan.instances[0].name
+    (0.001, 2500, 'driver')
+    """
 
     instances: tuple[Instance, ...]
     wires: tuple[Wire, ...]
@@ -342,6 +354,9 @@ class Plan:
         """Return this plan with parts of another in place of equal ones, to save memory."""
         shared: Plan = _shared(self, other)
         return shared
+
+
+Plan.__module__ = "yawbench"  # where users import it from
 
 
 def _shared(new: Any, old: Any) -> Any:

@@ -51,6 +51,10 @@ if TYPE_CHECKING:
         YawbenchError,
         YawbenchWarning,
     )
+    from orchestrator.evaluation.standard_tests import Evaluation, TestQuantity
+    from orchestrator.metrics.run_metrics import MetricValue
+    from orchestrator.metrics.verdict import Verdict
+    from orchestrator.plan import Override, Plan
 
     from ._controller import Controller
     from ._experiment import Experiment, Runs, experiment
@@ -63,9 +67,13 @@ __all__ = [
     "BuildError",
     "Controller",
     "Diagnostic",
+    "Evaluation",
     "Experiment",
     "Location",
+    "MetricValue",
     "ModelDescriptionError",
+    "Override",
+    "Plan",
     "Ranking",
     "RecordWarning",
     "ResultsError",
@@ -74,6 +82,8 @@ __all__ = [
     "Scenario",
     "ScenarioError",
     "SimulationError",
+    "TestQuantity",
+    "Verdict",
     "View",
     "WiringError",
     "YawbenchError",
@@ -91,6 +101,10 @@ __all__ = [
 _PACKAGES = ("components", "fmus", "orchestrator", "scenarios", "vocabulary")
 _MODULES = {
     "components.fmi.variables": ("output", "parameter", "signal"),
+    "orchestrator.evaluation.standard_tests": ("Evaluation", "TestQuantity"),
+    "orchestrator.metrics.run_metrics": ("MetricValue",),
+    "orchestrator.metrics.verdict": ("Verdict",),
+    "orchestrator.plan": ("Override", "Plan"),
     "yawbench._controller": ("Controller",),
     "yawbench._experiment": ("Experiment", "Runs", "experiment"),
     "yawbench._ranking": ("Ranking", "rank"),

@@ -32,7 +32,6 @@ from orchestrator.scenario.yaml_lines import Document, scalar
 
 from . import arguments
 from ._calls import make_all
-from ._controller import ControllerLike
 from ._run import Run, shown_in_notebooks
 from ._scenario import Scenario, warn
 
@@ -47,7 +46,7 @@ FAR = 1e100
 
 def experiment(
     base: Scenario,
-    axes: Mapping[str, Iterable[Value | ControllerLike]],
+    axes: Mapping[str, Iterable[object]],
     *,
     metrics: str | Iterable[str] = (),
 ) -> Experiment:

@@ -29,12 +29,22 @@ Limit = tuple[str, float, str]
 
 @dataclass(frozen=True)
 class TestQuantity:
-    """A quantity of a run, in SI; `unit` "%" marks a ratio that is shown in per cent."""
+    """A quantity of a run, in SI; `unit` "%" marks a ratio that is shown in per cent.
+
+    >>> gain = yb.load("proving_ground/step_steer").run().evaluate("step-steer").quantities["yaw_rate_gain"]
+    >>> gain.name, gain.unit, gain.value > 0
+    ('gain of the yaw rate', '1/s', True)
+    """
+
+    __test__ = False  # not a pytest class
 
     name: str
     value: float | None  # None: not defined for this run
     unit: str
     reading: str = ""  # our reading of the standard
+
+
+TestQuantity.__module__ = "yawbench"  # where users import it from
 
 
 class NotJudged(Exception):
@@ -43,7 +53,18 @@ class NotJudged(Exception):
 
 @dataclass
 class Evaluation:
-    """The evaluation of one run: its quantities and criteria."""
+    """The evaluation of one run by a standard test: its quantities and criteria.
+
+        >>> evaluation = run.evaluate("step-steer")
+        >>> evaluation.verdict, evaluation.criteria  # the standard has none
+        (None, {})
+
+    Attributes:
+        label: of the run.
+        quantities: key -> quantity.
+        criteria: name -> verdict.
+        notes: what else a reader should know.
+    """
 
     label: str
     quantities: dict[str, TestQuantity] = field(default_factory=dict)  # key -> quantity
@@ -85,6 +106,9 @@ class Evaluation:
             "criteria": {name: verdict.as_data() for name, verdict in self.criteria.items()},
             "notes": self.notes,
         }
+
+
+Evaluation.__module__ = "yawbench"  # where users import it from
 
 
 def evaluation(

@@ -127,11 +127,18 @@ class MetricValue:
     """The value of a metric in one run, in SI; `unit` "%" marks a ratio that is shown in per cent.
 
     Over several repeats it is the mean, and `half` is half the width of its confidence interval.
+
+    >>> peak = run.metrics()["peak(sideslip)"]
+    >>> round(peak.number, 4), peak.unit
+    (0.0198, 'rad')
     """
 
     number: float
     unit: str
     half: float = 0.0
+
+
+MetricValue.__module__ = "yawbench"  # where users import it from
 
 
 def during(window: TimeWindow | None, lead: str = "") -> str:

@@ -40,7 +40,11 @@ WORST_FIRST = (Status.FAILED, Status.NOT_JUDGED, Status.UNDECIDED, Status.PASSED
 
 @dataclass(frozen=True)
 class Verdict:
-    """The verdict on a claim, criterion or limit, with the number and the bound that decide it."""
+    """The verdict on a claim, criterion or limit, with the number and the bound that decide it.
+
+    >>> run.evaluate("sine-with-dwell").criteria["stability"].holds is None  # not this manoeuvre
+    True
+    """
 
     status: Status
     value: float | None = None  # in SI; None: judged by more than a number, or not judged
@@ -85,6 +89,9 @@ class Verdict:
 
     def __str__(self) -> str:
         return f"{self.status.value}. {self.why}"
+
+
+Verdict.__module__ = "yawbench"  # where users import it from
 
 
 def compare(

@@ -375,7 +375,10 @@ def _is_key(value: Any) -> bool:
 UNHASHABLE = {label for label, make in WRONG.items() if not _is_key(make())}
 
 
-NOT_CALLED = (yb.Controller, yb.Diagnostic, yb.Location)
+NOT_CALLED = (
+    yb.Controller, yb.Diagnostic, yb.Evaluation, yb.Location, yb.MetricValue, yb.Override, yb.Plan,
+    yb.TestQuantity, yb.Verdict,
+)  # fmt: skip
 """What users write, or only read."""
 
 

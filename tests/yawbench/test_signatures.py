@@ -12,6 +12,10 @@ ANYTHING = {
     "Controller.output.u": "a named tuple with the fields that the controller's inputs name",
     "Run.record.return": "JSON of any depth, whose definition is the schema of run.json",
     "parameter.return": "a field of a dataclass of any type, as dataclasses.field returns it",
+    "Evaluation.as_data.return": "JSON, as it is written to evaluation.json",
+    "Verdict.as_data.return": "the same JSON",
+    "Plan.scenario": "the scenario file as it was run: JSON of any depth",
+    "Plan.__init__.scenario": "the same JSON",
     "Diagnostic.record.return": "JSON, as it is written to run.json",
     "Diagnostic.of.record": "the same JSON",
 }
@@ -54,3 +58,46 @@ def has(word: str, annotation: str) -> bool:
 def test_no_public_signature_has_any_but_for_values_that_may_be_anything():
     found = {name for name, annotation in annotations().items() if has("Any", annotation)}
     assert found == set(ANYTHING)
+
+
+INSIDE = {
+    "ControllerLike",
+    "Design",
+    "ExperimentResult",
+    "FaultList",
+    "FaultySignal",
+    "Instance",
+    "LoadedScenario",
+    "Messages",
+    "Numbers",
+    "PythonComponent",
+    "RankingResult",
+    "Relation",
+    "Results",
+    "Severity",
+    "SignalName",
+    "Status",
+    "Target",
+    "Value",
+    "VariableSpec",
+    "Wire",
+}
+"""Private types in public signatures: what public classes are made of, and names of unions."""
+
+
+def test_public_signatures_name_only_what_is_exported():
+    foreign = {
+        "Any",
+        "Callable",
+        "Fraction",
+        "DataFrame",
+        "Figure",
+        "Iterable",
+        "Literal",
+        "Mapping",
+        "None",
+        "Path",
+        "Sequence",
+    }
+    named = {word for note in annotations().values() for word in re.findall(r"\b[A-Z]\w+", note)}
+    assert named - foreign - set(yb.__all__) == INSIDE
