@@ -2,7 +2,8 @@
 
 Coordinates, all zero at rest: heave z [m] of the sprung mass's centre, roll phi, pitch theta [rad], heights
 u_i [m] of the unsprung masses; x_i, y_i are the wheel's place from the sprung mass's centre. Wheel travel
-and contact point, p_i the lateral slope of the wheel's path, h the height of the car's centre of mass:
+and contact point, p_i the lateral slope of the wheel's path, h_ci the height of its roll centre, h that of
+the car's centre of mass:
 
     c_i = u_i - z - y_i phi + x_i theta                                                    (1)
     X_i = x_i - h theta,  Y_i = y_i + h phi + p_i c_i          from the centre of mass      (2)
@@ -15,8 +16,8 @@ cannot pull, and, by virtual work of the contact forces f_x, f_y, of the links:
     N_i = max(N_i0 - k_t u_i, 0)                                                          (4)
 
     m_s ddz   = sum(e_i)                          m_u ddu_i = N_i - N_i0 - e_i             (5)
-    Q_phi     =  sum(y_i e_i) + h Y + m_s g h_phi sin(phi)                                 (6)
-    Q_theta   = -sum(x_i e_i) - h X + m_s g h_theta sin(theta)                             (7)
+    Q_phi     =  sum(y_i e_i) + h Y + sum(N_i0 (h - h_ci)) sin(phi)                        (6)
+    Q_theta   = -sum(x_i e_i) - h X + m g h sin(theta)                                     (7)
     M         = sum(X_i f_yi - Y_i f_xi)                                                   (8)
 
 Roll, pitch and yaw follow from Lagrange's equations with the kinetic energy to second order in the small
@@ -72,8 +73,8 @@ class Ride(NamedTuple):
     k_t: float
     load_f: float  # static load N_0 of one wheel
     load_r: float
-    gravity_roll: float  # m_s g h_phi [N.m/rad]
-    gravity_pitch: float
+    gravity_roll: float  # sum of N_i0 (h - h_ci) [N.m/rad]
+    gravity_pitch: float  # m g h
     roll: float  # inertia A
     pitch: float  # B
     yaw_sprung: float  # D

@@ -62,7 +62,6 @@ def ride_of(p: FourteenDofParameters) -> Ride:
     a, b = p.cg_to_front_axle - offset, p.cg_to_rear_axle + offset
     if min(a, b) <= 0.0:
         raise ValueError("the sprung mass must stand between the axles: correct front_unsprung_share or mass")
-    centre = (b * p.roll_centre_height_front + a * p.roll_centre_height_rear) / (a + b)
     arms = m_s * (h_s - h) ** 2 + unsprung * (h - h_u) ** 2
     wheels = (
         2.0 * m_f * (p.cg_to_front_axle**2 + t * t)
@@ -75,7 +74,11 @@ def ride_of(p: FourteenDofParameters) -> Ride:
             f"(got {p.yaw_inertia:g})"
         )
     share = m_s * G / (2.0 * (a + b))
-    gravity_roll, gravity_pitch = m_s * G * (h_s - centre), m_s * G * h_s
+    load_f, load_r = share * b + m_f * G, share * a + m_r * G
+    gravity_roll = 2.0 * (
+        load_f * (h - p.roll_centre_height_front) + load_r * (h - p.roll_centre_height_rear)
+    )
+    gravity_pitch = p.mass * G * h
     k_f, k_r = p.spring_stiffness_front, p.spring_stiffness_rear
     s_f, s_r = p.anti_roll_stiffness_front, p.anti_roll_stiffness_rear
     against_roll = 2.0 * t * t * (k_f + k_r + 2.0 * (s_f + s_r))
@@ -104,8 +107,8 @@ def ride_of(p: FourteenDofParameters) -> Ride:
         p_f=p.roll_centre_height_front / t,
         p_r=p.roll_centre_height_rear / t,
         k_t=p.tyre_vertical_stiffness,
-        load_f=share * b + m_f * G,
-        load_r=share * a + m_r * G,
+        load_f=load_f,
+        load_r=load_r,
         gravity_roll=gravity_roll,
         gravity_pitch=gravity_pitch,
         roll=roll,

@@ -30,7 +30,6 @@ PLACES = ((A, D / 2), (A, -D / 2), (-B, D / 2), (-B, -D / 2))
 SLOPES = tuple(2 * CENTRES[i // 2] / D * (1 if i % 2 == 0 else -1) for i in range(4))
 I_ZS = I_Z - M_S * X_S**2 - M_U * sum(x * x + y * y for x, y in PLACES)
 STATIC = [M * GRAVITY * (B if i < 2 else A) / (2 * (A + B)) for i in range(4)]
-ROLL_ARM = H_S - (CENTRES[0] * (B + X_S) + CENTRES[1] * (A - X_S)) / (A + B)
 
 Tyre = Callable[[float, float, float, float, int], tuple[float, float]]
 """(slip angle [rad], slip [1], load [N], friction [1], wheel) -> F_x, F_y [N] in wheel axes."""
@@ -96,8 +95,11 @@ def accelerations(q: np.ndarray, w: np.ndarray, f_x: Sequence[float], f_y: Seque
         bar = BARS[axle] * (c[left] - c[right])
         for i, sign in ((left, 1), (right, -1)):
             force -= TRAVEL[i] * (SPRINGS[axle] * c[i] + DAMPERS[axle] * dc[i] + sign * bar)
-    force[4] += M_S * GRAVITY * ROLL_ARM * sin(q[1])
-    force[5] += M_S * GRAVITY * H_S * sin(q[2])
+    # Every mass lies above the roll centre of its axle, and turns about it with the body.
+    arms = [H_S - CENTRES[0], H_S - CENTRES[1], H_U - CENTRES[0], H_U - CENTRES[1]]
+    masses = [M_S * (B + X_S) / (A + B), M_S * (A - X_S) / (A + B), 2 * M_U, 2 * M_U]
+    force[4] += GRAVITY * np.dot(masses, arms) * sin(q[1])
+    force[5] += GRAVITY * (M_S * H_S + 4 * M_U * H_U) * sin(q[2])
     force[6:] += loads(q) - STATIC
     v_x, v_y, r = w[:3]
     small = 1e-30

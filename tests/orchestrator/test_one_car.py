@@ -76,7 +76,11 @@ def test_the_derived_car_is_that_of_the_equations_of_motion(saloon):
     ride, car = ride_of(p), car_of(saloon).values
     assert 2.0 * ride.load_f + 2.0 * ride.load_r == pytest.approx(p.mass * G, rel=1e-12)
     assert [car["static_load_front"], car["static_load_rear"]] == pytest.approx([ride.load_f, ride.load_r])
-    assert car["sprung_mass"] * G * car["roll_arm"] == pytest.approx(ride.gravity_roll, rel=1e-12)
+    centres = [p.roll_centre_height_front] * 2 + [p.roll_centre_height_rear] * 2
+    wheels = [ride.m_f, ride.m_f, ride.m_r, ride.m_r]
+    leaning = sum(m * G * (p.unsprung_height - h) for m, h in zip(wheels, centres, strict=True))
+    sprung = car["sprung_mass"] * G * car["roll_arm"]  # eight degrees of freedom: its wheels do not lean
+    assert sprung + leaning == pytest.approx(ride.gravity_roll, rel=1e-12)
     assert car["sprung_cg_offset"] != 0.0
     given = {name: value for name, value in saloon.items() if name != "yaw_inertia"}
     whole = car_of(given | {"sprung_yaw_inertia": ride.yaw_sprung}).values
