@@ -1,12 +1,12 @@
 """A sprung body and four wheels with exact rotations, to compare the equations of `cars.ride` with.
 
-Independent of the components and of their derivation: one rigid body, four point masses that slide in it along
-straight lines, positions written down exactly, Jacobians by complex step, Newton's and Euler's equations with
-d'Alembert's principle. No coordinate is small. The line of a wheel is fixed in the body, with the slope
-p_i = h_ci / y_i in its contact point's path; the body rolls about no given centre.
+Independent of the components and of their derivation: one rigid body, four point masses that slide in it
+along straight lines, positions written down exactly, Jacobians by complex step, Newton's and Euler's
+equations with d'Alembert's principle. No coordinate is small. The line of a wheel is fixed in the body, with
+the slope p_i = h_ci / y_i in its contact point's path; the body rolls about no given centre.
 
-Coordinates q: x, y, psi, z, phi, theta of the sprung mass's centre (z from rest), then the travels c_fl, c_fr,
-c_rl, c_rr along the lines; velocities are their time derivatives.
+Coordinates q: x, y, psi, z, phi, theta of the sprung mass's centre (z from rest), then the travels c_fl,
+c_fr, c_rl, c_rr along the lines; velocities are their time derivatives.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ class MultiBody:
     """The car of `p`.
 
     Args:
-        sideways: whether wheel centres follow the slope of their contact points' paths, as on parallel arms of
-            equal length; else they do not move sideways in the body, as `cars.ride` assumes.
+        sideways: whether wheel centres follow the slope of their contact points' paths, as on parallel arms
+            of equal length; else they do not move sideways in the body, as `cars.ride` assumes.
     """
 
     def __init__(self, p: FourteenDofParameters, *, sideways: bool = False) -> None:

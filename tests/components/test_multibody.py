@@ -1,4 +1,4 @@
-"""The car with fourteen degrees of freedom beside a multi-body model, and the terms in which the two differ."""
+"""The car with fourteen degrees of freedom beside a multi-body model, and the terms in which they differ."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ STILL = (0.0,) * 4
 
 
 def accelerations(ride: Ride, y, f_y, *, added: bool, **options):
-    """Return dr, ddz, ddphi, ddtheta and ddu_i of `cars.ride`, with or without the terms of straight paths."""
+    """Return dr, ddz, ddphi, ddtheta, ddu_i of `cars.ride`, with or without the terms of straight paths."""
     got = np.array(rates(tuple(y), contact(0.0, STILL, tuple(f_y), P), ride))
     got = got[[0, *range(8, 15)]]
     if added:
