@@ -46,7 +46,7 @@ def concluded(experiment: LoadedExperiment, execute: Executor, options: RunOptio
     """Return the result of an experiment, drawn and written; see `conduct`."""
     from ..errors import YawbenchError
     from ..experiments.figures import draw_all
-    from ..experiments.outcome import judge_results
+    from ..experiments.outcome import judge_results, kept_cases
     from ..experiments.record import write_findings
     from ..messages import changed
 
@@ -55,7 +55,9 @@ def concluded(experiment: LoadedExperiment, execute: Executor, options: RunOptio
     if experiment.by_options:
         say(f"changed: {changed(experiment.by_options)}")
     try:
-        findings = execute(experiment, keep=options.keep)
+        findings = execute(experiment, keep=options.keep or experiment.spec.keep == "all")
+        if experiment.spec.axes:
+            findings = execute.keeping(findings, kept_cases(findings))
     except YawbenchError:
         if not options.no_run or experiment.spec.axes:
             raise  # scenarios or FMUs are missing, but existing results can be judged without them
@@ -110,6 +112,7 @@ def chapter_of(
     *,
     shown_in: Path,
     views: Sequence[View] = (),
+    each: Each = map,
     **more: Any,
 ) -> dict[str, Any]:
     """Return the chapter of an experiment for a page in `shown_in`; `more`: further template data."""
@@ -125,7 +128,13 @@ def chapter_of(
     }
     with stoppable(folder):
         facts = chapter(
-            findings, command=command, stale=out_of_date, folder=folder, shown_in=shown_in, views=views
+            findings,
+            command=command,
+            stale=out_of_date,
+            folder=folder,
+            shown_in=shown_in,
+            views=views,
+            each=each,
         )
     for name, why in out_of_date.items():
         say(f"{name}: out of date: {why}")
@@ -200,7 +209,7 @@ def of_files(context: typer.Context, files: Sequence[Path], options: RunOptions)
             quick=options.quick and (experiment.spec.region is not None or bool(experiment.spec.repeats)),
             **options.changing,
         )
-        chapters.append(chapter_of(findings, folder, command, shown_in=page))
+        chapters.append(chapter_of(findings, folder, command, shown_in=page, each=each))
         failed = failed or bool(findings.failed) or bool(findings.not_made)
         if len(files) == 1:
             print_tables(all_tables(findings))

@@ -10,9 +10,9 @@ round of all of them is one experiment.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -22,6 +22,7 @@ from ..errors import ResultsError, ScenarioError
 from ..metrics.run_metrics import metric, results_to_be, unit_in
 from ..plan import Plan
 from ..planner import Planner
+from ..results.folder_and_lock import RUN_FILE
 from ..results.plan_record_and_freshness import altered, staleness
 from .experiment import Case, LoadedExperiment, NamedRun
 from .jobs import (
@@ -160,6 +161,37 @@ class Executor(AbstractContextManager["Executor"]):
         left = list(jobs) if again else left_to_do(jobs, journal.records if journal else {})
         with self.display.running(title, jobs, left, journaled=journaled) as told:
             return finish(left, journal, runner=self.runner, told=told) if self.runner and left else []
+
+    def keeping(self, findings: ExperimentResult, numbers: Collection[int]) -> ExperimentResult:
+        """Return a result whose cases with these numbers keep their results.
+
+        Which runs are worth keeping is known when all have been judged. Those without results are made
+        again; the journal keeps the records of their first time.
+
+        Args:
+            findings: of an experiment with axes.
+            numbers: of its cases.
+        """
+        assert findings.planned is not None
+        jobs = [
+            replace(job, keep=job.keep or number in numbers)
+            for number, job in enumerate(findings.planned.jobs)
+        ]
+        lacking = {job.out: job for job, record in zip(jobs, findings.records, strict=True)
+                   if job.keep and not _has_results(job, record)}  # fmt: skip
+        if self.runner and lacking:
+            title = f"{findings.spec.title}: results to keep"
+            left = [*lacking.values()]
+            with self.display.running(title, left, left, journaled=True) as told:
+                finish(left, None, runner=self.runner, told=told)
+        return replace(findings, planned=replace(findings.planned, jobs=jobs))
+
+
+def _has_results(job: Job, record: MeasuredRun) -> bool:
+    """Return whether the results of a finished run are in its folder; of a failed one, up to its failure."""
+    if record.failed:
+        return (job.out / RUN_FILE).is_file()
+    return job.plan is not None and staleness(job.plan, job.out) is None
 
 
 Search = Generator[float, bool, T]

@@ -290,6 +290,7 @@ class Limit:
     largest: float | None  # up to which all values hold; None: not even the first
     beyond: float | None  # the next value, which fails; None: all hold
     verdict: Verdict  # at that value, else at the largest; not judged: why the run has no metric
+    cases: tuple[Case, ...] = ()  # the last that holds and the first that fails; of repeats the first
 
 
 def limits_of(findings: ExperimentResult, spec: LimitSpec) -> list[Limit]:
@@ -312,18 +313,39 @@ def limits_of(findings: ExperimentResult, spec: LimitSpec) -> list[Limit]:
 def _limit(
     findings: ExperimentResult, spec: LimitSpec, others: dict[str, Level], cases: list[Case], at: int
 ) -> Limit:
-    run, largest, verdict = cases[0].run, None, Verdict(Status.PASSED)
-    settings = {findings.experiment.setting(case.point) for case in cases}
-    for setting in sorted(settings, key=lambda setting: float(setting[at].value)):
-        here = float(setting[at].value)
+    run, largest, last, verdict = cases[0].run, None, None, Verdict(Status.PASSED)
+    by_setting = {findings.experiment.setting(case.point): case for case in reversed(cases)}
+    for setting in sorted(by_setting, key=lambda setting: float(setting[at].value)):
+        here, case = float(setting[at].value), by_setting[setting]
         verdict = judge(spec, findings.at[setting], {run.name: run.row}).verdict
         if not verdict.holds:
             records = (findings.record(case) for case in findings.cases_of(run, setting))
             if status := next((record.status for record in records if not record.ok), ""):
                 verdict = not_judged(status)
-            return Limit(others, largest, here, verdict)
-        largest = here
-    return Limit(others, largest, None, verdict)
+            return Limit(others, largest, here, verdict, (last, case) if last else (case,))
+        largest, last = here, case
+    return Limit(others, largest, None, verdict, (last,) if last else ())
+
+
+LOST = ("run-process-died", "internal-error")
+"""Codes of failures that leave no results."""
+
+
+def kept_cases(findings: ExperimentResult) -> frozenset[int]:
+    """Return the numbers of the cases along axes whose results are to be kept; see `keep` in the schema."""
+    spec, cases = findings.spec, findings.experiment.cases
+    if spec.keep == "none" or not spec.axes:
+        return frozenset()
+    if spec.keep == "all":
+        return frozenset(case.number for case in cases)
+    limits = [limit for one in spec.limits.values() for limit in limits_of(findings, one)]
+    beside = {case.number for limit in limits for case in limit.cases if findings.record(case).made}
+    failed = {
+        case.number
+        for case in cases
+        if (record := findings.record(case)).failed and not {one.code for one in record.diagnostics} & {*LOST}
+    }
+    return frozenset(beside | failed)
 
 
 def limit_table(findings: ExperimentResult, name: str) -> Table:

@@ -94,6 +94,8 @@ With axes, a limit is how far one of them may go; curves and maps show a metric 
     figures:
       - {name: stable, kind: limit, limit: stable, x: friction, lines: control, panels: car}
 
+    keep: limits                           # or all, none: the runs whose results are kept
+
 Targets are written as on the command line: `instance.parameter`, `vehicle.parameter` and `inputs.pattern`
 take values, as do `stop_time`, `step_size` and `algorithm`; an instance alone takes FMUs
 (`fmu:parameter=value` also sets parameters), `vehicle` takes vehicle files, `tyres` (`tyres.front`,
@@ -353,6 +355,11 @@ class ExperimentSpec(OverrideSpec):
     region: RegionSpec | None = Field(None, description="Open values over which claims are judged again")
     limits: dict[str, LimitSpec] = {}
     figures: list[FigureSpec] = []
+    keep: Literal["limits", "all", "none"] = Field(
+        "limits",
+        description="Runs along axes whose results are kept, for the page to show: `limits` are the last run "
+        "within each limit, the first beyond it, and those that failed",
+    )
     tuning: TuningSpec | None = Field(None, description="What `yawbench tune` tunes")
 
     @model_validator(mode="after")

@@ -35,6 +35,7 @@ from ..plan import (
     PAPER,
     VARIED,
     Instance,
+    Override,
     Plan,
     Value,
     ValueSource,
@@ -105,6 +106,16 @@ def programs_of(runs: Iterable[Results | Plan]) -> dict[str, str]:
         for name, version in known.items():
             found.setdefault(name, {})[str(version)] = None
     return {name: " and ".join(several) for name, several in found.items()}
+
+
+def option_of(change: Override) -> list[str]:
+    """Return an override as an option of the command line."""
+    if change.target.kind == "vehicle_file":
+        return ["--vehicle", os.path.relpath(str(change.value))]
+    if change.faulty:
+        return ["--fault", f"{change.faulty}: {change.value}"]
+    text = str(change.value).lower() if isinstance(change.value, bool) else str(change.value)
+    return ["--swap" if change.swaps else "--set", f"{change.target}={text}"]
 
 
 def made_by() -> dict[str, object]:

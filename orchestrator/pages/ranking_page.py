@@ -29,8 +29,7 @@ from ..experiments.ranking_tables import (
 )
 from ..experiments.tables import Table
 from ..messages import changed
-from ..plan import Override
-from .page_parts_and_provenance import FigureImage, anchor, image_of, made_by, render, style
+from .page_parts_and_provenance import FigureImage, anchor, image_of, made_by, option_of, render, style
 
 STATES = {
     "passed": "passed",
@@ -166,18 +165,8 @@ def series_command(ranked: RankingResult, cell: RankingCell) -> str:
         for one in (*ranking.changes_of_condition(cell.condition), *ranking.changes_of_entry(cell.entry))
     }
     for one in changes.values():
-        words += _option(one)
+        words += option_of(one)
     return shlex.join(words)
-
-
-def _option(change: Override) -> list[str]:
-    """Return an override as an option of the command line."""
-    if change.target.kind == "vehicle_file":
-        return ["--vehicle", os.path.relpath(str(change.value))]
-    if change.faulty:
-        return ["--fault", f"{change.faulty}: {change.value}"]
-    text = str(change.value).lower() if isinstance(change.value, bool) else str(change.value)
-    return ["--swap" if change.swaps else "--set", f"{change.target}={text}"]
 
 
 def _conditions(ranked: RankingResult) -> Table:

@@ -20,7 +20,7 @@ from ..experiments.confidence import LEVEL
 from ..experiments.experiment import FIGURES
 from ..experiments.figures import runs_of, title_of
 from ..experiments.jobs import Job
-from ..experiments.outcome import ExperimentResult
+from ..experiments.outcome import Each, ExperimentResult
 from ..experiments.region import runs_of as runs_of_claim
 from ..experiments.schema import FigureSpec
 from ..experiments.tables import Cell, Table
@@ -50,7 +50,7 @@ from ..results.read_and_salvage import Results
 from ..results.run_record import RunRecord, load_record
 from ..scenario import find_and_load, yaml_lines
 from ..scenario.find_and_load import LoadedScenario
-from .diagram_and_friction_map import diagrams, systems_of
+from .diagram import diagrams, systems_of
 from .page_parts_and_provenance import (
     FigureImage,
     anchor,
@@ -63,6 +63,7 @@ from .page_parts_and_provenance import (
     render,
     style,
 )
+from .sweep_view import DATA, sweep_view, write_sides
 from .viewer import MOST, PANELS, Settings, View, assets, viewer
 
 
@@ -74,8 +75,9 @@ def chapter(
     folder: Path,
     shown_in: Path,
     views: Sequence[View] = (),
+    each: Each = map,
 ) -> dict[str, Any]:
-    """Return the template data of an experiment's chapter.
+    """Return the template data of an experiment's chapter; write the side files of its runs.
 
     Args:
         findings: the experiment and its results.
@@ -84,6 +86,7 @@ def chapter(
         folder: of its results and figures.
         shown_in: folder of the page.
         views: of the viewer, before those of the figures.
+        each: `map`, or a parallel equivalent, to write side files with.
     """
     experiment, spec = findings.experiment, findings.spec
     name = anchor(f"{experiment.path.absolute().parent.name} {experiment.path.stem}")
@@ -92,6 +95,10 @@ def chapter(
     made = runs_made(findings)
     failed = findings.failed
     drawing, numbers = viewer_of(findings, name, views)
+    sweep = None
+    if spec.axes and findings.planned and len(findings.records) > 1:
+        sides = write_sides(findings, folder, each)
+        sweep = sweep_view(findings, f"{name}{SWEEP}", sides, _relative_to(folder / DATA, shown_in))
 
     def link(one: ClaimResult) -> str:
         """Return the address that shows a claim's runs in the viewer; "" if it has none of them."""
@@ -113,6 +120,7 @@ def chapter(
         "limits": limit_tables(findings),
         "systems": systems(plans, spec.title),
         "viewer": drawing,
+        "sweep": sweep,
         "figures": figure_files(findings, _relative_to(folder / FIGURES, shown_in)),
         "charts": charts(findings, folder / FIGURES),
         "tables": [*run_tables(findings), *derived_tables(findings, apart=True)],
@@ -234,8 +242,8 @@ LIVELY = tuple(map(metric, ("peak(sideslip)", "peak(yaw_rate)")))
 """Metrics of how lively a run is; the first that all runs have is used."""
 SEVERAL = {HOLDS: "hold", **{word: word.replace("does", "do", 1) for word in FAILS.values()}}
 """Verdict -> its plural."""
-VIEW = "-view"
-"""Suffix of a chapter's anchor: its viewer."""
+VIEW, SWEEP = "-view", "-sweep"
+"""Suffixes of a chapter's anchor: its viewer, its view over axes."""
 LARGEST = 1_500_000
 """Size of the samples in a chapter [bytes]. Chosen: a page of 2.5 MB opens at once, also by mail."""
 
@@ -291,20 +299,20 @@ def _liveliest(runs: Sequence[LabelledRun]) -> float:
 
 
 def figure_files(findings: ExperimentResult, files: str) -> list[dict[str, str]]:
-    """Return title and path, without suffix, of the overlay figures that runs have results for."""
+    """Return title and path, without suffix, of the figures that the page shows in another form."""
     return [
         {"title": title_of(findings, spec), "file": f"{files}/{spec.name}"}
         for spec in findings.spec.figures
-        if spec.what.shows == "runs" and runs_of(findings, spec)
+        if spec.what.over_axes or (spec.what.shows == "runs" and runs_of(findings, spec))
     ]
 
 
 def charts(findings: ExperimentResult, folder: Path) -> list[FigureImage]:
-    """Return the figures over axes that have been drawn, as images."""
+    """Return the drawn figures of grids as images; the view of the sweep shows those over axes."""
     found = []
     for spec in findings.spec.figures:
         file = folder / f"{spec.name}.svg"
-        if spec.what.shows != "runs" and file.is_file():
+        if spec.what.shows == "grid" and file.is_file():
             found.append(image_of(file, title_of(findings, spec)))
     return found
 
@@ -393,7 +401,7 @@ def found_studies(folder: Path = SCENARIOS) -> list[Path]:
 def report_page(chapters: Sequence[dict[str, Any]], ranking: str = "") -> str:
     """Return the HTML page of one or several chapters; `ranking`: link to the ranking's page."""
     title = TITLE if len(chapters) > 1 else str(chapters[0]["title"])
-    scripts = assets() if any(one["viewer"] for one in chapters) else ""
+    scripts = assets() if any(one["viewer"] or one["sweep"] for one in chapters) else ""
     return render(
         "report.html.j2", title=title, chapters=chapters, ranking=ranking, style=style(), assets=scripts,
         **made_by(),

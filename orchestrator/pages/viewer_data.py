@@ -15,8 +15,8 @@ import base64
 import gzip
 import math
 import zlib
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -32,21 +32,48 @@ CLOSE = 0.01
 
 
 @dataclass(frozen=True)
-class PackedRun:
-    """A run's samples: a block of bytes, and where each column is in it.
+class PackedColumn:
+    """A column: its form, what decodes it, and its byte planes (none for a constant).
 
-    `columns`: name -> [form, offset in bytes, ...]. The forms are ["q", offset, first, step, order, bytes]:
-    codes as differences of that order, a sample is (first + code) step; ["f", offset]: 32-bit floats; and
-    ["c", 0, value]: a constant. `time` is ["u", 0, begin, end]: evenly spaced, or ["d", offset]: 64-bit
-    floats.
+    The forms are ("q", first, step, order, bytes): codes as differences of that order, a sample is
+    (first + code) step; ("f",): 32-bit floats; ("c", value): a constant; of times also ("d",): 64-bit
+    floats, and ("u", begin, end): evenly spaced.
     """
 
+    form: str
+    numbers: tuple[float, ...] = ()
+    planes: bytes = b""
+
+
+@dataclass(frozen=True)
+class PackedRun:
+    """A run's samples: its times and columns, each packed by itself."""
+
     rows: int
-    time: list[Any]
-    data: bytes
-    columns: dict[str, list[Any]] = field(default_factory=dict)
+    time: PackedColumn
+    columns: dict[str, PackedColumn]
     address: str = ""
     """Where the page gets the bytes; "": it carries them."""
+
+    def only(self, names: Collection[str]) -> PackedRun:
+        """Return the run with some of its columns."""
+        return replace(self, columns={k: one for k, one in self.columns.items() if k in names})
+
+    @cached_property
+    def _offsets(self) -> dict[bytes, int]:
+        """Byte planes -> their offset in the block; equal ones are stored once."""
+        found: dict[bytes, int] = {b"": 0}
+        size = 0
+        for one in (self.time, *self.columns.values()):
+            if one.planes not in found:
+                found[one.planes] = size
+                size += len(one.planes)
+        return found
+
+    @property
+    def data(self) -> bytes:
+        """All byte planes."""
+        return b"".join(self._offsets)
 
     @cached_property
     def block(self) -> str:
@@ -55,8 +82,13 @@ class PackedRun:
 
     @property
     def header(self) -> dict[str, Any]:
-        """What the script needs to decode the block."""
-        return {"rows": self.rows, "time": self.time, "columns": self.columns}
+        """What the script needs to decode the block: of times and each column [form, offset, ...]."""
+
+        def place(one: PackedColumn) -> list[Any]:
+            return [one.form, self._offsets[one.planes], *one.numbers]
+
+        columns = {name: place(one) for name, one in self.columns.items()}
+        return {"rows": self.rows, "time": place(self.time), "columns": columns}
 
 
 def pack(runs: Sequence[Results], *, exact: bool = False) -> list[PackedRun]:
@@ -107,9 +139,7 @@ def _close(run: Results, others: Sequence[Results], ranges: dict[str, tuple[floa
 
 
 def _packed(run: Results, ranges: dict[str, tuple[float, float]], fine: set[str], exact: bool) -> PackedRun:
-    block = _Block()
-    time = _packed_time(run.time, block)
-    columns: dict[str, list[Any]] = {}
+    columns: dict[str, PackedColumn] = {}
     for name, values in run.columns.items():
         if not is_numeric(values):
             continue
@@ -118,43 +148,24 @@ def _packed(run: Results, ranges: dict[str, tuple[float, float]], fine: set[str]
         size = 3 if name in fine else 2
         step = (high - low) / LEVELS[size]
         if np.isfinite(values[:1]).all() and (values == values[:1]).all():
-            columns[name] = ["c", 0, float(values[0])]
+            columns[name] = PackedColumn("c", (float(values[0]),))
         elif exact or not (0.0 < step < np.inf and np.isfinite(values).all()):
-            columns[name] = ["f", block.add(_float_planes(values))]
+            columns[name] = PackedColumn("f", (), _float_planes(values))
         else:
             first = math.floor(low / step)
             order, planes = _code_planes(np.rint(values / step) - first, size)
-            columns[name] = ["q", block.add(planes), first, step, order, size]
-    return PackedRun(run.time.size, time, block.data(), columns)
+            columns[name] = PackedColumn("q", (first, step, order, size), planes)
+    return PackedRun(run.time.size, _packed_time(run.time), columns)
 
 
-class _Block:
-    """Bytes of a run; what is added twice is stored once."""
-
-    def __init__(self) -> None:
-        self._offsets: dict[bytes, int] = {}
-        self._size = 0
-
-    def add(self, planes: bytes) -> int:
-        """Add bytes and return their offset."""
-        if planes not in self._offsets:
-            self._offsets[planes] = self._size
-            self._size += len(planes)
-        return self._offsets[planes]
-
-    def data(self) -> bytes:
-        """Return all bytes."""
-        return b"".join(self._offsets)
-
-
-def _packed_time(time: np.ndarray, block: _Block) -> list[Any]:
-    """Return ["u", 0, first, last] for evenly spaced times, else ["d", offset] of 64-bit floats."""
+def _packed_time(time: np.ndarray) -> PackedColumn:
+    """Return evenly spaced times as their ends, others as 64-bit floats."""
     if time.size > 1:
         even = np.linspace(time[0], time[-1], time.size)
         if np.allclose(time, even, rtol=0.0, atol=1e-9):
-            return ["u", 0, float(time[0]), float(time[-1])]
+            return PackedColumn("u", (float(time[0]), float(time[-1])))
     raw = np.ascontiguousarray(time, "<f8").view(np.uint8).reshape(-1, 8)
-    return ["d", block.add(raw.T.tobytes())]
+    return PackedColumn("d", (), raw.T.tobytes())
 
 
 def _code_planes(codes: np.ndarray, size: int) -> tuple[int, bytes]:

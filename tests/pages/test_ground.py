@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.figures.style import LabelledRun
-from orchestrator.pages.diagram_and_friction_map import MOST, clipped, ground_of
+from orchestrator.pages.road import POLYGONS, clipped, ground_of
 from orchestrator.pages.viewer import viewer
 from tests.orchestrator.recorded import noted
 from tests.sentences import golden_in
@@ -59,7 +59,7 @@ def test_there_is_no_ground_without_patches_or_of_too_many_pieces():
     assert ground_of({"patches": "", **numbers}, (0, 9), (0, 9)) == []
     assert ground_of({}, (0, 9), (0, 9)) == []
     fine = {"patches": "x % 0.02 < 0.01", **numbers}
-    assert ground_of(fine, (0, MOST), (0, 9)) == []
+    assert ground_of(fine, (0, POLYGONS), (0, 9)) == []
     for text in ("x % 1e-9 < 5e-10", "x % 1e-310 > 0", "x % 0.1 < 0.05, x % 0.11 < 0.05, y > 0"):
         assert ground_of({"patches": text, **numbers}, (0, 9), (0, 9)) == []
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from orchestrator.pages.diagram_and_friction_map import diagonal, diagrams, stack, system_of, systems_of
+from orchestrator.pages.diagram import diagonal, diagrams, stack, system_of, systems_of
 from orchestrator.plan import Fmu, Instance, Plan, Wire
 from tests.sentences import golden
 from vocabulary.wheels import WHEELS

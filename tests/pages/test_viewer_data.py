@@ -21,7 +21,7 @@ RNG = np.random.default_rng(11)
 def unpacked(packed: PackedRun, name: str) -> np.ndarray:
     """Return a column as the browser decodes it, written independently of the script."""
     raw = gzip.decompress(base64.b64decode(packed.block))
-    form, offset, *more = packed.columns[name]
+    form, offset, *more = packed.header["columns"][name]
     n = packed.rows
     if form == "c":
         return np.full(n, more[0])
@@ -84,7 +84,7 @@ def test_a_difference_of_close_runs_is_no_rounding():
     apart = 1e-4 * np.cos(np.linspace(0, 9, 500))
     assert np.max(np.abs(apart)) < CLOSE * np.ptp(one)
     runs = pack([made(x=one), made(x=one + apart), made(x=5.0 * one)])
-    assert [run.columns["plant.x"][-1] for run in runs] == [3, 3, 2]
+    assert [run.columns["plant.x"].numbers[-1] for run in runs] == [3, 3, 2]
     difference = unpacked(runs[1], "plant.x") - unpacked(runs[0], "plant.x")
     np.testing.assert_allclose(difference, apart, atol=2e-3 * 1e-4 + 10 / LEVELS[3])
 
@@ -105,7 +105,7 @@ def test_constants_and_both_ends_of_a_wire_cost_nothing():
     (one,) = pack([made(a=noise)])
     (two,) = pack([made(a=noise, b=noise.copy(), still=np.full(500, 3.25))])
     assert two.block == one.block
-    assert two.columns["plant.still"] == ["c", 0, 3.25]
+    assert two.header["columns"]["plant.still"] == ["c", 0, 3.25]
     np.testing.assert_array_equal(unpacked(two, "plant.b"), unpacked(two, "plant.a"))
 
 
@@ -117,12 +117,21 @@ def test_text_columns_are_left_out():
 
 def test_even_and_uneven_times():
     even = made(x=np.zeros(500))
-    assert pack([even])[0].time == ["u", 0, 0.0, 5.0]
+    assert pack([even])[0].header["time"] == ["u", 0, 0.0, 5.0]
     uneven = replace(even, time=np.sort(RNG.uniform(0, 5, 500)))
     (packed,) = pack([uneven])
     raw = gzip.decompress(base64.b64decode(packed.block))
     planes = np.frombuffer(raw[: 8 * 500], np.uint8).reshape(8, 500)
     np.testing.assert_array_equal(np.ascontiguousarray(planes.T).view("<f8").ravel(), uneven.time)
+
+
+def test_a_part_of_the_columns_is_packed_without_packing_again():
+    run = whole_car()
+    (whole,) = pack([run])
+    part = whole.only({"plant.sideslip", "plant.yaw_rate"})
+    assert set(part.header["columns"]) == {"plant.sideslip", "plant.yaw_rate"}
+    assert len(part.block) < len(whole.block) / 2
+    np.testing.assert_array_equal(unpacked(part, "plant.yaw_rate"), unpacked(whole, "plant.yaw_rate"))
 
 
 def test_packing_is_repeatable():

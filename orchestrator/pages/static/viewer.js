@@ -10,18 +10,34 @@ function plotter(ratio) {
   return plotters.get(ratio);
 }
 
+// The fragment of the address is the state of each part of the page: key?name=value&&key?...; null: it says nothing.
+function readAddress(key) {
+  const own = location.hash.slice(1).split('&&').find((part) => part.startsWith(key + '?'));
+  return own === undefined ? null : new URLSearchParams(own.slice(key.length + 1));
+}
+
+// Write the state of a part of the page into the address, and return the fragment.
+function writeAddress(key, words) {
+  const others = location.hash.slice(1).split('&&').filter((part) => part.includes('?') && !part.startsWith(key + '?'));
+  const all = [...others, ...(words.size || others.length || location.hash.includes('?') ? [`${key}?${words}`] : [])];
+  const written = '#' + all.join('&&');
+  if (all.length && location.hash !== written) history.replaceState(null, '', written);
+  return written;
+}
+
 class Viewer {
   constructor(root, data, runs) {
     Object.assign(this, {root, data, runs});
     this.find = (name) => root.querySelector('.yv-' + name);
     this.key = root.id;
+    this.fill();
     this.state = this.initial();
     this.restore();
     this.shift();
     this.panels = [];
     this.removal = new AbortController();
     this.listen();
-    this.road = this.find('road') ? new Road(this) : null;
+    this.road = runs.some((run) => run.road) ? new Road(this) : null;
     this.refresh();
     const {signal} = this.removal;
     window.addEventListener('hashchange', () => {
@@ -44,6 +60,44 @@ class Viewer {
     if (this.road) this.road.pause();
     this.removal.abort();
     this.observer.disconnect();
+  }
+
+  // What depends on the runs: their table, the views and signals to choose from, the legend.
+  fill() {
+    const {data, find, key} = this;
+    const several = data.runs.length > 1;
+    const made = (tag, text = '', attributes = {}) => {
+      const element = Object.assign(document.createElement(tag), attributes);
+      element.append(text);
+      return element;
+    };
+    const head = find('runs').tHead.rows[0];
+    if (several) head.append(made('th', 'baseline', {scope: 'col'}));
+    for (const [title] of data.metrics) head.append(made('th', title, {scope: 'col', className: 'yv-metric'}));
+    data.runs.forEach((run, k) => {
+      const row = find('runs').tBodies[0].insertRow();
+      row.dataset.run = k;
+      const label = made('label', made('input', '', {type: 'checkbox', className: 'yv-show'}));
+      label.append(' ', made('span', '', {className: 'yv-swatch'}), ` ${run.label}`);
+      row.append(made('th', label, {scope: 'row'}));
+      if (several) {
+        const base = made('input', '', {type: 'radio', className: 'yv-base', name: `${key}-baseline`, ariaLabel: `${run.label} is the baseline`});
+        row.append(made('td', base));
+      }
+      for (const [, values] of data.metrics) row.append(made('td', values[k] || '–', {className: 'yv-metric'}));
+    });
+    find('views').append(...data.views.map((view, k) => new Option(view.title, k)));
+    find('choice').hidden = data.views.length < 2;
+    for (const one of this.root.querySelectorAll('.yv-several')) one.hidden = !several;
+    find('partial').hidden = !data.partial;
+    find('key').textContent = data.key;
+    const names = Object.entries(data.signals);
+    find('add').placeholder = `${names.length} recorded`;
+    find('add').list.append(...names.map(([name, {label}]) => made('option', label, {value: name})));
+    if (data.runs.some((run) => run.road)) return;
+    find('main').classList.add('yv-alone');
+    find('play').remove();
+    find('road').remove();
   }
 
   initial() {
@@ -70,18 +124,14 @@ class Viewer {
       if (same(value, plain[name])) continue;
       words.set(name, name === 'time' ? String(Number(value.toFixed(6))) : JSON.stringify(value));
     }
-    const others = location.hash.slice(1).split('&&').filter((part) => part && !part.startsWith(this.key + '?') && part.includes('?'));
-    const own = `${this.key}?${words}`;
-    const all = [...others, ...(words.size || others.length || location.hash.includes('?') ? [own] : [])];
-    this.written = '#' + all.join('&&');
-    if (all.length && location.hash !== this.written) history.replaceState(null, '', this.written);
+    this.written = writeAddress(this.key, words);
   }
 
   // Take over what the address says; return whether it says anything about this viewer.
   restore() {
     if (location.hash === this.written) return false;
-    const own = location.hash.slice(1).split('&&').find((part) => part.startsWith(this.key + '?'));
-    if (own === undefined) return false;
+    const own = readAddress(this.key);
+    if (!own) return false;
     const state = this.initial();
     const isRun = (v) => Number.isInteger(v) && v in this.runs;
     const kinds = {
@@ -94,7 +144,7 @@ class Viewer {
       x: (v) => this.axes().includes(v), camera: (v) => v === 'cars' || v === 'whole' || isRun(v),
       offsets: (v) => v && typeof v === 'object' && !Array.isArray(v) && Object.values(v).every(Number.isFinite),
     };
-    for (const [name, text] of new URLSearchParams(own.slice(this.key.length + 1))) {
+    for (const [name, text] of own) {
       let value;
       try { value = JSON.parse(text); } catch { continue; }
       if (!Object.hasOwn(kinds, name) || !kinds[name](value)) continue;
@@ -279,7 +329,7 @@ class Viewer {
     this.find('difference').checked = this.state.difference;
     this.find('tolerance').value = this.state.tolerance || '';
     this.find('x').value = this.state.x;
-    if (this.find('views')) this.find('views').value = this.state.view;
+    this.find('views').value = this.state.view;
     const slider = this.find('slider');
     [slider.min, slider.max] = this.ends();
     slider.step = 'any';
@@ -334,13 +384,11 @@ class Viewer {
       }
       this.refresh();
     });
-    if (this.find('views')) {
-      this.find('views').addEventListener('change', (event) => {
-        const view = Number(event.target.value);
-        Object.assign(this.state, {view, span: null}, this.viewed(view));
-        this.refresh();
-      });
-    }
+    this.find('views').addEventListener('change', (event) => {
+      const view = Number(event.target.value);
+      Object.assign(this.state, {view, span: null}, this.viewed(view));
+      this.refresh();
+    });
     const add = this.find('add');
     add.addEventListener('change', () => {
       const spec = add.value.trim();
@@ -370,7 +418,7 @@ class Viewer {
     this.find('out').addEventListener('click', () => this.zoom(1 / 1.6));
     this.find('csv').addEventListener('click', () => this.save(new Blob([this.csv()], {type: 'text/csv'}), 'csv'));
     this.find('png').addEventListener('click', () => this.picture().toBlob((blob) => this.save(blob, 'png')));
-    this.find('link').addEventListener('click', (event) => this.copyLink(event.target));
+    this.find('link').addEventListener('click', (event) => { this.remember(); copyAddress(event.target); });
     this.find('slider').addEventListener('input', (event) => this.seek(Number(event.target.value)));
     const keys = this.data.alone ? document : this.root; // several viewers of a page: the one with the focus
     keys.addEventListener('keydown', (event) => this.pressed(event), {signal: this.removal.signal});
@@ -468,17 +516,17 @@ class Viewer {
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
   }
+}
 
-  async copyLink(button) {
-    this.remember();
-    try {
-      await navigator.clipboard.writeText(location.href);
-      button.textContent = 'Copied';
-    } catch {
-      button.textContent = 'See the address bar';
-    }
-    setTimeout(() => { button.textContent = 'Link'; }, 1500);
+async function copyAddress(button) {
+  const before = button.textContent;
+  try {
+    await navigator.clipboard.writeText(location.href);
+    button.textContent = 'Copied';
+  } catch {
+    button.textContent = 'See the address bar';
   }
+  setTimeout(() => { button.textContent = before; }, 1500);
 }
 
 let bytesOf = (block) => inflate(block.textContent); // a served page has its own
@@ -486,8 +534,13 @@ let bytesOf = (block) => inflate(block.textContent); // a served page has its ow
 async function startViewer(root) {
   root.classList.add('yv-started');
   const data = JSON.parse(root.querySelector('script[type="application/json"]').textContent);
-  const bytes = await Promise.all([...root.querySelectorAll('script[type="text/plain"]')].map((block) => bytesOf(block)));
+  return fillViewer(root, data, [...root.querySelectorAll('script[type="text/plain"]')].map((block) => bytesOf(block)));
+}
+
+async function fillViewer(root, data, blocks) {
+  const bytes = await Promise.all(blocks);
   root.viewer = new Viewer(root, data, data.runs.map((run, k) => new Run(run, bytes[k], k)));
+  return root.viewer;
 }
 
 async function startAll() {

@@ -1,0 +1,309 @@
+"""Interactive view of an experiment along axes: a map with numbers, parallel coordinates, a limit to move.
+
+A click on a point opens its run in the viewer: runs whose results are kept have a file each beside the page,
+`data/<key>.js`; for the others the page has the command that makes them.
+"""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+from markupsafe import Markup
+
+from ..errors import ResultsError
+from ..experiments.axes import RUN, Level, changes_at
+from ..experiments.experiment import Case
+from ..experiments.jobs import Job
+from ..experiments.judged_schema import MetricReference, si_number
+from ..experiments.outcome import Each, ExperimentResult, limits_of
+from ..figures.style import LabelledRun, digits_of, shown, shown_unit
+from ..files import write_whole
+from ..messages import counted, listed
+from ..metrics.measures import variable_of
+from ..metrics.run_metrics import metric
+from ..plan import Override
+from ..results.folder_and_lock import RUN_FILE
+from ..results.read_and_salvage import load_results
+from .page_parts_and_provenance import option_of, render
+from .viewer import METRICS, PANELS, Settings, View, side_file, viewer_frame
+
+DATA = "data"
+"""Folder of the side files, beside the page."""
+KEY = 12
+"""Characters of a run's key that name its file, as they name its folder."""
+DIGITS = 6
+"""Significant digits of the numbers that the view carries; chosen: more than it shows."""
+MOST_METRICS = 8
+"""Metrics in the table of an opened run."""
+
+
+def sweep_view(findings: ExperimentResult, name: str, sides: Mapping[int, str], folder: str) -> Markup:
+    """Return the view of an experiment along axes as part of a page.
+
+    Args:
+        findings: the experiment and the records of its runs.
+        name: its anchor.
+        sides: number of a case -> key of its side file; see `write_sides`.
+        folder: of the side files, relative to the page.
+    """
+    data = _data(findings, sides) | {"folder": folder}
+    frame = viewer_frame(f"{name}-run")
+    text = render(
+        "sweep.html.j2", name=name, data=data, frame=frame, counts=status_counts(findings),
+        answer=limit_sentences(findings) or [range_sentence(findings)],
+    )  # fmt: skip
+    return Markup(text)
+
+
+def status_counts(findings: ExperimentResult) -> str:
+    """Return how many runs there are, and how many of them ended with each status."""
+    counts = Counter(record.status for record in findings.records)
+    words = [f"{count} {status}" for status, count in counts.items()]
+    return f"{counted(len(findings.records), 'run')}: {listed(words)}"
+
+
+def limit_sentences(findings: ExperimentResult) -> list[str]:
+    """Return a sentence per limit: its smallest and largest value for each run and value of named axes."""
+    planned, found = findings.planned, []
+    assert planned is not None
+    for spec in findings.spec.limits.values():
+        unit = planned.axis_unit(spec.of).strip(" []")
+        groups: dict[tuple[str, ...], list[Any]] = {}
+        ranges: dict[str, list[Level]] = {}
+        for limit in limits_of(findings, spec):
+            named = [k for k in limit.others if k == RUN or not findings.spec.axes[k].numeric]
+            groups.setdefault(tuple(limit.others[k].words for k in named), []).append(limit)
+            for k in limit.others.keys() - set(named):
+                ranges.setdefault(k, []).append(limit.others[k])
+        parts = [f"{', '.join(words)} {_reach(limits, unit)}".strip() for words, limits in groups.items()]
+        over = [
+            f"{k} {min(levels, key=_number).words} to {max(levels, key=_number).words}"
+            f"{planned.axis_unit(k).replace('[', '').replace(']', '')}"
+            for k, levels in ranges.items()
+        ]
+        where = f", over {listed(over)}" if over else ""
+        found.append(f"{spec.says.rstrip('.')}: {'; '.join(parts)}{where}.")
+    return found
+
+
+def _number(level: Level) -> float:
+    return float(level.value)
+
+
+def _reach(limits: Sequence[Any], unit: str) -> str:
+    """Return the values of limits as a range; `at least` where no tried value fails."""
+    known = sorted((one for one in limits if one.largest is not None), key=lambda one: one.largest)
+    if not known:
+        return "at no value tried"
+    least, most = known[0], known[-1]
+    ends = [most] if least.largest == most.largest else [least, most]
+    texts = [("at least " if one.beyond is None else "") + digits_of(one.largest) for one in ends]
+    if len(known) < len(limits):
+        texts = ["none", texts[-1]]
+    return f"{' to '.join(texts)} {unit}".rstrip()
+
+
+def range_sentence(findings: ExperimentResult) -> str:
+    """Return the smallest and largest value of the first metric, and where they are; "" without numbers."""
+    for key, spec in findings.spec.metrics.items():
+        values = [
+            (value.number, case.number)
+            for case in findings.experiment.cases
+            if (value := findings.value(case, key)) is not None and math.isfinite(value.number)
+        ]
+        if values:
+            unit = findings.unit(key)
+            ends = [
+                f"{shown(x, unit)} ({findings.words(findings.experiment.cases[number])})"
+                for x, number in (min(values), max(values))
+            ]
+            return f"{spec.heading or metric(spec.metric).title}: {ends[0]} to {ends[1]}."
+    return ""
+
+
+# ---- what the view carries ----
+
+
+def _data(findings: ExperimentResult, sides: Mapping[int, str]) -> dict[str, Any]:
+    experiment, records = findings.experiment, findings.records
+    cases, for_all, by_options = experiment.cases, experiment.for_all, experiment.by_options
+    axes = [*_axes(findings)]
+    statuses = list(dict.fromkeys(record.status for record in records))
+    jobs = findings.planned.jobs if findings.planned else []
+    return {
+        "axes": [one for one, _ in axes],
+        "metrics": [_metric(findings, key) for key in findings.spec.metrics],
+        "levels": [places for _, places in axes],
+        "statuses": statuses,
+        "status": [statuses.index(record.status) for record in records],
+        "told": {case.number: why for case in cases if (why := _told(findings, case))},
+        "keys": [job.key[:KEY] for job in jobs],
+        "sides": [number in sides for number in range(len(cases))],
+        "base": [
+            ["yawbench", "run", str(run.scenario), *_words([*for_all, *run.changes, *by_options])]
+            for run in experiment.runs.values()
+        ],
+        "of_run": [[*experiment.runs].index(case.run.name) for case in cases],
+        "grid": findings.spec.design == "grid" and not experiment.design,
+        **_chosen(findings),
+    }  # fmt: skip
+
+
+def _axes(findings: ExperimentResult) -> Iterator[tuple[dict[str, Any], list[int]]]:
+    """Yield each axis that varies, and the index of the level of every case on it."""
+    experiment, planned = findings.experiment, findings.planned
+    assert planned is not None
+    if len(experiment.runs) > 1:
+        runs = [*experiment.runs]
+        labels = [run.row or run.label or run.name for run in experiment.runs.values()]
+        about: dict[str, Any] = {
+            "name": RUN,
+            "label": "run",
+            "unit": "",
+            "words": labels,
+            "numbers": None,
+            "log": False,
+        }
+        yield about, [runs.index(case.run.name) for case in experiment.cases]
+    for k, (name, axis) in enumerate(findings.spec.axes.items()):
+        every = dict.fromkeys(point[k] for point in experiment.points)
+        levels = sorted(every, key=_number) if axis.numeric else [*every]
+        applies = [any(fnmatchcase(run, pattern) for pattern in axis.runs) for run in experiment.runs]
+        about = {
+            "name": name,
+            "label": axis.says or name,
+            "unit": planned.axis_unit(name).strip(" []").replace(".", "·"),
+            "words": [level.words for level in levels],
+            "numbers": [_number(level) for level in levels] if axis.numeric else None,
+            "log": axis.spacing == "log",
+            "repeats": axis.repeats,
+            "options": [_words(changes_at(axis, level, experiment.path.parent)) for level in levels],
+            "applies": applies,
+        }
+        index = {level: number for number, level in enumerate(levels)}
+        yield about, [index[case.point[k]] for case in experiment.cases]
+
+
+def _words(changes: Sequence[Override]) -> list[str]:
+    """Return overrides as words of a command line."""
+    return [shlex.quote(word) for change in changes for word in option_of(change)]
+
+
+def _metric(findings: ExperimentResult, key: str) -> dict[str, Any]:
+    spec = findings.spec.metrics[key]
+    unit, factor = shown_unit(findings.unit(key))
+    found = [findings.value(case, key) for case in findings.experiment.cases]
+    values = [
+        _rounded(value.number * factor) if value and math.isfinite(value.number) else None for value in found
+    ]
+    return {"name": key, "label": spec.heading or metric(spec.metric).title, "unit": unit, "values": values}
+
+
+def _rounded(number: float) -> float:
+    return float(f"{number:.{DIGITS}g}")
+
+
+def _told(findings: ExperimentResult, case: Case) -> str:
+    """Return why a run failed or ended early, and its warnings."""
+    record = findings.record(case)
+    return "; ".join(filter(None, [record.reason if record.made else "", ", ".join(record.warning_codes)]))
+
+
+def _chosen(findings: ExperimentResult) -> dict[str, Any]:
+    """Return what the view shows at first: axes of the map, its metric, and the limits of metrics."""
+    spec = findings.spec
+    limits: dict[str, dict[str, Any]] = {}
+    asked = [
+        (c.metric, c.bound, c.operator in ("below", "at_most"))
+        for one in spec.limits.values()
+        for c in one.holds_if
+    ]
+    asked += [(one.metric, one.mark, True) for one in spec.figures if one.metric and one.mark is not None]
+    for key, bound, at_most in asked:
+        if key in spec.metrics and key not in limits and not isinstance(bound, MetricReference):
+            unit = findings.unit(key)
+            factor = shown_unit(unit)[1]
+            limits[key] = {
+                "bound": float(f"{si_number(bound, unit) * factor:.{DIGITS}g}"),
+                "at_most": at_most,
+            }
+    drawn = next((one for one in spec.figures if one.kind == "map"), None)
+    named = [RUN] * (len(findings.experiment.runs) > 1) + [*spec.axes]
+    names = sorted(named, key=lambda k: k == RUN or not spec.axes[k].numeric or spec.axes[k].repeats)
+    if drawn:
+        first = [drawn.x, drawn.y, drawn.panel_axis]
+    else:
+        of = next((one.of for one in spec.limits.values()), "")
+        others = [k for k in names if k != of]
+        first = [*others[:1], of, *others[1:2]] if of else names[:3]
+    first = [k for k in dict.fromkeys(first) if k]
+    first += [k for k in names if k not in first]
+    return {
+        "limits": limits,
+        "metric": (drawn.metric if drawn else "") or next(iter(limits), "") or next(iter(spec.metrics), ""),
+        "map": first[:3],
+    }  # fmt: skip
+
+
+# ---- the runs beside the page ----
+
+
+def write_sides(findings: ExperimentResult, folder: Path, each: Each = map) -> dict[int, str]:
+    """Write a side file for every run along axes that has results; return number of its case -> key.
+
+    Args:
+        findings: the experiment and its plans.
+        folder: of its results; the files go to its subfolder `data`.
+        each: `map`, or a parallel equivalent.
+    """
+    jobs = findings.planned.jobs if findings.planned else []
+    kept = [
+        (case, job)
+        for case, job in zip(findings.experiment.cases, jobs, strict=True)
+        if job.keep and (job.out / RUN_FILE).is_file()
+    ]
+    settings = side_settings(findings)
+    wanted = [(job, findings.words(case), settings, folder / DATA) for case, job in kept]
+    written = list(each(_write_side, *zip(*wanted, strict=True))) if wanted else []
+    keys = {case.number: job.key[:KEY] for (case, job), done in zip(kept, written, strict=True) if done}
+    tidy_sides(folder, keys.values())
+    return keys
+
+
+def tidy_sides(folder: Path, keys: Any) -> None:
+    """Remove side files that the page does not refer to."""
+    for file in (folder / DATA).glob("*.js"):
+        if file.stem not in set(keys):
+            file.unlink()
+
+
+def side_settings(findings: ExperimentResult) -> Settings:
+    """Return what the viewer of a run shows: the signals of its metrics first, their limits, its metrics."""
+    asked = [metric(one.metric) for one in findings.spec.metrics.values()]
+    signals = dict.fromkeys(variable_of(one.signal) for one in asked if "*" not in one.signal)
+    panels = tuple(dict.fromkeys([*PANELS, *signals]))
+    limits = []
+    for key, limit in _chosen(findings)["limits"].items():
+        one = metric(findings.spec.metrics[key].metric)
+        if one.name.startswith("peak(") and not one.other:
+            level = limit["bound"] / shown_unit(findings.unit(key))[1]
+            limits += [(one.signal, side * level, "limit") for side in (1.0, -1.0)]
+    names = [one.metric for one in findings.spec.metrics.values()][:MOST_METRICS] or METRICS
+    return Settings([View(panels=panels)], names, limits=limits, largest=1)
+
+
+def _write_side(job: Job, label: str, settings: Settings, folder: Path) -> bool:
+    """Write the side file of a run; return False if its results cannot be shown."""
+    try:
+        text = side_file(job.key[:KEY], [LabelledRun(label, load_results(job.out))], settings)
+    except ResultsError:
+        return False
+    folder.mkdir(parents=True, exist_ok=True)
+    write_whole(folder / f"{job.key[:KEY]}.js", text)
+    return True
