@@ -107,7 +107,7 @@ def _entry(text: str) -> tuple[str, EntrySpec]:
 
 
 def _write(ranked: RankingResult, folder: Path, command: str, each: Each) -> None:
-    """Draw the figures, write tables and page, and print where it is."""
+    """Draw the figures, write tables, page and side files, and print where the page is."""
     from ..errors import ResultsError
     from ..experiments.experiment import FIGURES
     from ..experiments.ranking_tables import (
@@ -116,7 +116,6 @@ def _write(ranked: RankingResult, folder: Path, command: str, each: Each) -> Non
         columns_of_runs,
         draw_matrix,
         draw_pareto,
-        draw_run,
     )
     from ..experiments.tables import to_csv
     from ..figures.style import save
@@ -124,8 +123,6 @@ def _write(ranked: RankingResult, folder: Path, command: str, each: Each) -> Non
     from ..pages.ranking_page import ranking_page
     from ..pages.report import PAGE
 
-    kept = [(run.results, run.angle) for run in ranked.runs if run.results and run.results.is_dir()]
-    list(each(draw_run, *zip(*kept, strict=True)) if kept else ())
     for name, columns in (
         ("table", columns_of_entries),
         ("cells", columns_of_cells),
@@ -138,5 +135,5 @@ def _write(ranked: RankingResult, folder: Path, command: str, each: Each) -> Non
     except ResultsError as error:
         say(f"{FIGURES}/pareto: {error}")
     page = folder / PAGE
-    write_whole(page, ranking_page(ranked, folder, command))
+    write_whole(page, ranking_page(ranked, folder, command, each))
     say(f"The page: {page} ({page.stat().st_size / 1e6:.1f} MB)")

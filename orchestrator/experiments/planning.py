@@ -65,24 +65,20 @@ def metrics_of(experiment: LoadedExperiment, run: NamedRun | None = None) -> Met
     )
 
 
-Keep = bool | Callable[[Case], bool]
-"""Whether runs along axes keep their results: all or none, or those of chosen cases."""
-
-
-def jobs_of(experiment: LoadedExperiment, out: Path, *, keep: Keep = True, **of_jobs: Any) -> list[Job]:
+def jobs_of(experiment: LoadedExperiment, out: Path, *, keep: bool = True, **of_jobs: Any) -> list[Job]:
     """Return a job for every case, not planned yet.
 
     Args:
         experiment: as loaded.
         out: its results folder.
-        keep: which runs along axes keep their results; named runs always do.
+        keep: whether runs along axes keep their results; named runs always do.
         of_jobs: other fields of all jobs.
     """
     axes = bool(experiment.spec.axes)
     return [
         Job(
             case.label, case.run.scenario, out / (RUNS if axes else case.run.name), case.changes,
-            keep=not axes or (keep(case) if callable(keep) else keep), test=case.run.test, **of_jobs,
+            keep=keep or not axes, test=case.run.test, **of_jobs,
         )
         for case in experiment.cases
     ]  # fmt: skip

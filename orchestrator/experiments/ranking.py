@@ -49,7 +49,7 @@ from ..scenario.scenario_schema import Scalar
 from ..scenario.validation import StrictModel, Time, validate
 from .axes import DesignAxisSpec, Level, OverrideSpec, VariantSpec, axis_of_levels, changes_of_file
 from .execution import Executor
-from .experiment import Case, LoadedExperiment, NamedRun, experiment_of
+from .experiment import LoadedExperiment, NamedRun, experiment_of
 from .judged_schema import text_of
 from .outcome import ExperimentResult
 from .standard_test_runs import slow_steer_amplitude
@@ -162,9 +162,9 @@ STEERING_BEGINS = "start_time"
 """Parameter of the driver: beginning of steer [s]."""
 RECORDED = (
     "steering_wheel_angle*", "yaw_rate*", "sideslip*", "acceleration_y*", "velocity_x*", "yaw_moment*",
-    "wheel_torque*", "torque_request*",
+    "wheel_torque*", "torque_request*", "position_x*", "position_y*", "yaw_angle*", "steer_angle*",
 )  # fmt: skip
-"""The recorded signals; the others would only take space."""
+"""The recorded signals: those of the test, the metrics and the car on the road; others would take space."""
 
 
 @dataclass(frozen=True)
@@ -392,16 +392,3 @@ def _since_steering(plan: Plan) -> TimeWindow | None:
     begins = next(unit.parameter(STEERING_BEGINS) for unit in plan.instances if unit.name == driver)
     first, last = float(begins or 0.0), plan.time(plan.n_steps)
     return (first, last) if first < last else None
-
-
-def kept_cases(experiment: LoadedExperiment) -> frozenset[int]:
-    """Return the numbers of the cases that keep their results.
-
-    Of each entry under each condition it is the last amplitude, left first, of the first repeat.
-    """
-    kept: dict[tuple[str, Level], Case] = {}
-    for case in experiment.cases:
-        cell = kept.setdefault((case.run.name, case.point[0]), case)
-        if float(case.point[-1].value) > float(cell.point[-1].value):
-            kept[case.run.name, case.point[0]] = case
-    return frozenset(case.number for case in kept.values())

@@ -35,7 +35,6 @@ from .ranking import (
     angle_experiment,
     angles_of,
     dwell_experiment,
-    kept_cases,
 )
 
 UNHELD = 1.0
@@ -142,6 +141,21 @@ class RankingCell:
         if self.missing:
             return "missing"
         return "passed" if self.passed else "spun" if all(one.met for one in self.runs) else "failed"
+
+    @property
+    def worst(self) -> RankedRun:
+        """The run that says most of the cell: one that fails before one that passes, of least margin."""
+
+        def rank(one: RankedRun) -> tuple[bool, bool, float, float]:
+            margin, slip = one["margin"], one["sideslip"]
+            return (
+                one.passed,
+                one.met,
+                WORST if margin is None else margin,
+                -(math.pi if slip is None else slip),
+            )
+
+        return min(self.runs, key=rank)
 
     @property
     def share(self) -> float:
@@ -294,7 +308,7 @@ def run_ranking(
         ranking: as loaded.
         execute: executes experiments.
         only: entries whose runs are executed; empty: all. The others are scored by the runs in the journal.
-        keep: keep the results of the runs that figures show.
+        keep: keep the results of the worst run of every cell, which the page shows.
 
     Raises:
         YawbenchError: a run cannot start, or A cannot be determined.
@@ -309,16 +323,21 @@ def run_ranking(
             )
     angles = angles_of(ranking, slow)
     dwell = dwell_experiment(ranking, angles, execute)
-    kept = kept_cases(dwell) if keep else ()
     found = execute(
         dwell,
         only=lambda case: not only or case.point[0].value in only,
-        keep=lambda case: case.number in kept,
+        keep=False,
         record=RECORDED,
         timed=CONTROLLER,
     )
     runs = _ranked_runs(ranking, angles, found)
-    return RankingResult(ranking, angles, runs, scores_of(ranking, runs))
+    scores = scores_of(ranking, runs)
+    if keep:
+        worst = {id(cell.worst) for one in scores for cell in one.cells.values()}
+        kept = [number for number, run in enumerate(runs) if id(run) in worst and run.record is not None]
+        runs = _ranked_runs(ranking, angles, execute.keeping(found, kept))
+        scores = scores_of(ranking, runs)
+    return RankingResult(ranking, angles, runs, scores)
 
 
 def _ranked_runs(

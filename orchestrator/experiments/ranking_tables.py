@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import ResultsError
 from ..evaluation.sine_with_dwell import percent
-from ..evaluation.standard_tests import TESTS
-from ..evaluation.trace import trace_of
-from ..figures.style import QUIET, digits_of, frame, literal, new_figure, save, shown
+from ..figures.style import QUIET, digits_of, frame, literal, new_figure, shown
 from ..metrics.run_metrics import MetricValue
-from ..results.read_and_salvage import load_results
 from .jobs import STEP_TIME
-from .ranking import SERIES
 from .ranking_scores import Digits, EntryScore, RankingCell, deciding_digits
 from .tables import Cell, Column, Table, column
 
@@ -28,8 +23,6 @@ if TYPE_CHECKING:
 
 COLOURS = {"passed": "#BFE5D8", "spun": "#F7E3A1", "failed": "#F6CDB4", "missing": "#FFFFFF"}
 """Colours of cells, which their text also tells apart."""
-RUN = "sine_with_dwell"
-"""File name of a run's figure."""
 TUNED = {"authors": ("o", "#0072B2"), "tuned": ("D", "#D55E00")}
 ROW = 0.235
 """Height of a row of the matrix [inch]."""
@@ -134,22 +127,6 @@ def draw_pareto(ranked: RankingResult, note: str) -> Figure:
         title = "Stability over intervention; numbers are places"
         frame(figure, 4.9, list(handles.values()), title, " · ".join([*left_out, note]))
     return figure
-
-
-def draw_run(folder: Path, angle: float, again: bool = False) -> None:
-    """Draw a run of sine with dwell into its results folder, unless it exists; `angle`: A [rad].
-
-    A run without results is skipped.
-    """
-    if not again and (folder / f"{RUN}.svg").is_file():
-        return
-    try:
-        trace = trace_of(load_results(folder))
-        figure = TESTS[SERIES].draw(trace, TESTS[SERIES].evaluate(trace, angle))
-    except ResultsError:
-        return
-    if figure:
-        save(figure, folder / RUN)
 
 
 def degrees(amplitude: float) -> str:

@@ -1,22 +1,25 @@
-"""The HTML page of a ranking: the overview first, every cell linked to its runs."""
+"""The HTML page of a ranking: the matrix, and beside it the chosen cell with its worst run."""
 
 from __future__ import annotations
 
 import math
-import os
 import shlex
+from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from markupsafe import Markup
-
+from ..errors import ResultsError
+from ..evaluation.sine_with_dwell import RATIOS, SPUN, course_of
+from ..evaluation.standard_tests import NotJudged
+from ..evaluation.trace import trace_of
 from ..experiments.experiment import FIGURES
 from ..experiments.jobs import STEP_TIME
-from ..experiments.ranking import EntrySpec
+from ..experiments.outcome import Each
+from ..experiments.ranking import SERIES, EntrySpec
 from ..experiments.ranking_scores import Digits, EntryScore, RankingCell, RankingResult, deciding_digits
 from ..experiments.ranking_tables import (
     RULE,
-    RUN,
     UNITS,
     degrees,
     place_words,
@@ -28,8 +31,13 @@ from ..experiments.ranking_tables import (
     words_of,
 )
 from ..experiments.tables import Table
-from ..messages import changed
+from ..figures.style import LabelledRun
+from ..files import write_whole
+from ..messages import changed, counted, listed
+from ..results.read_and_salvage import Results, load_results
 from .page_parts_and_provenance import FigureImage, anchor, image_of, made_by, option_of, render, style
+from .sweep_view import DATA, tidy_sides
+from .viewer import Settings, View, assets, side_file, viewer_frame
 
 STATES = {
     "passed": "passed",
@@ -37,48 +45,72 @@ STATES = {
     "failed": "failed",
     "missing": "runs are missing in this build",
 }
+SHOWN = ("yaw_rate", "sideslip", "steering_wheel_angle", "yaw_moment", "acceleration_y")
+"""Signals of a cell's worst run; chosen: what the test judges and what the controller does."""
+IDLE = "controller_off"
+"""FMU of the car without control."""
 OTHERS = ("speed_lost", "intervention", "chatter")
 """Numbers of a cell shown in addition to margin and sideslip."""
 
 
-def ranking_page(ranked: RankingResult, folder: Path, command: str) -> str:
-    """Return the page as HTML.
+def ranking_page(ranked: RankingResult, folder: Path, command: str, each: Each = map) -> str:
+    """Return the page as HTML, and write a side file for every cell: its numbers and its worst run.
 
     Args:
         ranked: the result of the ranking.
         folder: its results folder, which also holds the page.
         command: command line that repeats it.
+        each: `map`, or a parallel equivalent.
     """
     ranking = ranked.ranking
     digits = deciding_digits(ranked.scores)
-    after = ["margin", "sideslip", "intervention", "time per step"]
+    cells = [(one, cell) for one in ranked.scores for cell in one.cells.values()]
+    wanted = [_side(ranked, one, cell, folder) for one, cell in cells]
+    list(each(_write_side, *zip(*wanted, strict=True)))
+    tidy_sides(folder, [_id(cell) for _, cell in cells])
+    lost = next((cell for _, cell in cells if cell.state in ("failed", "spun")), cells[0][1])
     table = table_of(ranked)
     return render(
         "ranking.html.j2",
         title=ranking.spec.title,
+        answer=answer(ranked),
         source=ranking.spec.source,
         rule=RULE,
         notes=[*ranking.spec.notes, *ranking.edited],
         quick=ranking.quick,
         missing=[one.spec.title for one in ranked.scores if one.missing],
         first=["place", "controller", "passed", "runs"],
-        after=after,
-        conditions=[
-            {"name": name, "short": one.heading, "title": one.title}
-            for name, one in ranking.conditions.items()
-        ],
-        rows=[_row(ranked, one, after, digits) for one in ranked.scores],
-        states=STATES,
+        conditions=[{"short": one.heading, "title": one.title} for one in ranking.conditions.values()],
+        rows=_rows(ranked, digits),
+        first_cell=_id(lost),
+        sides=DATA,
+        frame=viewer_frame("run"),
         pareto=_image(folder / FIGURES / "pareto.svg", "Stability over intervention"),
         table=Table("", table.columns, table.rows),
         described=_conditions(ranked),
         entries=_entries(ranked),
-        cells=[_cell(ranked, one, cell, folder) for one in ranked.scores for cell in one.cells.values()],
         command=command,
         folder=str(folder),
         style=style(),
-        assets=Markup(""),
+        assets=assets("ranking.js"),
         **made_by(),
+    )
+
+
+def answer(ranked: RankingResult) -> str:
+    """Return the result in one sentence: what the first places and the car without control pass."""
+    number = len(ranked.ranking.conditions)
+    placed = [one for one in ranked.scores if one.place]
+    if not placed:
+        return f"No controller has all of its runs under {counted(number, 'condition')}."
+    first = [one for one in placed if one.place == 1]
+    others = [one for one in placed if one.place != 1][:1]
+    others += [one for one in placed if one.spec.fmu == IDLE and one not in (*first, *others)]
+    names = listed(one.spec.title for one in first)
+    rest = "".join(f"; {one.spec.title} (place {one.place}) {one.count('passed')}" for one in others)
+    return (
+        f"Of {counted(len(placed), 'controller')}, the first is {names}: "
+        f"{first[0].count('passed')} of {counted(number, 'condition')} passed{rest}."
     )
 
 
@@ -86,40 +118,39 @@ def _image(file: Path, title: str) -> FigureImage | None:
     return image_of(file, title) if file.is_file() else None
 
 
-def _row(ranked: RankingResult, one: EntryScore, after: list[str], digits: Digits) -> dict[str, Any]:
-    """Return the row of a controller in the first table."""
-    row = row_of(one, digits)
-    texts = Table("", after, [[row[heading] for heading in after]]).text()[0]
-    return {
-        "place": place_words(one),
-        "title": one.spec.title,
-        "tuned": one.spec.gains == "tuned",
-        "passed": f"{one.count('passed')}/{len(one.cells)}" if one.place else f"{one.missing} missing",
-        "share": row["runs"] if one.place else "–",
-        "cells": [
-            {
-                "id": _id(cell),
-                "state": cell.state,
-                "words": sign_of(cell),
-                "says": f"{one.spec.title}, {ranked.ranking.conditions[name].title}: {STATES[cell.state]}",
-            }
-            for name, cell in one.cells.items()
-        ],
-        "after": [text.replace("-", "–") if one.place else "–" for text in texts],
-    }
+def _rows(ranked: RankingResult, digits: Digits) -> list[dict[str, Any]]:
+    """Return the rows of the matrix; `together`: rows that share a place, 0 below the first of them."""
+    sharing = Counter(one.place for one in ranked.scores)
+    rows = []
+    for number, one in enumerate(ranked.scores):
+        first = number == 0 or not one.place or ranked.scores[number - 1].place != one.place
+        rows.append({
+            "place": place_words(one),
+            "together": (sharing[one.place] if one.place else 1) if first else 0,
+            "title": one.spec.title,
+            "passed": f"{one.count('passed')}/{len(one.cells)}" if one.place else f"{one.missing} missing",
+            "share": row_of(one, digits)["runs"] if one.place else "–",
+            "cells": [
+                {
+                    "id": _id(cell),
+                    "state": cell.state,
+                    "words": sign_of(cell),
+                }
+                for cell in one.cells.values()
+            ],
+        })  # fmt: skip
+    return rows
 
 
 def _id(cell: RankingCell) -> str:
     return anchor(f"{cell.entry} in {cell.condition}")
 
 
-def _cell(ranked: RankingResult, one: EntryScore, cell: RankingCell, folder: Path) -> dict[str, Any]:
-    """Return the details of a cell: its numbers, all its runs, its figure, its command."""
-    condition = ranked.ranking.conditions[cell.condition]
-    kept = next((run for run in cell.runs if run.results), None)
-    picture = None
-    if kept and kept.results and (kept.results / f"{RUN}.svg").is_file():
-        picture = Path(os.path.relpath(kept.results / f"{RUN}.svg", folder)).as_posix()
+def _side(
+    ranked: RankingResult, one: EntryScore, cell: RankingCell, folder: Path
+) -> tuple[str, str, Path | None, str, Path]:
+    """Return the arguments of `_write_side` for a cell."""
+    condition, worst = ranked.ranking.conditions[cell.condition], cell.worst
     sums = {
         "runs that pass": f"{sum(run.passed for run in cell.runs)} of {len(cell.runs)}",
         "stability margin": spread(cell.margin, lambda x: f"{x:.1f} points"),
@@ -128,19 +159,45 @@ def _cell(ranked: RankingResult, one: EntryScore, cell: RankingCell, folder: Pat
         **{key.replace("_", " "): _text(cell.number(key), UNITS[key]) for key in OTHERS},
         "time per step": _text(cell.number(STEP_TIME), "s"),
     }
-    return {
-        "id": _id(cell),
+    label = (
+        f"{one.spec.title}, {'right' if worst.amplitude < 0 else 'left'} first, {degrees(worst.amplitude)}"
+    )
+    shows = worst.results is not None and worst.results.is_dir()
+    details = {
         "title": f"{one.spec.title}: {condition.title}",
         "state": cell.state,
         "says": STATES[cell.state],
         "sums": [(name, text) for name, text in sums.items() if text is not None],
         "repeats": len({run.repeat for run in cell.runs}),
         "table": runs_table(cell),
-        "picture": picture,
-        "amplitude": degrees(kept.amplitude) if kept else "",
         "command": series_command(ranked, cell),
         "again": again_command(ranked, cell, folder),
+        "worst": f"Its worst run: {label}, {worst.verdict}." if shows else "No results of its runs are here.",
     }  # fmt: skip
+    html = render("ranking_cell.html.j2", cell=details)
+    return _id(cell), label, worst.results if shows else None, html, folder / DATA
+
+
+def _write_side(key: str, label: str, results: Path | None, html: str, folder: Path) -> None:
+    """Write the side file of a cell; without results, or unreadable ones, it has no run."""
+    text = side_file(key, [], html=html)
+    if results is not None:
+        with suppress(ResultsError):
+            run = load_results(results)
+            limits = [("sideslip", side * SPUN, "20° of sideslip") for side in (1.0, -1.0)]
+            settings = Settings([View(panels=SHOWN)], marks=_instants(run), limits=limits, largest=1)
+            text = side_file(key, [LabelledRun(label, run)], settings, html=html)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_whole(folder / f"{key}.js", text)
+
+
+def _instants(run: Results) -> list[tuple[float, str]]:
+    """Return the instants of the test: completion of steer, and those at which the yaw rate is judged."""
+    try:
+        course = course_of(trace_of(run, SERIES))
+    except (NotJudged, ResultsError):
+        return []
+    return [(course.end, "COS"), *((course.end + late, f"COS + {late:g} s") for late, _ in RATIOS)]
 
 
 def _text(number: float | None, unit: str) -> str | None:

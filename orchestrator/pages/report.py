@@ -401,7 +401,8 @@ def found_studies(folder: Path = SCENARIOS) -> list[Path]:
 def report_page(chapters: Sequence[dict[str, Any]], ranking: str = "") -> str:
     """Return the HTML page of one or several chapters; `ranking`: link to the ranking's page."""
     title = TITLE if len(chapters) > 1 else str(chapters[0]["title"])
-    scripts = assets() if any(one["viewer"] or one["sweep"] for one in chapters) else ""
+    sweeps = ["sweep.js"] if any(one["sweep"] for one in chapters) else []
+    scripts = assets(*sweeps) if sweeps or any(one["viewer"] for one in chapters) else ""
     return render(
         "report.html.j2", title=title, chapters=chapters, ranking=ranking, style=style(), assets=scripts,
         **made_by(),

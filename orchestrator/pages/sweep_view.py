@@ -220,7 +220,7 @@ def _chosen(findings: ExperimentResult) -> dict[str, Any]:
     spec = findings.spec
     limits: dict[str, dict[str, Any]] = {}
     asked = [
-        (c.metric, c.bound, c.operator in ("below", "at_most"))
+        (c.metric, c.bound, c.relation in ("below", "at_most"))
         for one in spec.limits.values()
         for c in one.holds_if
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import re
 import shutil
 import subprocess
@@ -178,11 +179,15 @@ def test_a_small_matrix_is_driven_goes_on_where_it_was_and_shows_what_is_missing
     assert free < 0.001 * held  # what the engine's lag leaves of the driver's force
     assert len(rows(out / "runs.csv")) == 4
     page = (out / "report.html").read_text()
-    assert 'href="#fuzzy-pid-in-low"' in page
-    assert 'id="fuzzy-pid-in-low"' in page
-    drawn = next(out.glob("runs/*/sine_with_dwell.svg"))
-    assert f'href="{drawn.relative_to(out).as_posix()}"' in page
-    assert golden_in(page)
+    assert 'href="#cell?id=fuzzy-pid-in-low"' in page
+    sides = {path.stem: path.read_text() for path in (out / "data").glob("*.js")}
+    assert set(sides) == {f"{entry}-in-{name}" for entry in ("fuzzy-pid", "none") for name in ("dry", "low")}
+    (low,) = (one for one in rows(out / "runs.csv") if (one["entry"], one["condition"]) == ("none", "low"))
+    content = json.loads(sides["none-in-low"].partition(", ")[2].rstrip(");\n"))
+    (run,) = content["data"]["runs"]
+    assert {"x", "y", "yaw"} <= set(run["road"])  # what the car on the road needs
+    assert low["verdict"] in content["html"]
+    assert golden_in(content["html"])
 
 
 @pytest.mark.exhaustive

@@ -165,9 +165,11 @@ def test_one_row_per_run_with_units_and_figures_and_a_page(moods, yawbench, tmp_
     assert figures == {f"{name}.{kind}" for name in ("curve", "map", "limit") for kind in ("png", "svg")}
     page = html.fromstring((tmp_path / "out" / "report.html").read_text())
     assert page.cssselect("h1")[0].text_content() == "Moods"
-    assert [image.get("alt") for image in page.cssselect("figure.chart img")] == [
-        "Moods: curve", "Moods: map", "Moods: limit",
-    ]  # fmt: skip
+    assert page.cssselect("figure.chart") == []  # the map and the coordinates show them
+    files = page.xpath("//details//li/code/text()")
+    assert [one for one in files if one.endswith(".svg")] == [
+        f"figures/{name}.svg" for name in ("curve", "map", "limit")
+    ]
     assert golden_in(page.text_content())
     assert len(list(csv.DictReader((tmp_path / "out" / "table.csv").open()))) == 6
 
@@ -266,6 +268,7 @@ def test_fresh_makes_all_runs_again(moods, yawbench, tmp_path):
 
 def test_kept_results_can_be_loaded_in_every_format_and_are_made_once(moods, yawbench, tmp_path):
     file = moods(10)
+    file.write_text(file.read_text() + "keep: none\n")
     yawbench(file, "out")
     assert not (tmp_path / "out" / "runs").exists()
     assert "finished already" not in yawbench(file, "out", "--keep", "--format", "parquet")[2]
@@ -277,6 +280,47 @@ def test_kept_results_can_be_loaded_in_every_format_and_are_made_once(moods, yaw
     assert golden_in(yawbench(more, "out", "--keep")[2])
     kept = [load_results(tmp_path / "out" / "runs" / row["key"][:12]) for row in rows(tmp_path / "out")]
     assert [run["controller.yaw_moment"][-1] for run in kept] == pytest.approx([0.5, 0.5, 1.0, 1.0])
+
+
+def kept_levels(folder) -> list[tuple[float, bool]]:
+    """Return the level of each run with results, and whether it completed."""
+    kept = []
+    for row in rows(folder):
+        file = folder / "runs" / row["key"][:12] / "run.json"
+        if file.is_file():
+            kept.append((row["level"], json.loads(file.read_text())["status"] == "completed"))
+    return kept
+
+
+@pytest.mark.parametrize(
+    ("keep", "levels", "expected"),
+    [
+        ("", (10, 33, 38, 45), [33, 38]),  # the last within the limit, the first beyond
+        ("limits", (1, 2, 20, 45), [2, 20]),  # twenty fails
+        ("all", (10, 33), [10, 33]),
+        ("none", (10, 20), []),
+    ],
+)
+def test_results_are_kept_beside_limits_and_of_failed_runs_or_of_all_or_none(
+    keep, levels, expected, moods, yawbench, tmp_path
+):
+    file = moods(*levels, count=2)
+    file.write_text(file.read_text() + f"keep: {keep}\n" * bool(keep))
+    yawbench(file, "out")
+    found = kept_levels(tmp_path / "out")
+    before = journal(tmp_path / "out")
+    assert sorted({level for level, _ in found}) == expected, found
+    assert len(before) == 2 * len(levels)  # what is made again to keep it is not counted again
+    made = {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / "runs").rglob("run.json")}
+    assert "results to keep" not in yawbench(file, "out")[2]
+    assert {path: path.stat().st_mtime_ns for path in made} == made
+    sides = {path.stem for path in (tmp_path / "out" / "data").glob("*.js")}
+    assert sides <= {row["key"][:12] for row in rows(tmp_path / "out")}
+    if found:
+        missing = next(path for path in made if json.loads(path.read_text())["status"] == "completed")
+        missing.unlink()
+        yawbench(file, "out")
+        assert missing.is_file()
 
 
 def interrupted(file, out, fmus, tmp_path, number):

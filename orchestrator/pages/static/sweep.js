@@ -2,7 +2,7 @@
 // look share a path, so that thousands of runs are few elements.
 
 const SHADES = 7; // of a value within its range
-const MOST_NUMBERS = 700; // texts in the maps; chosen: a page has at most 2,000 elements
+const MOST_NUMBERS = 450; // texts in the maps; chosen: a page has at most 2,000 elements
 const MOST_CELLS = 900; // beyond this one map is shown at first
 const LINES_HIGH = 330;
 const NEAR_LINE = 14; // pixels
@@ -179,7 +179,7 @@ class Sweep {
     this.isVisible = new Set(this.visible);
     const inside = this.visible.filter((row) => this.within(row)).length;
     const brushed = Object.keys(this.state.brush).length ? `${this.visible.length} of ${this.count} chosen` : '';
-    const held = this.state.limit === null || !this.metric ? '' : `${inside} of ${this.visible.length} within ${this.text(this.state.limit, this.metric, 4)}`;
+    const held = this.state.limit === null || !this.metric ? '' : `${inside} of ${this.visible.length} within ${this.state.limit} ${this.metric.unit}`;
     this.find('chosen').textContent = [brushed, held].filter(Boolean).join('; ') + (brushed || held ? '.' : '');
     this.drawMap();
     this.drawLines();
@@ -265,11 +265,12 @@ class Sweep {
         + (x ? `<text class="ys-quiet" x="${x0}" y="${y0 + up * ch + 29}">right: ${escaped(label(x))}</text>` : '');
     });
     const total = Math.ceil(maps.length / beside) * high;
-    const words = this.metric ? `${this.metric.label}${this.metric.unit ? ` in ${this.metric.unit}` : ''}, darker: larger` : '';
+    const words = this.metric ? `${this.metric.label}${this.metric.unit ? ` in ${this.metric.unit}` : ''}, stronger: larger` : '';
     const key = this.state.limit === null || !this.metric ? escaped(words)
-      : `${escaped(words)}; <tspan class="ys-corner">◥</tspan> orange: beyond ${escaped(this.text(this.state.limit, this.metric, 4))}`;
-    holder.innerHTML = `<svg viewBox="0 0 ${wide} ${total + 18}" aria-hidden="true">${paths.join('')}${heads.join('')}${texts.join('')}`
-      + `<text class="ys-quiet" x="0" y="${total + 12}">${key}</text><path class="ys-open"/><path class="ys-cursor"/></svg>`;
+      : `${escaped(words)}; <tspan class="ys-corner">◥</tspan> orange: beyond ${escaped(`${this.state.limit} ${this.metric.unit}`)}`;
+    const legend = key.length * 6 > wide && this.state.limit !== null ? key.replace('; <tspan', `<tspan x="0" dy="15"></tspan><tspan`) : key;
+    holder.innerHTML = `<svg viewBox="0 0 ${wide} ${total + (legend === key ? 18 : 33)}" aria-hidden="true">${paths.join('')}${heads.join('')}${texts.join('')}`
+      + `<text class="ys-quiet" x="0" y="${total + 12}">${legend}</text><path class="ys-open"/><path class="ys-cursor"/></svg>`;
     this.mark();
   }
 
