@@ -22,6 +22,7 @@ PAGES = {
     "reference/scenario.md": schemas.scenario_page,
     "reference/experiment.md": schemas.experiment_page,
     "reference/ranking.md": schemas.ranking_page,
+    "reference/threats.md": schemas.threats_page,
     "reference/signals.md": signals.page,
     "reference/units.md": units.page,
     "reference/metrics.md": metrics.page,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from .errors import ScenarioError
 from .fmu.opener import Opener
 from .messages import hint
 from .names import match
-from .plan import Override, Plan
+from .plan import Instance, Override, Plan
 from .scenario import yaml_lines
 from .scenario.find_and_load import LoadedScenario, load_scenario
 from .scenario.yaml_lines import Document
@@ -21,7 +21,7 @@ from .wiring.make_plan import make_plan
 
 
 class Planner:
-    """Makes plans; reads every file and opens every FMU once for all of them.
+    """Makes plans; reads every file, opens every FMU and measures every tyre once for all of them.
 
     Args:
         options: of the `Opener`.
@@ -29,6 +29,7 @@ class Planner:
 
     def __init__(self, **options: Any) -> None:
         self._documents: dict[Path, Document] = {}
+        self._stiffnesses: dict[Hashable, dict[str, float]] = {}
         self.opener = Opener(**options)
 
     def load(
@@ -66,9 +67,7 @@ class Planner:
             YawbenchError: an FMU is missing or cannot be built, the instances cannot be connected, or a
                 signal is not recorded.
         """
-        plan = make_plan(
-            scenario, fmus=fmus, opener=self.opener, isolated=isolated, measure=cornering_stiffness
-        )
+        plan = make_plan(scenario, fmus=fmus, opener=self.opener, isolated=isolated, measure=self._measure)
         if not record:
             return plan
         recorded = {str(name): name for name in plan.record}
@@ -84,6 +83,14 @@ class Planner:
             if any(match(pattern, one) is not None for pattern in record for one in (text, name.variable))
         ]
         return replace(plan, record=tuple(chosen))
+
+    def _measure(self, tyres: Instance, loads: Mapping[str, float]) -> dict[str, float]:
+        """Return what `cornering_stiffness` returns, measured once for equal tyres."""
+        parts = tyres.parameters, tyres.constants, loads
+        key = (tyres.fmu.sha256, *(tuple(sorted(part.items())) for part in parts))
+        if key not in self._stiffnesses:
+            self._stiffnesses[key] = cornering_stiffness(tyres, loads)
+        return self._stiffnesses[key]
 
     def _read(self, path: Path, *, what: str) -> Document:
         """Return a fresh copy of what `yaml_lines.read` returns."""

@@ -14,6 +14,7 @@ from pydantic.fields import FieldInfo
 
 from orchestrator.experiments import ranking as ranking
 from orchestrator.experiments import schema as experiment
+from orchestrator.experiments import threats as threats
 from orchestrator.fault_kinds import KINDS, FaultLocation
 from orchestrator.names import SignalName, Target
 from orchestrator.scenario import scenario_schema as scenario
@@ -44,6 +45,11 @@ def experiment_page() -> str:
 def ranking_page() -> str:
     """Return the page of rankings."""
     return _page("Ranking files", ranking, [ranking.RankingSpec])
+
+
+def threats_page() -> str:
+    """Return the page of threat files."""
+    return _page("Threat files", threats, [threats.ThreatsSpec])
 
 
 def _page(heading: str, module: Any, roots: list[type[BaseModel]], more: str = "") -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -12,6 +12,8 @@ from .options import MAKING, RunOptions, named, takes
 from .progress import executor_of, hold, pooled, print_tables, say, stoppable
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from ..experiments.outcome import Each
     from ..experiments.ranking import EntrySpec
     from ..experiments.ranking_scores import RankingResult
@@ -52,7 +54,11 @@ def rank(
     condition: ConditionOption = None,
     quick: Quick = False,
 ) -> None:
-    """Rank controllers by sine with dwell.
+    """Rank controllers by sine with dwell or by threats.
+
+    A ranking file compares which conditions they pass; a threat file, such as proving_ground/threats, how far
+    each threat can be turned up. There --quick searches the first setting alone, and with --only the other
+    entries count with their published levels.
 
     Start reading at report.html. Without --out, results go to results/<folder of the ranking>/<its name>.
     Runs already made from the same scenario, FMUs and program version are not repeated, so an interrupted
@@ -62,17 +68,17 @@ def rank(
     from ..experiments.ranking import load_ranking
     from ..experiments.ranking_scores import run_ranking
     from ..experiments.ranking_tables import table_of
-    from ..messages import hint
     from ..results.folder_and_lock import default_folder
+    from ..scenario import yaml_lines
 
     more = dict(map(_entry, controller or ()))
+    if "threats" in (yaml_lines.read(file, what="ranking file").data or {}):
+        if condition:
+            raise ScenarioError(f"--condition: {file} has threats, not conditions", code="option-invalid")
+        _rank_by_threats(context, options, file, more, only or (), quick=quick, controller=controller)
+        return
     ranking = load_ranking(file, more=more, quick=quick, chosen=condition or ())
-    for name in only or ():
-        if name not in ranking.entries:
-            raise ScenarioError(
-                f"--only {name}: unknown entry{hint(name, ranking.entries, lead='known')}",
-                code="entry-unknown",
-            )
+    _check_only(only or (), ranking.entries)
     folder = options.out or default_folder(file)
     hold(context, folder)
     with stoppable(folder), executor_of(folder, ranking.identity, options, format="parquet") as execute:
@@ -82,6 +88,54 @@ def rank(
     print_tables([table_of(ranked, "gains", "speed lost", "chatter")])
     if unranked := [score.entry for score in ranked.scores if score.missing]:
         say(f"not ranked (missing runs): {', '.join(unranked)}")
+
+
+def _check_only(only: Sequence[str], entries: Mapping[str, Any]) -> None:
+    from ..errors import ScenarioError
+    from ..messages import hint
+
+    for name in only:
+        if name not in entries:
+            raise ScenarioError(
+                f"--only {name}: unknown entry{hint(name, entries, lead='known')}", code="entry-unknown"
+            )
+
+
+def _rank_by_threats(
+    context: typer.Context,
+    options: RunOptions,
+    file: Path,
+    more: Mapping[str, EntrySpec],
+    only: Sequence[str],
+    *,
+    quick: bool,
+    controller: list[str] | None,
+) -> None:
+    """Search the levels that entries survive; write tables and page."""
+    from ..experiments.tables import to_csv
+    from ..experiments.threat_runs import run_threats, table_of_levels, table_of_quantities
+    from ..experiments.threat_scores import table_of_scores
+    from ..experiments.threats import load_threats
+    from ..files import write_whole
+    from ..pages.report import PAGE
+    from ..pages.threats_page import main_table, scored, threats_page
+    from ..results.folder_and_lock import default_folder
+
+    threats = load_threats(file, more=more, quick=quick)
+    _check_only(only, threats.ranking.entries)
+    folder = options.out or default_folder(file)
+    hold(context, folder)
+    with stoppable(folder), executor_of(folder, threats.identity, options) as execute:
+        result = run_threats(threats, execute, only=only)
+    write_whole(folder / "levels.csv", to_csv(table_of_levels(result)))
+    write_whole(folder / "quantities.csv", to_csv(table_of_quantities(result)))
+    table = scored(result)
+    write_whole(folder / "scores.csv", to_csv(table_of_scores(table)))
+    page = folder / PAGE
+    command = command_of("rank", file, quick=quick, controller=controller)
+    write_whole(page, threats_page(result, table, folder, command))
+    say(f"The page: {page} ({page.stat().st_size / 1e6:.1f} MB)")
+    print_tables([main_table(result, table)])
 
 
 def _entry(text: str) -> tuple[str, EntrySpec]:

@@ -40,6 +40,8 @@ from .outcome import Each, ExperimentResult, judge_records, judge_results
 from .planning import PlannedExperiment, plan_experiment
 
 T = TypeVar("T")
+K = TypeVar("K")
+V = TypeVar("V")
 Runner = Callable[[Sequence[Job], OnOutcome], object]
 """Executes jobs and reports each outcome; see `runner_of`."""
 
@@ -194,13 +196,13 @@ def _has_results(job: Job, record: MeasuredRun) -> bool:
     return job.plan is not None and staleness(job.plan, job.out) is None
 
 
-Search = Generator[float, bool, T]
+Search = Generator[V, bool, T]
 """A search for a limit: yields values, is sent whether each of them passes, and returns what it has found."""
 
 
 def highest_passing(
     *, first: float, step: float, resolution: float, least: float, most: float
-) -> Search[tuple[float | None, float | None]]:
+) -> Search[float, tuple[float | None, float | None]]:
     """Search the highest value that passes, in steps and halves; return it and the lowest failing one above.
 
     None stands for a value that does not exist within the bounds.
@@ -234,16 +236,16 @@ def highest_passing(
 
 
 def side_by_side(
-    searches: Mapping[str, Search[T]], passing: Callable[[dict[str, float]], Mapping[str, bool]]
-) -> dict[str, T]:
+    searches: Mapping[K, Search[V, T]], passing: Callable[[dict[K, V]], Mapping[K, bool]]
+) -> dict[K, T]:
     """Run searches in rounds, so that the runs of a round are one experiment; return what each has found.
 
     Args:
         searches: name -> search.
         passing: maps the value that each search asks for in a round to whether it passes.
     """
-    found: dict[str, T] = {}
-    answers: Mapping[str, bool | None] = dict.fromkeys(searches)  # None starts a generator
+    found: dict[K, T] = {}
+    answers: Mapping[K, bool | None] = dict.fromkeys(searches)  # None starts a generator
     while answers:
         values = {}
         for name, answer in answers.items():

@@ -280,14 +280,21 @@ def load_ranking(
     return LoadedRanking(path, spec, entries, quick, tuple(chosen), tuple(edited))
 
 
-def angle_experiment(ranking: LoadedRanking, execute: Executor) -> LoadedExperiment:
+def angle_experiment(
+    ranking: LoadedRanking, execute: Executor, cars: Sequence[str] | None = None
+) -> LoadedExperiment:
     """Return the runs of slowly increasing steer to both sides that determine A, a named run per car.
+
+    Args:
+        ranking: as loaded.
+        execute: makes plans.
+        cars: names of cars; default: those of the conditions.
 
     Raises:
         ScenarioError: a scenario is wrong, or its driver has no amplitude.
     """
     runs = []
-    for name in ranking.cars:
+    for name in ranking.cars if cars is None else cars:
         car = ranking.spec.cars[name]
         scenario, changes = ranking.path.parent / car.slow_steer, ranking.changes(car, stop=False)
         runs.append(NamedRun(name, car.title, car.title, scenario, changes, (SLOW, None)))
@@ -304,14 +311,16 @@ def angle_experiment(ranking: LoadedRanking, execute: Executor) -> LoadedExperim
     return experiment_of(ranking.path, runs, title=title, axes=axes, design=design, origin="ranking")
 
 
-def angles_of(ranking: LoadedRanking, found: ExperimentResult) -> dict[str, float]:
-    """Return car -> angle A [rad], from the result of `angle_experiment`.
+def angles_of(
+    ranking: LoadedRanking, found: ExperimentResult, cars: Sequence[str] | None = None
+) -> dict[str, float]:
+    """Return car -> angle A [rad], from the result of `angle_experiment` for the same cars.
 
     Raises:
         ResultsError: the runs do not yield it.
     """
     angles = {}
-    for car in ranking.cars:
+    for car in ranking.cars if cars is None else cars:
         judged = []
         for case, record in zip(found.experiment.cases, found.records, strict=True):
             if case.run.name == car:

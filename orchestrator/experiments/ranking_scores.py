@@ -78,8 +78,13 @@ class RankedRun:
         """Whether the regulation's criteria are met."""
         if self["stability"] != 1.0:
             return False
-        asked = self.dry and self.multiple >= FROM * (1.0 - SLIGHT)
+        asked = self.dry and self.responsiveness_asked
         return not asked or self["responsiveness"] == 1.0
+
+    @property
+    def responsiveness_asked(self) -> bool:
+        """Whether the regulation asks for responsiveness at this amplitude, on a dry road."""
+        return self.multiple >= FROM * (1.0 - SLIGHT)
 
     @property
     def spun(self) -> bool:
@@ -182,7 +187,7 @@ class RankingCell:
     @cached_property
     def displacement(self) -> float | None:
         """Smallest displacement of the runs at amplitudes where responsiveness counts [m]."""
-        asked = [one for one in self.runs if one.multiple >= FROM * (1.0 - SLIGHT)]
+        asked = [one for one in self.runs if one.responsiveness_asked]
         return min((x for one in asked if (x := one["displacement"]) is not None), default=None)
 
     def number(self, key: str) -> float | None:

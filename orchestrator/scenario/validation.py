@@ -43,6 +43,7 @@ KINDS: dict[str, tuple[str, type, str]] = {
     "runs": ("a study file", list, "; it is for `yawbench study` and `report`"),
     "axes": ("a sweep file", dict, "; it is for `yawbench sweep`"),
     "conditions": ("a ranking file", dict, "; it is for `yawbench rank`"),
+    "threats": ("a threat file", dict, "; it is for `yawbench rank`"),
     "entries": ("a file of entries", dict, "; a ranking names it under 'more_entries'"),
     "units": ("a scenario", dict, "; it is for `yawbench run`"),
     "parameters": ("a vehicle file", dict, "; a scenario names it under 'vehicle'"),

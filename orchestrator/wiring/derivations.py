@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import NamedTuple
 
 from vocabulary.gravity import G
@@ -138,6 +139,11 @@ def car_of(given: Mapping[str, float]) -> CarQuantities:
     Args:
         given: name of `CAR` -> value in SI.
     """
+    return _derived(tuple(given.items()))
+
+
+@lru_cache(maxsize=1024)
+def _derived(given: tuple[tuple[str, float], ...]) -> CarQuantities:
     values, formulas, used = dict(given), dict[str, str](), set[str]()
     found = True
     while found:

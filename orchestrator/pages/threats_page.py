@@ -1,0 +1,360 @@
+"""The HTML page of a threat file: scores first, then levels, orders, other settings and disciplines."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from ..experiments.confidence import Bounds
+from ..experiments.tables import Table
+from ..experiments.threat_runs import ThreatResult
+from ..experiments.threat_scores import (
+    GainsAndLaws,
+    ScoreTable,
+    Spread,
+    gains_and_laws,
+    orders_without,
+    score_table,
+)
+from ..experiments.threats import LANE_CHANGE, REFERENCE, LoadedThreats, SearchPlace, ThreatSpec
+from .page_parts_and_provenance import made_by, render, style
+from .report import PAGE, RANKING
+
+RULE = (
+    "Score: the geometric mean of the highest levels survived, over threats and cars, each threat's range "
+    "taken as one unit; no control has 0, the best 100. Interval: 95 %, threats and cars drawn in blocks. "
+    "Place: one more than the entries whose whole interval lies above, never better than that of a higher "
+    "score. Order by rank: by the mean rank."
+)
+
+
+def titles_of(result: ThreatResult) -> dict[str, str]:
+    """Return entry -> title."""
+    return {name: spec.title for name, (spec, _) in result.threats.ranking.entries.items()}
+
+
+def interval_text(bounds: Bounds) -> str:
+    """Return an interval of scores."""
+    return f"{bounds.low:.0f} to {bounds.high:.0f}"
+
+
+def scored(result: ThreatResult, setting: str = "") -> ScoreTable:
+    """Return the scores of a setting, by default the main one."""
+    setting = setting or result.threats.main
+    entries = result.complete[setting]
+    return score_table(entries, result.positions(setting, entries), REFERENCE)
+
+
+def main_table(result: ThreatResult, table: ScoreTable) -> Table:
+    """Return the table of scores, the best first."""
+    titles = titles_of(result)
+    rows = [
+        [
+            str(one.place), titles[one.entry] + (" (published)" if one.entry in result.published else ""),
+            f"{one.score:.1f}", interval_text(one.bounds), f"{one.mean_rank:.1f}", str(one.by_rank),
+        ]
+        for one in table.scores
+    ]  # fmt: skip
+    return Table(
+        result.threats.spec.title,
+        ["place", "controller", "score", "95 % interval", "mean rank", "order by rank"],
+        [*rows], [RULE, told_apart(table)], {0, 2, 4, 5},
+    )  # fmt: skip
+
+
+def told_apart(table: ScoreTable) -> str:
+    """Return how many entries can be told apart, in a sentence."""
+    return (
+        f"{table.groups} of {len(table.scores)} intervals lie apart from each other. Of {table.pairs} pairs, "
+        f"{table.told_apart} are told apart by the interval of their difference."
+    )
+
+
+def level_text(spec: ThreatSpec, position: float, end: str = "") -> str:
+    """Return a level with its unit; a range that ended is marked."""
+    level = spec.level(position)
+    mark = {"hard": "≥ " if spec.hard > spec.easy else "≤ ", "easy": "fails at "}.get(end, "")
+    digits = 2 if abs(level) < 10 else 0
+    return f"{mark}{level:.{digits}f}"
+
+
+def levels_table(result: ThreatResult, entries: Sequence[str]) -> Table:
+    """Return the table of levels survived, geometric means over cars, an entry per row."""
+    threats, titles = result.threats, titles_of(result)
+    specs = {name: threats.spec.threats[name] for name in threats.threats_in(threats.main)}
+    headings = ["controller", *(_heading(spec) for spec in specs.values())]
+    table = Table("", headings, numbers=range(1, len(headings)))
+    for entry in entries:
+        row = [titles[entry]]
+        for name, spec in specs.items():
+            found = _of_threat(result, threats.main, name, entry)
+            ends = {one.end for one in found}
+            mean = sum(one.position for one in found) / len(found)
+            row.append(level_text(spec, mean, ends.pop() if len(ends) == 1 else ""))
+        table.rows.append(row)
+    table.notes.append(
+        "Geometric means over cars of the highest level survived. Fails at: on every car at the easy end of "
+        "the range, which then counts. ≥, ≤: survived to the hard end on every car."
+    )
+    return table
+
+
+def _heading(spec: ThreatSpec) -> str:
+    return (spec.short or spec.title) + (f" [{spec.unit}]" if spec.unit else "")
+
+
+def _of_threat(result: ThreatResult, setting: str, threat: str, entry: str) -> list[Any]:
+    cars = result.threats.spec.threats[threat].cars or result.threats.cars_in(setting)
+    places = (SearchPlace(setting, threat, car, entry) for car in cars)
+    return [result.survived[place] for place in places if place in result.survived]
+
+
+def car_tables(result: ThreatResult, entries: Sequence[str]) -> list[Table]:
+    """Return a table of levels per threat: an entry per row, a car per column."""
+    threats, titles, tables = result.threats, titles_of(result), []
+    for name in threats.threats_in(threats.main):
+        spec = threats.spec.threats[name]
+        cars = spec.cars or threats.spec.cars
+        heading = f"{spec.title}{f' [{spec.unit}]' if spec.unit else ''}"
+        table = Table(heading, ["controller", *cars], numbers=range(1, len(cars) + 1))
+        for entry in entries:
+            found = (result.survived[SearchPlace(threats.main, name, car, entry)] for car in cars)
+            table.rows.append([titles[entry], *(level_text(spec, one.position, one.end) for one in found)])
+        tables.append(table)
+    return tables
+
+
+def threats_table(result: ThreatResult) -> Table:
+    """Return the table of threats: range, cars, source."""
+    table = Table("", ["threat", "from", "to", "cars", "scenario", "changes", "source of the range"])
+    for spec in result.threats.spec.threats.values():
+        unit = f" {spec.unit}" if spec.unit else ""
+        changes = [*(f"{target} = {value}" for target, value in spec.set.items())]
+        changes += [f"{target} × level" for target in spec.factor] + [
+            f"{target} + level" for target in spec.add
+        ]
+        cars = "all" if not spec.cars else ", ".join(spec.cars)
+        ends = f"{spec.easy:g}{unit}", f"{spec.hard:g}{unit}"
+        table.rows.append([spec.title, *ends, cars, spec.scenario, "\n".join(changes), spec.source])
+    return table
+
+
+def orders_table(result: ThreatResult, entries: Sequence[str]) -> Table:
+    """Return the orders without each threat and each car."""
+    threats, titles = result.threats, titles_of(result)
+    names = {"threat": threats.threats_in(threats.main), "car": threats.cars_in(threats.main)}
+    table = Table("", ["without", "first", "entries that move", "farthest move", "order"], numbers={2})
+    whole = [*entries]
+    given = result.complete[threats.main]
+    for (word, k), order in orders_without(given, result.positions(threats.main, given), REFERENCE).items():
+        moves = {entry: order.index(entry) - whole.index(entry) for entry in whole}
+        far = max(moves, key=lambda entry: abs(moves[entry]))
+        moved = f"{titles[far]}, {whole.index(far) + 1} to {order.index(far) + 1}" if moves[far] else "none"
+        table.rows.append([
+            f"{word} {names[word][k]}", titles[order[0]], str(sum(map(bool, moves.values()))), moved,
+            " > ".join(titles[entry] for entry in order),
+        ])  # fmt: skip
+    return table
+
+
+def setting_table(result: ThreatResult, setting: str) -> Table:
+    """Return the scores of another setting, beside those of the main one on the same threats and cars."""
+    threats, titles = result.threats, titles_of(result)
+    spec = threats.spec.settings[setting]
+    entries = result.complete[setting]
+    table = scored(result, setting)
+    comparable = {*threats.threats_in(setting)} <= {*threats.threats_in(threats.main)}
+    both = [entry for entry in entries if entry in result.complete[threats.main]] if comparable else []
+    of_main, order, moved = {}, [], ""
+    if both:
+        mains = result.positions(threats.main, both, like=setting)
+        main = score_table(both, mains, REFERENCE)
+        of_main, order = {one.entry: one for one in main.scores}, main.order()
+        gain = np.nanmean(result.positions(setting, both) - mains)
+        moved = f"Levels lie {100 * gain:+.1f} % of a range from those of the main setting, on average. "
+    rows = [
+        [
+            str(one.place), titles[one.entry], f"{one.score:.1f}", interval_text(one.bounds),
+            f"{of_main[one.entry].score:.1f}" if one.entry in of_main else None,
+            str(order.index(one.entry) + 1) if one.entry in of_main else None,
+        ]
+        for one in table.scores
+    ]  # fmt: skip
+    about = (
+        f"Threats: {', '.join(threats.threats_in(setting))}; cars: {', '.join(threats.cars_in(setting))}. "
+        f"{moved}{told_apart(table)}"
+    )
+    headings = ["place", "controller", "score", "95 % interval", "main score, same threats", "main order"]
+    return Table(spec.title, headings, [*rows], [about], {0, 2, 4, 5})
+
+
+def compared_gains(result: ThreatResult) -> GainsAndLaws | None:
+    """Compare gains and laws by the setting with seeds; None if there is none with all levels."""
+    threats = result.threats
+    setting = next((name for name, one in threats.spec.settings.items() if one.seeds), None)
+    if setting is None:
+        return None
+    entries, complete = threats.ranking.entries, result.complete[setting]
+    authors = {spec.fmu: name for name, (spec, _) in entries.items() if spec.gains == "authors"}
+    laws: dict[str, list[str]] = {}
+    for name in complete:
+        if entries[name][0].gains == "tuned":
+            laws.setdefault(entries[name][0].fmu, []).append(name)
+    most = 1 + len(threats.spec.settings[setting].seeds)
+    whole = {fmu: names for fmu, names in laws.items() if len(names) == most and fmu in authors}
+    if len(whole) < 3:
+        return None
+    tuned = np.array([result.positions(setting, names) for names in whole.values()])
+    own = result.positions(threats.main, [authors[fmu] for fmu in whole], like=setting)
+    return gains_and_laws(tuned, own)
+
+
+def gains_table(found: GainsAndLaws) -> Table:
+    """Return the table of spreads, in per cent of a threat's range."""
+
+    def row(words: str, one: Spread) -> list[str]:
+        low, high = (100 * x for x in one.bounds)
+        return [words, f"{100 * one.value:.1f}", f"{low:.1f} to {high:.1f}"]
+
+    rows = [
+        row("between laws, tuned", found.laws),
+        row("between seeds of the search, within a law", found.seeds),
+        row("between authors' and tuned gains, within a law", found.gains),
+        row("between laws, means of both gains", found.between),
+        row("the third less the fourth", found.difference),
+    ]
+    return Table(
+        "", ["standard deviation of the mean level, % of a range", "", "95 % interval"], [*rows], [], {1}
+    )
+
+
+def gains_sentence(found: GainsAndLaws) -> str:
+    """Return whether gains matter more than laws."""
+    low, high = found.difference.bounds
+    if low > 0.0:
+        return "Gains matter more than laws: the interval of the difference is above zero."
+    if high < 0.0:
+        return "Laws matter more than gains: the interval of the difference is below zero."
+    return "Whether gains matter more than laws is undecided: the interval of the difference holds zero."
+
+
+def discipline_tables(result: ThreatResult) -> list[Table]:
+    """Return a table per discipline: quantities as means over cars, and their score with interval."""
+    titles, tables = titles_of(result), []
+    entries = result.complete[result.threats.main]
+    for name, spec in result.threats.spec.disciplines.items():
+        cars = spec.cars or result.threats.spec.cars
+        magnitudes = np.array([
+            [
+                [result.quantities.get((name, car, entry), {}).get(key) for car in cars]
+                for key in spec.quantities
+            ]
+            for entry in entries
+        ], dtype=float)  # fmt: skip
+        lost = np.isnan(magnitudes)
+        offsets = np.array([one.offset for one in spec.quantities.values()])[None, :, None]
+        logs = -np.log(np.where(lost, np.nan, magnitudes + offsets))
+        worst = np.nanmin(np.where(lost, np.inf, logs), axis=0)
+        logs = np.where(lost, np.where(np.isfinite(worst), worst, 0.0), logs)
+        table = score_table(entries, logs, REFERENCE)
+        rows = []
+        for one in table.scores:
+            i = entries.index(one.entry)
+            means = [
+                f"{np.nanmean(magnitudes[i, k]):.3g}"
+                + (f", lost on {n}" if (n := int(lost[i, k].sum())) else "")
+                if not lost[i, k].all()
+                else "lost"
+                for k in range(len(spec.quantities))
+            ]
+            rows.append(
+                [str(one.place), titles[one.entry], f"{one.score:.0f}", interval_text(one.bounds), *means]
+            )
+        headings = ["place", "controller", "score", "95 % interval"]
+        headings += [f"{one.title}{f' [{u}]' if (u := result.units.get((name, key))) else ''}"
+                     for key, one in spec.quantities.items()]  # fmt: skip
+        notes = [f"{spec.source}. Means over {', '.join(cars)}; less is better. {told_apart(table)}"]
+        tables.append(Table(spec.title, headings, [*rows], notes, {0, 2, *range(4, len(headings))}))
+    return tables
+
+
+def is_compared(result: ThreatResult, setting: str) -> bool:
+    """Return whether a setting with all levels is compared with the main one, not a discipline."""
+    threats = result.threats
+    return bool(
+        setting != threats.main and result.complete[setting] and not _of_lane_changes(threats, setting)
+    )
+
+
+def lane_change_tables(result: ThreatResult) -> list[Table]:
+    """Return a table for each setting whose threats are all judged by a lane change."""
+    threats = result.threats
+    names = [name for name in threats.spec.settings if _of_lane_changes(threats, name)]
+    return [_lane_change_table(result, name) for name in names if result.complete[name]]
+
+
+def _of_lane_changes(threats: LoadedThreats, setting: str) -> bool:
+    return all(threats.spec.threats[name].test == LANE_CHANGE for name in threats.threats_in(setting))
+
+
+def _lane_change_table(result: ThreatResult, setting: str) -> Table:
+    titles, threats = titles_of(result), result.threats
+    name, cars = threats.threats_in(setting)[0], threats.cars_in(setting)
+    spec, table = threats.spec.threats[name], scored(result, setting)
+    rows = []
+    for one in table.scores:
+        found = [result.survived[SearchPlace(setting, name, car, one.entry)] for car in cars]
+        levels = [level_text(spec, each.position, each.end) for each in found]
+        rows.append(
+            [str(one.place), titles[one.entry], f"{one.score:.0f}", interval_text(one.bounds), *levels]
+        )
+    headings = ["place", "controller", "score", "95 % interval", *(f"{car} [{spec.unit}]" for car in cars)]
+    notes = [f"More is better. {told_apart(table)}"]
+    return Table(
+        threats.spec.settings[setting].title, headings, [*rows], notes, {0, 2, *range(4, len(headings))}
+    )
+
+
+def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command: str) -> str:
+    """Return the page as HTML.
+
+    Args:
+        result: levels and quantities.
+        table: scores of the main setting.
+        folder: its results folder, which also holds the page.
+        command: command line that repeats it.
+    """
+    threats = result.threats
+    order = table.order()
+    gains = compared_gains(result)
+    others = [name for name in threats.spec.settings if is_compared(result, name)]
+    matrix = folder.parent / RANKING.parent.name / PAGE
+    page: str = render(
+        "threats.html.j2",
+        title=threats.spec.title,
+        source=threats.spec.source,
+        notes=[*threats.spec.notes, *threats.ranking.edited],
+        matrix=Path(os.path.relpath(matrix, folder)).as_posix() if matrix.is_file() else "",
+        published=[titles_of(result)[entry] for entry in order if entry in result.published],
+        main=main_table(result, table),
+        setting=threats.spec.settings[threats.main].title,
+        levels=levels_table(result, order),
+        orders=orders_table(result, order),
+        settings=[setting_table(result, name) for name in others],
+        gains=gains_table(gains) if gains else None,
+        sentence=gains_sentence(gains) if gains else "",
+        disciplines=[*lane_change_tables(result), *discipline_tables(result)],
+        cars=car_tables(result, order),
+        described=threats_table(result),
+        command=command,
+        folder=str(folder),
+        style=style(),
+        assets=Markup(""),
+        **made_by(),
+    )
+    return page

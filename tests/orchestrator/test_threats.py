@@ -1,0 +1,265 @@
+"""Threat files: levels, searches, and scores that recover a known order."""
+
+from __future__ import annotations
+
+import csv
+import math
+
+import numpy as np
+import pytest
+
+from orchestrator.errors import ScenarioError
+from orchestrator.experiments.execution import side_by_side
+from orchestrator.experiments.threat_runs import RESOLUTION, Attempt, Survived, _search
+from orchestrator.experiments.threat_scores import (
+    gains_and_laws,
+    groups_of,
+    mean_positions,
+    mean_ranks,
+    orders_without,
+    score_table,
+)
+from orchestrator.experiments.threats import LoadedThreats, ThreatSpec, load_threats
+from orchestrator.scenario.find_and_load import SHIPPED
+from tests.checkout import ROOT
+from tests.commands import status_of
+
+UNITS = (
+    "driver_sine_with_dwell", "reference_steady_state", "controller_off", "controller_fuzzy_pid",
+    "allocator_single_wheel", "wheel_control_hydraulic", "plant_fourteen_dof", "tyre_magic_formula",
+)  # fmt: skip
+GROUND = SHIPPED / "proving_ground"
+
+
+def threat(easy: float, hard: float, **keys) -> ThreatSpec:
+    return ThreatSpec.model_validate({
+        "title": "t", "easy": easy, "hard": hard, "source": "here", "scenario": "s.yaml",
+        "set": {"driver.amplitude": "{level} deg"}, **keys,
+    })  # fmt: skip
+
+
+def search(spec: ThreatSpec, survives, variants: int = 1) -> Survived:
+    def passing(attempts: dict[str, Attempt]) -> dict[str, bool]:
+        return {key: survives(spec.level(one.position), one.variant) for key, one in attempts.items()}
+
+    return side_by_side({"x": _search(spec, variants)}, passing)["x"]
+
+
+@pytest.mark.parametrize("easy, hard, limit", [(45, 720, 331.0), (0.9, 0.05, 0.51), (1, 1000, 75.0)])
+def test_a_search_finds_the_level_to_two_per_cent(easy, hard, limit):
+    spec = threat(easy, hard)
+    found = search(spec, lambda level, _: level <= limit if hard > easy else level >= limit)
+    assert found.end == ""
+    assert 0.0 <= abs(math.log(limit / spec.level(found.position))) <= 1.001 * RESOLUTION
+
+
+def test_the_ends_of_a_range_count_and_are_said():
+    spec = threat(10, 1000)
+    assert search(spec, lambda level, _: False) == Survived(0.0, "easy")
+    assert search(spec, lambda level, _: True) == Survived(1.0, "hard")
+
+
+def test_a_level_is_survived_if_all_of_its_runs_are_and_no_more_are_made_than_needed():
+    spec, driven = threat(10, 1000), []
+
+    def survives(level: float, variant: int) -> bool:
+        driven.append((level, variant))
+        return level <= (300.0 if variant == 0 else 100.0)
+
+    found = search(spec, survives, variants=2)
+    assert spec.level(found.position) == pytest.approx(100.0, rel=RESOLUTION)
+    assert all(level <= 300.0 for level, variant in driven if variant == 1)
+
+
+def test_the_first_failure_from_the_easy_end_counts_where_a_higher_level_passes_again():
+    spec = threat(1, 100)
+    found = search(spec, lambda level, _: level < 10.0 or level > 50.0)
+    assert spec.level(found.position) == pytest.approx(10.0, rel=RESOLUTION)
+
+
+@pytest.mark.parametrize(
+    "keys, words",
+    [
+        ({"hard": 45}, "same level"),
+        ({"set": {"driver.amplitude": 3}}, "changes nothing"),
+        ({"mirrored": False}, "has one side"),
+    ],
+)
+def test_a_threat_that_makes_no_sense_is_refused(keys, words):
+    with pytest.raises(ValueError, match=words):
+        threat(**{"easy": 45, "hard": 720, **keys})
+
+
+@pytest.fixture(scope="module")
+def shipped() -> LoadedThreats:
+    return load_threats(GROUND / "threats.yaml")
+
+
+def test_the_threats_of_the_proving_ground_are_as_many_as_the_docs_say(shipped):
+    assert len(shipped.spec.threats) >= 10
+    assert len(shipped.spec.cars) >= 6
+    assert shipped.main == "main"
+    bounds = {one.bound for one in shipped.spec.settings.values()}
+    assert bounds == {15.0, 20.0, 30.0}
+    assert {one.limit for one in shipped.spec.settings.values()} == {10000.0, None}
+    assert len(shipped.seeds) == 40  # ten laws, four more seeds
+
+
+@pytest.mark.parametrize(
+    "old, new, code, place",
+    [
+        (
+            "cars: [saloon75, hard, motors",
+            "cars: [truck, saloon75, hard, motors",
+            "condition-unknown",
+            "truck",
+        ),
+        ("easy: 60\n", "eazy: 60\n", "key-unknown", "threats.amplitude"),
+        ("threats: [amplitude, friction", "threats: [amplitud, friction", "value-invalid", "amplitud"),
+    ],
+)
+def test_a_wrong_threat_file_is_refused_at_its_place(old, new, code, place, tmp_path):
+    text = (GROUND / "threats.yaml").read_text(encoding="utf-8")
+    assert old in text
+    text = text.replace(old, new, 1).replace("ranking: ranking.yaml", f"ranking: {GROUND}/ranking.yaml")
+    (tmp_path / "threats.yaml").write_text(text)
+    with pytest.raises(ScenarioError) as refused:
+        load_threats(tmp_path / "threats.yaml")
+    assert any(one.code == code and place in f"{one.location} {one}" for one in refused.value.diagnostics)
+
+
+def simulated(
+    chance: np.random.Generator, skills: np.ndarray, threats: int = 13, cars: int = 6
+) -> np.ndarray:
+    """Positions of entries whose skill counts in all threats, which scatter, as do cars."""
+    common = chance.normal(0.3, 0.1, (1, threats, 1)) + chance.normal(0.0, 0.1, (1, 1, cars))
+    own = chance.normal(0.0, 0.02, (len(skills), threats, 1)) + chance.normal(
+        0.0, 0.02, (len(skills), 1, cars)
+    )
+    return skills[:, None, None] + common + own + chance.normal(0.0, 0.02, (len(skills), threats, cars))
+
+
+def test_a_known_order_is_recovered_by_score_and_by_rank():
+    skills = np.array([0.0, 0.05, 0.1, 0.15, 0.2])
+    names = ["none", *"abcd"]
+    table = score_table(names, simulated(np.random.default_rng(1), skills), "none")
+    assert table.order() == ["d", "c", "b", "a", "none"]
+    assert [one.by_rank for one in table.scores] == [1, 2, 3, 4, 5]
+    assert [one.place for one in table.scores] == [1, 2, 3, 4, 5]
+    assert table.groups == 5
+    assert (table.told_apart, table.pairs) == (10, 10)
+    assert [one.score for one in table.scores] == pytest.approx([100, 75, 50, 25, 0], abs=8)
+
+
+def test_entries_of_equal_skill_share_a_place():
+    skills = np.array([0.0, 0.2, 0.2, 0.2])
+    table = score_table(["none", *"abc"], simulated(np.random.default_rng(1), skills), "none")
+    assert [one.place for one in table.scores] == [1, 1, 1, 4]
+    assert table.groups == 2
+
+
+def test_intervals_hold_the_true_score_at_least_nine_times_in_ten():
+    """Relative to no control and to an entry that is best by far, so that the true scores are known."""
+    skills, chance, held = np.array([0.0, 0.1, 0.3]), np.random.default_rng(3), []
+    for _ in range(60):
+        table = score_table(["none", "half", "best"], simulated(chance, skills), "none", draws=300)
+        bounds = next(one.bounds for one in table.scores if one.entry == "half")
+        held.append(bounds.low <= 100 / 3 <= bounds.high)
+    assert np.mean(held) >= 0.9
+
+
+def test_threats_that_a_car_does_not_drive_are_left_out_and_all_threats_count_alike():
+    positions = np.array([[[0.0, 0.0], [0.0, np.nan]], [[0.2, 0.4], [0.9, np.nan]]])
+    assert mean_positions(positions) == pytest.approx([0.0, 0.6])
+    assert mean_ranks(positions) == pytest.approx([2.0, 1.0])
+    orders = orders_without(["none", "a"], positions, "none")
+    assert set(orders) == {("threat", 0), ("threat", 1), ("car", 0), ("car", 1)}
+
+
+def test_groups_are_intervals_that_lie_apart():
+    assert groups_of([(0, 1), (0.5, 2), (1.5, 3), (4, 5)]) == 3
+    assert groups_of([]) == 0
+
+
+def test_spreads_of_gains_and_laws_are_recovered():
+    chance = np.random.default_rng(4)
+    laws, threats, cars = 40, 8, 6
+    law, own = chance.normal(0.0, 0.05, (laws, 1)), chance.normal(0.0, 0.02, (laws, 5))
+    noise = chance.normal(0.0, 0.01, (laws, 5, threats, cars))
+    tuned = (0.4 + law + own)[..., None, None] + noise
+    authors = (0.3 + law)[..., None] + chance.normal(0.0, 0.01, (laws, threats, cars))
+    found = gains_and_laws(tuned, authors)
+    assert found.seeds.value == pytest.approx(0.02, rel=0.15)
+    assert found.laws.value == pytest.approx(0.05, rel=0.3)
+    assert found.gains.value == pytest.approx(0.1 / math.sqrt(2), rel=0.15)
+    assert found.laws.bounds.low < 0.05 < found.laws.bounds.high
+
+
+SMALL = f"""
+title: small
+ranking: ranking.yaml
+cars: [s]
+threats:
+  friction:
+    {{title: friction, easy: 0.9, hard: 0.1, scenario: {GROUND}/sine_with_dwell.yaml, dry: false,
+     set: {{"inputs.tyre.friction_*": "{{level}}"}}, source: here}}
+settings:
+  main: {{title: main, limit: 10000}}
+"""
+RANKING = f"""
+title: small
+step_size: 0.005
+stop_time: 5.5
+cars:
+  s:
+    title: hard
+    vehicle: {ROOT}/scenarios/vehicles/hard.yaml
+    slow_steer: {GROUND}/slowly_increasing_steer.yaml
+conditions:
+  dry: {{title: dry, car: s, scenario: {GROUND}/sine_with_dwell.yaml}}
+entries:
+  none: {{title: no control, fmu: controller_off, source: the car alone}}
+  fuzzy_pid: {{title: fuzzy PID, fmu: controller_fuzzy_pid, source: paper C}}
+"""
+
+
+def rows(file):
+    return list(csv.DictReader(file.open(encoding="utf-8")))
+
+
+def test_two_entries_face_a_threat_twice_with_the_same_table(tmp_path, capsys):
+    (tmp_path / "ranking.yaml").write_text(RANKING)
+    (tmp_path / "threats.yaml").write_text(SMALL)
+    for out in ("first", "second"):
+        status = status_of("rank", tmp_path / "threats.yaml", "--out", tmp_path / out, "--jobs", 1)
+        assert status == 0, capsys.readouterr().err
+    first, second = ((tmp_path / out / "levels.csv").read_text() for out in ("first", "second"))
+    assert first == second
+    levels = {one["entry"]: one for one in rows(tmp_path / "first" / "levels.csv")}
+    assert levels["none"]["end"] == "easy"
+    assert levels["fuzzy_pid"]["end"] == ""
+    assert 0.1 < float(levels["fuzzy_pid"]["level"]) < 0.9
+    scores = rows(tmp_path / "first" / "scores.csv")
+    assert [(one["entry"], float(one["score"])) for one in scores] == [("fuzzy_pid", 100.0), ("none", 0.0)]
+    page = (tmp_path / "first" / "report.html").read_text(encoding="utf-8")
+    assert "fuzzy PID" in page
+    assert "fails at 0.90" in page
+
+
+def test_an_entry_joins_the_published_levels_with_its_own_runs(tmp_path, capsys):
+    (tmp_path / "ranking.yaml").write_text(RANKING)
+    (tmp_path / "threats.yaml").write_text(SMALL + "published: {levels: levels.csv}\n")
+    (tmp_path / "levels.csv").write_text(
+        "setting,threat,car,entry,level,unit,position,end\nmain,friction,s,none,0.9,,0.0,easy\n"
+    )
+    options = ("--only", "fuzzy_pid", "--out", tmp_path / "out", "--jobs", 1)
+    assert status_of("rank", tmp_path / "threats.yaml", *options) == 0, capsys.readouterr().err
+    scores = rows(tmp_path / "out" / "scores.csv")
+    assert [one["entry"] for one in scores] == ["fuzzy_pid", "none"]
+    assert "published before" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
+def test_conditions_are_refused_for_a_threat_file(tmp_path, capsys):
+    (tmp_path / "threats.yaml").write_text(SMALL)
+    assert status_of("rank", tmp_path / "threats.yaml", "--condition", "dry") != 0
+    assert "has threats, not conditions" in capsys.readouterr().err
