@@ -1,0 +1,68 @@
+"""The tables of threats in docs/ranking.md from published levels: `python -m docs.generate.threat_tables`."""
+
+from __future__ import annotations
+
+import textwrap
+from dataclasses import replace
+from pathlib import Path
+
+from orchestrator.experiments.tables import Table
+from orchestrator.experiments.threat_runs import ThreatResult, published_result
+from orchestrator.experiments.threats import load_threats
+from orchestrator.pages import threats_page
+
+ROOT = Path(__file__).resolve().parents[2]
+FILE = ROOT / "scenarios" / "proving_ground" / "threats.yaml"
+PAGE = ROOT / "docs" / "ranking.md"
+BEGIN, END = "<!-- written by docs.generate.threat_tables -->", "<!-- end of tables -->"
+
+
+def tables_text(result: ThreatResult) -> str:
+    """Return all tables as Markdown, under headings of their own."""
+    threats = result.threats
+    scores = threats_page.scored(result)
+    order = scores.order()
+    parts = [
+        _text(threats_page.main_table(result, scores)),
+        "Highest levels survived:",
+        _text(threats_page.levels_table(result, order)),
+        "### The threats",
+        _text(threats_page.threats_table(result)),
+        "### Orders without a threat or a car",
+        _text(threats_page.orders_table(result, order)),
+    ]
+    gains = threats_page.compared_gains(result)
+    if gains:
+        parts += [
+            "### Gains and laws",
+            threats_page.gains_sentence(gains),
+            _text(threats_page.gains_table(gains)),
+        ]
+    for name, spec in threats.spec.settings.items():
+        if threats_page.is_compared(result, name):
+            parts += [f"### Setting: {spec.title}", _text(threats_page.setting_table(result, name))]
+    for table in (*threats_page.lane_change_tables(result), *threats_page.discipline_tables(result)):
+        parts += [f"### {table.title}", _text(table)]
+    return "\n\n".join(parts)
+
+
+def _text(table: Table) -> str:
+    lines = [
+        f"| {' | '.join(heading or ' ' for heading in table.headings)} |",
+        f"|{'|'.join('---:' if table.is_number(k) else '---' for k in range(len(table.headings)))}|",
+        *(f"| {' | '.join(cell.replace(chr(10), '; ') for cell in row)} |" for row in table.text()),
+    ]
+    notes = ["\n".join(textwrap.wrap(note, 118, break_on_hyphens=False)) for note in table.notes]
+    return "\n\n".join(["\n".join(lines), *notes])
+
+
+def page_with_tables() -> str:
+    """Return docs/ranking.md with its tables written anew."""
+    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
+    after = rest.partition(END)[2]
+    result = replace(published_result(load_threats(FILE)), published=frozenset())  # all of them are
+    return f"{before}{BEGIN}\n\n{tables_text(result)}\n\n{END}{after}"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page_with_tables(), encoding="utf-8")
