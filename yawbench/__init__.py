@@ -58,6 +58,7 @@ if TYPE_CHECKING:
 
     from ._controller import Controller
     from ._experiment import Experiment, Runs, experiment
+    from ._linear import LinearModel, linearize
     from ._ranking import Ranking, rank
     from ._run import Run, open
     from ._scenario import Scenario, load
@@ -69,6 +70,7 @@ __all__ = [
     "Diagnostic",
     "Evaluation",
     "Experiment",
+    "LinearModel",
     "Location",
     "MetricValue",
     "ModelDescriptionError",
@@ -89,6 +91,7 @@ __all__ = [
     "YawbenchError",
     "YawbenchWarning",
     "experiment",
+    "linearize",
     "load",
     "open",
     "output",
@@ -107,6 +110,7 @@ _MODULES = {
     "orchestrator.plan": ("Override", "Plan"),
     "yawbench._controller": ("Controller",),
     "yawbench._experiment": ("Experiment", "Runs", "experiment"),
+    "yawbench._linear": ("LinearModel", "linearize"),
     "yawbench._ranking": ("Ranking", "rank"),
     "yawbench._run": ("Run", "open"),
     "yawbench._scenario": ("Scenario", "load"),

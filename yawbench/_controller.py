@@ -142,17 +142,17 @@ class PythonInstance:
 
     def __init__(self, unit: Instance, component: Component, log: Log) -> None:
         self.name = unit.name
-        self._component = component
+        self.component = component
         self._log = log
 
     @property
     def error(self) -> BaseException | None:
         """The exception raised by the program, if any."""
-        return getattr(self._component, "error", None)
+        return getattr(self.component, "error", None)
 
     def connect(self, buffers: Buffers) -> StepCalls:
         inputs, input_places, outputs, output_places, time, step = buffers
-        component, status = self._component, self._status
+        component, status = self.component, self._status
         into, of = ([place.reference for place in places] for places in (input_places, output_places))
 
         def set_inputs() -> Status:
@@ -172,25 +172,25 @@ class PythonInstance:
         return kind
 
     def put(self, places: Sequence[ValueRef], values: Sequence[Value]) -> Status:
-        set_values = getattr(self._component, f"set_{places[0].type.lower()}")
+        set_values = getattr(self.component, f"set_{places[0].type.lower()}")
         set_values([place.reference for place in places], list(values))
         return self._status()
 
     def fetch(self, places: Sequence[ValueRef]) -> tuple[Status, list[Value]]:
-        get_values = getattr(self._component, f"get_{places[0].type.lower()}")
+        get_values = getattr(self.component, f"get_{places[0].type.lower()}")
         values = get_values([place.reference for place in places])
         return self._status(), values
 
     def setup(self, experiment: ExperimentSetup) -> Status:
-        self._component.setup_experiment(experiment.start, experiment.stop, experiment.tolerance)
+        self.component.setup_experiment(experiment.start, experiment.stop, experiment.tolerance)
         return self._status()
 
     def enter(self) -> Status:
-        self._component.enter_initialization_mode()
+        self.component.enter_initialization_mode()
         return self._status()
 
     def exit(self) -> Status:
-        self._component.exit_initialization_mode()
+        self.component.exit_initialization_mode()
         return self._status()
 
     def note(self, status: Status) -> Status:
@@ -201,14 +201,14 @@ class PythonInstance:
 
     def _status(self, stepped: bool = True) -> Status:
         """Pass on the component's messages; return its status."""
-        queue = self._component.log_queue
+        queue = self.component.log_queue
         if queue:
             for message in queue:
                 self._log.add(
                     self.name, int(message.status), message.category, message.msg.replace("%%", "%")
                 )
             queue.clear()
-        return OK if stepped and not self._component._failed else ERROR
+        return OK if stepped and not self.component._failed else ERROR
 
 
 def _described(description: ElementTree.Element) -> bytes:

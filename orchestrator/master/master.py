@@ -72,12 +72,12 @@ class Master:
         self.passes = 0
         self.memory = memory = SignalPool(plan, slaves)
         slow = {s.instance.period for s in memory.stations} - {1}
-        self._clocks = {1: log.time} | {period: ctypes.c_double(0.0) for period in slow}
+        self.clocks = {1: log.time} | {period: ctypes.c_double(0.0) for period in slow}
         for s in memory.stations:
             period = s.instance.period
             size = ctypes.c_double(float(period * plan.step))
             into, of = [v.place for v in s.inputs], [v.place for v in s.outputs]
-            s.calls = s.slave.connect(Buffers(s.u, into, s.y, of, self._clocks[period], size))
+            s.calls = s.slave.connect(Buffers(s.u, into, s.y, of, self.clocks[period], size))
         self.programs = StepProgram(memory)
         self._operations: dict[int, list[Operation]] = {}  # of the current `advance`, by phase
         q = math.lcm(plan.step.denominator, plan.start.denominator)
@@ -106,7 +106,7 @@ class Master:
         if missing := missing_loop(self._grid, self.plan.n_steps):
             return f"Python: {missing}"
         memory = self.memory
-        parts = memory.pool, memory.time_at, self._clocks, self._grid, self._recorded, self._reached
+        parts = memory.pool, memory.time_at, self.clocks, self._grid, self._recorded, self._reached
         self._compiled = CompiledLoop(*parts, self.stop.flag)
         self._compiled.expect(self._expected)
         return "compiled"
@@ -152,7 +152,7 @@ class Master:
         s, p, q = self._grid
         stop, reached, cycle = self.stop.flag, self._reached, self.programs.cycle
         calls = {phase: [op.call for op in operations] for phase, operations in self._operations.items()}
-        clocks = list(self._clocks.items())
+        clocks = list(self.clocks.items())
         total, ones, finite = self.memory.now.dot, self._ones, math.isfinite
         getpid, process = os.getpid, self._copies.process
         take, recorded, time = self.memory.pool.take, self._recorded, self.memory.time
