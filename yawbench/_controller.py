@@ -19,6 +19,7 @@ from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Protocol
+from urllib.parse import quote
 from xml.etree import ElementTree
 
 import numpy as np
@@ -94,6 +95,7 @@ class PythonComponent:
         program: a function, an object with `output`, or a component class.
         unit: the instance whose FMU it replaces, for messages.
         role: of that instance (controller, driver, ...); it determines the outputs of a function.
+        label: what it is known by in place of its name, to tell objects of a class apart.
 
     Attributes:
         step_size: sampling time [s]; None if the program declares none.
@@ -102,7 +104,7 @@ class PythonComponent:
         ScenarioError: the program is none of these, or its declarations are invalid.
     """
 
-    def __init__(self, program: object, *, unit: str, role: str) -> None:
+    def __init__(self, program: object, *, unit: str, role: str, label: str = "") -> None:
         self.program = program
         try:
             self.component, self._translated = _component(program, role)
@@ -117,7 +119,7 @@ class PythonComponent:
                 f"{unit}: {_name(program)}: {arguments.error_text(error)}", code="controller-invalid"
             ) from error
         name = self.component.fmu_name
-        self.path = HOME / f"{name}.fmu"
+        self.path = HOME / f"{quote(label, safe=' ') or name}.fmu"
         digest = hashlib.sha256(self._xml + _source(program)).hexdigest()
         files = {"modelDescription.xml": self._xml}
         described = describe(files, zipped(files), self.path)

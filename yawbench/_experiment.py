@@ -9,7 +9,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from orchestrator.errors import Diagnostic, Location, ScenarioError
+import numpy as np
+
+from orchestrator.errors import Diagnostic, Location, ResultsError, ScenarioError
 from orchestrator.experiments.experiment import LoadedExperiment as Design
 from orchestrator.experiments.experiment import NamedRun
 from orchestrator.experiments.figures import draw_over_axes
@@ -37,6 +39,7 @@ from ._scenario import Scenario, warn
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
     from matplotlib.figure import Figure
 
 
@@ -46,7 +49,7 @@ FAR = 1e100
 
 def experiment(
     base: Scenario,
-    axes: Mapping[str, Iterable[object]],
+    axes: Mapping[str, Iterable[object] | Mapping[str, object]],
     *,
     metrics: str | Iterable[str] = (),
 ) -> Experiment:
@@ -58,8 +61,9 @@ def experiment(
 
     Args:
         base: the scenario.
-        axes: an instance -> FMUs by name or path, or plain Python, as in `Scenario.swap`; a target of
-            `Scenario.set` -> values, numbers in SI or all with the same unit ("80 km/h").
+        axes: an instance -> FMUs by name or path, or plain Python, as in `Scenario.swap`, or a mapping of
+            labels to these, which tells objects of a class apart; a target of `Scenario.set` -> values,
+            numbers in SI or all with the same unit ("80 km/h").
         metrics: columns of the table, such as "peak(sideslip)"; default: the standard metrics.
 
     Raises:
@@ -71,13 +75,20 @@ def experiment(
     changed = base._unswapped(axes)
     for name, levels in axes.items():
         with arguments.as_scenario_errors():
-            levels = arguments.items(levels, name, "a list of levels")
+            labelled = arguments.is_a(levels, Mapping)
+            if labelled and name not in base.loaded.units:
+                raise TypeError(f"{name}: must be a list of values; only instances have labelled levels")
+            pairs = (
+                list(arguments.mapping(levels, name, "a mapping of labels to levels").items())
+                if labelled
+                else [("", level) for level in arguments.items(levels, name, "a list of levels")]
+            )
         if name in base.loaded.units:
             variants = {}
-            for level in levels:
-                swapped = changed.swap(**{name: level})
+            for label, level in pairs:
+                swapped = changed._swapped({name: level}, label)
                 swap, *others = swapped.changes[len(changed.changes) :]
-                words = level if isinstance(level, str) else Path(str(swap.value)).stem
+                words = label or (level if isinstance(level, str) else Path(str(swap.value)).stem)
                 if words in variants:
                     raise ScenarioError(f"{name}: two levels have the name {words!r}", code="name-duplicate")
                 settings = {str(change.target): change.value for change in others}
@@ -85,7 +96,7 @@ def experiment(
                 changed = replace(changed, programs=swapped.programs)
             specs[name] = {"variants": variants}
         else:
-            specs[name] = {"vary": name, **_values(name, levels)}
+            specs[name] = {"vary": name, **_values(name, [level for _, level in pairs])}
     wanted = arguments.texts(metrics, "metrics")
     spec = {
         "scenario": base.path.name,
@@ -223,6 +234,35 @@ class Runs:
         """One row per run: axes, status, reason, metrics, key; `attrs["units"]` holds the units."""
         return to_pandas(columns_of(self.findings))
 
+    def to_xarray(self) -> xr.Dataset:
+        """Return all columns of all runs over the axes and time; `attrs["units"]` of each has its unit.
+
+        A failed run, and what a run has not recorded, is NaN.
+
+        Raises:
+            ResultsError: results were not kept, or the runs have different times.
+        """
+        import xarray as xr
+
+        runs = [run for run in self.runs or () if run is not None]
+        if not runs or any(not np.array_equal(run.time, runs[0].time) for run in runs):
+            why = "the runs have different times" if runs else "no results were kept"
+            raise ResultsError(f"{self.findings.spec.title}: {why}", code="signal-unknown")
+        axes = {name: list(dict.fromkeys(self.table[name])) for name in self.findings.spec.axes}
+        units = self.table.attrs["units"]
+        coordinates = {name: (name, levels, _unit(units.get(name))) for name, levels in axes.items()}
+        shape = [*map(len, axes.values()), runs[0].time.size]
+        columns = {name: run.unit_of(name) for run in runs for name in run}
+        variables = {}
+        for name, unit in columns.items():
+            values = np.full(shape, np.nan)
+            for run, row in zip(self.runs or (), self.table[list(axes)].itertuples(index=False), strict=True):
+                if run is not None and name in run:
+                    values[tuple(axes[axis].index(x) for axis, x in zip(axes, row, strict=True))] = run[name]
+            variables[name] = ((*axes, "time"), values, _unit(unit))
+        time = ("time", runs[0].time, _unit("s"))
+        return xr.Dataset(variables, {**coordinates, "time": time}, {"title": self.findings.spec.title})
+
     def plot(
         self,
         metric: str,
@@ -328,6 +368,10 @@ class Runs:
 
     def _repr_html_(self) -> str:
         return str(self.table.drop(columns="key").to_html(index=False, na_rep=""))
+
+
+def _unit(unit: str | None) -> dict[str, str]:
+    return {"units": unit} if unit else {}
 
 
 def _axes_of(only: Any) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from . import arguments
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
     from matplotlib.figure import Figure
 
 
@@ -117,6 +118,21 @@ class Run:
         frame = pd.DataFrame(self.results.columns, index=pd.Index(self.time, name="time"))
         frame.attrs = {"title": self.title, "units": dict(self.results.units)}
         return frame
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return all columns over time; each variable has its unit in `attrs["units"]`.
+
+        >>> run.to_xarray()["plant.sideslip"].attrs["units"]
+        'rad'
+        """
+        import xarray as xr
+
+        units = self.results.units
+        variables = {
+            name: ("time", values, {"units": units[name]} if units[name] else {})
+            for name, values in self.results.columns.items()
+        }
+        return xr.Dataset(variables, {"time": ("time", self.time, {"units": "s"})}, {"title": self.title})
 
     def metric(self, name: str, window: tuple[float, float] | None = None) -> float:
         """Return a metric in SI units; ratios are plain numbers.

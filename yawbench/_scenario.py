@@ -102,6 +102,10 @@ class Scenario:
         Raises:
             ScenarioError: the instance is unknown, or its replacement invalid.
         """
+        return self._swapped(units)
+
+    def _swapped(self, units: Mapping[str, ControllerLike], label: str = "") -> Scenario:
+        """Return the scenario with instances replaced; plain Python is known by the label, if any."""
         existing = self.loaded.units
         changes, programs = [*self._unswapped(units).changes], dict(self.programs)
         for unit, wanted in units.items():
@@ -112,7 +116,7 @@ class Scenario:
                 changes.append(Override(Target.of_instance(unit), fmu_of(wanted, unit), "swap"))
                 continue
             role = role_of(unit, Path(self.loaded.replaced.get(unit, existing[unit].fmu)).stem)
-            program = PythonComponent(wanted, unit=unit, role=role)
+            program = PythonComponent(wanted, unit=unit, role=role, label=label)
             programs[program.path] = program
             changes.append(Override(Target.of_instance(unit), str(program.path), "swap"))
             if program.step_size is not None:

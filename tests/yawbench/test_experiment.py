@@ -131,3 +131,49 @@ def test_a_script_runs_an_experiment_without_a_guard_and_only_once(tmp_path):
     done = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == ("begun\n[20.0, 25.0]\n", "")
     assert list(tmp_path.iterdir()) == [script]
+
+
+class Gain:
+    """A controller with a parameter of its constructor."""
+
+    inputs, outputs = ("yaw_rate_ref", "yaw_rate"), ("yaw_moment",)
+
+    def __init__(self, gain):
+        self.gain = gain
+
+    def output(self, t, u):
+        return self.gain * (u.yaw_rate_ref - u.yaw_rate)
+
+
+@pytest.fixture(scope="module")
+def labelled(base):
+    axes = {"controller": {"low": Gain(1e4), "high": Gain(2e4), "1/2": "controller_off"}}
+    return yb.experiment(base, {**axes, "driver.amplitude": [0.02, 0.03]}).run(workers=1)
+
+
+def test_labels_tell_objects_of_a_class_apart(base, labelled):
+    assert labelled.table["controller"].tolist() == [*["low"] * 2, *["high"] * 2, *["1/2"] * 2]
+    alone = base.swap(controller=Gain(2e4)).set({"driver.amplitude": 0.02}).run()
+    assert np.array_equal(labelled.runs[2]["plant.yaw_rate"], alone["plant.yaw_rate"])
+    error = labelled.runs[0]["yaw_rate_ref"] - labelled.runs[0]["plant.yaw_rate"]
+    assert np.abs(labelled.runs[0]["controller.yaw_moment"]).max() == pytest.approx(
+        1e4 * np.abs(error).max(), rel=0.05
+    )
+
+
+def test_xarray_has_the_runs_over_axes_and_time(labelled):
+    pytest.importorskip("xarray")
+    data = labelled.to_xarray()
+    assert data["plant.yaw_rate"].dims == ("controller", "driver.amplitude", "time")
+    assert data["plant.yaw_rate"].attrs["units"] == "rad/s"
+    picked = data["plant.yaw_rate"].sel({"controller": "high", "driver.amplitude": 0.03})
+    assert np.array_equal(picked, labelled.runs[3]["plant.yaw_rate"])
+    single = labelled.runs[3].to_xarray()
+    assert np.array_equal(single["plant.yaw_rate"], picked)
+    assert single["time"].attrs["units"] == "s"
+
+
+def test_only_instances_have_labels(base):
+    with pytest.raises(yb.ScenarioError) as caught:
+        yb.experiment(base, {"driver.amplitude": {"small": 0.02}})
+    assert caught.value.code == "argument-invalid"

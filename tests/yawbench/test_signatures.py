@@ -91,6 +91,7 @@ def test_public_signatures_name_only_what_is_exported():
         "Callable",
         "Fraction",
         "DataFrame",
+        "Dataset",
         "Figure",
         "Iterable",
         "Literal",
