@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from ._experiment import Experiment, Runs, experiment
     from ._linear import LinearModel, linearize
     from ._ranking import Ranking, rank
-    from ._run import Run, open
+    from ._run import Run, measured, open
     from ._scenario import Scenario, load
     from ._view import View, view
 
@@ -93,6 +93,7 @@ __all__ = [
     "experiment",
     "linearize",
     "load",
+    "measured",
     "open",
     "output",
     "parameter",
@@ -112,7 +113,7 @@ _MODULES = {
     "yawbench._experiment": ("Experiment", "Runs", "experiment"),
     "yawbench._linear": ("LinearModel", "linearize"),
     "yawbench._ranking": ("Ranking", "rank"),
-    "yawbench._run": ("Run", "open"),
+    "yawbench._run": ("Run", "measured", "open"),
     "yawbench._scenario": ("Scenario", "load"),
     "yawbench._view": ("View", "view"),
 }

@@ -18,6 +18,7 @@ from orchestrator.evaluation.trace import trace_of
 from orchestrator.messages import hint, short
 from orchestrator.metrics.run_metrics import STANDARD, MetricValue, evaluate, evaluate_all, metric, why_none
 from orchestrator.plan import Override
+from orchestrator.results.measured import measured_results
 from orchestrator.results.read_and_salvage import Results, load_results
 
 from . import arguments
@@ -38,6 +39,24 @@ def open(folder: str | Path) -> Run:
         ResultsError: they are missing or unreadable.
     """
     return Run(load_results(arguments.path(folder, "folder")))
+
+
+def measured(file: str | Path, segment: int | None = None) -> Run:
+    """Return a recording of a car as a run: `metric`, `plot`, `evaluate`, `view` take it like one.
+
+        >>> laps = yb.measured("measured.yaml", segment=2)
+
+    Args:
+        file: the measurement file.
+        segment: its number, counted from 1, if the file has several.
+
+    Raises:
+        ScenarioError: the file, or a recording that it names, cannot be used.
+        ResultsError: there is no such segment.
+    """
+    path = arguments.path(file, "file")
+    number = None if segment is None else arguments.count(segment, "segment", least=1, most=10**6)
+    return Run(measured_results(path if number is None else Path(f"{path}#{number}")))
 
 
 class Run:

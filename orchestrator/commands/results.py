@@ -19,7 +19,9 @@ from .options import CHANGES, MAKING, RunOptions, takes
 
 RunSources = Annotated[
     list[Path],
-    typer.Argument(help="Results folders or scenarios; several are overlaid.", metavar="RESULTS..."),
+    typer.Argument(
+        help="Results folders, scenarios or measurement files; several are overlaid.", metavar="RESULTS..."
+    ),
 ]
 Labels = Annotated[
     list[str] | None,
@@ -40,12 +42,15 @@ def recorded(sources: Sequence[Path], options: RunOptions) -> list[Path]:
     from ..fmu.opener import stale_fmus
     from ..planner import Planner
     from ..results.folder_and_lock import default_folder
+    from ..results.measured import is_measurement, segments_of
     from ..results.plan_record_and_freshness import staleness
     from ..scenario import find_and_load
+    from ..scenario.find_and_load import MEASUREMENT
     from .progress import reported, say, stoppable
 
     sources = [path if os.path.exists(path) else find_and_load.named(path) or path for path in sources]
-    scenarios = [path for path in sources if path.suffix in find_and_load.ENDINGS and not os.path.isdir(path)]
+    files = [path for path in sources if path.suffix in find_and_load.ENDINGS and not os.path.isdir(path)]
+    scenarios = [path for path in files if find_and_load.kind_of(path) != MEASUREMENT]
     if options.changes and not scenarios:
         raise ScenarioError(
             "--swap, --set and --fault apply to scenarios, not to results folders",
@@ -64,7 +69,13 @@ def recorded(sources: Sequence[Path], options: RunOptions) -> list[Path]:
     for outcome in outcomes:
         if not outcome.ok:
             raise typer.Exit(outcome.exit_status)
-    return [jobs[source].out if source in jobs else source for source in sources]
+    folders: list[Path] = []
+    for source in sources:
+        if source in jobs:
+            folders.append(jobs[source].out)
+        else:
+            folders += segments_of(source) if is_measurement(source) else [source]
+    return folders
 
 
 def distinct(folders: Sequence[Path]) -> list[str]:
@@ -95,6 +106,12 @@ def labels_of(folders: Sequence[Path], given: Sequence[str] | None) -> list[str]
 
 def folder_of_all(folders: Sequence[Path]) -> Path:
     """Return the folder for figures of all runs: that of a single run, else their common parent."""
+    from ..results.folder_and_lock import below_results
+    from ..results.measured import is_measurement
+
+    if not (own := [folder for folder in folders if not is_measurement(folder)]):
+        return below_results("measured", folders[0].stem)
+    folders = own
     if len(folders) == 1:
         return folders[0]
     return Path(os.path.commonpath([folder.absolute().parent for folder in folders]))
@@ -181,7 +198,7 @@ def plot(
     from ..figures.panels import check_panels, shown_by
     from ..figures.plots import OVERVIEW, draw
     from ..figures.style import KINDS, LabelledRun, save
-    from ..results.read_and_salvage import load_results
+    from ..results.measured import load_run
     from .progress import say
 
     settings = _settings(style, size)
@@ -192,8 +209,7 @@ def plot(
         write_view(folders, labels, panel or (), options.out and options.out / "view.html")
         return
     runs = [
-        LabelledRun(name, load_results(folder, thin=True))
-        for name, folder in zip(labels, folders, strict=True)
+        LabelledRun(name, load_run(folder, thin=True)) for name, folder in zip(labels, folders, strict=True)
     ]
     check_panels(runs, panel or ())
     figures: dict[str, Sequence[str]] = {"overview": panel or OVERVIEW}
@@ -244,10 +260,10 @@ def write_view(
     from ..files import write_whole
     from ..messages import changed_each
     from ..pages.viewer import SETTINGS, Settings, View, page
-    from ..results.read_and_salvage import load_results
+    from ..results.measured import load_run
     from .progress import say
 
-    runs = [LabelledRun(name, load_results(folder)) for name, folder in zip(labels, folders, strict=True)]
+    runs = [LabelledRun(name, load_run(folder)) for name, folder in zip(labels, folders, strict=True)]
     titles = [run.results.record.title or run.label for run in runs]
     changed = changed_each([(run.label, run.results.record.overrides) for run in runs])
     settings = Settings((View(panels=panels),)) if panels else SETTINGS

@@ -288,10 +288,10 @@ def diff(one: One, other: Other) -> None:
     largest value), and the largest difference.
     """
     from ..pages.comparison import differences, differences_table, divergence, partings_table
-    from ..results.read_and_salvage import load_results
+    from ..results.measured import load_run
     from .results import distinct
 
-    first, second = load_results(one), load_results(other)
+    first, second = load_run(one), load_run(other)
     found, parted = differences(first.record, second.record), divergence(first, second)
     if found:
         print_tables([differences_table(found, *distinct([one, other]))])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +17,7 @@ from .options import CHANGES, MAKING, RunOptions, takes
 from .progress import executor_of, hold, say, stoppable
 
 if TYPE_CHECKING:
-    from ..evaluation.trace import MappingSpec, Trace
+    from ..evaluation.trace import Trace
     from ..experiments.execution import Executor
     from ..experiments.experiment import NamedRun
     from ..experiments.jobs import Job
@@ -168,13 +169,12 @@ TestToEvaluate = Annotated[TestName, typer.Argument(help="The test.", metavar="T
 EvaluatedSources = Annotated[
     list[Path],
     typer.Argument(
-        help="Results folders, searched with their subfolders; with --signals, files of measured data.",
+        help="Results folders, searched with their subfolders, or measurement files.",
         metavar="RESULTS...",
     ),
 ]
 SignalsOption = Annotated[
-    Path | None,
-    typer.Option("--signals", metavar="FILE", help="Mapping of the columns of measured files to signals."),
+    Path | None, typer.Option("--signals", metavar="FILE", help="Replaced by measurement files.", hidden=True)
 ]
 SlowSteer = Annotated[
     list[Path] | None,
@@ -214,17 +214,19 @@ def evaluate(
     with dwell, give A with --slow-steer or --angle; several runs are judged as a series. Exit status 1
     if nothing could be judged.
     """
-    from ..evaluation.trace import load_mapping, load_trace
+    from ..evaluation.trace import trace_of
     from ..results.folder_and_lock import below_results
+    from ..results.measured import load_run
     from .progress import say
     from .results import distinct, folder_of_all
 
     chosen = TESTS[test]
-    mapping = load_mapping(signals) if signals else None
-    places = [place for source in sources for place in _runs(source, mapping)]
+    if signals is not None:
+        _refuse_mapping(signals, sources, test)
+    places = [place for source in sources for place in _runs(source)]
     labels = distinct(places) if len(places) > 1 else [str(places[0])]
-    known = _angle(angle, slow_steer, mapping, chosen)
-    traces = [load_trace(place, mapping, label) for place, label in zip(places, labels, strict=True)]
+    known = _angle(angle, slow_steer, chosen)
+    traces = [trace_of(load_run(place), label) for place, label in zip(places, labels, strict=True)]
     judged = [chosen.evaluate(trace, known) for trace in traces]
     series = chosen.judge_together(judged, known)
     recorded_here = all(place.is_dir() for place in places)
@@ -299,17 +301,28 @@ class EvaluatedRuns:
         return count
 
 
-def _runs(source: Path, mapping: MappingSpec | None) -> list[Path]:
-    """Return the folders of the runs in and below a folder, or the file itself."""
+def _refuse_mapping(mapping: Path, sources: Sequence[Path], test: str) -> None:
+    """Raise ScenarioError with what replaces the option `--signals`."""
+    from ..errors import ScenarioError
+
+    files = ", ".join(os.path.relpath(source, mapping.parent) for source in sources)
+    raise ScenarioError(
+        f"--signals is replaced by measurement files: add 'files: [{files}]' to {mapping}, put mass and "
+        f"friction below 'vehicle:', and write 'yawbench evaluate {test} {mapping}'",
+        code="option-invalid",
+    )
+
+
+def _runs(source: Path) -> list[Path]:
+    """Return the folders of the runs in and below a folder, or the segments of a measurement file."""
     from ..errors import ResultsError
     from ..results.folder_and_lock import COMPLETED
+    from ..results.measured import segments_of
     from ..results.read_and_salvage import UNREADABLE, found_runs
     from .progress import say
 
     if not source.is_dir():
-        if not source.exists():
-            raise ResultsError(f"{source}: no such file or folder", code="results-missing")
-        return [source]
+        return segments_of(source)
     runs = found_runs(source)
     found = [run.folder for run in runs if run.status == COMPLETED]
     unreadable = [run.problem for run in runs if run.status == UNREADABLE]
@@ -342,14 +355,13 @@ def angle_of(given: str | None) -> float | None:
     return angle
 
 
-def _angle(
-    given: str | None, slow_steer: list[Path] | None, mapping: MappingSpec | None, test: StandardTest
-) -> float | None:
+def _angle(given: str | None, slow_steer: list[Path] | None, test: StandardTest) -> float | None:
     """Return A [rad], None if it is neither given nor needed."""
     from ..errors import ResultsError, ScenarioError
     from ..evaluation.steering_tests import characteristic_angle, evaluate_slow_steer
-    from ..evaluation.trace import load_trace
+    from ..evaluation.trace import trace_of
     from ..messages import counted
+    from ..results.measured import load_run
     from .progress import say
 
     if given and slow_steer:
@@ -358,9 +370,9 @@ def _angle(
         raise ScenarioError(f"{test.name} takes no A: omit --angle and --slow-steer", code="option-invalid")
     if not slow_steer:
         return angle_of(given)
-    places = [place for source in slow_steer for place in _runs(source, mapping)]
+    places = [place for source in slow_steer for place in _runs(source)]
     try:
-        angle = characteristic_angle([evaluate_slow_steer(load_trace(p, mapping)) for p in places])
+        angle = characteristic_angle([evaluate_slow_steer(trace_of(load_run(p))) for p in places])
     except NotJudged as why:
         raise ResultsError(str(why), code="test-not-applicable") from None
     runs = counted(len(places), "run")

@@ -1,16 +1,7 @@
 """Signals for standard tests: `Trace` of a run or a measurement, and its sampling, filtering and sign checks.
 
 A `Trace` has signals by their names in the vocabulary, in SI, over one time axis. In results the signals are
-found by name. For a measurement, a mapping file assigns columns to signals:
-
-    time: {column: Zeit, unit: ms}            # the unit, if the file does not state it
-    signals:
-      steering_wheel_angle: {column: LRW, unit: deg, sign: -1}     # -1: positive to the right there
-      yaw_rate: Gierrate                      # the header states the unit: "Gierrate [deg/s]"
-    mass: 1650 kg
-
-No unit is assumed: a column has one in the mapping, in its header, in a row of units below the header or in
-the file's own description, unless its signal is a plain number.
+found by name; a measurement file (`measured.measurement`) assigns the columns of recordings to them.
 
 Signals are prepared as regulations require: even sampling, zero-phase low pass. The low pass is a Butterworth
 filter of sixth order, forward and backward, which has twelve poles and no phase (at the cut-off frequency the
@@ -24,59 +15,32 @@ opposes the hand wheel is an error in the data, not a property of the car, and s
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field
 
 from vocabulary.signals import SIGNALS
 
-from ..errors import ResultsError, ScenarioError
-from ..files import reads
-from ..messages import hint, listed, with_changes
+from ..errors import ResultsError
+from ..measured.segment import LowPass, even_grid, resample
+from ..messages import with_changes
 from ..metrics.measures import si_of
 from ..metrics.run_metrics import columns_of
-from ..results.read_and_salvage import Results, load_results
+from ..results.read_and_salvage import Results
 from ..results.run_record import FmuRecord
-from ..scenario import yaml_lines
-from ..scenario.quantities import convert, meant_unit, measure_of, parse_unit, spellings
-from ..scenario.validation import StrictModel, validate
-from ..wiring.series import SECOND, SeriesFile, numbers_in, reading_series
 from .standard_tests import NotJudged
 
-ORDER = 6
 CUT_OFF = {"steering_wheel_angle": 10.0, "yaw_rate": 6.0, "acceleration_y": 6.0}
 """Cut-off frequencies of the low pass [Hz]: GTR 8."""
 SHORTEST = 1.0
 """Least length of a record that can be filtered [s]."""
 SLOWEST = 50.0
 """Least sampling rate [Hz]. Chosen: 2.5 times what a low pass of 10 Hz needs."""
-UNEVEN = 1e-6
-"""Relative difference of time steps up to which sampling counts as even; chosen: rounding in files."""
-
-
-def even_grid(time: np.ndarray) -> np.ndarray:
-    """Return evenly spaced times, at the median step [s] if the given ones are uneven; shape (rows,)."""
-    steps = np.diff(time)
-    step = float(np.median(steps))
-    if np.all(np.abs(steps - step) <= UNEVEN * max(step, 1e-12) + 1e-9):
-        return time
-    return np.asarray(time[0] + step * np.arange(int((time[-1] - time[0]) / step + 1e-9) + 1))
-
-
-def resample(grid: np.ndarray, time: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return x interpolated to a grid by a monotone cubic; x itself if the grid is its own time."""
-    if grid is time:
-        return x
-    from scipy.interpolate import PchipInterpolator
-
-    return np.asarray(PchipInterpolator(time, x)(grid))
 
 
 def prepared(trace: Trace, names: Iterable[str]) -> dict[str, np.ndarray]:
@@ -92,23 +56,8 @@ def prepared(trace: Trace, names: Iterable[str]) -> dict[str, np.ndarray]:
     if trace.rate < SLOWEST:
         raise NotJudged(f"sampled at {trace.rate:.3g} Hz; at least {SLOWEST:g} Hz are needed")
     even = trace.even
-    filtered = {name: low_pass(even[name], CUT_OFF[name], even.rate) for name, _ in wanted}
+    filtered = {name: LowPass(CUT_OFF[name])(even[name], even.rate) for name, _ in wanted}
     return {"time": even.time, **filtered}
-
-
-def low_pass(x: np.ndarray, cut_off: float, rate: float) -> np.ndarray:
-    """Return x filtered by the zero-phase Butterworth low pass.
-
-    Args:
-        x: shape (rows,), evenly sampled.
-        cut_off: frequency [Hz].
-        rate: sampling rate [Hz].
-    """
-    from scipy.signal import butter, sosfiltfilt
-
-    sections = butter(ORDER, cut_off, fs=rate, output="sos")
-    edge = min(len(x) - 1, int(rate))
-    return np.asarray(sosfiltfilt(sections, x, padlen=edge))
 
 
 def running_mean(x: np.ndarray, width: float, rate: float) -> np.ndarray:
@@ -138,10 +87,6 @@ def first_crossing(time: np.ndarray, x: np.ndarray, level: float, after: float) 
 def at(time: np.ndarray, x: np.ndarray, instant: float) -> float:
     """Return x at an instant [s], interpolated linearly."""
     return float(np.interp(instant, time, x))
-
-
-SPIKES = 0.01
-"""Fraction of samples that may exceed what cars reach; chosen: accelerometers have spikes."""
 
 
 @dataclass(frozen=True)
@@ -236,7 +181,7 @@ def trace_of(results: Results, label: str = "") -> Trace:
         float(mass) if isinstance(mass, (int, float)) else None,
         _friction(results, fmus, parameters),
         facts,
-        results.folder,
+        results.folder if results.record.results else None,
         with_changes(results.record.title or "", results.record.overrides),
     )
 
@@ -246,145 +191,10 @@ def _friction(results: Results, fmus: Mapping[str, FmuRecord], parameters: Mappi
     if columns := columns_of(results, "friction_*"):
         return float(min(results.columns[column].min() for column in columns))
     found = [parameters.get(unit, {}).get("base_friction") for unit in results.units_of_role("road")]
+    found += [values.get("friction") for values in parameters.values()]
     for fmu in fmus.values():
         found += [value for name, value in fmu.constants.items() if name.startswith("friction_")]
     return min((float(value) for value in found if isinstance(value, (int, float))), default=None)
-
-
-def _unit(text: str) -> str:
-    parse_unit(text)
-    return text
-
-
-def _signal(name: str) -> str:
-    known = [one for one in SIGNALS if "*" not in one]
-    if name not in known:
-        raise ValueError(f"unknown signal {name!r}{hint(name, known, lead='known')}")
-    return name
-
-
-def _kilograms(value: object) -> object:
-    if not isinstance(value, str):
-        raise ValueError(f"must be text with a unit, such as 1500 kg (got {value!r})")
-    return float(convert(value, "kg"))
-
-
-def _column(value: object) -> object:
-    return {"column": value} if isinstance(value, str) else value
-
-
-UnitText = Annotated[str, AfterValidator(_unit)]
-SignalText = Annotated[str, AfterValidator(_signal)]
-Kilograms = Annotated[float, BeforeValidator(_kilograms)]
-
-
-class ColumnSpec(StrictModel):
-    """The column of a measurement file that holds a signal."""
-
-    column: str = Field(min_length=1)  # header without the unit
-    unit: UnitText | None = None  # unit of its numbers; default: as the header says
-    sign: Literal[1, -1] = 1  # -1: positive where ISO 8855 is negative
-
-
-AnyColumn = Annotated[ColumnSpec, BeforeValidator(_column)]
-
-
-class MappingSpec(StrictModel):
-    """The mapping from the columns of a measurement to signals."""
-
-    time: AnyColumn = ColumnSpec(column="time")
-    signals: dict[SignalText, AnyColumn] = Field(min_length=1)
-    mass: Kilograms | None = None  # of the car, with its unit
-    friction: float | None = Field(None, gt=0)  # of the road
-
-
-@reads("mapping of signals", ScenarioError)
-def load_mapping(path: Path | str) -> MappingSpec:
-    """Read a mapping file.
-
-    Raises:
-        ScenarioError: it is invalid; lists all errors.
-    """
-    document = yaml_lines.read(Path(path), what="mapping of signals")
-    spec = validate(MappingSpec, document)
-    if spec is None:
-        raise ScenarioError(document.sorted_errors())
-    return spec
-
-
-def load_trace(path: Path, mapping: MappingSpec | None, label: str = "") -> Trace:
-    """Read the trace of a results folder, or of a measurement file: CSV, Parquet or ASAM MDF 4.
-
-    Raises:
-        ResultsError: it cannot be read, lacks a column, a unit does not fit, or there is no mapping.
-    """
-    if os.path.isdir(path):
-        return trace_of(load_results(path), label)
-    if mapping is None:
-        raise ResultsError(f"{path}: is not a results folder; for files of measured data give --signals")
-    try:
-        with reading_series(path):
-            return _measured(SeriesFile(path), mapping, label or path.name, path.stem)
-    except ValueError as error:
-        raise ResultsError(str(error)) from None
-
-
-def _measured(file: SeriesFile, mapping: MappingSpec, label: str, title: str) -> Trace:
-    signals: dict[str, np.ndarray] = {}
-    clock = np.zeros(0)
-    for name, spec in mapping.signals.items():
-        column = file.column(spec.column, mapping.time.column)
-        of_times = _unit_of("time", mapping.time, column.time_unit, "s")
-        times = numbers_in(column.times, of_times, SECOND, "s", "time")
-        if not signals:
-            clock = times
-            if len(clock) < 2 or not np.all(np.diff(clock) > 0):
-                raise ValueError("times must increase from row to row")
-        wanted = SIGNALS[name].unit
-        unit = _unit_of(name, spec, column.unit, wanted)
-        values = numbers_in(column.values, unit, measure_of(wanted), wanted, f"column {spec.column!r}")
-        _refuse_implausible(name, spec.column, column.values, values, unit)
-        if not np.array_equal(times, clock):
-            values = np.interp(clock, times, values)  # channels of an MDF file may have different time axes
-        signals[name] = spec.sign * values
-    return Trace(label, clock, signals, mapping.mass, mapping.friction, title=title)
-
-
-def _unit_of(name: str, spec: ColumnSpec, of_file: str | None, wanted: str) -> str:
-    """Return the unit of a signal's column or of the time column.
-
-    Raises:
-        ValueError: neither the mapping nor the file states it; only plain numbers may have none.
-    """
-    unit = spec.unit or of_file or (wanted if wanted == "1" else None)
-    if unit is None:
-        raise ValueError(
-            f"column {spec.column!r} has no unit, such as {listed(spellings(wanted), last='or')}: give it in "
-            f"the mapping, '{name}: {{column: {spec.column}, unit: {wanted}}}', or in the file's header, "
-            f"'{spec.column} [{wanted}]'"
-        )
-    return unit
-
-
-def _refuse_implausible(name: str, column: str, given: np.ndarray, values: np.ndarray, unit: str) -> None:
-    """Raise ValueError if a signal has values that no car reaches; suggest the unit that was probably meant.
-
-    Args:
-        name: name of the signal.
-        column: heading of its column.
-        given: the numbers of the column, in `unit`.
-        values: the same in SI.
-        unit: unit of the column.
-    """
-    largest, wanted = SIGNALS[name].largest, SIGNALS[name].unit
-    if largest is None or np.mean(np.abs(values) > largest) <= SPIKES:
-        return
-    number = float(np.quantile(np.abs(given.astype(float)), 1.0 - SPIKES))
-    likely = meant_unit(number, unit, wanted, lambda value: abs(value) <= largest)
-    raise ValueError(
-        f"column {column!r}: no car reaches {name} of {number:.4g}{f' {unit}' if unit != '1' else ''}, "
-        f"at most {largest:.4g} {wanted} is allowed{f'; did you mean {likely!r}?' if likely else ''}"
-    )
 
 
 def likeness(hand: np.ndarray, answer: np.ndarray) -> float:
@@ -409,5 +219,5 @@ def opposed(name: str) -> NotJudged:
     """Return the exception for a run whose response opposes the steering."""
     return NotJudged(
         f"the {name} opposes the steering: both are positive to the left, so one of them has the wrong sign "
-        "('sign: -1' in the mapping of measured columns turns it)"
+        "('sign: -1' in a measurement file turns it)"
     )

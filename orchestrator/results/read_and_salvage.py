@@ -38,7 +38,13 @@ from .folder_and_lock import (
     unfinished,
 )
 from .formats_and_csv import FILES, RESULTS_FILE, CsvFile, source_of
-from .run_record import ConnectionRecord, RunRecord, check_record, load_record, warn_if_unchecked
+from .run_record import (
+    ConnectionRecord,
+    RunRecord,
+    check_record,
+    load_record,
+    warn_if_unchecked,
+)
 
 UNREADABLE = "unreadable"
 """Status of a run whose record cannot be read or has been changed."""

@@ -230,6 +230,7 @@ COMMANDS = {
 """Kind of file -> the command that takes it."""
 HOMES = {"a vehicle file": "vehicles"}
 """Kind of file -> its folder, which names may omit: `van` for `vehicles/van`."""
+MEASUREMENT = "a measurement file"
 _KEY = re.compile(rf"^[\"']?({'|'.join(KINDS)})[\"']?[ \t]*:", re.MULTILINE)
 
 

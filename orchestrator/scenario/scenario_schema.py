@@ -278,7 +278,7 @@ class UnitSpec(StrictModel):
 
 
 class SeriesSpec(StrictModel):
-    """A time series from a file (CSV, Parquet or ASAM MDF 4) for an input.
+    """A time series for an input: a signal of a measurement file, or a column of CSV, Parquet or ASAM MDF 4.
 
     Headers may name units (`delta [deg]`), and values are converted to the unit of the input. With the
     algorithm `extrapolated`, an integrated input uses the value in the middle of the step, so that linear
@@ -296,6 +296,10 @@ class SeriesSpec(StrictModel):
     )
     extrapolate: Literal["refuse", "hold"] = Field(
         "refuse", description="What to do in a run beyond the file's times"
+    )
+    segment: int | None = Field(None, description="Of a measurement, counted from 1", ge=1)
+    begin: Instant | None = Field(
+        None, alias="from", description="s, the file's time at the start of the run; default: the run's"
     )
 
 

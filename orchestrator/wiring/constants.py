@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from ..errors import code_of
+from ..errors import InvalidValueError, ScenarioError, code_of, text_of
 from ..messages import fold, hint
 from ..names import SignalName, matching
-from ..plan import InputSeries, Value, ValueOrigin
+from ..plan import InputSeries, Value, ValueOrigin, Variable
+from ..scenario.find_and_load import LoadedScenario
+from ..scenario.quantities import measure_of
 from ..scenario.scenario_schema import SeriesSpec
 from ..scenario.yaml_lines import KeyPath
 from .context import WiringContext, facts_of
 from .parameters import origin, value_for
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from ..measured.columns import FileColumn
 
 Input = tuple[str, str]  # instance, variable
 
@@ -48,9 +59,7 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
     scenario, fmus, inputs = system.scenario, system.fmus, system.inputs
     read = None
     if any(isinstance(raw, SeriesSpec) for raw in scenario.inputs.values()):
-        from .series import series_reader  # needs numpy, which takes long to import
-
-        read = series_reader(scenario)
+        read = _series_reader(scenario)
     found = dict(_of_facts(system))
     fact_changed = any(one.level == CHANGED_FACT for one in found.values())
     for pattern, raw in scenario.inputs.items():
@@ -127,3 +136,100 @@ def _of_facts(system: WiringContext) -> Iterator[tuple[Input, Constant]]:
         for sentence, inputs in refused.items():
             for one in inputs:
                 system.report(key, sentence if everywhere else f"{sentence}, for {one}")
+
+
+Reader = Callable[[SeriesSpec, str, Variable], InputSeries]
+"""Callback: (specification, part matched by the `*` of its key, input) -> time series."""
+
+
+def _series_reader(scenario: LoadedScenario) -> Reader:
+    """Return a reader for the time series of a scenario, which reads every file once.
+
+    The reader raises ValueError if the file or a column is missing or unusable, the unit is incompatible, or
+    the times do not cover the run.
+    """
+    from ..measured.columns import ColumnFile, numbers_in, reading_series  # NumPy takes long to import
+    from ..measured.measurement import ENDINGS, Measurement, load_measurement
+
+    @cache
+    def opened(file: str) -> ColumnFile | Measurement:
+        path = Path(os.path.normpath(scenario.path.parent / file))
+        if path.suffix in ENDINGS:
+            return load_measurement(path)
+        with reading_series(path):
+            return ColumnFile(path)
+
+    def column_of(spec: SeriesSpec, name: str) -> FileColumn:
+        file = opened(spec.file)
+        if isinstance(file, Measurement):
+            return file.column(name, spec.segment)
+        if spec.segment is not None:
+            raise ValueError(f"{spec.file} has no segments: only measurement files have")
+        return file.column(name, spec.time)
+
+    def read(spec: SeriesSpec, part: str, variable: Variable) -> InputSeries:
+        name = (spec.column or variable.name).replace("*", part)
+        try:
+            file = opened(spec.file)
+        except ScenarioError as error:
+            raise InvalidValueError(text_of(error.diagnostics), code=error.code) from None
+        with reading_series(spec.file):
+            column = column_of(spec, name)
+            times = numbers_in(column.times, column.time_unit, measure_of("s"), "s", f"time {spec.time!r}")
+            if spec.begin is not None:
+                times = times - float(spec.begin - scenario.start_time)
+            values = _values(column, name, variable)
+            _check_times(times, scenario, spec)
+        held = spec.interpolation == "held" or variable.type != "Real"
+        return InputSeries(spec.file, name, file.sha256, held, times, values)
+
+    return read
+
+
+def _values(column: FileColumn, name: str, variable: Variable) -> np.ndarray:
+    """Convert the values of a column to the type and unit of a variable."""
+    import numpy as np
+
+    from ..measured.columns import numbers_in
+
+    if variable.type == "Real":
+        wanted = measure_of(variable.unit, variable.definition)
+        numbers = numbers_in(column.values, column.unit, wanted, variable.unit or "none", f"column {name!r}")
+        for extreme in (numbers.min(), numbers.max()):
+            value_for(variable, float(extreme))
+        return numbers
+    taken = np.empty(len(column.values), dtype=object)
+    for i, cell in enumerate(column.values.tolist()):
+        try:
+            taken[i] = value_for(variable, _plain(cell, variable))
+        except ValueError as error:  # noqa: PERF203 - the first is told
+            raise ValueError(f"column {name!r}: value {i + 1} {error}") from None
+    return taken
+
+
+def _plain(cell: Any, variable: Variable) -> Value:
+    """Return a cell as in a scenario: files have whole numbers as floats, and booleans as 0 and 1."""
+    if variable.type == "Boolean" and cell in (0, 1):
+        return bool(cell)
+    return int(cell) if isinstance(cell, float) and cell.is_integer() else cell
+
+
+def _check_times(times: np.ndarray, scenario: LoadedScenario, spec: SeriesSpec) -> None:
+    import numpy as np
+
+    back = np.flatnonzero(np.diff(times) <= 0)
+    if back.size:
+        at = int(back[0]) + 1
+        raise ValueError(f"time must increase: {times[at]:g} s follows {times[at - 1]:g} s (value {at + 1})")
+    if spec.extrapolate == "hold":
+        return
+    start, stop = float(scenario.start_time), float(scenario.stop_time)
+    slack = 1e-9 * max(abs(start), abs(stop))
+    last = float(times[-1])
+    if spec.interpolation == "held" and len(times) > 1:
+        last += float(times[-1] - times[-2])  # the last value holds as long as the previous one
+    if times[0] > start + slack or last < stop - slack:
+        raise ValueError(
+            f"covers {times[0]:g} to {times[-1]:g} s of a run from {start:g} to {stop:g} s; "
+            "'extrapolate: hold' would hold its ends"
+        )

@@ -21,6 +21,7 @@ STAGES = (
     {"errors", "messages", "names", "plan", "cache_and_checksums", "files"} | {"coupling", "fault_kinds"},
     {"processes", "supervisor", "workers", "interrupts"},
     {"scenario"},
+    {"measured"},
     {"fmu"},
     {"wiring"},
     {"results"},

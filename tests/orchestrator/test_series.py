@@ -16,12 +16,12 @@ from orchestrator.cli import main
 from orchestrator.errors import RecordWarning, ResultsError, YawbenchError
 from orchestrator.interop.ssp_write import write_ssp
 from orchestrator.master.simulate import simulate
+from orchestrator.measured.columns import ColumnFile
 from orchestrator.plan import InputSeries, Plan
 from orchestrator.results.plan_record_and_freshness import staleness
 from orchestrator.results.read_and_salvage import load_results
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
-from orchestrator.wiring.series import SeriesFile
 from tests.sentences import golden, golden_in, refused, texts_of
 from vocabulary.wheels import WHEELS
 
@@ -373,16 +373,16 @@ def test_a_long_series_takes_little_more_memory_than_its_file(folder: Path) -> N
 def test_a_changed_record_beside_recorded_results_is_no_source_of_units(tmp_path: Path) -> None:
     file = write(car(n=5), tmp_path / "run") / "results.csv"
     beside = file.with_name("run.json")
-    assert SeriesFile(file).column("driver.steer_angle", "time").unit == "rad"
+    assert ColumnFile(file).column("driver.steer_angle", "time").unit == "rad"
     text = beside.read_text()
     beside.write_text(text.replace('"driver.steer_angle": "rad"', '"driver.steer_angle": "deg"'))
     with refused(ValueError):
-        SeriesFile(file)
+        ColumnFile(file)
     beside.write_text("{")
     with refused(ValueError):
-        SeriesFile(file)
+        ColumnFile(file)
     bare = {key: value for key, value in json.loads(text).items() if key != "checksums"}
     beside.write_text(json.dumps(bare))
     with pytest.warns(RecordWarning) as told:
-        SeriesFile(file)
+        ColumnFile(file)
     assert golden([one.message for one in told])

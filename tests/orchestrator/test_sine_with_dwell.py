@@ -14,9 +14,10 @@ from components.drivers.sine_with_dwell import SineWithDwellParameters, sine_wit
 from orchestrator.evaluation.sine_with_dwell import amplitudes, evaluate_dwell, is_series, judge_series
 from orchestrator.evaluation.standard_tests import TESTS, Evaluation, NotJudged
 from orchestrator.evaluation.steering_tests import G, characteristic_angle, evaluate_slow_steer
-from orchestrator.evaluation.trace import Trace, load_mapping, load_trace
+from orchestrator.evaluation.trace import Trace, trace_of
 from orchestrator.figures.style import save
 from orchestrator.metrics.verdict import Status, Verdict, not_judged
+from orchestrator.results.measured import load_run
 from tests.commands import status_of
 from tests.sentences import golden, golden_in
 from vocabulary.units import UNITS
@@ -341,7 +342,8 @@ signals:
   steering_wheel_angle: {column: LRW, unit: deg, sign: -1}
   yaw_rate: Gier
   acceleration_y: {column: ay, unit: cm/s2}
-mass: 1.8 t
+vehicle: {mass: 1.8 t}
+files: [run.csv]
 """
 
 
@@ -362,7 +364,7 @@ def test_measured_columns_under_other_names_units_and_signs_give_the_same(tmp_pa
     made = trace(sampling=SAMPLING["200 Hz"])
     write_measured(made, tmp_path / "run.csv")
     (tmp_path / "map.yaml").write_text(MAPPING)
-    ended = status_of("evaluate", "sine-with-dwell", "run.csv", "--signals", "map.yaml", "--angle", "36 deg",
+    ended = status_of("evaluate", "sine-with-dwell", "map.yaml", "--angle", "36 deg",
                  "--out", "out", "--no-figures")  # fmt: skip
     assert ended == 0
     found = json.loads((tmp_path / "out/evaluation.json").read_text())["runs"][0]
@@ -387,10 +389,10 @@ def test_units_of_measured_columns_are_read_from_the_file(heading, tmp_path):
     write_measured(made, file)
     file.write_text(heading + file.read_text().partition("\n")[2])
     (tmp_path / "map.yaml").write_text(
-        "time: Zeit\n"
+        "files: [run.csv]\ntime: Zeit\n"
         "signals: {steering_wheel_angle: {column: LRW, sign: -1}, yaw_rate: Gier, acceleration_y: ay}\n"
     )
-    read = load_trace(file, load_mapping(tmp_path / "map.yaml"))
+    read = trace_of(load_run(tmp_path / "map.yaml"))
     assert read.time == pytest.approx(made.time)
     for name in ("steering_wheel_angle", "yaw_rate", "acceleration_y"):
         assert read[name] == pytest.approx(made[name], abs=1e-9), name
@@ -401,7 +403,7 @@ def test_accelerations_may_be_in_g(tmp_path):
     made.signals["acceleration_y"] *= 0.01 / G
     write_measured(made, file)
     (tmp_path / "map.yaml").write_text(MAPPING.replace("unit: cm/s2", "unit: g"))
-    read = load_trace(file, load_mapping(tmp_path / "map.yaml"))
+    read = trace_of(load_run(tmp_path / "map.yaml"))
     assert read["acceleration_y"] == pytest.approx(G * made["acceleration_y"] / 0.01, rel=1e-9)
 
 
@@ -410,7 +412,7 @@ def test_a_few_spikes_of_an_accelerometer_are_no_wrong_unit(tmp_path):
     made.signals["acceleration_y"][:: made.time.size // 5] = 90.0
     write_measured(made, file)
     (tmp_path / "map.yaml").write_text(MAPPING)
-    read = load_trace(file, load_mapping(tmp_path / "map.yaml"))
+    read = trace_of(load_run(tmp_path / "map.yaml"))
     assert read["acceleration_y"].max() == pytest.approx(90.0)
 
 
@@ -420,11 +422,11 @@ def test_an_evaluation_that_judges_nothing_says_so_and_ends_with_1(tmp_path, mon
     names = ("steering_wheel_angle", "yaw_rate", "acceleration_y")
     table = np.column_stack([made.time, *(made[name] for name in names)])
     np.savetxt("run.csv", table, "%.12g", ",", header="t,a [rad],r [rad/s],ay [m/s2]", comments="")
-    signals = "signals: {steering_wheel_angle: a, yaw_rate: r, acceleration_y: ay}\n"
+    signals = "files: [run.csv]\nsignals: {steering_wheel_angle: a, yaw_rate: r, acceleration_y: ay}\n"
     mapping = f"time: {{column: t, unit: s}}\n{signals}"
     (tmp_path / "map.yaml").write_text(mapping)
-    options = ("--signals", "map.yaml", "--out", "out", "--no-figures")
-    command = ("evaluate", "sine-with-dwell", "run.csv", *options)
+    options = ("--out", "out", "--no-figures")
+    command = ("evaluate", "sine-with-dwell", "map.yaml", *options)
     assert status_of(*command) == 1
     said = capsys.readouterr()
     assert golden_in(said.out)
@@ -455,17 +457,17 @@ def test_units_in_the_file_are_si(tmp_path, monkeypatch):
         (("unit: cm/s2", "unit: m/s2"), "no car reaches acceleration_y of"),
         (("unit: cm/s2", "unit: g"), "no car reaches acceleration_y of"),
         (("{column: ay, unit: cm/s2}", "ay"),
-         "column 'ay' has no unit, such as m/s2 or g: give it in the mapping, "
-         "'acceleration_y: {column: ay, unit: m/s2}', or in the file's header, 'ay [m/s2]'"),
+         "column 'ay' has no unit, such as m/s2 or g: write 'acceleration_y: {column: ay, unit: m/s2}', "
+         "or in the file's header 'ay [m/s2]'"),
         (("{column: Zeit, unit: ms}", "Zeit"), "column 'Zeit' has no unit, such as s, ms, min or h"),
         (("1.8 t", "1.8 m"), "'1.8 m' is not a value in kg"),
-        (("1.8 t", "1800"), "mass: must be text with a unit, such as 1500 kg (got 1800)"),
+        (("1.8 t", "1800"), "vehicle.mass: must be text with a unit, such as kg (got 1800)"),
     ],
 )  # fmt: skip
 def test_a_wrong_mapping_is_answered_by_a_sentence(wrong, sentence, tmp_path, capsys):
     write_measured(trace(sampling=SAMPLING["200 Hz"]), tmp_path / "run.csv")
     (tmp_path / "map.yaml").write_text(MAPPING.replace(*wrong))
-    ended = status_of("evaluate", "sine-with-dwell", tmp_path / "run.csv", "--signals", tmp_path / "map.yaml")
+    ended = status_of("evaluate", "sine-with-dwell", tmp_path / "map.yaml")
     assert ended in (1, 2)
     assert sentence in capsys.readouterr().err
 

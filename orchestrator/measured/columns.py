@@ -1,8 +1,9 @@
-"""Reads time series for inputs from files, converted to unit and type of the input and checked for the run.
+"""Files of columns, as recordings have them: CSV, Parquet and ASAM MDF 4.
 
-Formats are CSV (separated by `,`, `;` or tab), Parquet and ASAM MDF 4. A header may name a unit,
-`delta [deg]`, and CSV may have a row of units below its header; Parquet has units in the metadata of fields,
-MDF in channels. The units of results of this program are in the run.json next to them.
+CSV is separated by `,`, `;`, tab, `|` or spaces, in UTF-8, UTF-16 or Latin-1 (Windows-1252). Its numbers may
+have a decimal comma if the comma does not separate. A header may name a unit, `delta [deg]`, and CSV may have
+a row of units below its header; Parquet has units in the metadata of fields, MDF in channels. The units of
+results of this program are in the run.json next to them.
 """
 
 from __future__ import annotations
@@ -13,24 +14,20 @@ import hashlib
 import io
 import itertools
 import json
-import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from vocabulary.signals import SignalEntry
+
 from ..cache_and_checksums import changed_since, has_checksums, warn_of_record
 from ..errors import ScenarioError
 from ..files import read_bytes, reading, reason
-from ..messages import hint
-from ..plan import InputSeries, Value, Variable
-from ..scenario.find_and_load import LoadedScenario
-from ..scenario.quantities import Unit, gain_and_offset, measure_of
-from ..scenario.scenario_schema import SeriesSpec
-from .parameters import value_for
+from ..messages import hint, listed
+from ..scenario.quantities import Unit, gain_and_offset, meant_unit, measure_of, spellings
 
 LARGEST = 1_000_000_000
 """Bytes of a file. Chosen: it fits into memory."""
@@ -57,7 +54,7 @@ class _Table(NamedTuple):
     times: Callable[[int], np.ndarray] | None = None  # in s, if every column has its own times
 
 
-class SeriesFile:
+class ColumnFile:
     """A file of columns, read into memory.
 
     Raises:
@@ -68,7 +65,9 @@ class SeriesFile:
     def __init__(self, path: Path) -> None:
         raw = read_bytes(path, largest=LARGEST)
         self.sha256 = hashlib.sha256(raw).hexdigest()
-        kinds: dict[str, Callable[[bytes], _Table]] = {".csv": _csv, ".parquet": _parquet, ".mf4": _mdf}
+        kinds: dict[str, Callable[[bytes], _Table]] = {
+            ".csv": _csv, ".tsv": _csv, ".txt": _csv, ".parquet": _parquet, ".mf4": _mdf,
+        }  # fmt: skip
         if path.suffix.lower() not in kinds:
             raise ValueError(f"must be a file of type {', '.join(kinds)}")
         self._table = kinds[path.suffix.lower()](raw)
@@ -102,34 +101,62 @@ class SeriesFile:
 
 def _csv(raw: bytes) -> _Table:
     """Return the table of a CSV file; its text is parsed again for every column, to save memory."""
-    first = raw.partition(b"\n")[0].decode("utf-8-sig", "replace")
-    delimiter = max(",;\t", key=first.count)
+    encoding = _encoding(raw)
+    first, _, rest = raw[:HEADING].decode(encoding, "replace").partition("\n")
+    separator = max(SEPARATORS, key=first.count)
+    spaced = separator not in first and len(first.split()) == len(rest.partition("\n")[0].split()) > 1
 
     def rows() -> Iterator[list[str]]:
-        text = io.TextIOWrapper(io.BytesIO(raw), encoding="utf-8-sig", newline="")
-        found = (row for row in csv.reader(text, delimiter=delimiter) if row)
-        return itertools.islice(found, head, None)
+        text = io.TextIOWrapper(io.BytesIO(raw), encoding=encoding, newline="")
+        lines = (line.split() for line in text) if spaced else csv.reader(text, delimiter=separator)
+        return itertools.islice((row for row in lines if row), head, None)
+
+    def number(cell: str) -> float:
+        return float(cell if separator == "," and not spaced else cell.replace(",", "."))
 
     def values(at: int) -> np.ndarray:
         try:
-            return np.fromiter((float(row[at]) for row in rows()), float)
+            return np.fromiter((number(row[at]) for row in rows()), float)
         except ValueError:
             return np.array([row[at] for row in rows()], dtype=object)
 
     head = 0
-    try:
-        headers, below = [*itertools.islice(rows(), 2), [], []][:2]
-        units = _row_of_units(below) if len(below) == len(headers) else None
-        head = 2 if units else 1
-        number = head
-        for number, row in enumerate(rows(), start=head + 1):
-            if len(row) != len(headers):
-                raise ValueError(f"row {number} has {len(row)} values for {len(headers)} columns")
-    except UnicodeDecodeError:
-        raise ValueError("is not UTF-8") from None
-    if number == head:
+    headers, below = [*itertools.islice(rows(), 2), [], []][:2]
+    units = _row_of_units(below) if len(below) == len(headers) else None
+    head = 2 if units else 1
+    last = head
+    for last, row in enumerate(rows(), start=head + 1):
+        if len(row) != len(headers):
+            raise ValueError(f"row {last} has {len(row)} values for {len(headers)} columns")
+    if last == head:
         raise ValueError("has no rows")
     return _Table(headers, units or [None] * len(headers), values)
+
+
+SEPARATORS = ",;\t|"
+HEADING = 100_000
+"""Bytes in which the first two lines of a CSV file end. Chosen: some thousand columns."""
+
+
+def _encoding(raw: bytes) -> str:
+    """Return the encoding of a text.
+
+    Raises:
+        ValueError: not a text.
+    """
+    if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    if b"\0" in raw:
+        raise ValueError("is not text")
+    try:
+        raw.decode("utf-8")
+    except UnicodeDecodeError:
+        return "cp1252" if not _UNDEFINED.intersection(raw) else "latin-1"
+    return "utf-8-sig"
+
+
+_UNDEFINED = frozenset(b"\x81\x8d\x8f\x90\x9d")
+"""Bytes that Windows-1252 does not define; Latin-1 does."""
 
 
 def _row_of_units(row: Sequence[str]) -> list[str | None] | None:
@@ -144,7 +171,7 @@ def _row_of_units(row: Sequence[str]) -> list[str | None] | None:
 
 def _is_number(text: str) -> bool:
     try:
-        float(text)
+        float(text.replace(",", "."))
     except ValueError:
         return False
     return True
@@ -215,37 +242,7 @@ def _units_beside(path: Path) -> Mapping[str, str]:
     return {str(name): str(unit) for name, unit in units.items() if unit} if isinstance(units, dict) else {}
 
 
-Reader = Callable[[SeriesSpec, str, Variable], InputSeries]
-"""Callback: (specification, part matched by the `*` of its key, input) -> time series."""
-
 SECOND = measure_of("s")
-
-
-def series_reader(scenario: LoadedScenario) -> Reader:
-    """Return a reader for the time series of a scenario, which reads every file once.
-
-    The reader raises ValueError if the file or a column is missing or unusable, the unit is incompatible, or
-    the times do not cover the run.
-    """
-
-    @cache
-    def opened(file: str) -> SeriesFile:
-        path = Path(os.path.normpath(scenario.path.parent / file))
-        with reading_series(path):
-            return SeriesFile(path)
-
-    def read(spec: SeriesSpec, part: str, variable: Variable) -> InputSeries:
-        file = opened(spec.file)
-        name = (spec.column or variable.name).replace("*", part)
-        with reading_series(spec.file):
-            column = file.column(name, spec.time)
-            times = numbers_in(column.times, column.time_unit, SECOND, "s", f"time {spec.time!r}")
-            values = _values(column.values, column.unit, name, variable)
-            _check_times(times, scenario, spec)
-        held = spec.interpolation == "held" or variable.type != "Real"
-        return InputSeries(spec.file, name, file.sha256, held, times, values)
-
-    return read
 
 
 @contextlib.contextmanager
@@ -300,44 +297,43 @@ def _numbers(column: np.ndarray, what: str) -> np.ndarray:
     return numbers
 
 
-def _values(column: np.ndarray, unit: str | None, name: str, variable: Variable) -> np.ndarray:
-    """Convert the values of a column to the type and unit of a variable."""
-    if variable.type == "Real":
-        wanted = measure_of(variable.unit, variable.definition)
-        numbers = numbers_in(column, unit, wanted, variable.unit or "none", f"column {name!r}")
-        for extreme in (numbers.min(), numbers.max()):
-            value_for(variable, float(extreme))
-        return numbers
-    taken = np.empty(len(column), dtype=object)
-    for i, cell in enumerate(column.tolist()):
-        try:
-            taken[i] = value_for(variable, _plain(cell, variable))
-        except ValueError as error:  # noqa: PERF203 - the first is told
-            raise ValueError(f"column {name!r}: value {i + 1} {error}") from None
-    return taken
+SHARE_OF_SPIKES = 0.01
+"""Fraction of samples that may exceed what cars reach; chosen: accelerometers have spikes."""
 
 
-def _plain(cell: Any, variable: Variable) -> Value:
-    """Return a cell as in a scenario: files have whole numbers as floats, and booleans as 0 and 1."""
-    if variable.type == "Boolean" and cell in (0, 1):
-        return bool(cell)
-    return int(cell) if isinstance(cell, float) and cell.is_integer() else cell
+def unit_of(name: str, column: str, given: str | None, wanted: str) -> str:
+    """Return the unit of a signal's column or of the time column.
 
-
-def _check_times(times: np.ndarray, scenario: LoadedScenario, spec: SeriesSpec) -> None:
-    back = np.flatnonzero(np.diff(times) <= 0)
-    if back.size:
-        at = int(back[0]) + 1
-        raise ValueError(f"time must increase: {times[at]:g} s follows {times[at - 1]:g} s (value {at + 1})")
-    if spec.extrapolate == "hold":
-        return
-    start, stop = float(scenario.start_time), float(scenario.stop_time)
-    slack = 1e-9 * max(abs(start), abs(stop))
-    last = float(times[-1])
-    if spec.interpolation == "held" and len(times) > 1:
-        last += float(times[-1] - times[-2])  # the last value holds as long as the previous one
-    if times[0] > start + slack or last < stop - slack:
+    Raises:
+        ValueError: neither the description nor the file states it; only plain numbers may have none.
+    """
+    unit = given or (wanted if wanted == "1" else None)
+    if unit is None:
         raise ValueError(
-            f"covers {times[0]:g} to {times[-1]:g} s of a run from {start:g} to {stop:g} s; "
-            "'extrapolate: hold' would hold its ends"
+            f"column {column!r} has no unit, such as {listed(spellings(wanted), last='or')}: write "
+            f"'{name}: {{column: {column}, unit: {wanted}}}', or in the file's header '{column} [{wanted}]'"
         )
+    return unit
+
+
+def refuse_implausible(
+    name: str, entry: SignalEntry, column: str, given: np.ndarray, values: np.ndarray, unit: str
+) -> None:
+    """Raise ValueError if a signal has values that no car reaches; suggest the unit that was probably meant.
+
+    Args:
+        name, entry: the signal.
+        column: heading of its column.
+        given: the numbers of the column, in `unit`.
+        values: the same in SI.
+        unit: unit of the column.
+    """
+    largest, wanted = entry.largest, entry.unit
+    if largest is None or np.mean(np.abs(values) > largest) <= SHARE_OF_SPIKES:
+        return
+    number = float(np.quantile(np.abs(given.astype(float)), 1.0 - SHARE_OF_SPIKES))
+    likely = meant_unit(number, unit, wanted, lambda value: abs(value) <= largest)
+    raise ValueError(
+        f"column {column!r}: no car reaches {name} of {number:.4g}{f' {unit}' if unit != '1' else ''}, "
+        f"at most {largest:.4g} {wanted} is allowed{f'; did you mean {likely!r}?' if likely else ''}"
+    )

@@ -1,0 +1,1 @@
+"""Measured cars: recordings read, examined, and compared with simulations."""

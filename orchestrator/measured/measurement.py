@@ -1,0 +1,437 @@
+"""Measurements: recordings of a car, described by a file `measured.yaml`, as signals in SI.
+
+    files: [run01.csv, run02.mf4]
+    segments: {by: Lap}                  # where time restarts; `by: time`: at every restart
+    time: {column: Time, unit: ms}
+    signals:
+      steering_wheel_angle: {column: SWA, unit: deg, sign: -1, delay: 20 ms, spikes: 2 deg}
+      yaw_rate: {column: Gyro, unit: deg/s, noise: 0.1 deg/s}
+      acceleration_y: {column: Ay, unit: g, at: {x: 0.2 m, z: 0.4 m}}
+      velocity_x: Speed                  # the header states the unit: "Speed [km/h]"
+    filter: {low_pass: 6 Hz, order: 12, phaseless: true}
+    vehicle: {mass: 1650 kg, wheelbase: 2.7 m, steering_ratio: 15.7, friction: 0.95}
+    car: Saloon, 2 occupants
+    source: own recording, airfield
+    licence: CC-BY-4.0
+    date: 2024-05-17
+
+No unit is assumed: a column has one here, in its header, in a row of units below the header or in the file's
+own description, unless its signal is a plain number. The value of a signal is
+
+    sign gain (column - offset)    at the time of its row, less its delay
+
+with spikes (values that differ from the median of seven by more than `spikes`) replaced by interpolation,
+then moved from the place of its sensor (`at`: relative to the centre of mass, ISO 8855) to the centre of
+mass of the rigid body, with angular rates p, q, r as far as they are recorded, then filtered.
+
+The filter is the Butterworth low pass of GTR 8 by default, which has no phase: half of its poles forward and
+half of them backward, so that amplitudes at the cut-off frequency are halved.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field
+
+from vocabulary.signals import SIGNALS, SignalEntry
+from vocabulary.vehicle import CAR
+from vocabulary.wheels import wheels
+
+from ..errors import Diagnostic, InvalidValueError, Location, ScenarioError, code_of
+from ..files import reads
+from ..messages import hint, listed
+from ..scenario import yaml_lines
+from ..scenario.quantities import convert, measure_of, parse_unit
+from ..scenario.validation import StrictModel, validate
+from ..scenario.yaml_lines import Document, KeyPath
+from .columns import (
+    SECOND,
+    ColumnFile,
+    FileColumn,
+    numbers_in,
+    reading_series,
+    refuse_implausible,
+    unit_of,
+)
+from .segment import MOVED, POLES, LowPass, Segment, parts_of, resample, to_centre_of_mass, without_spikes
+
+MEASURABLE: dict[str, SignalEntry] = {name: one for key, one in SIGNALS.items() for name in wheels(key)}
+"""Signals that a measurement may have, those of wheels one by one."""
+ENDINGS = (".yaml", ".yml")
+"""Of measurement files."""
+BY_TIME = "time"
+OF_TEST = {"action_time": "s"}
+"""Values that tests need beside signals and vehicle, with their units."""
+
+
+def _unit(text: str) -> str:
+    parse_unit(text)
+    return text
+
+
+def _signal(name: str) -> str:
+    if name not in MEASURABLE:
+        raise ValueError(f"unknown signal {name!r}{hint(name, MEASURABLE, lead='known')}")
+    return name
+
+
+def _column(value: object) -> object:
+    return {"column": value} if isinstance(value, str) else value
+
+
+def _quantity(value: object) -> str:
+    """Return the text of a number with its unit, which is checked where the signal is known."""
+    if not isinstance(value, str):
+        raise ValueError(f"must be text with a unit, such as 20 ms (got {value!r})")
+    return value
+
+
+def _text(value: object) -> object:
+    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+UnitText = Annotated[str, AfterValidator(_unit)]
+Quantity = Annotated[str, BeforeValidator(_quantity)]
+Words = Annotated[str, BeforeValidator(_text)]
+
+
+class PlaceSpec(StrictModel):
+    """The place of a sensor relative to the centre of mass, vehicle axes of ISO 8855."""
+
+    x: Quantity = Field("0 m", description="m, forward")
+    y: Quantity = Field("0 m", description="m, to the left")
+    z: Quantity = Field("0 m", description="m, up; acts only with a recorded roll_rate")
+
+
+class SignalSpec(StrictModel):
+    """The column of a recording that holds a signal, and how the signal follows from it."""
+
+    column: str = Field(description="Its header, without the unit", min_length=1)
+    unit: UnitText | None = Field(None, description="Unit of its numbers; default: as the file says")
+    sign: Literal[1, -1] = Field(1, description="-1: positive where ISO 8855 is negative")
+    gain: float = Field(1.0, description="Factor of its numbers", gt=0)
+    offset: Quantity | None = Field(None, description="What the column shows at zero")
+    delay: Quantity | None = Field(None, description="Time by which it lags")
+    spikes: Quantity | None = Field(None, description="Values this far from the running median are replaced")
+    noise: Quantity | None = Field(None, description="Standard deviation of its noise")
+    at: PlaceSpec | None = Field(None, description="Place of the sensor; default: the centre of mass")
+
+
+class TimeSpec(StrictModel):
+    """The column of times."""
+
+    column: str = Field("time", min_length=1)
+    unit: UnitText | None = Field(None, description="Default: as the file says")
+    repeated: Literal["refuse", "mean"] = Field(
+        "refuse", description="Rows with the same time; mean: become a row of their means"
+    )
+
+
+class SegmentsSpec(StrictModel):
+    """Segments of a recording, each with increasing time."""
+
+    by: str = Field(description="Column that changes from segment to segment; time: where time restarts")
+
+
+class FilterSpec(StrictModel):
+    """The Butterworth low pass of all signals, measured and simulated."""
+
+    low_pass: Quantity = Field(description="Hz, cut-off frequency")
+    order: int = Field(POLES, description="Number of poles, even if phaseless", ge=1, le=24)
+    phaseless: bool = Field(True, description="Half of the poles forward, half of them backward in time")
+
+
+AnySignal = Annotated[SignalSpec, BeforeValidator(_column)]
+AnyTime = Annotated[TimeSpec, BeforeValidator(_column)]
+
+
+class MeasurementSpec(StrictModel):
+    """A file that describes a measurement."""
+
+    files: list[str] = Field(description="CSV, Parquet or MDF 4, relative to this file", min_length=1)
+    segments: SegmentsSpec | None = Field(None, description="Default: a segment per file")
+    time: AnyTime = Field(
+        TimeSpec(column="time", unit=None, repeated="refuse"), description="Column of times"
+    )
+    signals: dict[Annotated[str, AfterValidator(_signal)], AnySignal] = Field(min_length=1)
+    filter: FilterSpec | None = None
+    vehicle: dict[str, float | str] = Field({}, description="Known quantities of the car, and friction")
+    test: dict[str, float | str] = Field({}, description=f"What tests need: {listed(OF_TEST)}")
+    car: Words = ""
+    source: Words = ""
+    licence: Words = ""
+    date: Words = ""
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What a file `measured.yaml` describes."""
+
+    path: Path
+    segments: tuple[Segment, ...]
+    car: str
+    source: str
+    licence: str
+    date: str
+    vehicle: Mapping[str, float]  # quantity of the car, or "friction" -> value in SI
+    test: Mapping[str, float]  # such as "action_time" -> value in SI
+    noise: Mapping[str, float]  # signal -> standard deviation in SI, where it is known
+    filter: LowPass | None  # already applied to the segments; for simulated signals
+    sha256: str  # of this file and of all that it names
+    notes: tuple[Diagnostic, ...] = ()
+
+    @property
+    def title(self) -> str:
+        """The car and the date, in words."""
+        return ", ".join(filter(None, (self.car or self.path.stem, self.date)))
+
+    @property
+    def origin(self) -> str:
+        """Source and licence, in words."""
+        return ", ".join(filter(None, (self.source, self.licence and f"licence: {self.licence}")))
+
+    def column(self, name: str, number: int | None = None) -> FileColumn:
+        """Return a signal of a segment as a column (see `segment`).
+
+        Raises:
+            ValueError: there is no such signal or segment.
+        """
+        segment = self.segment(number)
+        if name not in segment.signals:
+            raise ValueError(f"has no signal {name!r}{hint(name, segment.signals, lead='it has')}")
+        return FileColumn(segment.time, segment.signals[name], "s", MEASURABLE[name].unit)
+
+    def segment(self, number: int | None = None) -> Segment:
+        """Return a segment by its number, counted from 1; None: the only one.
+
+        Raises:
+            ValueError: there is no such segment, or more than one to choose from.
+        """
+        count = len(self.segments)
+        if number is None and count > 1:
+            raise ValueError(f"has {count} segments: choose one by its number, 1 to {count}")
+        if number is not None and not 1 <= number <= count:
+            raise ValueError(f"has no segment {number}: write 1 to {count}")
+        return self.segments[(number or 1) - 1]
+
+
+@dataclass(frozen=True)
+class _Correction:
+    """The numbers of a `SignalSpec`, in SI."""
+
+    offset: float = 0.0
+    delay: float = 0.0
+    spikes: float = 0.0
+    noise: float = 0.0
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@reads("measurement file", ScenarioError)
+def load_measurement(path: Path | str, *, filtered: bool = True) -> Measurement:
+    """Read a measurement.
+
+    Args:
+        path: the file that describes it.
+        filtered: False: leave out the low pass.
+
+    Raises:
+        ScenarioError: it, or a file that it names, cannot be used; lists all errors.
+    """
+    path = Path(path)
+    document = yaml_lines.read(path, what="measurement file")
+    spec = validate(MeasurementSpec, document)
+    if spec is None:
+        raise ScenarioError(document.sorted_errors())
+    reader = _Reader(document, spec)
+    segments = [segment for number in range(len(spec.files)) for segment in reader.segments_of(number)]
+    if document.errors:
+        raise ScenarioError(document.sorted_errors())
+    if filtered and reader.filter:
+        low = reader.filter
+        segments = [one.filtered(low) for one in segments]
+    digest = hashlib.sha256(path.read_bytes() + "".join(reader.hashes).encode()).hexdigest()
+    return Measurement(
+        path, tuple(segments), spec.car, spec.source, spec.licence, spec.date, reader.vehicle, reader.test,
+        {name: one.noise for name, one in reader.corrections.items() if one.noise}, reader.filter, digest,
+        tuple(reader.notes),
+    )  # fmt: skip
+
+
+class _Reader:
+    """Reads the files of a measurement; errors go to its document."""
+
+    def __init__(self, document: Document, spec: MeasurementSpec) -> None:
+        self.document, self.spec = document, spec
+        self.hashes: list[str] = []
+        self.notes: list[Diagnostic] = []
+        if missing := [key for key in ("car", "source", "licence", "date") if not getattr(spec, key)]:
+            words = f"does not state {listed(missing, last='and')}; reports show whose recording it is"
+            where = Location(document.path, 1)
+            self.notes.append(Diagnostic("measurement-unattributed", words, "info", where))
+        self.corrections = {name: self._correction(name, one) for name, one in spec.signals.items()}
+        known = {name: one.unit for name, one in CAR.items()} | {"friction": "1"}
+        self.vehicle = self._values("vehicle", spec.vehicle, known)
+        self.test = self._values("test", spec.test, OF_TEST)
+        self.filter = self._filter()
+
+    def _si(self, key: KeyPath, text: object, unit: str, *, above: float | None = None) -> float:
+        try:
+            number = float(convert(text, unit)) if isinstance(text, str) else float(Fraction(repr(text)))
+            if above is not None and not number > above:
+                raise ValueError(f"must be above {above:g} (got {text})")
+        except ValueError as error:
+            self.document.report(key, str(error), code_of(error))
+            return 0.0
+        return number
+
+    def _values(
+        self, group: str, given: Mapping[str, float | str], known: Mapping[str, str]
+    ) -> dict[str, float]:
+        values = {}
+        for name, value in given.items():
+            if name not in known:
+                unknown = f"unknown quantity{hint(name, known, lead='known')}"
+                self.document.report((group, name), unknown, "key-unknown")
+            elif not isinstance(value, str) and known[name] != "1":
+                wrong = f"must be text with a unit, such as {known[name]} (got {value:g})"
+                self.document.report((group, name), wrong)
+            else:
+                values[name] = self._si((group, name), value, known[name])
+        return values
+
+    def _correction(self, name: str, spec: SignalSpec) -> _Correction:
+        unit, key = MEASURABLE[name].unit, ("signals", name)
+        found: dict[str, Any] = {}
+        for part, of_it, above in (
+            ("offset", unit, None), ("delay", "s", None), ("spikes", unit, 0.0), ("noise", unit, 0.0)
+        ):  # fmt: skip
+            if (text := getattr(spec, part)) is not None:
+                found[part] = self._si((*key, part), text, of_it, above=above)
+        if spec.at is not None:
+            found["at"] = tuple(self._si((*key, "at", axis), getattr(spec.at, axis), "m") for axis in "xyz")
+            if name not in MOVED:
+                what = f"a place matters for {listed(MOVED, last='and')} alone"
+                self.document.report((*key, "at"), what)
+        return _Correction(**found)
+
+    def _filter(self) -> LowPass | None:
+        spec = self.spec.filter
+        if spec is None:
+            return None
+        if spec.phaseless and spec.order % 2:
+            self.document.report(("filter", "order"), f"must be even if phaseless (got {spec.order})")
+        cut_off = self._si(("filter", "low_pass"), spec.low_pass, "Hz", above=0.0)
+        return LowPass(cut_off, spec.order, spec.phaseless)
+
+    def segments_of(self, number: int) -> Iterator[Segment]:
+        """Yield the segments of a file; nothing if it cannot be used."""
+        name, key = self.spec.files[number], ("files", number)
+        try:
+            path = Path(os.path.normpath(self.document.path.parent / name))
+            with reading_series(path):
+                file = ColumnFile(path)
+            self.hashes.append(file.sha256)
+        except ValueError as error:
+            self.document.report(key, str(error), code_of(error, "series-unreadable"))
+            return
+        read = {signal: self._read(file, name, signal) for signal in self.spec.signals}
+        labels = self._labels(file)
+        if self.document.errors:
+            return
+        times = next(iter(read.values()))[0]
+        parts: Iterable[tuple[str, slice]] = [("", slice(None))]
+        if self.spec.segments is not None:
+            if any(not np.array_equal(t, times) for t, _ in read.values()) or (
+                labels is not None and len(labels) != len(times)
+            ):
+                wrong = f"{name}: channels with times of their own cannot be divided into segments"
+                return self.document.report(("segments",), wrong, "measurement-time")
+            parts = parts_of(times, labels)
+        for label, rows in parts:
+            called = f"{name} {label}" if label else name
+            try:
+                yield self._segment(called, {signal: (t[rows], x[rows]) for signal, (t, x) in read.items()})
+            except ValueError as error:
+                self.document.report(key, f"{called}: {error}", code_of(error, "measurement-time"))
+
+    def _read(self, file: ColumnFile, path: str, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return times [s] and values [SI] of a column; reports what is wrong with them."""
+        spec, time, entry = self.spec.signals[name], self.spec.time, MEASURABLE[name]
+        try:
+            column: FileColumn = file.column(spec.column, time.column)
+            unit = unit_of(name, spec.column, spec.unit or column.unit, entry.unit)
+            of_time = unit_of("time", time.column, time.unit or column.time_unit, "s")
+            times = numbers_in(column.times, of_time, SECOND, "s", "time")
+            what = f"column {spec.column!r}"
+            values = numbers_in(column.values, unit, measure_of(entry.unit), entry.unit, what)
+            values = spec.gain * (values - self.corrections[name].offset)
+            refuse_implausible(name, entry, spec.column, column.values, values, unit)
+        except ValueError as error:
+            self.document.report(("signals", name), f"{path}: {error}", code_of(error, "series-unreadable"))
+            return np.zeros(0), np.zeros(0)
+        return times, spec.sign * values if spec.sign < 0 else values
+
+    def _labels(self, file: ColumnFile) -> np.ndarray | None:
+        """Return the value that tells segments apart, a row each; None: time does, if it may restart."""
+        segments = self.spec.segments
+        if segments is None or segments.by == BY_TIME:
+            return None
+        try:
+            return file.column(segments.by, self.spec.time.column).values
+        except ValueError as error:
+            self.document.report(("segments", "by"), str(error), "series-unreadable")
+            return None
+
+    def _segment(self, name: str, read: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Segment:
+        clocks = {}
+        for signal, (times, values) in read.items():
+            times, values = _increasing(times, values, self.spec.time)
+            one = self.corrections[signal]
+            clocks[signal] = times - one.delay, without_spikes(times, values, one.spikes)
+        time = next(iter(clocks.values()))[0] + next(iter(self.corrections.values())).delay
+        begin, end = max(t[0] for t, _ in clocks.values()), min(t[-1] for t, _ in clocks.values())
+        time = time[(time >= begin) & (time <= end)]
+        if time.size < 2:
+            raise ValueError("its signals have less than two samples at the same times")
+        signals = {
+            signal: values if np.array_equal(t, time) else resample(time, t, values)
+            for signal, (t, values) in clocks.items()
+        }
+        segment = Segment(name, time, signals)
+        places = {signal: one.at for signal, one in self.corrections.items() if any(one.at)}
+        return replace(segment, signals=to_centre_of_mass(segment, places)) if places else segment
+
+
+def _increasing(times: np.ndarray, values: np.ndarray, spec: TimeSpec) -> tuple[np.ndarray, np.ndarray]:
+    """Return times that increase, and their values; equal times become one if the file says so.
+
+    Raises:
+        ValueError: they do not increase.
+    """
+    back = np.flatnonzero(np.diff(times) < 0.0)
+    if back.size:
+        row = int(back[0])
+        raise InvalidValueError(
+            f"time goes back from {times[row]:g} to {times[row + 1]:g} s (value {row + 2}): write "
+            f"'segments: {{by: {BY_TIME}}}', or by: the column that counts laps",
+            code="measurement-time",
+        )
+    if times.size < 2 or np.all(np.diff(times) > 0.0):
+        return times, values
+    if spec.repeated == "refuse":
+        row = int(np.flatnonzero(np.diff(times) == 0.0)[0])
+        raise InvalidValueError(
+            f"{times[row]:g} s occurs twice (value {row + 2}): write 'time: {{column: {spec.column}, "
+            "repeated: mean}' for the mean of such rows",
+            code="measurement-time",
+        )
+    unique, place, count = np.unique(times, return_inverse=True, return_counts=True)
+    return unique, np.bincount(place, values) / count

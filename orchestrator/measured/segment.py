@@ -1,0 +1,176 @@
+"""Segments of measurements: signals over time, and what is done to them before they are compared.
+
+A rigid body's point at (x, y, z) from the centre of mass has, with roll, pitch and yaw rates p, q, r,
+
+    v = v_G + omega x (x, y, z)        a = a_G + d omega/dt x (x, y, z) + omega x (omega x (x, y, z))
+
+of which the terms with p and q count where they are recorded. An accelerometer's part of gravity in a roll
+is left in, as all sensors have it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+Place = tuple[float, float, float]
+"""x, y, z [m] relative to the centre of mass, vehicle axes."""
+POLES = 12
+"""Poles of the low pass: GTR 8, "a 12-pole phaseless Butterworth filter", those of both directions."""
+UNEVEN = 1e-6
+"""Relative difference of time steps up to which sampling counts as even; chosen: rounding in files."""
+WINDOW = 7
+"""Samples of the running median that spikes are measured from. Chosen: spikes of up to three samples."""
+OF_ROTATION = 6.0
+"""Cut-off of the low pass of rates before they are differentiated [Hz]: that of GTR 8 for yaw rates."""
+MOVED = ("velocity_x", "velocity_y", "sideslip", "acceleration_x", "acceleration_y")
+"""Signals that depend on the place of their sensor."""
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """A Butterworth low pass; phaseless: half of the poles forward, half of them backward."""
+
+    cut_off: float  # [Hz]
+    order: int = POLES
+    phaseless: bool = True
+
+    def __call__(self, x: np.ndarray, rate: float) -> np.ndarray:
+        """Return x filtered; shape (rows,), evenly sampled at `rate` [Hz]."""
+        from scipy.signal import butter, sosfilt, sosfilt_zi, sosfiltfilt
+
+        if self.phaseless:
+            sections = butter(self.order // 2, self.cut_off, fs=rate, output="sos")
+            return np.asarray(sosfiltfilt(sections, x, padlen=min(len(x) - 1, int(rate))))
+        sections = butter(self.order, self.cut_off, fs=rate, output="sos")
+        return np.asarray(sosfilt(sections, x, zi=sosfilt_zi(sections) * x[0])[0])
+
+
+def even_grid(time: np.ndarray, step: float | None = None) -> np.ndarray:
+    """Return evenly spaced times, at the median step [s] if the given ones are uneven; shape (rows,)."""
+    steps = np.diff(time)
+    wanted = float(np.median(steps)) if step is None else step
+    if np.all(np.abs(steps - wanted) <= UNEVEN * max(wanted, 1e-12) + 1e-9):
+        return time
+    return np.asarray(time[0] + wanted * np.arange(int((time[-1] - time[0]) / wanted + 1e-9) + 1))
+
+
+def resample(grid: np.ndarray, time: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Return x interpolated to a grid by a monotone cubic; x itself if the grid is its own time."""
+    if grid is time:
+        return x
+    from scipy.interpolate import PchipInterpolator
+
+    return np.asarray(PchipInterpolator(time, x)(grid))
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Signals over increasing time: a file, or a part of it."""
+
+    name: str
+    time: np.ndarray  # shape (rows,) [s], as recorded
+    signals: Mapping[str, np.ndarray]  # name in the vocabulary -> shape (rows,), in SI
+
+    @property
+    def rate(self) -> float:
+        """Median sampling rate [Hz]."""
+        return 1.0 / float(np.median(np.diff(self.time)))
+
+    def even(self, step: float | None = None) -> Segment:
+        """Return the segment sampled evenly, every `step` [s]; default: its median step."""
+        grid = even_grid(self.time, step)
+        return replace(
+            self,
+            time=grid,
+            signals={name: resample(grid, self.time, x) for name, x in self.signals.items()},
+        )
+
+    def filtered(self, low_pass: LowPass) -> Segment:
+        """Return the segment with all signals filtered, at the same times."""
+        even = self.even()
+        signals = {name: low_pass(x, even.rate) for name, x in even.signals.items()}
+        if even.time is not self.time:
+            signals = {name: np.interp(self.time, even.time, x) for name, x in signals.items()}
+        return replace(self, signals=signals)
+
+    def between(self, begin: float, end: float) -> Segment:
+        """Return the part from `begin` to `end` [s], both included."""
+        inside = (self.time >= begin - 1e-9) & (self.time <= end + 1e-9)
+        signals = {name: x[inside] for name, x in self.signals.items()}
+        return replace(self, time=self.time[inside], signals=signals)
+
+
+def parts_of(times: np.ndarray, labels: np.ndarray | None) -> Iterator[tuple[str, slice]]:
+    """Yield the segments of a file: a label, "" if there is one alone, and the rows.
+
+    Args:
+        times: of the rows.
+        labels: what tells segments apart, for every row; None: they begin where time goes back.
+    """
+    apart = np.diff(times) < 0.0 if labels is None else labels[1:] != labels[:-1]
+    edges = [0, *(int(cut) + 1 for cut in np.flatnonzero(apart)), len(times)]
+    for number, (begin, end) in enumerate(pairwise(edges), start=1):
+        label = number if labels is None else labels[begin]
+        words = str(label) if isinstance(label, (int, str)) else f"{label:g}"
+        if end - begin >= 2:
+            yield words if len(edges) > 2 else "", slice(begin, end)
+
+
+def without_spikes(time: np.ndarray, x: np.ndarray, threshold: float) -> np.ndarray:
+    """Return x with values that are further than `threshold` from the running median interpolated.
+
+    Args:
+        time: shape (rows,).
+        x: shape (rows,).
+        threshold: in the unit of x; 0: x is returned as it is.
+    """
+    if not threshold or x.size < WINDOW:
+        return x
+    kept = np.abs(x - running_median(x)) <= threshold
+    return np.interp(time, time[kept], x[kept]) if kept.any() and not kept.all() else x
+
+
+def running_median(x: np.ndarray) -> np.ndarray:
+    """Return the median of `WINDOW` samples around each one."""
+    from scipy.ndimage import median_filter
+
+    return np.asarray(median_filter(x, WINDOW, mode="nearest"))
+
+
+def to_centre_of_mass(segment: Segment, places: Mapping[str, Place]) -> dict[str, np.ndarray]:
+    """Return the signals of a segment, those of sensors at `places` moved to the centre of mass."""
+    signals = dict(segment.signals)
+    (p, dp), (q, dq), (r, dr) = (
+        _rate_and_slope(segment, f"{axis}_rate") for axis in ("roll", "pitch", "yaw")
+    )
+    for name, (x, y, z) in places.items():
+        recorded = segment.signals[name]
+        if name == "velocity_x":
+            signals[name] = recorded - (q * z - r * y)
+        elif name == "velocity_y":
+            signals[name] = recorded - (r * x - p * z)
+        elif name == "acceleration_x":
+            signals[name] = recorded - (dq * z - dr * y - (q * q + r * r) * x + p * (q * y + r * z))
+        elif name == "acceleration_y":
+            signals[name] = recorded - (dr * x - dp * z - (p * p + r * r) * y + q * (p * x + r * z))
+        elif name == "sideslip" and "velocity_x" in segment.signals:
+            forward = segment.signals["velocity_x"]
+            signals[name] = np.arctan2(
+                (forward - r * y) * np.tan(recorded) - (r * x - p * z), np.maximum(forward, 0.1)
+            )
+    return signals
+
+
+def _rate_and_slope(segment: Segment, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return an angular rate and its derivative, without noise above `OF_ROTATION`; zeros if not recorded."""
+    if name not in segment.signals:
+        return np.zeros(segment.time.size), np.zeros(segment.time.size)
+    even = segment.even()
+    rate = even.signals[name]
+    smooth = LowPass(OF_ROTATION)(rate, even.rate) if even.rate > 2.5 * OF_ROTATION else rate
+    slope = np.gradient(smooth, even.time)
+    return np.interp(segment.time, even.time, smooth), np.interp(segment.time, even.time, slope)

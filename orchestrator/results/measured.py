@@ -1,0 +1,97 @@
+"""Recordings of cars as results of runs."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from ..errors import ResultsError
+from ..measured.measurement import ENDINGS, MEASURABLE, load_measurement
+from .folder_and_lock import COMPLETED
+from .read_and_salvage import Results, load_results
+from .run_record import DiagnosticRecord, FmuRecord, RunRecord
+
+STEERING = ("steering_wheel_angle", "steer_angle", "drive_force")
+"""Measured signals that a driver gives in simulations."""
+MEASURED = "measured"
+"""Name of the FMU in the record of a measurement."""
+
+
+def load_run(path: Path | str, *, thin: bool = False) -> Results:
+    """Read a recorded run: a results folder, a measurement file, or a segment of it, `measured.yaml#2`.
+
+    Args:
+        path: the folder or the file.
+        thin: see `load_results`.
+
+    Raises:
+        ResultsError, ScenarioError: it cannot be read.
+    """
+    path = Path(path)
+    return measured_results(path) if is_measurement(path) else load_results(path, thin=thin)
+
+
+def is_measurement(path: Path) -> bool:
+    """Return whether a path is that of a measurement file, or of a segment of it, not of a folder."""
+    return path.suffix.partition("#")[0] in ENDINGS and not path.is_dir()
+
+
+def segments_of(path: Path) -> list[Path]:
+    """Return the paths of all segments of a measurement file.
+
+    Raises:
+        ResultsError: it does not exist, or is a recording itself.
+        ScenarioError: it cannot be used.
+    """
+    if not os.path.exists(str(path).partition("#")[0]):
+        raise ResultsError(f"{path}: no such file or folder", code="results-missing")
+    if not is_measurement(path):
+        raise ResultsError(
+            f"{path}: describe recordings in a measurement file, 'files: [{path.name}]' and "
+            "'signals: {yaw_rate: {column: ..., unit: ...}}', and name that file",
+            code="measurement-missing",
+        )
+    count = len(load_measurement(path).segments) if "#" not in path.name else 1
+    return [Path(f"{path}#{k}") for k in range(1, count + 1)] if count > 1 else [path]
+
+
+def measured_results(path: Path) -> Results:
+    """Return a segment of a measurement as the results of a run.
+
+    Steering belongs to the instance `driver` there, all other signals to `plant`, so that they meet those of
+    simulations. What is known of the car are parameters of both.
+
+    Args:
+        path: the measurement file, with `#` and the number of the segment if it has several.
+
+    Raises:
+        ScenarioError: it cannot be used.
+        ResultsError: there is no such segment.
+    """
+    file, _, number = str(path).partition("#")
+    measurement = load_measurement(file)
+    try:
+        segment = measurement.segment(int(number) if number else None)
+    except ValueError as error:
+        raise ResultsError(f"{file}: {error}, as in {file}#1", code="segment-unknown") from None
+    columns, units = {}, {"time": "s"}
+    for name, values in segment.signals.items():
+        column = f"{'driver' if name in STEERING else 'plant'}.{name}"
+        columns[column], units[column] = values, MEASURABLE[name].unit
+    known = {**measurement.vehicle, **measurement.test}
+    record = RunRecord(
+        status=COMPLETED,
+        title=f"{measurement.title}, {segment.name}" if len(measurement.segments) > 1 else measurement.title,
+        rows=segment.time.size,
+        start_time=float(segment.time[0]),
+        stop_time=float(segment.time[-1]),
+        units=dict(units),
+        fmus={
+            role: FmuRecord(name=MEASURED, role=role, sha256=measurement.sha256, parameters=known)
+            for role in ("driver", "plant")
+        },
+        scenario={"source": measurement.origin, "file": str(path)},
+        diagnostics=[DiagnosticRecord.of(one) for one in measurement.notes],
+        results="",
+    )
+    return Results(path, segment.time, columns, units, record)

@@ -1,0 +1,275 @@
+"""Measurement files: every format and correction gives what was recorded; mistakes have a line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+import yawbench as yb
+from orchestrator.cli import main
+from orchestrator.errors import ResultsError, ScenarioError
+from orchestrator.measured.measurement import load_measurement
+from orchestrator.measured.segment import LowPass
+from orchestrator.plan import InputSeries
+from orchestrator.planner import Planner
+from orchestrator.results.measured import load_run
+from orchestrator.scenario.find_and_load import load_scenario
+from tests.sentences import golden
+
+T = np.arange(0.0, 6.0, 0.01)
+STEER = 0.5 * np.sin(2.0 * T)
+YAW = 0.2 * np.sin(2.0 * T - 0.3)
+SIDE = 4.0 * np.sin(2.0 * T - 0.4)
+HEAD = """files: [FILE]
+time: {column: Zeit, unit: ms}
+signals:
+  steering_wheel_angle: {column: Lenkrad, unit: deg}
+  yaw_rate: {column: Gier, unit: deg/s}
+  acceleration_y: {column: Quer, unit: g}
+"""
+COLUMNS = {
+    "Zeit": 1000.0 * T,
+    "Lenkrad": np.degrees(STEER),
+    "Gier": np.degrees(YAW),
+    "Quer": SIDE / 9.80665,
+    "Länge": T,
+}
+
+
+def described(folder: Path, text: str = HEAD, file: str = "run.csv") -> Path:
+    """Write a measurement file and return its path."""
+    path = folder / "measured.yaml"
+    path.write_text(text.replace("FILE", file), encoding="utf-8")
+    return path
+
+
+def write_csv(
+    path: Path, columns: dict[str, np.ndarray], separator: str = ",", comma: bool = False, code: str = "utf-8"
+) -> None:
+    """Write columns as text."""
+    rows = [separator.join(columns)]
+    for values in zip(*columns.values(), strict=True):
+        line = separator.join(f"{value:.12g}" for value in values)
+        rows.append(line.replace(".", ",") if comma else line)
+    path.write_bytes(("\n".join(rows) + "\n").encode(code))
+
+
+FORMS = {
+    "comma": (",", False, "utf-8"),
+    "semicolon and decimal comma, Latin-1": (";", True, "latin-1"),
+    "tab, Windows": ("\t", True, "cp1252"),
+    "bar": ("|", False, "utf-8-sig"),
+    "spaces": (" ", True, "utf-8"),
+    "UTF-16": (";", True, "utf-16"),
+}
+
+
+@pytest.mark.parametrize(("separator", "comma", "code"), FORMS.values(), ids=FORMS)
+def test_text_of_any_separator_decimal_and_encoding_gives_the_same(separator, comma, code, tmp_path):
+    write_csv(tmp_path / "run.csv", COLUMNS, separator, comma, code)
+    (segment,) = load_measurement(described(tmp_path)).segments
+    assert segment.time == pytest.approx(T, abs=1e-9)
+    assert segment.signals["steering_wheel_angle"] == pytest.approx(STEER, abs=1e-10)
+    assert segment.signals["acceleration_y"] == pytest.approx(SIDE, abs=1e-9)
+
+
+def test_parquet_and_mdf_give_the_same(tmp_path):
+    pq.write_table(pa.table(COLUMNS), tmp_path / "run.parquet")
+    (segment,) = load_measurement(described(tmp_path, file="run.parquet")).segments
+    assert segment.signals["yaw_rate"] == pytest.approx(YAW, abs=1e-12)
+    asammdf = pytest.importorskip("asammdf")
+    with asammdf.MDF(version="4.10") as mdf:
+        mdf.append([asammdf.Signal(x, T, name=name) for name, x in COLUMNS.items() if name != "Zeit"])
+        mdf.save(tmp_path / "run.mf4")
+    (segment,) = load_measurement(described(tmp_path, file="run.mf4")).segments
+    assert segment.signals["yaw_rate"] == pytest.approx(YAW, abs=1e-12)
+
+
+def test_sign_gain_offset_and_delay_are_undone(tmp_path):
+    late = np.sin(2.0 * (T - 0.02) - 0.3)
+    columns = COLUMNS | {"Gier": -(np.degrees(0.2 * late) / 1.25) + 3.0}
+    write_csv(tmp_path / "run.csv", columns)
+    text = HEAD.replace(
+        "{column: Gier, unit: deg/s}",
+        "{column: Gier, unit: deg/s, sign: -1, gain: 1.25, offset: 3 deg/s, delay: 20 ms, noise: 0.1 deg/s}",
+    )
+    measurement = load_measurement(described(tmp_path, text))
+    (segment,) = measurement.segments
+    kept = np.isin(np.round(T, 6), np.round(segment.time, 6))
+    assert T.size - kept.sum() == 2  # no value is made up after the last row
+    assert segment.signals["yaw_rate"] == pytest.approx(YAW[kept], abs=1e-5)
+    assert segment.signals["steering_wheel_angle"] == pytest.approx(STEER[kept], abs=1e-9)
+    assert measurement.noise == {"yaw_rate": pytest.approx(np.radians(0.1))}
+
+
+def test_spikes_are_replaced_and_nothing_else(tmp_path):
+    spiked = np.degrees(STEER)
+    spiked[[50, 51, 300]] += 40.0
+    write_csv(tmp_path / "run.csv", COLUMNS | {"Lenkrad": spiked})
+    text = HEAD.replace("unit: deg}", "unit: deg, spikes: 2 deg}")
+    (segment,) = load_measurement(described(tmp_path, text)).segments
+    error = np.abs(segment.signals["steering_wheel_angle"] - STEER)
+    assert error.max() < np.radians(0.05)
+    assert np.flatnonzero(error > 1e-9).tolist() == [50, 51, 300]
+
+
+def test_a_sensor_elsewhere_is_moved_to_the_centre_of_mass(tmp_path):
+    slope = np.gradient(YAW, T)
+    columns = COLUMNS | {"Quer": (SIDE + slope * 1.5 - YAW**2 * 0.4) / 9.80665}
+    write_csv(tmp_path / "run.csv", columns)
+    text = HEAD.replace("unit: g}", "unit: g, at: {x: 1.5 m, y: 0.4 m}}")
+    (segment,) = load_measurement(described(tmp_path, text)).segments
+    inner = slice(100, -100)
+    assert segment.signals["acceleration_y"][inner] == pytest.approx(SIDE[inner], abs=5e-3)
+    assert np.abs(columns["Quer"] * 9.80665 - SIDE).max() > 0.5
+
+
+def test_restarts_begin_segments_only_if_asked_for(tmp_path):
+    double = {name: np.concatenate([x, x[:200]]) for name, x in COLUMNS.items()}
+    lap = np.concatenate([np.full(T.size, 3.0), np.full(200, 4.0)])
+    write_csv(tmp_path / "run.csv", double | {"Lap": lap})
+    path = described(tmp_path)
+    with pytest.raises(ScenarioError) as refused:
+        load_measurement(path)
+    assert {one.code for one in refused.value.diagnostics} == {"measurement-time"}
+    assert (refused.value.file, refused.value.line) == (path, 1)
+    assert golden(str(refused.value.diagnostics[0].message))
+    for by, names in (("time", ["run.csv 1", "run.csv 2"]), ("Lap", ["run.csv 3", "run.csv 4"])):
+        segments = load_measurement(described(tmp_path, f"segments: {{by: {by}}}\n{HEAD}")).segments
+        assert [one.name for one in segments] == names
+        assert [one.time.size for one in segments] == [600, 200]
+    assert load_run(f"{path}#2").time.size == 200
+    with pytest.raises(ResultsError) as two:
+        load_run(path)
+    assert golden(str(two.value))
+
+
+def test_repeated_times_are_refused_or_averaged(tmp_path):
+    order = np.sort(np.concatenate([np.arange(T.size), [7, 7]]))
+    columns = {name: x[order].copy() for name, x in COLUMNS.items()}
+    columns["Gier"][7:10] += [3.0, 0.0, -3.0]
+    write_csv(tmp_path / "run.csv", columns)
+    with pytest.raises(ScenarioError) as refused:
+        load_measurement(described(tmp_path))
+    assert golden(str(refused.value.diagnostics[0].message))
+    text = HEAD.replace("unit: ms}", "unit: ms, repeated: mean}")
+    (segment,) = load_measurement(described(tmp_path, text)).segments
+    assert segment.signals["yaw_rate"] == pytest.approx(YAW, abs=1e-10)
+
+
+def test_the_filter_acts_on_all_signals_and_is_there_for_simulated_ones(tmp_path):
+    noise = 0.05 * np.sin(2.0 * np.pi * 30.0 * T)
+    write_csv(tmp_path / "run.csv", COLUMNS | {"Gier": np.degrees(YAW + noise)})
+    path = described(tmp_path, HEAD + "filter: {low_pass: 6 Hz}\n")
+    measurement = load_measurement(path)
+    inner = slice(100, -100)
+    assert measurement.filter == LowPass(6.0, 12, True)
+    filtered = measurement.segments[0].signals["yaw_rate"]
+    assert np.abs(filtered - YAW)[inner].max() < 1e-4
+    assert measurement.filter(YAW + noise, 100.0) == pytest.approx(filtered, abs=1e-6)
+    assert np.abs(load_measurement(path, filtered=False).segments[0].signals["yaw_rate"] - YAW).max() > 0.04
+    causal = LowPass(6.0, 4, phaseless=False)(YAW, 100.0)
+    assert np.abs(causal - YAW)[inner].max() > 0.01
+
+
+WRONG = {
+    "no such file": ("FILE", "other.csv"),
+    "signal": ("yaw_rate:", "yaw_rat:"),
+    "column": ("column: Gier", "column: Gear"),
+    "unit": ("unit: deg/s", "unit: degs"),
+    "unit of another kind": ("unit: deg/s", "unit: kg"),
+    "implausible": ("unit: deg/s", "unit: rad/s"),
+    "no unit": ("{column: Gier, unit: deg/s}", "Gier"),
+    "spikes": ("unit: deg/s", "unit: deg/s, spikes: 2"),
+    "noise": ("unit: deg/s", "unit: deg/s, noise: 2 m"),
+    "delay": ("unit: deg/s", "unit: deg/s, delay: 20 deg"),
+    "place": ("unit: deg/s", "unit: deg/s, at: {x: 1 m}"),
+    "axis": ("unit: g", "unit: g, at: {w: 1 m}"),
+    "order": ("files:", "filter: {low_pass: 6 Hz, order: 5}\nfiles:"),
+    "vehicle": ("files:", "vehicle: {mas: 1200 kg}\nfiles:"),
+    "vehicle's unit": ("files:", "vehicle: {mass: 1200}\nfiles:"),
+    "segments": ("files:", "segments: {by: Runde}\nfiles:"),
+    "key": ("files:", "licens: CC0\nfiles:"),
+}
+
+
+@pytest.mark.parametrize(("old", "new"), WRONG.values(), ids=WRONG)
+def test_a_mistake_is_answered_with_its_line(old, new, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_csv(Path("run.csv"), COLUMNS)
+    text = HEAD.replace(old, new)
+    described(Path(), text)
+    with pytest.raises(ScenarioError) as refused:
+        load_measurement("measured.yaml")
+    wanted = next(k for k, line in enumerate(text.splitlines(), start=1) if line not in HEAD.splitlines())
+    assert refused.value.line == wanted
+    assert golden([str(one) for one in refused.value.diagnostics])
+
+
+def test_a_recording_is_a_run(tmp_path):
+    write_csv(tmp_path / "run.csv", COLUMNS)
+    known = (
+        "vehicle: {mass: 1600 kg, friction: 0.9}\ncar: saloon\ndate: 2024-05-17\nsource: own\nlicence: CC0\n"
+    )
+    run = yb.measured(described(tmp_path, HEAD + known))
+    assert run["yaw_rate"] == pytest.approx(YAW, abs=1e-10)
+    assert run.metric("peak(yaw_rate)") == pytest.approx(0.2, rel=1e-3)
+    assert run.unit_of("steering_wheel_angle") == "rad"
+    assert run.title == "saloon, 2024-05-17"
+    assert not run.diagnostics
+    assert {axes.get_label() for axes in run.plot("yaw_rate", "acceleration_y").axes} == {
+        "yaw_rate", "acceleration_y",
+    }  # fmt: skip
+    assert "plant.yaw_rate" in yb.view({"measured": run, "again": run}, "yaw_rate").html
+
+
+def test_missing_provenance_is_asked_for(tmp_path):
+    write_csv(tmp_path / "run.csv", COLUMNS)
+    (note,) = yb.measured(described(tmp_path, HEAD + "car: saloon\n")).diagnostics
+    assert (note.code, note.severity) == ("measurement-unattributed", "info")
+    assert golden(note.message)
+
+
+def test_commands_take_measurement_files(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    write_csv(Path("run.csv"), COLUMNS)
+    write_csv(Path("other.csv"), COLUMNS | {"Gier": 1.1 * COLUMNS["Gier"]})
+    described(Path())
+    Path("other.yaml").write_text(HEAD.replace("FILE", "other.csv"))
+
+    def status_of(*arguments: str) -> int:
+        with pytest.raises(SystemExit) as ended:
+            main(arguments)
+        return int(ended.value.code or 0)
+
+    assert status_of("plot", "measured.yaml", "other.yaml", "--panel", "yaw_rate", "--out", "out") == 0
+    assert Path("out/runs.svg").exists() or list(Path("out").glob("*.svg"))
+    assert status_of("diff", "measured.yaml", "other.yaml") == 0
+    assert "plant.yaw_rate" in capsys.readouterr().out
+    assert status_of("evaluate", "step-steer", "run.csv", "--signals", "measured.yaml") == 2
+    assert golden(capsys.readouterr().err)
+    assert status_of("evaluate", "step-steer", "run.csv") == 2
+    assert golden(capsys.readouterr().err)
+
+
+def test_a_measurement_drives_an_input(tmp_path, fmus):
+    write_csv(tmp_path / "run.csv", COLUMNS)
+    described(tmp_path, HEAD.replace("Lenkrad, unit: deg", "Lenkrad, unit: deg, sign: -1"))
+    path = tmp_path / "scenario.yaml"
+    path.write_text(
+        "stop_time: 2\nstep_size: 0.01\nunits: {tyre: {fmu: tyre_linear}}\n"
+        "inputs:\n"
+        "  slip_angle_*: {file: measured.yaml, column: steering_wheel_angle, from: 1.5 s}\n"
+        "  slip_ratio_*: 0\n  vertical_load_*: 4000\n  friction_*: 1\n"
+    )
+    plan = Planner().plan(load_scenario(path), fmus=fmus)
+    series = plan.instances[0].series["slip_angle_fl"]
+    assert isinstance(series, InputSeries)
+    assert series.first(0.0) == pytest.approx(-np.interp(1.5, T, STEER), abs=1e-9)
+
+
+UNITS = ("tyre_linear",)
