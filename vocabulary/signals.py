@@ -64,7 +64,6 @@ SIGNALS: dict[str, SignalEntry] = {
     ),
     "roll_angle": SignalEntry("rad", "Roll angle, positive with the left side up", "φ", largest=math.pi),
     "roll_rate": SignalEntry("rad/s", "Roll rate", largest=5.0),
-    "pitch_rate": SignalEntry("rad/s", "Pitch rate", largest=5.0),
     "pitch_angle": SignalEntry("rad", "Pitch angle, positive with the nose down", "θ", largest=math.pi),
     "position_x": SignalEntry(
         "m", "Position of the centre of mass, earth axes, x", "x", "Longitudinal position"
