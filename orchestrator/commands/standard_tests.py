@@ -174,7 +174,8 @@ EvaluatedSources = Annotated[
     ),
 ]
 SignalsOption = Annotated[
-    Path | None, typer.Option("--signals", metavar="FILE", help="Replaced by measurement files.", hidden=True)
+    Path | None,
+    typer.Option("--signals", metavar="FILE", help="Of earlier versions: says what to write instead."),
 ]
 SlowSteer = Annotated[
     list[Path] | None,
