@@ -9,6 +9,9 @@ Each wheel has its own slip angle and its own load, quasi-static from a_y = Y / 
 longitudinal slip is 0, and longitudinal tyre forces, which the role has as inputs, are left out as in
 the paper. The controller's yaw moment M acts on the body from outside.
 
+If a speed is given from outside (`velocity_x_measured` above 0), v_x follows it: the value at the middle of
+a step is carried on to its end, and dv_x/dt is its slope. Loads stay those of a_x = 0.
+
 A bank and wind act as `cars.road_plane` says; on a slope, too, something holds v_x and loads no axle.
 
 Whatever holds v_x does work: a car that spins gains speed here, v_x / cos(beta), at 60 degrees of sideslip
@@ -91,6 +94,7 @@ class TwoDof(Car):
         *("steer_angle", "tyre_force_x_*", "tyre_force_y_*", "yaw_moment"),
         signal("tyre_moment_z_*", optional=True),
         *ROAD_PLANE,
+        signal("velocity_x_measured", "m/s", "Speed along x that the car is given; 0: none", optional=True),
     )
     outputs = (
         *MOTION,
@@ -101,6 +105,8 @@ class TwoDof(Car):
     )
 
     def rest(self, signals: Sequence[Any]) -> Values:
+        self.given = 0.0
+        self.slope = 0.0
         return (lateral_resultants(signals[0], signals[2], self.p)[0] / self.p.mass,)
 
     def move(self, h: float, delta: float, signals: Sequence[Any]) -> Values:
@@ -109,11 +115,18 @@ class TwoDof(Car):
         force, moment = lateral_resultants(delta, signals[2], self.p)
         a_y = force / self.p.mass
         dr = (moment + yaw_moment) / self.p.yaw_inertia
+        given, before = signals[-1], self.given
+        if given > 0.0:
+            self.slope = (given - before) / h if before > 0.0 else 0.0
+            self.given = given
+            self.motion = (given, *self.motion[1:])
         self.motion = drift(self.motion, h, a_y=a_y + pull.y, dr=dr)
+        if given > 0.0:
+            self.motion = (given + 0.5 * h * self.slope, *self.motion[1:])
         return (a_y,)
 
     def finish(self, carried: Values) -> None:
         (a_y,) = carried
         _, v_y, r = self.motion[:3]
-        self.end = -v_y * r, a_y + self.pull.y
+        self.end = self.slope - v_y * r, a_y + self.pull.y
         self.loads = quasi_static_loads(0.0, a_y, self.p, G - self.pull.lighter)

@@ -13,6 +13,9 @@ so a locked or sideways sliding wheel has exactly mu F_z against its sliding, an
 against its travel (kappa < -1) slides like a locked one. c is positive also for a wheel that rolls
 backwards, |alpha| > 90 degrees.
 
+C_y is half the cornering stiffness of the axle where the car's is known, else that of one tyre for all four;
+mu is the friction of the road times the grip of the axle (`tyre_models.axles`).
+
 Source: paper A, equations (9)-(12); H. Dugoff, P. S. Fancher, L. Segel, SAE 700377, 1970. Erratum: (10)
 prints cos(alpha) for tan(alpha); slip is positive when driving, as (9) needs.
 """
@@ -21,12 +24,13 @@ from dataclasses import dataclass
 from math import cos, sin, sqrt
 
 from ..fmi.variables import parameter
+from ..tyre_models.axles import AxleParameters, of_axle
 from ..tyre_models.tyre import Curve, Tyre
 
 
 @dataclass(frozen=True)
-class DugoffParameters:
-    """Of one tyre; all four are equal."""
+class DugoffParameters(AxleParameters):
+    """Of one tyre, and of the axles where they differ."""
 
     longitudinal_stiffness: float = parameter(
         40000.0, "N", "Longitudinal stiffness C_x of one tyre per unit slip", "paper A, table 1", minimum=1.0
@@ -78,17 +82,18 @@ class Dugoff(Tyre):
     Parameters = DugoffParameters
 
     @staticmethod
-    def axle(p: DugoffParameters, name: str) -> tuple[float, float]:
-        return p.longitudinal_stiffness, p.cornering_stiffness
+    def axle(p: DugoffParameters, name: str) -> tuple[float, float, float]:
+        c_y, grip = of_axle(p, name, p.cornering_stiffness)
+        return p.longitudinal_stiffness, c_y, grip
 
     @staticmethod
     def wheel(
-        kappa: float, alpha: float, f_z: float, mu: float, axle: tuple[float, float]
+        kappa: float, alpha: float, f_z: float, mu: float, axle: tuple[float, float, float]
     ) -> tuple[float, ...]:
-        c_x, c_y = axle
-        return dugoff(alpha, kappa, f_z, mu, c_x, c_y)
+        c_x, c_y, grip = axle
+        return dugoff(alpha, kappa, f_z, mu * grip, c_x, c_y)
 
     @classmethod
-    def curve(cls, alpha: float, f_z: float, mu: float, axle: tuple[float, float]) -> Curve:
-        c_x, c_y = axle
-        return lambda kappa: dugoff(alpha, kappa, f_z, mu, c_x, c_y)[0], mu * f_z / c_x
+    def curve(cls, alpha: float, f_z: float, mu: float, axle: tuple[float, float, float]) -> Curve:
+        c_x, c_y, grip = axle
+        return lambda kappa: dugoff(alpha, kappa, f_z, mu * grip, c_x, c_y)[0], mu * grip * f_z / c_x

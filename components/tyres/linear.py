@@ -3,6 +3,9 @@
     F_x = C_x kappa        F_y = -C_y alpha
     limited:  F scaled by mu F_z / |F| where |F| > mu F_z; none without friction
 
+C_y is half the cornering stiffness of the axle where the car's is known, else that of one tyre for all four;
+mu is the friction of the road times the grip of the axle (`tyre_models.axles`).
+
 For comparison with linear theory. A wheel that rolls backwards has its slip angle folded back to
 [-pi/2, pi/2], so that the force still opposes the lateral sliding. No load, no force.
 """
@@ -11,12 +14,13 @@ from dataclasses import dataclass
 from math import pi, sqrt
 
 from ..fmi.variables import parameter
+from ..tyre_models.axles import AxleParameters, of_axle
 from ..tyre_models.tyre import Tyre
 
 
 @dataclass(frozen=True)
-class LinearTyreParameters:
-    """Of one tyre; all four are equal."""
+class LinearTyreParameters(AxleParameters):
+    """Of one tyre, and of the axles where they differ."""
 
     longitudinal_stiffness: float = parameter(
         40000.0, "N", "Longitudinal stiffness C_x of one tyre per unit slip", "paper A, table 1", minimum=0.0
@@ -27,26 +31,33 @@ class LinearTyreParameters:
     limited: bool = parameter(False, None, "Limit the force to mu F_z", "chosen: off, a truly linear tyre")
 
 
+LinearAxle = tuple[float, float, float, bool]
+"""Longitudinal [N] and cornering stiffness [N/rad], grip [1], whether friction limits the force."""
+
+
 class LinearTyre(Tyre):
     """Linear tyres on four wheels, without or with a friction limit."""
 
     Parameters = LinearTyreParameters
 
     @staticmethod
-    def wheel(
-        kappa: float, alpha: float, f_z: float, mu: float, axle: LinearTyreParameters
-    ) -> tuple[float, ...]:
+    def axle(p: LinearTyreParameters, name: str) -> LinearAxle:
+        c_y, grip = of_axle(p, name, p.cornering_stiffness)
+        return p.longitudinal_stiffness, c_y, grip, p.limited
+
+    @staticmethod
+    def wheel(kappa: float, alpha: float, f_z: float, mu: float, axle: LinearAxle) -> tuple[float, ...]:
         if not f_z > 0.0:
             return 0.0, 0.0, 0.0
         if alpha > 0.5 * pi:
             alpha = pi - alpha
         elif alpha < -0.5 * pi:
             alpha = -pi - alpha
-        c_x = axle.longitudinal_stiffness
-        f_x, f_y = c_x * kappa, -axle.cornering_stiffness * alpha
-        if not axle.limited:
+        c_x, c_y, of_tyre, limited = axle
+        f_x, f_y = c_x * kappa, -c_y * alpha
+        if not limited:
             return f_x, f_y, c_x
-        grip, square = mu * f_z, f_x * f_x + f_y * f_y
+        grip, square = mu * of_tyre * f_z, f_x * f_x + f_y * f_y
         if not grip > 0.0:
             return 0.0, 0.0, 0.0
         size = sqrt(square)

@@ -149,6 +149,7 @@ class Parameters:
                 key = ("units", unit, "parameters", name)
                 if (unit, name) not in by_change or self._scenario.document.override(key):
                     self._give_own(unit, name, raw, key)
+        self._settle_stiffnesses()
         self._refuse_half_a_car()
         return self._given
 
@@ -278,6 +279,16 @@ class Parameters:
                     "value-unused", f"vehicle.{name} changes nothing: no unit here takes it or what follows"
                 )
 
+    def _settle_stiffnesses(self) -> None:
+        """Leave out the vehicle file's stiffness of an axle where the scenario gives that of one tyre."""
+        for unit in self._takers("cornering_stiffness"):
+            origins = self._system.origins[unit]
+            own = _level(origins["cornering_stiffness"])
+            for name in STIFFNESSES:
+                if name in self._given[unit] and own > _level(origins[name]):
+                    del self._given[unit][name]
+                    origins[name] = DEFAULT
+
     def _refuse_half_a_car(self) -> None:
         """Report instances that get only part of their car; store which stiffnesses tyres must supply.
 
@@ -290,7 +301,8 @@ class Parameters:
         for unit, fmu in self._fmus.items():
             given = self._given[unit]
             lacks = [v.name for v in fmu.of("parameter") if v.name in CAR and v.name not in given]
-            if of_tyres := [name for name in lacks if name in STIFFNESSES]:
+            of_tyres = [name for name in lacks if name in STIFFNESSES]
+            if of_tyres and "tyre_force_y_fl" not in fmu.variables:
                 self.lacking[unit] = of_tyres
             needed = [name for name in lacks if CAR[name].needed]
             if needed and any(name in self.car.values for name in given):
@@ -308,6 +320,11 @@ class Parameters:
             return False
         before = self._system.replaced(unit)
         return before is None or _is_parameter(before, name)
+
+
+def _level(came: ValueOrigin) -> int:
+    """Return the precedence of an origin: that of a default, the vehicle file, the scenario, an override."""
+    return {"default": 0, "vehicle": 1, "derived": 1, "scenario": 2, "file": 2}.get(came.kind, 3)
 
 
 def _from_file(name: str, says: str, place: tuple[Document, KeyPath]) -> ValueOrigin:

@@ -81,6 +81,7 @@ SPREAD = {
 """How far about that, by unit."""
 
 ODD = {
+    "steering_wheel_angle_measured",
     *("velocity_y", "yaw_rate", "sideslip", "sideslip_rate", "acceleration_y", "roll_angle", "roll_rate"),
     *("position_y", "yaw_angle", "steer_angle", "steering_wheel_angle", "yaw_rate_ref", "sideslip_ref"),
     *("yaw_acceleration_ref", "sideslip_rate_ref", "yaw_moment", "path_offset"),

@@ -45,7 +45,7 @@ def test_limited_there_is_no_force_without_load_and_friction_above_zero(load, mu
 
 
 def linear_tyre(alpha, kappa):
-    return LinearTyre.wheel(kappa, alpha, 1.0, 1.0, LinearTyreParameters())[:2]
+    return LinearTyre.wheel(kappa, alpha, 1.0, 1.0, LinearTyre.axle(LinearTyreParameters(), "front"))[:2]
 
 
 def test_mirrored_slip_gives_the_mirrored_force_to_the_last_bit():
