@@ -66,5 +66,7 @@ class Measured(Component):
 
     def _wanted(self, u: list[float]) -> float:
         p = self.p
-        wanted = p.mass * u[2] + p.speed_gain * (u[1] - u[3])
-        return min(max(wanted, -p.brake_force_limit), p.drive_force_limit)
+        wanted: float = p.mass * u[2] + p.speed_gain * (u[1] - u[3])
+        low: float = -p.brake_force_limit
+        high: float = p.drive_force_limit
+        return min(max(wanted, low), high)
