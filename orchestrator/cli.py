@@ -45,6 +45,7 @@ COMMANDS = {
     "export-ssp": "interop",
     "second-opinion": "interop",
     "tyre": "vehicle_and_tyre",
+    "measured": "measured",
     "vehicle": "vehicle_and_tyre",
     "cache": "build_and_list",
 }

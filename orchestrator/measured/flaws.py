@@ -1,0 +1,180 @@
+"""Flaws of recordings, found where signals say the same twice.
+
+The lateral acceleration is that of the motion, a_y = dv_y/dt + r v_x, with v_y = v_x tan(beta). One flaw at a
+time is supposed: a factor or sign of a signal, a lag of the accelerometer, its place or zero point, the zero
+point of the yaw rate. The one that leaves the smallest residual is named if it explains `EXPLAINED` of what
+is left without it; a recording without v_y and sideslip is examined for factors and signs alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import ScenarioError
+from .measurement import MEASURABLE, load_measurement
+from .segment import LowPass, Segment, running_median
+
+FACTORS = {"yaw_rate": 180.0 / np.pi, "acceleration_y": 9.80665, "velocity_x": 3.6}
+"""Signal -> factor by which it is wrong if its unit is mistaken: deg for rad, g for m/s2, km/h for m/s."""
+BAND = 3.0
+"""Cut-off of the low pass before signals are compared [Hz]. Chosen: cars hardly answer faster."""
+EXPLAINED = 0.5
+"""Part of the residual's power that a flaw must explain. Chosen: noise explains none, a flaw nearly all."""
+NEAR = 0.25
+"""Relative distance from a factor that still names it. Chosen: the factors lie further apart."""
+SPIKE = 12.0
+"""Distance of a spike from its median, over that of 98 of 100 samples. Chosen: noise has less than 3."""
+EVEN = 0.05
+"""Part of the steps that may be uneven. Chosen: single gaps are no uneven sampling."""
+LEAST = {"lag": 0.004, "place": 0.1, "zero of acceleration_y": 0.05, "zero of yaw_rate": 0.002}
+"""Least lag [s], distance [m], zero points [m/s2, rad/s] that are named. Chosen: harmless to a comparison."""
+
+
+@dataclass(frozen=True)
+class Flaw:
+    """What is wrong with a recording."""
+
+    kind: str  # "sign", "factor", "lag", "place", "zero", "spikes", "uneven time", or "refused"
+    signal: str
+    value: float  # the factor, the lag [s], the distance [m], the zero point in SI, the number of spikes
+    text: str
+
+
+def flaws_of(path: Path | str) -> tuple[Flaw, ...]:
+    """Return the flaws of a measurement, none twice.
+
+    Raises:
+        ScenarioError: it cannot be read for a reason other than its times and the size of its values.
+    """
+    try:
+        measurement = load_measurement(path, filtered=False)
+    except ScenarioError as error:
+        if any(one.code not in ("measurement-time", "series-unreadable") for one in error.diagnostics):
+            raise
+        return tuple(Flaw("refused", "", 0.0, one.message) for one in error.diagnostics)
+    found: dict[tuple[str, str], Flaw] = {}
+    for segment in measurement.segments:
+        for flaw in _of_segment(segment):
+            found.setdefault((flaw.kind, flaw.signal), flaw)
+    return tuple(found.values())
+
+
+def _of_segment(segment: Segment) -> list[Flaw]:
+    flaws = [flaw for name, x in segment.signals.items() if (flaw := _spikes(name, x)) is not None]
+    steps = np.diff(segment.time)
+    uneven = float(np.mean(np.abs(steps / np.median(steps) - 1.0) > 0.1))
+    if uneven > EVEN:
+        words = f"{100.0 * uneven:.0f} % of its steps differ from their median by more than a tenth"
+        flaws.append(Flaw("uneven time", "", uneven, words))
+    if flaws:
+        return flaws
+    contradiction = _contradiction(segment.even())
+    return [contradiction] if contradiction else []
+
+
+def _spikes(name: str, x: np.ndarray) -> Flaw | None:
+    off = np.abs(x - running_median(x))
+    usual = float(np.quantile(off, 0.98))
+    count = int(np.sum(off > SPIKE * max(usual, 1e-3 * float(np.ptp(x)))))
+    if not count:
+        return None
+    unit = MEASURABLE[name].unit
+    size = float(off.max())
+    return Flaw(
+        "spikes",
+        name,
+        count,
+        f"has {count} spikes up to {size:.3g} {unit}: 'spikes: {0.3 * size:.2g} {unit}'",
+    )
+
+
+def _contradiction(even: Segment) -> Flaw | None:
+    """Return the one flaw that explains why a_y is not that of the motion."""
+    if not {"yaw_rate", "acceleration_y", "velocity_x"} <= even.signals.keys() or even.rate < 3.0 * BAND:
+        return None
+    low, edge = LowPass(BAND), int(even.rate)
+    smooth = {name: low(x, even.rate) for name, x in even.signals.items()}
+    r, a_y, v = (smooth[name] for name in ("yaw_rate", "acceleration_y", "velocity_x"))
+    inner = slice(edge, -edge)
+    if a_y[inner].size < 10 or np.std(a_y[inner]) < 0.1:
+        return None
+    turning = r * v
+    ratio = float(np.sum((a_y * turning)[inner]) / np.sum((turning * turning)[inner]))
+    if (flaw := _factor(ratio)) is not None:
+        return flaw
+    if ratio < 0.0:
+        return _sign(smooth, inner)
+    side = _lateral_velocity(smooth)
+    if (flaw := _steering(smooth, inner)) is not None or side is None:
+        return flaw
+    motion = turning + np.gradient(side, even.time)
+    slope = np.gradient(a_y, even.time)
+    return _single(
+        (a_y - motion)[inner],
+        {
+            ("lag", "acceleration_y"): -slope[inner],
+            ("place", "acceleration_y"): np.gradient(r, even.time)[inner],
+            ("zero", "acceleration_y"): np.ones(a_y.size)[inner],
+            ("zero", "yaw_rate"): -v[inner],
+        },
+    )
+
+
+def _lateral_velocity(smooth: Mapping[str, np.ndarray]) -> np.ndarray | None:
+    if "velocity_y" in smooth:
+        return smooth["velocity_y"]
+    return smooth["velocity_x"] * np.tan(smooth["sideslip"]) if "sideslip" in smooth else None
+
+
+def _factor(ratio: float) -> Flaw | None:
+    """Return the signal whose unit explains the ratio of a_y to r v."""
+    for name, factor in FACTORS.items():
+        for wrong, of_ratio in (
+            (factor, factor if name == "acceleration_y" else 1.0 / factor),
+            (1.0 / factor, 1.0 / factor if name == "acceleration_y" else factor),
+        ):
+            if abs(abs(ratio) / of_ratio - 1.0) < NEAR:
+                words = (
+                    f"is {wrong:.3g} times what the other signals say: 'gain: {1.0 / wrong:.4g}', or its unit"
+                )
+                return Flaw("factor", name, wrong, words)
+    return None
+
+
+def _sign(smooth: Mapping[str, np.ndarray], inner: slice) -> Flaw:
+    """Return which of yaw rate and lateral acceleration has the wrong sign: the one against the steering."""
+    hand = next((smooth[name] for name in ("steering_wheel_angle", "steer_angle") if name in smooth), None)
+    name = "acceleration_y"
+    if hand is not None and float(np.sum((hand * smooth["yaw_rate"])[inner])) < 0.0:
+        name = "yaw_rate"
+    return Flaw("sign", name, -1.0, "is opposed to the other signals: 'sign: -1'")
+
+
+def _steering(smooth: Mapping[str, np.ndarray], inner: slice) -> Flaw | None:
+    for name in ("steering_wheel_angle", "steer_angle"):
+        if name in smooth and float(np.sum((smooth[name] * smooth["yaw_rate"])[inner])) < 0.0:
+            return Flaw("sign", name, -1.0, "is opposed to the yaw rate: 'sign: -1'")
+    return None
+
+
+def _single(residual: np.ndarray, effects: Mapping[tuple[str, str], np.ndarray]) -> Flaw | None:
+    """Return the flaw whose effect explains most of a residual, if it explains enough and is large enough."""
+    power = float(np.sum(residual**2))
+    sizes = {key: float(np.sum(residual * x) / np.sum(x * x)) for key, x in effects.items()}
+    left = {key: float(np.sum((residual - sizes[key] * x) ** 2)) for key, x in effects.items()}
+    best = min(left, key=left.__getitem__)
+    (kind, name), value = best, sizes[best]
+    least = LEAST[f"{kind} of {name}" if kind == "zero" else kind]
+    if left[best] > (1.0 - EXPLAINED) * power or abs(value) < least:
+        return None
+    unit = MEASURABLE[name].unit
+    words = {
+        "lag": f"lags by {1000.0 * value:.1f} ms: 'delay: {1000.0 * value:.1f} ms'",
+        "place": f"is measured {value:.2f} m ahead of the centre of mass: 'at: {{x: {value:.2f} m}}'",
+        "zero": f"shows {value:.3g} {unit} at zero: 'offset: {value:.3g} {unit}'",
+    }
+    return Flaw(kind, name, value, words[kind])
