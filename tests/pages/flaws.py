@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import functools
+from importlib.resources import files
+
 from .browser import Browser
 
 CUT = """
@@ -79,6 +82,33 @@ Promise.all([...document.images].map(async (image) => {
   return inked(image) > 0.01 ? null : `empty: ${image.alt}`;
 })).then((said) => done(said.filter(Boolean)));
 """
+
+
+AXE = """
+const done = arguments[arguments.length - 1];
+axe.run(document, {resultTypes: ['violations']}).then(({violations}) => done(violations.flatMap((one) =>
+  one.nodes.map((node) => `${one.id}: ${node.target}: ${node.failureSummary.split('\\n')[1] || ''}`))));
+"""
+
+
+def inaccessible(chromium: Browser) -> list[str]:
+    """Return what axe-core finds on the page that is open, in light and in dark colours."""
+    found = []
+    for scheme in ("dark", "light"):
+        wish = {"name": "prefers-color-scheme", "value": scheme}
+        calm = {"name": "prefers-reduced-motion", "value": "reduce"}
+        chromium.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": [wish, calm]})
+        chromium.run(_axe())
+        chromium.driver.set_script_timeout(60)
+        found += [f"{scheme}: {said}" for said in chromium.driver.execute_async_script(AXE)]
+    chromium.run("scrollTo({top: 0, behavior: 'instant'})")  # axe-core scrolls to what it looks at
+    return found
+
+
+@functools.cache
+def _axe() -> str:
+    """Return the script of axe-core."""
+    return (files("axe_selenium_python") / "node_modules/axe-core/axe.min.js").read_text(encoding="utf-8")
 
 
 def flaws(chromium: Browser) -> list[str]:

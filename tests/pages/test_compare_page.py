@@ -12,7 +12,7 @@ from tests.fmu_copies import put_fmus
 from tests.sentences import golden, golden_in
 
 from .browser import DESK, PHONE
-from .flaws import flaws, open_all
+from .flaws import flaws, inaccessible, open_all
 from .made_up import data_in
 
 ROOT = Path(__file__).parents[2]
@@ -88,6 +88,7 @@ def test_nothing_is_cut_overlapping_or_empty_at_any_width(chromium, page, width)
     assert flaws(chromium) == []
     open_all(chromium)
     assert flaws(chromium) == []
+    assert inaccessible(chromium) == []
 
 
 def test_the_viewer_comes_first_with_the_signals_that_differ_most(chromium, page):

@@ -16,7 +16,7 @@ from orchestrator.pages.evaluation_page import criteria_of, evaluation_page, res
 from tests.orchestrator.recorded import write
 
 from .browser import DESK, PHONE, Browser
-from .flaws import flaws, open_all
+from .flaws import flaws, inaccessible, open_all
 from .made_up import data_in, whole_car
 
 TEST = TESTS["sine-with-dwell"]
@@ -107,3 +107,4 @@ def test_the_page_has_no_flaws(chromium: Browser, traces, tmp_path: Path, width:
     chromium.open(file, width=width)
     open_all(chromium)
     assert flaws(chromium) == []
+    assert inaccessible(chromium) == []

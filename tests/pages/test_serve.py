@@ -25,6 +25,7 @@ from tests.sentences import golden
 from vocabulary.vehicle import CAR
 
 from .browser import PHONE, Browser
+from .flaws import inaccessible
 from .made_up import whole_car
 from .test_viewer import labelled
 
@@ -327,6 +328,15 @@ def test_the_bench_fits_a_phone(server, chromium: Browser):
     chromium.driver.get(f"{server.address}bench?scenario={SCENARIO}")
     chromium.wait_for("document.querySelector('form.bench')?.dataset.shown")
     assert chromium.overflow() <= 0
+    assert inaccessible(chromium) == []
+
+
+@pytest.mark.parametrize("address", ["", f"bench?scenario={SCENARIO}", "view?run=runs/one&run=runs/two"])
+def test_every_page_of_the_server_can_be_read_by_everyone(server, chromium: Browser, address):
+    chromium.open(Path("/"))
+    chromium.driver.get(f"{server.address}{address}")
+    chromium.wait_for("document.querySelectorAll('.yv:not(.yv-ready)').length === 0")
+    assert inaccessible(chromium) == []
 
 
 def test_ctrl_c_ends_the_command_and_its_processes(folder):

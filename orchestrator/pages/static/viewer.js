@@ -107,6 +107,13 @@ class Viewer {
     };
   }
 
+  // Level of the panels' headings: one below the last heading before the viewer.
+  get level() {
+    const before = [...document.querySelectorAll('h1, h2, h3, h4, h5')]
+      .filter((one) => !one.closest('.yv') && one.compareDocumentPosition(this.root) & Node.DOCUMENT_POSITION_FOLLOWING);
+    return before.length ? Number(before.at(-1).tagName[1]) + 1 : 2;
+  }
+
   // Runs, baseline and panels of a view.
   viewed(number) {
     const {shown, panels, x} = this.data.views[number];
