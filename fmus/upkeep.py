@@ -37,10 +37,10 @@ _NO_KEY = "none"
 
 
 class FmuUpdater:
-    """Brings FMUs up to date, each once. `tell` is called with a line for each FMU that is built."""
+    """Brings FMUs up to date, each once. `report` is called with a line for each FMU that is built."""
 
-    def __init__(self, tell: Callable[[str], None]) -> None:
-        self._tell = tell
+    def __init__(self, report: Callable[[str], None]) -> None:
+        self._report = report
         self._digests = SourceDigests()
         self._recipes: dict[str, Recipe] = {}
         self._brought: dict[tuple[Path, bool], tuple[Path, BuildInfo | None]] = {}
@@ -122,7 +122,7 @@ class FmuUpdater:
         built = read_stamp(target)
         assert built is not None
         later = f"; it runs in Python: {LATER}" if built.is_unfinished else ""
-        self._tell(f"{recipe.name}: built{later}")
+        self._report(f"{recipe.name}: built{later}")
         return target, _built(built, current=True)
 
 

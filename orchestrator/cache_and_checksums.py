@@ -50,7 +50,7 @@ def cache_folders() -> Iterator[Path]:
     folder = _user_folder()
     errors: list[str | Diagnostic] = []
     not_plain = (
-        f"{folder}: FMUs cannot be unpacked here: the path holds more than ASCII letters, digits, "
+        f"{folder}: FMUs cannot be unpacked here: the path has more than ASCII letters, digits, "
         "spaces and ._~-; name another folder in YAWBENCH_CACHE"
     )
     usable = folder is not None and bool(_PLAIN_PATH.fullmatch(str(folder)))

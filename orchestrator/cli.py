@@ -199,8 +199,8 @@ TRACEBACK = "YAWBENCH_TRACEBACK"
 
 
 def _print_errors(diagnostics: Iterable[Diagnostic]) -> None:
-    for one in diagnostics:
-        print(cut(str(one), LONGEST_MESSAGE), file=sys.stderr)
+    for diagnostic in diagnostics:
+        print(cut(str(diagnostic), LONGEST_MESSAGE), file=sys.stderr)
 
 
 def _print_traceback(error: BaseException) -> bool:

@@ -106,7 +106,7 @@ class Diagnostic:
 
 def errors_in(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
     """Return the diagnostics that are errors."""
-    return tuple(one for one in diagnostics if one.severity == "error")
+    return tuple(diagnostic for diagnostic in diagnostics if diagnostic.severity == "error")
 
 
 def warnings_in(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
@@ -161,7 +161,9 @@ class YawbenchError(Exception):
 
     def __init__(self, messages: Messages, *, code: str | None = None) -> None:
         self.diagnostics = _diagnostics(messages, code or self.default_code)
-        located = next((one.location for one in self.diagnostics if one.location.file), Location())
+        located = next(
+            (diagnostic.location for diagnostic in self.diagnostics if diagnostic.location.file), Location()
+        )
         self.file = located.file
         self.line = located.line
         super().__init__("\n".join(map(str, self.diagnostics)))
@@ -277,8 +279,8 @@ class SimulationError(YawbenchError):
     ) -> None:
         where = Location(instance=instance, time=time)
         super().__init__([
-            replace(one, location=where) if one.location == Location() else one
-            for one in _diagnostics(messages, code or self.default_code)
+            replace(diagnostic, location=where) if diagnostic.location == Location() else diagnostic
+            for diagnostic in _diagnostics(messages, code or self.default_code)
         ])  # fmt: skip
         self.instance = instance
         self.time = time

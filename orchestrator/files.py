@@ -124,13 +124,13 @@ def check_archive(archive: zipfile.ZipFile) -> None:
     """
     members = archive.infolist()
     if len(members) > MEMBERS:
-        raise TooLargeError(f"it holds {len(members)} files, more than {MEMBERS}")
+        raise TooLargeError(f"it contains {len(members)} files, more than {MEMBERS}")
     size = sum(member.file_size for member in members)
     if size > UNPACKED:
         raise TooLargeError(f"unpacked it has {_in_words(size)}, more than {_in_words(UNPACKED)}")
     depth = max((re.sub(r"[/\\\\]+", "/", member.filename).count("/") for member in members), default=0)
     if depth > DEPTH:
-        raise TooLargeError(f"it holds {depth} folders in each other, more than {DEPTH}")
+        raise TooLargeError(f"it contains {depth} nested folders, more than {DEPTH}")
 
 
 def _in_words(size: int) -> str:

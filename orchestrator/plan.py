@@ -131,7 +131,7 @@ class Fmu:
         """Whether the FMU is not written in Python, so that fewer checks and messages are possible."""
         return not self.python_modules
 
-    def doubts(self) -> list[str]:
+    def violations(self) -> list[str]:
         """Return a message for every violation of the standard in the model description."""
         return [f"the model description is not valid FMI {self.fmi}.0: {flaw}" for flaw in self.flaws]
 

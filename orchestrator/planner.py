@@ -80,7 +80,7 @@ class Planner:
         chosen = [
             name
             for text, name in recorded.items()
-            if any(match(pattern, one) is not None for pattern in record for one in (text, name.variable))
+            if any(match(pattern, known) is not None for pattern in record for known in (text, name.variable))
         ]
         return replace(plan, record=tuple(chosen))
 

@@ -41,12 +41,12 @@ def python(module: str, *arguments: object) -> list[str]:
 def how_it_ended(code: int) -> str:
     """Describe how a process ended, by its return code as `subprocess` gives it."""
     if code >= 0:
-        return f"ended itself with exit status {code}"
+        return f"ended with exit status {code}"
     try:
         name = signal.Signals(-code).name
     except ValueError:
         name = f"signal {-code}"
-    return f"died of {name}" + (" (sent from outside or for want of memory)" if name == "SIGKILL" else "")
+    return f"died of {name}" + (" (sent by another process, or out of memory)" if name == "SIGKILL" else "")
 
 
 def die_with_parent(number: int = signal.SIGKILL) -> None:

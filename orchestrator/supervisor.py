@@ -196,7 +196,7 @@ class SupervisedProcess:
         """Kill the process if its answer is late, and raise `ProcessLost`."""
         if time.monotonic() > self._deadline:
             self.close(kill=True)
-            raise ProcessLost("did not come back")
+            raise ProcessLost("did not respond")
 
     def hear(self, wanted: int) -> Any:
         """Handle incoming records until the expected record or one-byte answer arrives; return it."""

@@ -28,7 +28,7 @@ from orchestrator.fmu.binary import NATIVE, runs_as
 from orchestrator.interop.second_opinion import MASTERS, installed, second_opinion
 from orchestrator.interrupts import StopFlag
 from orchestrator.master.compiled_loop import WANTED as LOOP
-from orchestrator.master.fmi import open_unit
+from orchestrator.master.fmi import open_instance
 from orchestrator.master.log_and_process_state import Log
 from orchestrator.master.master import Master
 from orchestrator.master.step_program import Operation
@@ -81,7 +81,7 @@ def measure(plan: Plan, change: Change = lambda operation: [operation]) -> dict[
     begin = perf_counter()
     try:
         for unit in plan.instances:
-            slaves[unit.name] = open_unit(unit, log, corrupted)
+            slaves[unit.name] = open_instance(unit, log, corrupted)
         opened = perf_counter()
         master = Master(plan, slaves, log, StopFlag())
         row = np.zeros(1 + len(plan.record))

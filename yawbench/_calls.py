@@ -9,7 +9,7 @@ from typing import Any
 from orchestrator.errors import YawbenchError
 from orchestrator.experiments.jobs import Job, Outcome, execute
 from orchestrator.fmu.binary import NATIVE
-from orchestrator.master.fmi import open_unit
+from orchestrator.master.fmi import open_instance
 from orchestrator.master.log_and_process_state import Log
 from orchestrator.plan import Instance
 
@@ -21,7 +21,9 @@ def opener_of(programs: Mapping[Path, PythonComponent]) -> Callable[[Instance, L
 
     def opener(unit: Instance, log: Log, corrupted: set[Path]) -> Any:
         program = programs.get(unit.fmu.path)
-        return program.open(unit, log) if program and _in_python(unit) else open_unit(unit, log, corrupted)
+        return (
+            program.open(unit, log) if program and _in_python(unit) else open_instance(unit, log, corrupted)
+        )
 
     return opener
 

@@ -22,7 +22,7 @@ from orchestrator.experiments.planning import metrics_of, plan_experiment
 from orchestrator.experiments.record import columns_of
 from orchestrator.experiments.schema import ExperimentSpec, FigureSpec
 from orchestrator.experiments.tables import to_pandas
-from orchestrator.master.fmi import open_unit
+from orchestrator.master.fmi import open_instance
 from orchestrator.master.run_loop import OpenInstance
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.messages import hint, listed, printable, short
@@ -199,7 +199,7 @@ class Experiment:
         return Runs(findings, runs)
 
 
-def _in_memory(job: Job, opener: OpenInstance = open_unit) -> Results:
+def _in_memory(job: Job, opener: OpenInstance = open_instance) -> Results:
     assert job.plan is not None
     return simulate_in_memory(job.plan, opener=opener)
 

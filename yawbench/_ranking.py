@@ -93,7 +93,7 @@ def rank(
     kept = {key: entry for key, entry in loaded.entries.items() if key in wanted or key in more}
     loaded = replace(loaded, entries=kept)
     opened = {path: program.as_now() for path, program in programs.items()}
-    planner = Planner(build=True, tell=lambda text: None, opened=opened)
+    planner = Planner(build=True, report=lambda text: None, opened=opened)
     with contextlib.ExitStack() as stack:
         folder = Path(kept_in or stack.enter_context(tempfile.TemporaryDirectory()))
         stack.enter_context(writing(folder))

@@ -227,7 +227,7 @@ class Scenario:
     def _planner(self) -> Planner:
         """Return a planner that builds FMUs silently if out of date and knows the plain Python components."""
         opened = {path: program.as_now() for path, program in self.programs.items()}
-        return Planner(build=True, tell=lambda text: None, opened=opened)
+        return Planner(build=True, report=lambda text: None, opened=opened)
 
     def run(self, *, progress: Callable[[int, int], None] | None = None) -> Run:
         """Run the scenario in this process and return its results; nothing is written.
@@ -260,7 +260,9 @@ class Scenario:
                 run = Run(simulate_in_memory(again, opener=opener))  # fails, too, with an exception to show
         except SimulationError as error:
             warn(plan.title, (*plan.diagnostics, *error.warnings))
-            causes = [getattr(slave, "error", None) for slave in opened if slave.name == error.instance]
+            causes = [
+                getattr(instance, "error", None) for instance in opened if instance.name == error.instance
+            ]
             raise error from next(iter(causes), None)
         warn(run.title, run.diagnostics)
         return run

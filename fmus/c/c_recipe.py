@@ -68,7 +68,7 @@ class CRecipe:
 
     def __post_init__(self) -> None:
         if not (self.source / DESCRIPTION).is_file():
-            raise BuildError(f"{self.source}: no unit in C: it holds no {DESCRIPTION}")
+            raise BuildError(f"{self.source}: not a component in C: it contains no {DESCRIPTION}")
         if self.source.parent.name not in ROLES:
             folders = ", ".join(ROLES)
             raise BuildError(
@@ -125,7 +125,7 @@ class CRecipe:
         sources = {file.name: file.read_bytes() for file in code}
         units = [name for name in sources if name.endswith(".c")]
         if not units:
-            raise BuildError(f"{self.source} holds no C file")
+            raise BuildError(f"{self.source} contains no C file")
         role = ROLES[self.source.parent.name]
         root, variables = read_declaration(description.read_bytes(), self.name, role)
         root.set("guid", _guid(root, sources))

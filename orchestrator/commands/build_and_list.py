@@ -103,7 +103,9 @@ def cache(action: CacheAction = "show") -> None:
             for kind, entries in kept_in(folder).items():
                 size = sum(entry.size for entry in entries)
                 unwanted = [
-                    one for one in entries if action == "clear" or (action == "verify" and not one.whole())
+                    entry
+                    for entry in entries
+                    if action == "clear" or (action == "verify" and not entry.whole())
                 ]
                 for entry in unwanted if alone else ():
                     remove(entry.path)
@@ -164,8 +166,8 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
     from .progress import print_tables
 
     if units:
-        found, errors = fmus_in(_folder_of_fmus(place or options.fmus))
-        table = units_table(found)
+        fmus, errors = fmus_in(_folder_of_fmus(place or options.fmus))
+        table = units_table(fmus)
         table.notes += map(str, errors)
         print_tables([table])
         return
@@ -186,10 +188,10 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
         scenario = find_and_load.find(place, "a scenario")
         table = recorded_table(plan_of_scenario(scenario, options))
     else:
-        found, errors = fmus_in(_folder_of_fmus(place or options.fmus))
-        table = fmus_table(found, errors)
+        fmus, errors = fmus_in(_folder_of_fmus(place or options.fmus))
+        table = fmus_table(fmus, errors)
         if what == "signals":
-            table = signals_table(found)
+            table = signals_table(fmus)
     print_tables([table])
 
 

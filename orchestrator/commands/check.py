@@ -42,8 +42,8 @@ def check(scenario: ScenarioFile, options: RunOptions, all_: All = False) -> Non
     for diagnostic in plan.diagnostics:
         say(f"note: {diagnostic}")
     for unit in plan.instances:
-        for doubt in unit.fmu.doubts():
-            say(f"warning: {unit.name}: {doubt}")
+        for violation in unit.fmu.violations():
+            say(f"warning: {unit.name}: {violation}")
 
 
 def show(plan: Plan, scenario: Path, *, defaults: bool = False) -> None:
@@ -216,10 +216,10 @@ def _beside_tyres(plan: Plan) -> Iterable[Sequence[str]]:
         of_tyres = dict(zip(STIFFNESSES, cornering_stiffness(tyres[0], loads).values(), strict=True))
     except (ValueError, YawbenchError):
         return  # the tyre model does not provide it
-    for (name, given), units in takers.items():
+    for (name, stated), units in takers.items():
         of_axle = 2.0 * of_tyres[name]
-        difference = f"{round(100.0 * (given / of_axle - 1.0), 1) + 0.0:+g} %" if of_axle else ""
-        yield name, _shown(given, "N/rad"), _shown(of_axle, "N/rad"), difference, ", ".join(units)
+        difference = f"{round(100.0 * (stated / of_axle - 1.0), 1) + 0.0:+g} %" if of_axle else ""
+        yield name, _shown(stated, "N/rad"), _shown(of_axle, "N/rad"), difference, ", ".join(units)
 
 
 def _idle(plan: Plan) -> list[str]:

@@ -78,8 +78,8 @@ def say_problems(findings: ExperimentResult) -> None:
         say(f"{findings.not_made} of {counted(len(findings.records), 'run')} not made yet")
     if findings.spec.axes:  # without axes, failed runs have been reported one by one
         say_failed(findings.failed)
-        if found := findings.remarkable():
-            say(f"note: {found}")
+        if remarks := findings.remarkable():
+            say(f"note: {remarks}")
 
 
 def _over_region(
@@ -146,8 +146,8 @@ def command_of(preset: str, path: Path, *, quick: bool = False, **options: Itera
     import shlex
 
     flags = ["--quick"] if quick else []
-    given = [(f"--{name}", str(value)) for name, values in options.items() for value in values or ()]
-    return shlex.join(["yawbench", preset, str(path), *flags, *itertools.chain.from_iterable(given)])
+    pairs = [(f"--{name}", str(value)) for name, values in options.items() for value in values or ()]
+    return shlex.join(["yawbench", preset, str(path), *flags, *itertools.chain.from_iterable(pairs)])
 
 
 def write_page(chapters: Sequence[dict[str, Any]], folder: Path) -> None:
@@ -180,7 +180,7 @@ def of_files(context: typer.Context, files: Sequence[Path], options: RunOptions)
 
     changes, out = options.changes, options.out
     experiments = [load_experiment(file, changes=changes) for file in files]
-    if tuned := [str(one.path) for one in experiments if one.spec.tuning]:
+    if tuned := [str(experiment.path) for experiment in experiments if experiment.spec.tuning]:
         raise ScenarioError(
             [f"{file}: a tuning file; use `yawbench tune`" for file in tuned], code="file-wrong-kind"
         )
@@ -329,15 +329,15 @@ def tune(context: typer.Context, file: TuningFile, options: RunOptions, seed: Tu
             say_problems(findings)
             return findings
 
-        found = search(experiment, judged)
-        findings = concluded(best_of(experiment, found), execute, options)
-    table = tuning_table(experiment, found)
-    write_whole(folder / "trials.csv", to_csv(columns_of(found)))
+        tuned = search(experiment, judged)
+        findings = concluded(best_of(experiment, tuned), execute, options)
+    table = tuning_table(experiment, tuned)
+    write_whole(folder / "trials.csv", to_csv(columns_of(tuned)))
     print_tables([table])
     command = command_of("tune", file, **options.changing, seed=None if seed is None else [seed])
     if tuning_of(experiment).entries:
-        write_whole(folder / ENTRIES, entries_text(entries_of(experiment, found), command))
-    save(history_figure(experiment, found, command), folder / "history")
+        write_whole(folder / ENTRIES, entries_text(entries_of(experiment, tuned), command))
+    save(history_figure(experiment, tuned, command), folder / "history")
     charts = [image_of(folder / "history.svg", experiment.spec.title)]
     facts: dict[str, Any] = {"results": [table], "charts": charts}
     write_page([chapter_of(findings, folder, command, shown_in=folder, **facts)], folder)

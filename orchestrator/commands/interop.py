@@ -38,7 +38,7 @@ def second_opinion(
     from ..interop.second_opinion import MASTERS, second_opinion
     from ..messages import changed, faults_of, hint
 
-    known = {one.title.lower(): one for one in MASTERS}
+    known = {program.title.lower(): program for program in MASTERS}
     for name in master or ():
         if name.lower() not in known:
             raise ScenarioError(
@@ -66,9 +66,9 @@ def second_opinion(
         except RuntimeError as error:
             raise SimulationError(str(error), instance=None, time=0.0) from None
     show(opinions)
-    wrong = [one for one in opinions if not one.agrees and one.master.title != "fmpy"]
+    wrong = [opinion for opinion in opinions if not opinion.agrees and opinion.master.title != "fmpy"]
     if wrong:
-        names = " and ".join(one.master.title for one in wrong)
+        names = " and ".join(opinion.master.title for opinion in wrong)
         raise SimulationError(
             f"{scenario}: the results disagree with {names}, see above",
             instance=None,
@@ -82,35 +82,35 @@ def show(opinions: list[SecondOpinion]) -> None:
     from ..experiments.tables import Table
     from ..messages import printable
 
-    found = [one for one in opinions if not one.problem]
-    if found:
-        names = [one.master.title for one in found]
-        columns = set(range(1, len(found) + 1))
+    comparable = [opinion for opinion in opinions if not opinion.problem]
+    if comparable:
+        names = [opinion.master.title for opinion in comparable]
+        columns = set(range(1, len(comparable) + 1))
         apart = Table("Largest difference / range", ["signal", *names], numbers=columns)
-        for signal in found[0].differences:
-            apart.rows.append([signal, *(f"{one.differences[signal]:.1e}" for one in found)])
-        apart.rows.append(["largest", *(f"{one.largest:.1e}" for one in found)])
-        keys = list(found[0].seconds)
+        for signal in comparable[0].differences:
+            apart.rows.append([signal, *(f"{opinion.differences[signal]:.1e}" for opinion in comparable)])
+        apart.rows.append(["largest", *(f"{opinion.largest:.1e}" for opinion in comparable)])
+        keys = list(comparable[0].seconds)
         times = Table("us per communication step", ["master", *keys], numbers=set(range(1, len(keys) + 1)))
-        for one in found:
-            times.rows.append([one.master.title, *(f"{1e6 * one.seconds[key]:.0f}" for key in keys)])
+        for opinion in comparable:
+            times.rows.append([opinion.master.title, *(f"{1e6 * opinion.seconds[key]:.0f}" for key in keys)])
         print_tables([apart, times])
-        _show_still(found[0])
-    for one in opinions:
-        if one.problem:
-            print(printable(f"{one.master.title}: {one.problem}"))
-        elif one.one_step or one.master.note:
-            step = "compared with a common step size for all units: " if one.one_step else ""
-            print(printable(f"{one.master.title}: {step}{one.master.note}"))
+        _show_still(comparable[0])
+    for opinion in opinions:
+        if opinion.problem:
+            print(printable(f"{opinion.master.title}: {opinion.problem}"))
+        elif opinion.one_step or opinion.master.note:
+            step = "compared with a common step size for all units: " if opinion.one_step else ""
+            print(printable(f"{opinion.master.title}: {step}{opinion.master.note}"))
 
 
-def _show_still(one: SecondOpinion) -> None:
+def _show_still(opinion: SecondOpinion) -> None:
     """Print which signals are constant during the run: their agreement is not evidence."""
     from ..messages import counted, fold, listed, printable
 
-    if one.still:
-        share = f"{len(one.still)} of {counted(len(one.differences), 'signal')}"
-        names = listed(fold(list(one.still)))
+    if opinion.still:
+        share = f"{len(opinion.still)} of {counted(len(opinion.differences), 'signal')}"
+        names = listed(fold(list(opinion.still)))
         print(printable(f"Constant during the run, so their agreement is not evidence: {share}, {names}."))
 
 

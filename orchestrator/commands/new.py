@@ -264,7 +264,7 @@ def _shown(path: Path) -> Path:
 def _program(name: str) -> str:
     """Return the command that calls a program of this environment from the working directory."""
     ours = Path(sys.executable).with_name(name)
-    found = shutil.which(name)
-    if not ours.exists() or (found is not None and os.path.samefile(found, ours)):
+    path = shutil.which(name)
+    if not ours.exists() or (path is not None and os.path.samefile(path, ours)):
         return name
     return str(_shown(ours))

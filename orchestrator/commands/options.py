@@ -192,9 +192,9 @@ class RunOptions:
         """Time limit of an FMU call [s]; None if instances are not isolated."""
         from ..errors import ScenarioError
 
-        given = self.call_limit
+        limit = self.call_limit
         if not self.isolate:
-            if given is not None:
+            if limit is not None:
                 raise ScenarioError(
                     "--call-limit requires --isolate: a call in this process cannot be ended",
                     code="option-invalid",
@@ -203,10 +203,10 @@ class RunOptions:
         from ..master.isolation import CALL_LIMIT
         from ..scenario.quantities import seconds
 
-        if given is None:
+        if limit is None:
             return CALL_LIMIT
         try:
-            return float(seconds(int(given) if given.isdecimal() else given))
+            return float(seconds(int(limit) if limit.isdecimal() else limit))
         except ValueError as error:
             raise ScenarioError(f"--call-limit: {error}") from None
 

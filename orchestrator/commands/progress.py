@@ -125,9 +125,9 @@ def executor_of(
 
     runner = None if options.no_run else runner_of(options.jobs, options.scheduler)
     planner = Planner(build=options.build)
-    given = options.of_jobs | of_jobs
+    fields = options.of_jobs | of_jobs
     return Executor(
-        folder, identity, runner, planner, options.fresh, given, each, Terminal(making=not options.no_run)
+        folder, identity, runner, planner, options.fresh, fields, each, Terminal(making=not options.no_run)
     )
 
 

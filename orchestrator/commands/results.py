@@ -89,7 +89,7 @@ def distinct(folders: Sequence[Path]) -> list[str]:
     return ["/".join(p[-1:]) for p in parts]
 
 
-def labels_of(folders: Sequence[Path], given: Sequence[str] | None) -> list[str]:
+def labels_of(folders: Sequence[Path], labels: Sequence[str] | None) -> list[str]:
     """Return the label of each run in a legend: as given, or from `distinct`.
 
     Raises:
@@ -98,10 +98,10 @@ def labels_of(folders: Sequence[Path], given: Sequence[str] | None) -> list[str]
     from ..errors import ScenarioError
     from ..messages import counted
 
-    if given and len(given) != len(folders):
-        counts = f"{counted(len(given), 'label')}, {counted(len(folders), 'folder')}"
+    if labels and len(labels) != len(folders):
+        counts = f"{counted(len(labels), 'label')}, {counted(len(folders), 'folder')}"
         raise ScenarioError(f"--label: give one label per results folder (got {counts})")
-    return list(given or distinct(folders))
+    return list(labels or distinct(folders))
 
 
 def folder_of_all(folders: Sequence[Path]) -> Path:

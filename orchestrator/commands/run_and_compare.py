@@ -292,10 +292,10 @@ def diff(one: One, other: Other) -> None:
     from .results import distinct
 
     first, second = load_run(one), load_run(other)
-    found, parted = differences(first.record, second.record), divergence(first, second)
-    if found:
-        print_tables([differences_table(found, *distinct([one, other]))])
+    inputs, parted = differences(first.record, second.record), divergence(first, second)
+    if inputs:
+        print_tables([differences_table(inputs, *distinct([one, other]))])
     if parted.partings or parted.notes:
         print_tables([partings_table(parted, first, second)])
-    if not (found or parted.partings or parted.notes):
+    if not (inputs or parted.partings or parted.notes):
         say("The runs are identical: same inputs, same numbers.")

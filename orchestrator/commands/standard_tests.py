@@ -150,7 +150,7 @@ def _run_all(title: str, runs: Sequence[NamedRun], execute: Executor) -> tuple[l
     return jobs, max((outcome.exit_status for outcome in outcomes if not outcome.ok), default=0)
 
 
-def _vehicle(given: str | None) -> tuple[Override, ...]:
+def _vehicle(name: str | None) -> tuple[Override, ...]:
     """Return the override of the vehicle file.
 
     Raises:
@@ -159,9 +159,9 @@ def _vehicle(given: str | None) -> tuple[Override, ...]:
     from ..plan import Override
     from ..scenario import find_and_load
 
-    if given is None:
+    if name is None:
         return ()
-    return (Override.of("vehicle", str(find_and_load.find(given, "a vehicle file").resolve()), "--vehicle"),)
+    return (Override.of("vehicle", str(find_and_load.find(name, "a vehicle file").resolve()), "--vehicle"),)
 
 
 TestName = Literal[tuple(TESTS)]  # type: ignore[valid-type]
@@ -268,7 +268,7 @@ class EvaluatedRuns:
         data = {
             "test": self.test.name,
             "A": self.angle,
-            "runs": [one.as_data() for one in self.judged],
+            "runs": [run.as_data() for run in self.judged],
             "series": self.series.found if self.series else None,
         }
         write_whole(self.folder / FILE, json.dumps(data, indent=1))
@@ -325,16 +325,16 @@ def _runs(source: Path) -> list[Path]:
     if not source.is_dir():
         return segments_of(source)
     runs = found_runs(source)
-    found = [run.folder for run in runs if run.status == COMPLETED]
+    completed = [run.folder for run in runs if run.status == COMPLETED]
     unreadable = [run.problem for run in runs if run.status == UNREADABLE]
-    if not found:
+    if not completed:
         raise ResultsError(unreadable or f"{source}: contains no completed run", code="runs-missing")
     for problem in unreadable:
         say(f"note: skipped: {problem}")
-    return found
+    return completed
 
 
-def angle_of(given: str | None) -> float | None:
+def angle_of(text: str | None) -> float | None:
     """Return A [rad] as given by `--angle`; None without it.
 
     Raises:
@@ -343,20 +343,18 @@ def angle_of(given: str | None) -> float | None:
     from ..errors import ScenarioError
     from ..scenario.quantities import convert
 
-    if given is None:
+    if text is None:
         return None
     try:
-        angle = float(convert(given, "rad"))
+        angle = float(convert(text, "rad"))
     except ValueError as error:
         raise ScenarioError(f"--angle: {error}", code="fmu-wrong-kind") from None
     if not 0 < angle < 2 * math.pi:
-        raise ScenarioError(
-            f"--angle: must be between 0 and 360 degrees (got {given})", code="fmu-wrong-kind"
-        )
+        raise ScenarioError(f"--angle: must be between 0 and 360 degrees (got {text})", code="fmu-wrong-kind")
     return angle
 
 
-def _angle(given: str | None, slow_steer: list[Path] | None, test: StandardTest) -> float | None:
+def _angle(text: str | None, slow_steer: list[Path] | None, test: StandardTest) -> float | None:
     """Return A [rad], None if it is neither given nor needed."""
     from ..errors import ResultsError, ScenarioError
     from ..evaluation.steering_tests import characteristic_angle, evaluate_slow_steer
@@ -365,12 +363,12 @@ def _angle(given: str | None, slow_steer: list[Path] | None, test: StandardTest)
     from ..results.measured import load_run
     from .progress import say
 
-    if given and slow_steer:
+    if text and slow_steer:
         raise ScenarioError("--angle and --slow-steer are mutually exclusive", code="option-invalid")
-    if (given or slow_steer) and not test.needs_angle:
+    if (text or slow_steer) and not test.needs_angle:
         raise ScenarioError(f"{test.name} takes no A: omit --angle and --slow-steer", code="option-invalid")
     if not slow_steer:
-        return angle_of(given)
+        return angle_of(text)
     places = [place for source in slow_steer for place in _runs(source)]
     try:
         angle = characteristic_angle([evaluate_slow_steer(trace_of(load_run(p))) for p in places])

@@ -165,12 +165,12 @@ def trace_of(results: Results, label: str = "") -> Trace:
     fmus = results.record.fmus
     parameters = {unit: {**fmu.defaults, **fmu.parameters} for unit, fmu in fmus.items()}
     best = [
-        unit for role in ("driver", "plant") for unit in results.units_of_role(role)
+        unit for role in ("driver", "plant") for unit in results.instances_of_role(role)
     ]  # their parameters win over others of the same name
     facts = {name: value for unit in (*parameters, *best) for name, value in parameters.get(unit, {}).items()}
     masses = [
         parameters[unit]["mass"]
-        for unit in results.units_of_role("plant")
+        for unit in results.instances_of_role("plant")
         if "mass" in parameters.get(unit, {})
     ]
     mass = masses[-1] if masses else None
@@ -190,7 +190,7 @@ def _friction(results: Results, fmus: Mapping[str, FmuRecord], parameters: Mappi
     """Return the lowest friction at any wheel: as recorded, else from the parameters of road and tyres."""
     if columns := columns_of(results, "friction_*"):
         return float(min(results.columns[column].min() for column in columns))
-    found = [parameters.get(unit, {}).get("base_friction") for unit in results.units_of_role("road")]
+    found = [parameters.get(unit, {}).get("base_friction") for unit in results.instances_of_role("road")]
     found += [values.get("friction") for values in parameters.values()]
     for fmu in fmus.values():
         found += [value for name, value in fmu.constants.items() if name.startswith("friction_")]

@@ -143,8 +143,8 @@ def panels_of(runs: Sequence[LabelledRun], name: str, *, whole: bool = False) ->
         return [Panel(name, False, lambda axes: _draw_wheels(axes, runs[0], name))]
     scale = name if "*" in name else ""
     return [
-        Panel(one, False, partial(_draw_signal, runs=runs, name=one, whole=whole), scale)
-        for one in wheels(name)
+        Panel(wheel, False, partial(_draw_signal, runs=runs, name=wheel, whole=whole), scale)
+        for wheel in wheels(name)
     ]
 
 
@@ -350,10 +350,10 @@ def _alike(references: list[np.ndarray]) -> list[list[int]]:
     """Group references that lie within the width of one wide line, so that one line represents them."""
     allowed = 0.05 * max((_peak(r) for r in references), default=0.0)
     groups: list[list[int]] = []
-    for i, one in enumerate(references):
+    for i, curve in enumerate(references):
         for group in groups:
             first = references[group[0]]
-            if first.shape == one.shape and _peak(one - first) <= allowed:
+            if first.shape == curve.shape and _peak(curve - first) <= allowed:
                 group.append(i)
                 break
         else:

@@ -81,7 +81,7 @@ def draw_portrait(axes: Axes, runs: Sequence[LabelledRun], x: str, y: str) -> No
     curves = curves_of(runs, x, y)
     drawn: list[tuple[np.ndarray, np.ndarray]] = []
     for curve in curves:
-        if curve.reference and not any(_alike(curve.reference, one) for one in drawn):
+        if curve.reference and not any(_alike(curve.reference, other) for other in drawn):
             drawn.append(curve.reference)
             axes.plot(*curve.reference, **REFERENCE, label="reference")
     for curve in curves:
@@ -102,10 +102,10 @@ def _label(signal: str, unit: str) -> str:
     return f"{name} in {unit}" if unit else name
 
 
-def _alike(one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> bool:
+def _alike(curve: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> bool:
     return all(
         a.shape == b.shape and np.ptp(a - b) <= 0.01 * max(np.ptp(b), 1e-300)
-        for a, b in zip(one, other, strict=True)
+        for a, b in zip(curve, other, strict=True)
     )
 
 

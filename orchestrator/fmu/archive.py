@@ -73,7 +73,7 @@ def open_fmu(path: Path | str, *, validate: bool = True) -> Fmu:
         if validate and fmu.flaws:
             more = f" (and {len(fmu.flaws) - 1} more)" if len(fmu.flaws) > 1 else ""
             way = "; 'validate: false' for the unit (--set UNIT.validate=false) makes it a warning"
-            raise ModelDescriptionError(f"{fmu.path}: {fmu.doubts()[0].rstrip('.')}{more}{way}")
+            raise ModelDescriptionError(f"{fmu.path}: {fmu.violations()[0].rstrip('.')}{more}{way}")
         if wrong := binary_problem(fmu):
             raise ModelDescriptionError(f"{fmu.path}: {wrong}")
         return fmu
@@ -177,7 +177,7 @@ def _files(raw: bytes, path: Path) -> dict[str, bytes]:
                 parts = PurePosixPath(name).parts
                 if name.startswith("/") or ".." in parts or ":" in name or "\0" in name:
                     raise ModelDescriptionError(
-                        f"{path}: the archive is unsafe: it holds the path {info.filename!r}",
+                        f"{path}: the archive is unsafe: it contains the path {info.filename!r}",
                         code="fmu-damaged",
                     )
                 if not name.endswith("/"):

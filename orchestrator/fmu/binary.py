@@ -69,7 +69,7 @@ def binary_problem(fmu: Fmu) -> str | None:
     if name in present:
         files = sorted(p.name for p in (fmu.directory / "binaries" / name).iterdir())
         return (
-            f"no binary of the name that the model identifier asks for ({missing}); binaries/{name} holds "
+            f"no binary of the name that the model identifier asks for ({missing}); binaries/{name} contains "
             f"{listed(files)}"
         )
     others = f"it has binaries for {listed(present)}" if present else "it has no binaries"

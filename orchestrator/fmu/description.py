@@ -181,10 +181,10 @@ def shadowed_modules(fmus: Mapping[str, Fmu], *, isolated: bool = False) -> list
         isolated: each instance has a process of its own, and so its own modules.
     """
     problems = []
-    seen: dict[str, tuple[str, str]] = {}
+    first_in: dict[str, tuple[str, str]] = {}
     for unit, fmu in fmus.items():
         for module, content in fmu.python_modules.items():
-            other, its_content = seen.setdefault(module, (unit, content))
+            other, its_content = first_in.setdefault(module, (unit, content))
             if its_content != content and not isolated:
                 problems.append(
                     f"{unit} ({fmu.name}) would run code of {other} ({fmus[other].name}): both FMUs bring "

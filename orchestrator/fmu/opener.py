@@ -38,7 +38,7 @@ class Opener:
     Args:
         build: build FMUs that are stale, or missing but buildable. Only the process that starts runs does
             so, once for all of them; FMUs found stale later are listed in the plan.
-        tell: called with a line for every FMU that is built.
+        report: called with a line for every FMU that is built.
         opened: FMUs already opened, by their paths.
     """
 
@@ -46,11 +46,11 @@ class Opener:
         self,
         *,
         build: bool = False,
-        tell: Callable[[str], None] = _say,
+        report: Callable[[str], None] = _say,
         opened: Mapping[Path, Fmu] | None = None,
     ) -> None:
         self.build = build
-        self._tell = tell
+        self._report = report
         self._preopened = dict(opened or {})
         self._opened: dict[tuple[Path, BuildInfo | None, bool], Fmu] = {}
         self._built: dict[Path, BuildInfo | None] = {}
@@ -59,7 +59,7 @@ class Opener:
     def _upkeep(self) -> FmuUpdater:
         from fmus.upkeep import FmuUpdater
 
-        return FmuUpdater(self._tell)
+        return FmuUpdater(self._report)
 
     def bring(self, archive: Path, *, build: bool = True) -> Path:
         """Return the archive to open for `archive`, building it if necessary; it may not exist.
@@ -142,7 +142,7 @@ def find_fmu(fmu: str, *, scenario: Path, fmus: Path, opener: Opener, build: boo
     names = opener.names(fmus)
     if not names:
         raise ModelDescriptionError(
-            f"no FMU {short(fmu)}: the folder {fmus} holds no FMUs", code="fmu-missing"
+            f"no FMU {short(fmu)}: the folder {fmus} contains no FMUs", code="fmu-missing"
         )
     role = role_in(fmu)
     related = [name for name in names if role and role_in(name) == role] or names
@@ -159,8 +159,7 @@ def stale_fmus(fmus: Iterable[Fmu]) -> list[Diagnostic]:
     return [
         Diagnostic(
             "fmu-out-of-date",
-            f"{path.name} is not made of {source or 'its sources'} as it is now; "
-            "'yawbench build' makes it anew",
+            f"{path.name} is out of date with {source or 'its sources'}; 'yawbench build' rebuilds it",
             "warning",
         )
         for path, source in stale.items()

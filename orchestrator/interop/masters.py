@@ -40,7 +40,7 @@ from typing import Any
 import numpy as np
 
 from ..interrupts import StopFlag
-from ..master.fmi import open_unit
+from ..master.fmi import open_instance
 from ..master.instance import FmuInstance
 from ..master.log_and_process_state import Log
 from ..master.master import Master
@@ -103,20 +103,20 @@ def run_own(request: Request) -> Recording:
     jacobi = Override.of("algorithm", "jacobi", "second-opinion")
     planner = Planner()
     plan = planner.plan(planner.load(Path(request.archive), [jacobi]))
-    log, slaves = Log(), dict[str, FmuInstance]()
+    log, running = Log(), dict[str, FmuInstance]()
     plan = replace(plan, record=tuple(SignalName(*column) for column in request.columns))
     rows = np.zeros((request.n_steps + 1, 1 + len(request.columns)))
     try:
         for instance in plan.instances:
-            slaves[instance.name] = open_unit(instance, log, set())
-        master = Master(plan, slaves, log, StopFlag())
+            running[instance.name] = open_instance(instance, log, set())
+        master = Master(plan, running, log, StopFlag())
         master.initialize(rows[0], [])
         begin = time.perf_counter()
         master.advance(request.n_steps, list(rows[1:]), [])
         spent = time.perf_counter() - begin
     finally:
-        for slave in slaves.values():
-            slave.free()
+        for fmu_instance in running.values():
+            fmu_instance.free()
     return Recording(rows[:, 1:], spent / request.n_steps)
 
 

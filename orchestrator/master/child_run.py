@@ -39,7 +39,7 @@ from ..plan import Plan, Value
 from ..processes import ForkedChild, die_with_parent
 from ..results.recorder import BLOCK, RowBlock
 from ..supervisor import LOG, REPLY, PipeChannel, ProcessLost, ProtocolError
-from .fmi import open_unit
+from .fmi import open_instance
 from .instance import CtypesInstance
 from .ipc_and_guardian import FmuProcess, LogRelay, error_record, rebuilt
 from .isolation import Isolation
@@ -267,14 +267,14 @@ class ChildRun(RunLoop, FmuProcess):
         return self._inputs
 
     def go(self, opener: OpenInstance) -> None:
-        if opener is open_unit:
+        if opener is open_instance:
             self._suspects = [u.name for u in self.plan.instances if u.fmu.compiled]
-        asked, self._asking = os.pipe()
+        stop_pipe, self._asking = os.pipe()
         try:
-            FmuProcess.__init__(self, partial(self._forked, opener, asked), self.log)
+            FmuProcess.__init__(self, partial(self._forked, opener, stop_pipe), self.log)
             self._started = True
         finally:
-            os.close(asked)
+            os.close(stop_pipe)
         try:
             self.passes, self.loop, ending, failed = self.hear(ENDED)
         except ProcessLost as lost:
@@ -287,11 +287,11 @@ class ChildRun(RunLoop, FmuProcess):
             self._inputs = failed["inputs"]
             raise rebuilt(failed) if failed["kind"] else RuntimeError(failed["traceback"])
 
-    def _forked(self, opener: OpenInstance, asked: int, commands: int, answers: int) -> ForkedChild:
+    def _forked(self, opener: OpenInstance, stop_pipe: int, commands: int, answers: int) -> ForkedChild:
         flush_output()
         process = os.fork()
         if process == 0:
-            step_units(self.plan, opener, self._stop, self._shared, PipeChannel(commands, answers), asked)
+            step_units(self.plan, opener, self._stop, self._shared, PipeChannel(commands, answers), stop_pipe)
         return ForkedChild(process)
 
     def take(self, kind: int, content: Any) -> None:
@@ -335,12 +335,12 @@ class ChildRun(RunLoop, FmuProcess):
 
     def check_time(self) -> None:
         """Pass a stop request on to the child; kill it if it does not stop, or takes too long to end."""
-        now, asked = time.monotonic(), stop_requested_at()
-        if asked is not None:
+        now, requested = time.monotonic(), stop_requested_at()
+        if requested is not None:
             self._ask()
-        if now > self._deadline or (asked is not None and now - asked > KILL_AFTER):
+        if now > self._deadline or (requested is not None and now - requested > KILL_AFTER):
             self.close()
-            raise ProcessLost("did not come back")
+            raise ProcessLost("did not respond")
 
     def _ask(self) -> None:
         """Ask the child to stop and to report its current instance."""

@@ -229,7 +229,7 @@ def _log_fmi3(environment: int, status: int, category: bytes | None, text: bytes
 _logger_fmi3 = fmi3LogMessageCallback(_log_fmi3)
 
 
-SLAVES: dict[int, type[CtypesInstance]] = {2: Fmi2Instance, 3: Fmi3Instance}
+INSTANCE_TYPES: dict[int, type[CtypesInstance]] = {2: Fmi2Instance, 3: Fmi3Instance}
 """Major version of FMI -> class of its instances."""
 
 
@@ -270,7 +270,7 @@ def _known_by(unit: Instance) -> tuple[str, Path, str]:
 
 
 def keep_instances() -> KeptInstances:
-    """Have `open_unit` keep the instances of native FMUs from now on, in this process alone."""
+    """Have `open_instance` keep the instances of native FMUs from now on, in this process alone."""
     global _kept
     if _kept is None or _kept.process != os.getpid():
         _kept = KeptInstances()
@@ -286,14 +286,14 @@ def _keeping() -> KeptInstances | None:
     return _kept if _kept is not None and _kept.process == os.getpid() else None
 
 
-def open_unit(unit: Instance, log: Log, corrupted: set[Path]) -> CtypesInstance:
+def open_instance(unit: Instance, log: Log, corrupted: set[Path]) -> CtypesInstance:
     """Return the running instance for a `plan.Instance`; arguments and errors as for `CtypesInstance`."""
     kept = _keeping()
     if kept is not None and (idle := kept.take(unit, log, corrupted)) is not None:
         return idle
     state = ProcessState()
     try:
-        instance = SLAVES[unit.fmu.fmi](unit, log, corrupted)
+        instance = INSTANCE_TYPES[unit.fmu.fmi](unit, log, corrupted)
     finally:
         state.restore(unit.name, log)
     if kept is not None:

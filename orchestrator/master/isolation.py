@@ -25,7 +25,7 @@ from ..interrupts import stop_requested_at
 from ..plan import Instance, Plan, Value, ValueRef
 from ..processes import start
 from ..supervisor import ANSWER, FAILED, LOG, REPLY, REQUEST, PipeChannel, ProcessLost
-from .fmi import SLAVES, open_unit
+from .fmi import INSTANCE_TYPES, open_instance
 from .instance import Buffers, CtypesInstance, ExperimentSetup, FmuInstance, Status, StepCalls
 from .ipc_and_guardian import (
     GET,
@@ -104,14 +104,14 @@ class InstanceProcess(FmuProcess):
         super().take(kind, content)
 
     def check_time(self) -> None:
-        now, asked = time.monotonic(), stop_requested_at()
-        if asked is not None and now - asked > STOP_GRACE:
+        now, requested = time.monotonic(), stop_requested_at()
+        if requested is not None and now - requested > STOP_GRACE:
             self.close()
             raise ProcessLost("did not return when the run was asked to stop", late=True)
         if now > self._deadline:
             self.close()
             limit = f"{self._limit:g} s, the limit of a call (--call-limit)"
-            raise ProcessLost(f"did not come back within {limit}", late=True)
+            raise ProcessLost(f"did not return within {limit}", late=True)
 
     def close(self, *, kill: bool = False) -> int:
         """End the process by its guardian, which finds the pipe closed and kills everything that is left."""
@@ -135,7 +135,7 @@ class IsolatedInstance:
         self._stepping = False
         self._part = ""
         self._answered = 0
-        self._prefix, self._real = SLAVES[unit.fmu.fmi].prefix, SLAVES[unit.fmu.fmi].real
+        self._prefix, self._real = INSTANCE_TYPES[unit.fmu.fmi].prefix, INSTANCE_TYPES[unit.fmu.fmi].real
         process.log = log
         try:
             process.wait_until_ready()
@@ -312,7 +312,7 @@ def opener_of(
         SimulationError: isolation is not supported on this operating system.
     """
     if call_limit is None:
-        yield open_unit
+        yield open_instance
         return
     if sys.platform == "win32":
         raise SimulationError(
@@ -330,7 +330,7 @@ class InstanceServer:
         self._memory = memory
         self._log = LogRelay(channel, timed=False)
         self._surroundings: ProcessState | None = ProcessState()  # until stepping begins
-        self._slave: CtypesInstance
+        self._instance: CtypesInstance
 
     def serve(self) -> None:
         """Answer requests until the master is gone, or return in a copy forked by the FMU."""
@@ -342,7 +342,7 @@ class InstanceServer:
                 answer, count = self.exchange(parts), count + 256
             else:
                 name, arguments = self._channel.receive_object()
-                reply = getattr(self if hasattr(self, name) else self._slave, name)(*arguments)
+                reply = getattr(self if hasattr(self, name) else self._instance, name)(*arguments)
                 if self._surroundings is not None:
                     self._surroundings.restore("", self._log)
             if os.getpid() != process:
@@ -374,14 +374,14 @@ class InstanceServer:
     def open(self, unit: Instance) -> dict[str, Any] | None:
         """Instantiate the FMU; return a description of the error if that fails."""
         try:
-            self._slave = open_unit(unit, self._log, set())
+            self._instance = open_instance(unit, self._log, set())
         except YawbenchError as error:
             return error_record(error)
         return None
 
     def connect(self, input_places: Sequence[ValueRef], output_places: Sequence[ValueRef]) -> None:
         board = SharedBuffer(self._memory, len(input_places), len(output_places))
-        calls = self._slave.connect(
+        calls = self._instance.connect(
             Buffers(board.inputs, input_places, board.outputs, output_places, board.time, board.step)
         )
         self._part = board.part
@@ -390,11 +390,11 @@ class InstanceServer:
 
     def exit(self) -> int:
         self._surroundings = None
-        return self._slave.exit()
+        return self._instance.exit()
 
     def free(self) -> None:
         """Free the instance and flush what its library has printed."""
-        self._slave.free()
+        self._instance.free()
         self._log.finish()
         flush_output()
 

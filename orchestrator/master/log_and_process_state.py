@@ -71,17 +71,17 @@ class Log:
         self.messages: list[Message] = []
         self.dropped = 0
         self._counts: Counter[str] = Counter()
-        self._deaf = False
+        self._muted = False
         self.time = ctypes.c_double(0.0)  # [s], moved on by the master
 
     @contextlib.contextmanager
-    def deaf(self) -> Iterator[None]:
+    def muted(self) -> Iterator[None]:
         """Ignore FMU messages inside this block, because an optional read may legally fail."""
-        self._deaf = True
+        self._muted = True
         try:
             yield
         finally:
-            self._deaf = False
+            self._muted = False
 
     def add(self, unit: str, status: int, category: str, text: str, time: float | None = None) -> None:
         """Add a message; those with the status OK are ignored.
@@ -90,7 +90,7 @@ class Log:
             time: simulation time that it is about [s]; default: the last communication point.
         """
         status = known(status)
-        if status == OK or (self._deaf and category not in (MASTER, PROCESS)):
+        if status == OK or (self._muted and category not in (MASTER, PROCESS)):
             return
         self._counts[unit] += 1
         if self._counts[unit] > KEPT and category not in (MASTER, PROCESS):

@@ -28,7 +28,7 @@ RunProgress = Callable[[int, int], None]
 """Called a few times a second with the number of communication points completed and their total."""
 
 OpenInstance = Callable[[Instance, Log, set[Path]], FmuInstance]
-"""Creates the running instance for a `plan.Instance` (see `fmi.open_unit`)."""
+"""Creates the running instance for a `plan.Instance` (see `fmi.open_instance`)."""
 
 
 class RecordedRows(Protocol):
@@ -74,7 +74,7 @@ class RunLoop:
         self._progress = progress
         self._reached = reached
         self._master: Master | None = None
-        self._slaves: dict[str, FmuInstance] = {}
+        self._running: dict[str, FmuInstance] = {}
         self._copies = Copies()
 
     def inputs_of(self, unit: str) -> dict[str, Value]:
@@ -85,11 +85,11 @@ class RunLoop:
         """Open the FMUs, initialize them and step to the end."""
         corrupted: set[Path] = set()
         for unit in self.plan.instances:
-            for doubt in unit.fmu.doubts():
-                self.log.add(unit.name, WARNING, MASTER, doubt, self.plan.time(0))
-            self._slaves[unit.name] = opener(unit, self.log, corrupted)
+            for violation in unit.fmu.violations():
+                self.log.add(unit.name, WARNING, MASTER, violation, self.plan.time(0))
+            self._running[unit.name] = opener(unit, self.log, corrupted)
             self._copies.end()
-        self._master = Master(self.plan, self._slaves, self.log, self._stop, self._reached, self._copies)
+        self._master = Master(self.plan, self._running, self.log, self._stop, self._reached, self._copies)
         self.loop = self._master.loop
         with np.errstate(all="ignore"):  # non-finite values are found by `Master`, not by NumPy warnings
             self._master.initialize(self._rows.rows[0], self._rows.others)
@@ -171,8 +171,8 @@ class RunLoop:
 
     def end(self) -> None:
         """Terminate and free the instances."""
-        for slave in reversed(self._slaves.values()):
-            slave.free()
+        for instance in reversed(self._running.values()):
+            instance.free()
             self._copies.end()
 
 

@@ -30,7 +30,7 @@ from ..results.read_and_salvage import Results
 from ..results.recorder import MemoryRecorder, Recorder
 from ..results.run_record import DiagnosticRecord, EndRecord, ErrorRecord, WarningRecord
 from .child_run import ChildRun, can_be_apart
-from .fmi import keeps, open_unit
+from .fmi import keeps, open_instance
 from .log_and_process_state import STATUS, Log, Message
 from .run_loop import OpenInstance, RunLoop, RunProgress
 
@@ -60,7 +60,7 @@ def simulate(
     out: Path | str,
     *,
     progress: RunProgress | None = None,
-    opener: OpenInstance = open_unit,
+    opener: OpenInstance = open_instance,
     format: str = "csv",
     apart: bool = False,
 ) -> RunInfo:
@@ -105,7 +105,7 @@ def simulate(
 
 
 def simulate_in_memory(
-    plan: Plan, *, progress: RunProgress | None = None, opener: OpenInstance = open_unit
+    plan: Plan, *, progress: RunProgress | None = None, opener: OpenInstance = open_instance
 ) -> Results:
     """Run a plan and return its results without writing anything to disk.
 
@@ -130,7 +130,7 @@ def simulate_in_memory(
 def _columns(plan: Plan) -> tuple[list[str], list[bool], dict[str, str | None]]:
     """Return the names of the recorded columns, whether each is Real, and the units of measurement."""
     units = {unit.name: unit for unit in plan.instances}
-    recorded = {str(one): units[one.instance].fmu.variables[one.variable] for one in plan.record}
+    recorded = {str(signal): units[signal.instance].fmu.variables[signal.variable] for signal in plan.record}
     units_of = {"time": "s", **{column: variable.unit for column, variable in recorded.items()}}
     return list(recorded), [variable.type == "Real" for variable in recorded.values()], units_of
 

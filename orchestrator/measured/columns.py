@@ -76,10 +76,10 @@ class ColumnFile:
         beside = _units_beside(path)
         for header, unit in zip(self._table.headers, self._table.units, strict=True):
             known = unit or beside.get(header)
-            found = None if known and _INDEXED.fullmatch(header) else _HEADER.fullmatch(header)
-            name = found["name"] if found else header.strip()
+            parts = None if known and _INDEXED.fullmatch(header) else _HEADER.fullmatch(header)
+            name = parts["name"] if parts else header.strip()
             self._names.append(name)
-            self._units.append((found and found["unit"].strip()) or known or beside.get(name))
+            self._units.append((parts and parts["unit"].strip()) or known or beside.get(name))
 
     def column(self, name: str, time: str) -> FileColumn:
         """Return a column with its times: those of the column `time`, in MDF those of the channel."""
@@ -91,11 +91,11 @@ class ColumnFile:
 
     def _find(self, name: str) -> int:
         for names in (self._names, self._table.headers):
-            found = [i for i, one in enumerate(names) if one == name]
-            if len(found) > 1:
-                raise ValueError(f"{len(found)} columns are called {name!r}")
-            if found:
-                return found[0]
+            indices = [i for i, column in enumerate(names) if column == name]
+            if len(indices) > 1:
+                raise ValueError(f"{len(indices)} columns are called {name!r}")
+            if indices:
+                return indices[0]
         raise ValueError(f"has no column {name!r}{hint(name, self._names, lead='it has')}")
 
 
@@ -198,8 +198,8 @@ def _mdf(raw: bytes) -> _Table:
         mdf: Any = asammdf.MDF(io.BytesIO(raw))
         places = [
             (group, index, channel.name, channel.unit)
-            for group, one in enumerate(mdf.groups)
-            for index, channel in enumerate(one.channels)
+            for group, channels in enumerate(mdf.groups)
+            for index, channel in enumerate(channels.channels)
             if index != mdf.masters_db.get(group)
         ]
     except Exception as error:  # asammdf raises whatever its parsing meets

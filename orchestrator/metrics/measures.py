@@ -324,12 +324,12 @@ def catalogue() -> list[MeasureEntry]:
     return [
         MeasureEntry(
             name,
-            one.definition,
-            one.formula.replace("{x_ref}", "x_ref").replace("{x}", "x"),
-            _UNITS.get(one.unit, one.unit),
-            " and ".join(_NEEDS.get(other, other) for other in one.takes[1:]),
+            entry.definition,
+            entry.formula.replace("{x_ref}", "x_ref").replace("{x}", "x"),
+            _UNITS.get(entry.unit, entry.unit),
+            " and ".join(_NEEDS.get(other, other) for other in entry.takes[1:]),
         )
-        for name, one in MEASURES.items()
+        for name, entry in MEASURES.items()
     ]
 
 

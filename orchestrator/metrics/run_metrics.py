@@ -412,7 +412,7 @@ def _rate_of(results: Results, column: str) -> str | None:
 
 def _is_measured_or_estimated(results: Results, column: str) -> bool:
     """Return whether a column is a measurement or an estimate."""
-    return any(results.names[column].instance in results.units_of_role(role) for role in SENSING)
+    return any(results.names[column].instance in results.instances_of_role(role) for role in SENSING)
 
 
 def reference_of(results: Results, column: str) -> str | None:

@@ -56,41 +56,42 @@ class RunComparison:
     notes: tuple[str, ...]
 
 
-def divergence(one: Results, other: Results) -> RunComparison:
+def divergence(first: Results, second: Results) -> RunComparison:
     """Compare all signals that both runs recorded, at their common times.
 
     Signals that begin to differ at the same time are in evaluation order, so that causes come first.
     """
-    rows, others = _common(one.time, other.time)
+    rows, others = _common(first.time, second.time)
     notes = [
         f"only {which} recorded {', '.join(dict.fromkeys(star(name) for name in missing))}"
         for which, missing in (
-            ("the first", [name for name in one if name not in other]),
-            ("the other", [name for name in other if name not in one]),
+            ("the first", [name for name in first if name not in second]),
+            ("the other", [name for name in second if name not in first]),
         )
         if missing
     ]
-    if rows.size < max(one.time.size, other.time.size):
+    if rows.size < max(first.time.size, second.time.size):
         notes.append(f"compared at the {rows.size} times that both runs have")
-    shared = [name for name in one if name in other]
-    time = one.time[rows]
-    found: dict[str, SignalDifference] = {}
+    shared = [name for name in first if name in second]
+    time = first.time[rows]
+    by_signal: dict[str, SignalDifference] = {}
     for name in shared if rows.size else []:
-        parting = _parting(name, time, one.columns[name][rows], other.columns[name][others], one)
+        parting = _parting(name, time, first.columns[name][rows], second.columns[name][others], first)
         if parting is not None:
-            known = found.get(parting.signal)
-            found[parting.signal] = parting if known is None else _together(known, parting)
-    order = {unit: i for i, unit in enumerate(one.record.evaluation_order)}
+            known = by_signal.get(parting.signal)
+            by_signal[parting.signal] = parting if known is None else _together(known, parting)
+    order = {unit: i for i, unit in enumerate(first.record.evaluation_order)}
     ranked = sorted(
-        found.values(), key=lambda p: (p.first, order.get(SignalName.parse(p.signal).instance, len(order)))
+        by_signal.values(),
+        key=lambda p: (p.first, order.get(SignalName.parse(p.signal).instance, len(order))),
     )
     return RunComparison(tuple(ranked), len(shared), tuple(notes))
 
 
-def _common(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _common(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the row indices of both arrays at which the times agree to a nanosecond."""
     _, rows, others = np.intersect1d(
-        np.round(one * 1e9).astype(np.int64), np.round(other * 1e9).astype(np.int64), return_indices=True
+        np.round(first * 1e9).astype(np.int64), np.round(second * 1e9).astype(np.int64), return_indices=True
     )
     return rows, others
 
@@ -129,13 +130,13 @@ def _parting(
     )
 
 
-def _together(one: SignalDifference, other: SignalDifference) -> SignalDifference:
+def _together(first: SignalDifference, second: SignalDifference) -> SignalDifference:
     """Merge the differences of two wheels: the earliest times, the largest difference."""
-    widest = max(one, other, key=lambda parting: parting.largest)
-    seen = [parting.seen for parting in (one, other) if parting.seen is not None]
+    widest = max(first, second, key=lambda parting: parting.largest)
+    times = [parting.seen for parting in (first, second) if parting.seen is not None]
     return SignalDifference(
-        one.signal, one.targets, min(one.first, other.first), min(seen, default=None),
-        widest.largest, widest.largest_at, one.unit, widest.relative,
+        first.signal, first.targets, min(first.first, second.first), min(times, default=None),
+        widest.largest, widest.largest_at, first.unit, widest.relative,
     )  # fmt: skip
 
 
@@ -157,10 +158,10 @@ class RecordDifference(NamedTuple):
     other: Any
 
 
-def differences(one: RunRecord, other: RunRecord) -> list[RecordDifference]:
+def differences(a: RunRecord, b: RunRecord) -> list[RecordDifference]:
     """Return what differs between the records of two runs: scenario, instances, wires, versions."""
-    first, second = dict(_facts(one)), dict(_facts(other))
-    exchanged = tuple(f"{unit}." for unit in _names(one) if _names(one)[unit] != _names(other).get(unit))
+    first, second = dict(_facts(a)), dict(_facts(b))
+    exchanged = tuple(f"{unit}." for unit in _names(a) if _names(a)[unit] != _names(b).get(unit))
     both = first.keys() & second.keys()
     return [
         RecordDifference(place, first.get(place), second.get(place))
@@ -194,10 +195,10 @@ def _facts(record: RunRecord) -> Iterator[tuple[str, Any]]:
     yield from record.versions.items()
 
 
-def differences_table(found: list[RecordDifference], one: str, other: str) -> Table:
-    """Return the table of differences between two records; `one`, `other`: the names of the runs."""
-    rows: list[Any] = [[place, _text(a), _text(b)] for place, a, b in found]
-    return Table("What the runs were made of", ["", one, other], rows)
+def differences_table(changes: list[RecordDifference], first: str, second: str) -> Table:
+    """Return the table of differences between two records; `first`, `second`: the names of the runs."""
+    rows: list[Any] = [[place, _text(a), _text(b)] for place, a, b in changes]
+    return Table("What the runs were made of", ["", first, second], rows)
 
 
 def _text(value: Any) -> str | None:
@@ -206,11 +207,11 @@ def _text(value: Any) -> str | None:
     return f"{value:.10g}"
 
 
-def partings_table(found: RunComparison, one: Results, other: Results) -> Table:
+def partings_table(comparison: RunComparison, first: Results, second: Results) -> Table:
     """Return the table of signals that differ between two runs, the earliest first."""
     headings = ["signal", "differs from", "visibly from", "largest difference", "at"]
-    table = Table("What came out", headings, notes=list(found.notes))
-    for parting in found.partings:
+    table = Table("What came out", headings, notes=list(comparison.notes))
+    for parting in comparison.partings:
         table.rows.append([
             parting.signal,
             MetricValue(parting.first, "s"),
@@ -218,9 +219,11 @@ def partings_table(found: RunComparison, one: Results, other: Results) -> Table:
             None if math.isnan(parting.largest) else MetricValue(parting.largest, parting.unit or "1"),
             MetricValue(parting.largest_at, "s"),
         ])  # fmt: skip
-    ends = {f"{run.time[-1]:.6g} s" for run in (one, other) if run.time.size}
+    ends = {f"{run.time[-1]:.6g} s" for run in (first, second) if run.time.size}
     table.notes += [f"The runs end at {' and '.join(sorted(ends))}."] if len(ends) > 1 else []
-    table.notes.append(f"{counted(found.compared, 'signal')} compared; the others are the same to the end.")
+    table.notes.append(
+        f"{counted(comparison.compared, 'signal')} compared; the others are the same to the end."
+    )
     return table
 
 
@@ -238,7 +241,7 @@ LESS_IS_BETTER = (
 )  # fmt: skip
 """Measures that are better the smaller they are; for others, such as displacement, it depends."""
 OF_CONTROL = ("effort", "total_variation_rate")
-"""Measures of control activity: small values are no merit of a controller that does nothing."""
+"""Measures of control activity: a controller that does nothing has small values, too."""
 
 
 class MetricCell(NamedTuple):
@@ -262,13 +265,16 @@ def comparison_facts(findings: ExperimentResult) -> dict[str, Any] | None:
     if not runs:
         return None
     first, *others = runs
-    found = [divergence(first.results, other.results) for other in others]
+    divergences = [divergence(first.results, other.results) for other in others]
     return {
         "labels": [marked(*run) for run in runs],
         "rows": metric_rows(findings),
         "remarks": remarks(runs),
-        "views": _most_different(found),
-        "partings": [_parted(run.label, first.label, one) for run, one in zip(others, found, strict=True)],
+        "views": _most_different(divergences),
+        "partings": [
+            _parted(run.label, first.label, difference)
+            for run, difference in zip(others, divergences, strict=True)
+        ],
         "rule": RULE,
     }
 
@@ -301,8 +307,12 @@ def _idle(findings: ExperimentResult) -> set[int]:
         for key, spec in findings.spec.metrics.items()
         if metric(spec.metric).name.partition("(")[0] in OF_CONTROL
     ]
-    found = [[findings.values.get((name, key)) for key in of_control] for name in findings.results]
-    return {k for k, values in enumerate(found) if any(one is not None and one.number == 0 for one in values)}
+    controls = [[findings.values.get((name, key)) for key in of_control] for name in findings.results]
+    return {
+        k
+        for k, values in enumerate(controls)
+        if any(value is not None and value.number == 0 for value in values)
+    }
 
 
 def _best(values: Sequence[MetricValue | None], apart: Collection[int]) -> int | None:
@@ -312,18 +322,20 @@ def _best(values: Sequence[MetricValue | None], apart: Collection[int]) -> int |
         values: of all runs.
         apart: indices of runs to leave out.
     """
-    known = sorted((one.number, k) for k, one in enumerate(values) if one is not None and k not in apart)
+    known = sorted(
+        (value.number, k) for k, value in enumerate(values) if value is not None and k not in apart
+    )
     if len(known) < 2:
         return None
     (first, best), (second, _) = known[:2]
-    unit = next(one.unit for one in values if one is not None)
+    unit = next(value.unit for value in values if value is not None)
     return None if shown(first, unit) == shown(second, unit) else best
 
 
-def _most_different(found: Sequence[RunComparison]) -> list[View]:
+def _most_different(comparisons: Sequence[RunComparison]) -> list[View]:
     """Return the view of the signals that differ most from the first run, relative to their peaks."""
     apart: dict[str, float] = {}
-    for parting in (parting for one in found for parting in one.partings):
+    for parting in (parting for comparison in comparisons for parting in comparison.partings):
         name = variable_of(parting.signal)
         if "*" not in name and not name.startswith("position_"):  # one line per run in each panel
             apart[name] = max(apart.get(name, 0.0), parting.relative)
@@ -345,48 +357,50 @@ def difference(first: MetricValue | None, other: MetricValue | None) -> str:
     return f"{'+' if apart > 0 else '−'}{size} {'points' if unit == '%' else unit}".rstrip()
 
 
-def _parted(label: str, first: str, found: RunComparison) -> dict[str, Any]:
+def _parted(label: str, first: str, comparison: RunComparison) -> dict[str, Any]:
     return {
         "title": f"{label} against {first}",
-        "summary": parting_summary(found),
-        "table": parting_table(found.partings[:AT_ONCE]),
-        "rest": parting_table(found.partings[AT_ONCE:]),
-        "notes": found.notes,
+        "summary": parting_summary(comparison),
+        "table": parting_table(comparison.partings[:AT_ONCE]),
+        "rest": parting_table(comparison.partings[AT_ONCE:]),
+        "notes": comparison.notes,
     }
 
 
-def parting_summary(found: RunComparison) -> str:
+def parting_summary(comparison: RunComparison) -> str:
     """Return a sentence on the signals that differ first."""
-    if not found.compared:
+    if not comparison.compared:
         return "The runs have no signal in common."
-    if not found.partings:
+    if not comparison.partings:
         which = (
-            "The only signal they share is" if found.compared == 1 else f"All {found.compared} signals are"
+            "The only signal they share is"
+            if comparison.compared == 1
+            else f"All {comparison.compared} signals are"
         )
         return f"{which} the same throughout."
-    first = found.partings[0]
-    others = [one.signal for one in found.partings if one.first == first.first][1:]
+    first = comparison.partings[0]
+    others = [parting.signal for parting in comparison.partings if parting.first == first.first][1:]
     more = " and others" if len(others) > 3 else ""
     then = f", then {', '.join(others[:3])}{more} in the same step" if others else ""
-    seen = [(one.seen, one.signal) for one in found.partings if one.seen is not None]
-    told = "In no curve can it be seen."
-    if seen:
-        at, signal = min(seen, key=lambda one: one[0])
-        told = f"Curves can be told apart from {at:g} s on, first {signal}."
-    return f"The first to differ is {first.signal}, at {first.first:g} s{then}. {told}"
+    visible = [(parting.seen, parting.signal) for parting in comparison.partings if parting.seen is not None]
+    sentence = "The difference is not visible in any curve."
+    if visible:
+        at, signal = min(visible, key=lambda item: item[0])
+        sentence = f"It is visible from {at:g} s on, first in {signal}."
+    return f"The first to differ is {first.signal}, at {first.first:g} s{then}. {sentence}"
 
 
 def parting_table(partings: Sequence[SignalDifference]) -> Table:
     """Return a table of signals that differ, the earliest first."""
     headings = ["signal", "goes to", "differs from", "seen from", "largest difference", "at"]
     table = Table("", headings, numbers={2, 3, 4, 5} if partings else set())
-    for one in partings:
+    for parting in partings:
         table.rows.append([
-            one.signal,
-            ", ".join(one.targets) or "recorded only",
-            f"{one.first:g} s",
-            None if one.seen is None else f"{one.seen:g} s",
-            None if math.isnan(one.largest) else shown(one.largest, one.unit),
-            f"{one.largest_at:g} s",
+            parting.signal,
+            ", ".join(parting.targets) or "recorded only",
+            f"{parting.first:g} s",
+            None if parting.seen is None else f"{parting.seen:g} s",
+            None if math.isnan(parting.largest) else shown(parting.largest, parting.unit),
+            f"{parting.largest_at:g} s",
         ])  # fmt: skip
     return table

@@ -56,7 +56,9 @@ def system_of(plans: Iterable[Plan]) -> SystemDiagram:
         )
         for ends, pairs in wires.items()
     }
-    return SystemDiagram(tuple(DiagramBlock(name, tuple(found)) for name, found in fmus.items()), signals)
+    return SystemDiagram(
+        tuple(DiagramBlock(name, tuple(programs)) for name, programs in fmus.items()), signals
+    )
 
 
 def systems_of(plans: Sequence[Plan]) -> list[tuple[SystemDiagram, list[int]]]:
@@ -87,11 +89,13 @@ DiagramParts = list[Markup]
 
 def _tag(name: str, content: str = "", **attributes: Any) -> Markup:
     """Return an SVG element; `_` in the name of an attribute becomes `-`."""
-    given = (
-        Markup(' {}="{}"').format(key.replace("_", "-"), round(one, 1) if isinstance(one, float) else one)
-        for key, one in attributes.items()
+    written = (
+        Markup(' {}="{}"').format(
+            key.replace("_", "-"), round(attribute, 1) if isinstance(attribute, float) else attribute
+        )
+        for key, attribute in attributes.items()
     )
-    return Markup("<{0}{1}>{2}</{0}>").format(name, Markup("").join(given), content)
+    return Markup("<{0}{1}>{2}</{0}>").format(name, Markup("").join(written), content)
 
 
 def _width(texts: Sequence[str], size: float) -> float:
@@ -199,8 +203,8 @@ def stack(system: SystemDiagram, title: str) -> Markup:
         fmus = textwrap.wrap(", ".join(block.fmus), characters, break_on_hyphens=False)
         content += [(line, SMALL, {"fill": "#444"}, "") for line in fmus]
         for source in system.sources_of(block.name):
-            said = f"{source}: {', '.join(system.signals[source, block.name])}"
-            rows = textwrap.wrap(said, characters, subsequent_indent="  ", break_on_hyphens=False)
+            line = f"{source}: {', '.join(system.signals[source, block.name])}"
+            rows = textwrap.wrap(line, characters, subsequent_indent="  ", break_on_hyphens=False)
             content += [(row, SIGNAL, {}, source if k == 0 else "") for k, row in enumerate(rows)]
         height = 2 * PAD + sum(LEADING * size for _, size, _, _ in content)
         drawn.append(_box(1, y, right - 1, height, BLOCK))

@@ -56,7 +56,7 @@ def address_of(svg: str) -> Markup:
     svg = re.sub(r"(?<=>)[^<]+(?=<)", lambda text: text[0].translate(CURLY), svg)
     svg = svg.replace("'", "").replace('"', "'")
     svg = re.sub(
-        r"(scale\([^)]*\))|(\.\d\d)\d+", lambda found: found[1] or found[2], svg
+        r"(scale\([^)]*\))|(\.\d\d)\d+", lambda match: match[1] or match[2], svg
     )  # glyphs keep their aspect ratio
     svg = re.sub(r"\s*\n\s*", "\n", svg)
     return Markup("data:image/svg+xml," + quote(svg, safe=" =:/'(),;.-+*!?@$[]{}|^`~"))
@@ -77,21 +77,21 @@ def image_of(file: Path, title: str) -> FigureImage:
 
 def fmus_of(runs: Iterable[Results | Plan]) -> Table:
     """Return the table of all FMUs in the runs, taken from their records or plans."""
-    found: dict[tuple[str, str], dict[str, None]] = {}
-    for one in runs:
-        for unit, name, sha256 in _fmus_in(one):
-            found.setdefault((name, sha256), {})[unit] = None
-    ordered = sorted(found.items(), key=lambda one: (min(one[1]), one[0][0]))
+    by_fmu: dict[tuple[str, str], dict[str, None]] = {}
+    for run in runs:
+        for unit, name, sha256 in _fmus_in(run):
+            by_fmu.setdefault((name, sha256), {})[unit] = None
+    ordered = sorted(by_fmu.items(), key=lambda item: (min(item[1]), item[0][0]))
     rows = [(name, ", ".join(units), sha256) for (name, sha256), units in ordered]
     return Table("", ["FMU", "as", "SHA-256"], [*rows])
 
 
-def _fmus_in(one: Results | Plan) -> Iterator[tuple[str, str, str]]:
+def _fmus_in(run: Results | Plan) -> Iterator[tuple[str, str, str]]:
     """Yield instance, FMU and its hash."""
-    if isinstance(one, Plan):
-        yield from ((unit.name, unit.fmu.name, unit.fmu.sha256) for unit in one.instances)
+    if isinstance(run, Plan):
+        yield from ((unit.name, unit.fmu.name, unit.fmu.sha256) for unit in run.instances)
     else:
-        for unit, fmu in one.record.fmus.items():
+        for unit, fmu in run.record.fmus.items():
             yield unit, fmu.name or unit, fmu.sha256
 
 
@@ -100,12 +100,12 @@ def programs_of(runs: Iterable[Results | Plan]) -> dict[str, str]:
 
     Runs without a record, known by their key in the journal, have today's versions: the key includes them.
     """
-    found: dict[str, dict[str, None]] = {}
-    for one in runs:
-        known = versions() if isinstance(one, Plan) else one.record.versions
+    by_program: dict[str, dict[str, None]] = {}
+    for run in runs:
+        known = versions() if isinstance(run, Plan) else run.record.versions
         for name, version in known.items():
-            found.setdefault(name, {})[str(version)] = None
-    return {name: " and ".join(several) for name, several in found.items()}
+            by_program.setdefault(name, {})[str(version)] = None
+    return {name: " and ".join(several) for name, several in by_program.items()}
 
 
 def option_of(change: Override) -> list[str]:
@@ -231,15 +231,15 @@ def groups_of(runs: Sequence[tuple[RunRecord, Plan]]) -> list[ParameterGroup]:
     order: dict[str, None] = {}
     for record, plan in runs:
         by_name = {unit.name: unit for unit in plan.instances if unit.name in record.fmus}
-        given = record.scenario.get("units", {})
-        for name in [name for name in given if name in by_name]:
+        instances = record.scenario.get("units", {})
+        for name in [name for name in instances if name in by_name]:
             order[name] = None
             unit, fmu = by_name[name], record.fmus[name]
             own = units.setdefault(
                 (name, fmu.name), ParameterGroup(f"{name}: {fmu.name}", unit.fmu.description)
             )
             values = fmu.defaults | fmu.parameters
-            own_names = given[name].get("parameters", {})
+            own_names = instances[name].get("parameters", {})
             of_vehicle = record.scenario.get("vehicle_parameters", {}).keys() - own_names
             for variable in unit.fmu.of("parameter"):
                 if variable.name not in values:
@@ -261,9 +261,12 @@ def _default(record: RunRecord, unit: Instance, variable: Variable) -> ValueSour
 
 def _vehicle_group(vehicles: dict[str, ParameterGroup], record: RunRecord) -> ParameterGroup:
     """Return the group of a run's vehicle file."""
-    told = record.scenario
-    file = Path(os.path.normpath(Path(record.scenario_file).parent / str(told.get("vehicle", ""))))
-    title, source = told.get("vehicle_title") or file.stem, told.get("vehicle_source", NOT_RECORDED.says)
+    scenario = record.scenario
+    file = Path(os.path.normpath(Path(record.scenario_file).parent / str(scenario.get("vehicle", ""))))
+    title, source = (
+        scenario.get("vehicle_title") or file.stem,
+        scenario.get("vehicle_source", NOT_RECORDED.says),
+    )
     return vehicles.setdefault(str(file), ParameterGroup(f"The car: {title}", f"{file.name}; {source}"))
 
 
@@ -296,5 +299,5 @@ def text_of(value: Value | None) -> str:
 
 def count_kinds(groups: Iterable[ParameterGroup]) -> dict[str, int]:
     """Return the number of parameters by kind of provenance."""
-    kinds = Counter(one.origin.kind for group in groups for one in group.parameters.values())
+    kinds = Counter(parameter.origin.kind for group in groups for parameter in group.parameters.values())
     return {kind: kinds[kind] for kind in (PAPER, ERRATUM, CHOSEN, LITERATURE, NEUTRAL) if kind in kinds}

@@ -100,9 +100,9 @@ def chapter(
         sides = write_sides(findings, folder, each)
         sweep = sweep_view(findings, f"{name}{SWEEP}", sides, _relative_to(folder / DATA, shown_in))
 
-    def link(one: ClaimResult) -> str:
+    def link(result: ClaimResult) -> str:
         """Return the address that shows a claim's runs in the viewer; "" if it has none of them."""
-        shown = [numbers[run] for run in runs_of_claim(experiment, one.claim) if run in numbers]
+        shown = [numbers[run] for run in runs_of_claim(experiment, result.claim) if run in numbers]
         return f"#{name}{VIEW}?shown={shown}&baseline={shown[0]}".replace(" ", "") if shown else ""
 
     return {
@@ -114,8 +114,8 @@ def chapter(
         "reach": reach(findings),
         "conclusions": conclusions(findings),
         "answer": answer(findings),
-        "claims": [judged(one) | {"link": link(one)} for one in findings.claims],
-        "checks": [judged(one) | {"link": link(one)} for one in findings.checks],
+        "claims": [judged(result) | {"link": link(result)} for result in findings.claims],
+        "checks": [judged(result) | {"link": link(result)} for result in findings.checks],
         "region": region_table(findings) if findings.regions else None,
         "limits": limit_tables(findings),
         "systems": systems(plans, spec.title),
@@ -156,10 +156,10 @@ def repeats(findings: ExperimentResult) -> str:
     if not spec.repeats:
         return ""
     number = math.prod(spec.axes[name].length or 1 for name in spec.repeats)
-    said = " and ".join(spec.axes[name].says or name for name in spec.repeats)
-    sure = f"the interval that holds the true mean with {100 * LEVEL:.0f} % confidence (Student)"
+    names = " and ".join(spec.axes[name].says or name for name in spec.repeats)
+    sure = f"the interval that contains the true mean with {100 * LEVEL:.0f} % confidence (Student)"
     return (
-        f"Numbers with ± are means over {number} repeats ({said}), with {sure}. "
+        f"Numbers with ± are means over {number} repeats ({names}), with {sure}. "
         "A verdict whose threshold lies inside reads undecided."
     )
 
@@ -191,12 +191,12 @@ def conclusions(findings: ExperimentResult) -> list[dict[str, Any]]:
 
     With a region, claims that hold are included, and robust verdicts come first.
     """
-    told = [
-        judged(one)
-        for one in findings.judgements
-        if verdict(one) != HOLDS or (one.group == "claims" and one.region)
+    shown = [
+        judged(judgement)
+        for judgement in findings.judgements
+        if verdict(judgement) != HOLDS or (judgement.group == "claims" and judgement.region)
     ]
-    return sorted(told, key=lambda one: not one["robust"])
+    return sorted(shown, key=lambda judgement: not judgement["robust"])
 
 
 def answer(findings: ExperimentResult) -> str:
@@ -212,20 +212,20 @@ def answer(findings: ExperimentResult) -> str:
     return f"Of {len(results)} {kind}, {listed(counts, last='and')}{f', {where}' if where else ''}."
 
 
-def judged(one: ClaimResult) -> dict[str, Any]:
+def judged(result: ClaimResult) -> dict[str, Any]:
     """Return a claim with its measured values and verdict."""
     return {
-        "says": one.claim.says,
-        "source": one.claim.source,
-        "measured": one.measured,
-        "conditions": [str(condition) for condition in one.claim.holds_if],
-        "verdict": verdict(one),
-        "margin": margin_words(one.verdict),
-        "region": region_words(one),
-        "agreeing": one.region and 100 * one.region.agreeing,
-        "robust": one.region is not None and one.region.robust,
-        "lines": line_table(one) if one.region else None,
-        "note": one.claim.note,
+        "says": result.claim.says,
+        "source": result.claim.source,
+        "measured": result.measured,
+        "conditions": [str(condition) for condition in result.claim.holds_if],
+        "verdict": verdict(result),
+        "margin": margin_words(result.verdict),
+        "region": region_words(result),
+        "agreeing": result.region and 100 * result.region.agreeing,
+        "robust": result.region is not None and result.region.robust,
+        "lines": line_table(result) if result.region else None,
+        "note": result.claim.note,
     }
 
 
@@ -261,7 +261,9 @@ def viewer_of(
     overlays = [spec for spec in findings.spec.figures if spec.what.shows == "runs"]
     named: dict[str, LabelledRun] = {}
     wanted = [run.name for spec in overlays for run in findings.experiment.matching(spec.runs)]
-    wanted += [name for one in findings.judgements for name in runs_of_claim(findings.experiment, one.claim)]
+    wanted += [
+        name for result in findings.judgements for name in runs_of_claim(findings.experiment, result.claim)
+    ]
     for run in (findings.experiment.runs[name] for name in wanted):
         results = findings.results.get(run.name)
         if results is not None and results.time.size and len(named) < MOST:
@@ -274,7 +276,7 @@ def viewer_of(
         shown = [numbers[run.name] for run in findings.experiment.matching(spec.runs) if run.name in numbers]
         lively = _liveliest([run for number, run in enumerate(named.values()) if number in shown])
         drawn += [(lively, view) for view in _views(spec, title_of(findings, spec), shown) if shown]
-    ordered = [view for _, view in sorted(drawn, key=lambda one: -one[0])]
+    ordered = [view for _, view in sorted(drawn, key=lambda item: -item[0])]
     settings = Settings([*views, *ordered], largest=LARGEST)
     return viewer([*named.values()], settings, name=f"{chapter}{VIEW}"), numbers
 
@@ -291,8 +293,8 @@ def _views(spec: FigureSpec, title: str, shown: Sequence[int]) -> Iterator[View]
 
 def _liveliest(runs: Sequence[LabelledRun]) -> float:
     """Return the largest sideslip of any run, or the largest yaw rate; 0 if neither is known."""
-    for one in LIVELY:
-        values = [value.number for run in runs if (value := evaluate(run.results, one))]
+    for signal in LIVELY:
+        values = [value.number for run in runs if (value := evaluate(run.results, signal))]
         if values:
             return max(values)
     return 0.0
@@ -309,12 +311,12 @@ def figure_files(findings: ExperimentResult, files: str) -> list[dict[str, str]]
 
 def charts(findings: ExperimentResult, folder: Path) -> list[FigureImage]:
     """Return the drawn figures of grids as images; the view of the sweep shows those over axes."""
-    found = []
+    drawn = []
     for spec in findings.spec.figures:
         file = folder / f"{spec.name}.svg"
         if spec.what.shows == "grid" and file.is_file():
-            found.append(image_of(file, title_of(findings, spec)))
-    return found
+            drawn.append(image_of(file, title_of(findings, spec)))
+    return drawn
 
 
 def definitions(findings: ExperimentResult) -> list[dict[str, str]]:
@@ -338,7 +340,7 @@ def settings(findings: ExperimentResult) -> Table:
     for run in findings.experiment.runs.values():
         results = findings.results.get(run.name)
         faults = "; ".join(fault.words for fault in results.record.faults) if results else ""
-        ended = Counter(findings.record(one).status for one in findings.experiment.cases if one.run == run)
+        ended = Counter(findings.record(case).status for case in findings.experiment.cases if case.run == run)
         rows.append([
             run.name or None, run.scenario.name, changed(run.changes) or None, faults or None,
             *(str(ended[status]) for status in statuses),
@@ -350,15 +352,15 @@ def settings(findings: ExperimentResult) -> Table:
 
 def grid_of_times(runs: Iterable[Results | Plan]) -> list[str]:
     """Return each combination of algorithm, step size and stop time that occurs in plans or records."""
-    found: Counter[str] = Counter()
-    for one in runs:
+    counts: Counter[str] = Counter()
+    for run in runs:
         algorithm: str
-        if isinstance(one, Plan):
-            algorithm, step, end = one.algorithm, float(one.step), one.time(one.n_steps)
+        if isinstance(run, Plan):
+            algorithm, step, end = run.algorithm, float(run.step), run.time(run.n_steps)
         else:
-            algorithm, step, end = one.record.algorithm, one.record.step_size, one.record.stop_time
-        found[f"{algorithm}, {1000 * step:g} ms, until {end:g} s"] += 1
-    return [f"{text} ({counted(count, 'run')})" for text, count in found.items()]
+            algorithm, step, end = run.record.algorithm, run.record.step_size, run.record.stop_time
+        counts[f"{algorithm}, {1000 * step:g} ms, until {end:g} s"] += 1
+    return [f"{text} ({counted(count, 'run')})" for text, count in counts.items()]
 
 
 def _relative_to(path: Path, folder: Path) -> str:
@@ -401,8 +403,8 @@ def found_studies(folder: Path = SCENARIOS) -> list[Path]:
 def report_page(chapters: Sequence[dict[str, Any]], ranking: str = "") -> str:
     """Return the HTML page of one or several chapters; `ranking`: link to the ranking's page."""
     title = TITLE if len(chapters) > 1 else str(chapters[0]["title"])
-    sweeps = ["sweep.js"] if any(one["sweep"] for one in chapters) else []
-    scripts = assets(*sweeps) if sweeps or any(one["viewer"] for one in chapters) else ""
+    sweeps = ["sweep.js"] if any(chapter["sweep"] for chapter in chapters) else []
+    scripts = assets(*sweeps) if sweeps or any(chapter["viewer"] for chapter in chapters) else ""
     return render(
         "report.html.j2", title=title, chapters=chapters, ranking=ranking, style=style(), assets=scripts,
         **made_by(),

@@ -149,12 +149,12 @@ def death(folder: Path) -> str:
     when = f" begun at {cut(begun, 60)}" if begun and isinstance(begun, str) else ""
     if is_final(folder):
         return (
-            f"{folder}: the run{when} was stopped before its results were in their places; put them there "
+            f"{folder}: the run{when} was stopped before its results were in place; move them there "
             f"with 'yawbench salvage {folder}', or run it again."
         )
     beside = "; the results of the run before it are read again then" if _status(folder / RUN_FILE) else ""
     return (
-        f"{folder}: the run{when} ended without a word; run it again, or keep what it recorded with "
+        f"{folder}: the run{when} ended abnormally; run it again, or keep what it recorded with "
         f"'yawbench salvage {folder}'{beside}."
     )
 

@@ -82,7 +82,7 @@ FORMATS = {
     ),
 }  # fmt: skip
 """Format name -> format. CSV is the default: every program reads it, and killed runs can be salvaged."""
-FILES = {name: one.file for name, one in FORMATS.items()}
+FILES = {name: format.file for name, format in FORMATS.items()}
 """Format name -> file name."""
 
 
@@ -117,7 +117,7 @@ def source_of(path: Path, texts: Sequence[str] | None = None) -> ResultsSource:
         OSError, ValueError: it is not a file that a run writes.
         ResultsError: a package that the format needs is missing.
     """
-    (source,) = (one.source for one in FORMATS.values() if one.file == path.name)
+    (source,) = (format.source for format in FORMATS.values() if format.file == path.name)
     opened: ResultsSource = _class(source)(path, texts)
     return opened
 

@@ -146,8 +146,8 @@ class MdfFile:
         with self._open() as mdf:
             (group,) = mdf.groups
             master = mdf.masters_db.get(0)
-            self._places = {one.name: i for i, one in enumerate(group.channels) if i != master}
-            self.names = ["time", *(one.name for i, one in enumerate(group.channels) if i != master)]
+            self._places = {channel.name: i for i, channel in enumerate(group.channels) if i != master}
+            self.names = ["time", *(channel.name for i, channel in enumerate(group.channels) if i != master)]
             self._rows = int(group.channel_group.cycles_nr)
 
     @contextlib.contextmanager

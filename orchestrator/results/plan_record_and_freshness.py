@@ -81,7 +81,9 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> RunRecord:
 def units_of(plan: Plan) -> dict[str, str | None]:
     """Return the units of time and of all recorded columns."""
     units = {unit.name: unit for unit in plan.instances}
-    columns = {str(one): units[one.instance].fmu.variables[one.variable].unit for one in plan.record}
+    columns = {
+        str(signal): units[signal.instance].fmu.variables[signal.variable].unit for signal in plan.record
+    }
     return {"time": "s", **columns}
 
 
@@ -93,13 +95,13 @@ def connections_of(plan: Plan) -> list[ConnectionRecord]:
 
 def faults_of(plan: Plan) -> list[FaultRecord]:
     """Return the faults of a plan as the scenario states them, with their times [s] and variables."""
-    found: dict[tuple[str, str], FaultRecord] = {}
+    records: dict[tuple[str, str], FaultRecord] = {}
     for signal in plan.faults:
         place, says = str(signal.fault.on), str(signal.fault)
         begin, end = (t if math.isfinite(t) else None for t in (signal.fault.begin, signal.fault.end))
         new = FaultRecord(on=place, fault=says, begin=begin, until=end, at=[])
-        found.setdefault((place, says), new).at.append(f"{signal.instance}.{signal.variable}")
-    return list(found.values())
+        records.setdefault((place, says), new).at.append(f"{signal.instance}.{signal.variable}")
+    return list(records.values())
 
 
 def _connection(wire: Wire, units: Mapping[str, Instance]) -> ConnectionRecord:
@@ -116,7 +118,7 @@ def _connection(wire: Wire, units: Mapping[str, Instance]) -> ConnectionRecord:
 def _fmu(unit: Instance, plan: Plan, sources: dict[ValueSource, int]) -> FmuRecord:
     """Return the record of an instance; adds the sources of its values, with their index."""
     fmu = unit.fmu
-    given = {name: origin.source for name, origin in unit.origins.items() if origin.source is not None}
+    sourced = {name: origin.source for name, origin in unit.origins.items() if origin.source is not None}
     record = FmuRecord(
         name=fmu.name,
         role=unit.role,
@@ -131,7 +133,7 @@ def _fmu(unit: Instance, plan: Plan, sources: dict[ValueSource, int]) -> FmuReco
         tolerance=unit.tolerance or fmu.tolerance,
         parameters=dict(unit.parameters),
         origins={name: str(origin) for name, origin in unit.origins.items() if origin != DEFAULT},
-        sources={name: sources.setdefault(source, len(sources)) for name, source in given.items()},
+        sources={name: sources.setdefault(source, len(sources)) for name, source in sourced.items()},
         defaults={v.name: v.start for v in fmu.of("parameter") if v.name not in unit.parameters},
         constants={name: value for name, value in unit.constants.items() if name not in unit.series},
     )

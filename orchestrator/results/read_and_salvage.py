@@ -67,13 +67,11 @@ def found_runs(folder: Path) -> list[FoundRun]:
         ResultsError: the folder does not exist, or there is no run in it.
     """
     if not folder.is_dir():
-        raise ResultsError(
-            f"{folder}: there is no such folder; name one that holds results", code="results-missing"
-        )
+        raise ResultsError(f"{folder}: no such folder; name one with results", code="results-missing")
     runs = [run for place in _folders(folder) for run in _runs_in(place)]
     if not runs:
         raise ResultsError(
-            f"{folder}: holds no results; make some with 'yawbench run SCENARIO'", code="results-missing"
+            f"{folder}: contains no results; 'yawbench run SCENARIO' makes some", code="results-missing"
         )
     return sorted(runs, key=lambda run: (run.record.started or "", run.folder))
 
@@ -94,7 +92,7 @@ def _runs_in(folder: Path) -> Iterator[FoundRun]:
             record = check_record(going, folder / f"{RUN_FILE}{PART}")
         except ResultsError:  # the run may have died before it had written its record
             record = RunRecord()
-        yield FoundRun(folder, DIED if dead else RUNNING, record, "it ended without a word" if dead else "")
+        yield FoundRun(folder, DIED if dead else RUNNING, record, "it ended abnormally" if dead else "")
     if going is not None and not os.path.lexists(folder / RUN_FILE):
         return
     try:
@@ -131,10 +129,10 @@ def thinned(
     for block in blocks:
         numbers = [i for i, column in enumerate(block) if column.dtype.kind == "f"]
         distances = [block[i] - block[k] for i, k in errors if i in numbers and k in numbers]
-        seen = np.vstack([*(block[i] for i in numbers), *distances])
+        curves = np.vstack([*(block[i] for i in numbers), *distances])
         kept = np.zeros(len(block[0]), dtype=bool)
         for begin in range(0, len(kept), length):
-            part = seen[:, begin : begin + length]
+            part = curves[:, begin : begin + length]
             gaps = np.isnan(part)
             kept[begin + np.where(gaps, np.inf, part).argmin(axis=1)] = True
             kept[begin + np.where(gaps, -np.inf, part).argmax(axis=1)] = True
@@ -231,7 +229,7 @@ class Results:
             return [variable]
         columns = [column for column, name in self.names.items() if name.variable == variable]
         if role is not None:
-            units = self.units_of_role(role)
+            units = self.instances_of_role(role)
             columns = [column for column in columns if self.names[column].instance in units]
         return columns if columns or role is not None else self._feeding(variable)
 
@@ -244,7 +242,7 @@ class Results:
         ]
         return [column for column in dict.fromkeys(feeding) if column in self.columns]
 
-    def units_of_role(self, role: str) -> list[str]:
+    def instances_of_role(self, role: str) -> list[str]:
         """Return the names of the instances that have the role, in evaluation order."""
         return [name for name, fmu in self.record.fmus.items() if fmu.role_as(name) == role]
 
@@ -260,8 +258,8 @@ def _is_the_same(wire: ConnectionRecord, unit: str | None) -> bool:
     """Return whether a wire passes on an output of this unit as it is, at most converted to another unit."""
     if wire.gain is None:
         return True
-    one, other = measure_of(unit), measure_of(str(wire.unit))
-    factors = conversion(one, other) if one and other else None
+    source, target = measure_of(unit), measure_of(str(wire.unit))
+    factors = conversion(source, target) if source and target else None
     return factors is not None and np.allclose(factors, (wire.gain, wire.offset))
 
 
@@ -309,7 +307,9 @@ def load_results(
     except (OSError, ValueError) as error:
         raise ResultsError(f"{path}: cannot be read: {reason(error)}") from None
     if record.status == COMPLETED and not thin and time.size < record.rows:
-        raise ResultsError(f"{path}: holds {time.size} of the {record.rows} rows of its run; run it again.")
+        raise ResultsError(
+            f"{path}: contains {time.size} of the {record.rows} rows of its run; run it again."
+        )
     return Results(folder, time, dict(zip(columns, values, strict=True)), empty.units, record)
 
 
@@ -359,15 +359,15 @@ def _in_order(blocks: Iterator[list[np.ndarray]]) -> Iterator[list[np.ndarray]]:
 def _joined(blocks: Iterable[list[np.ndarray]], columns: int) -> list[np.ndarray]:
     """Return the concatenated columns of all blocks."""
     parts = list(blocks)
-    found = []
+    arrays = []
     for k in range(columns):
-        found.append(np.concatenate([part[k] for part in parts]) if parts else np.empty(0))
+        arrays.append(np.concatenate([part[k] for part in parts]) if parts else np.empty(0))
         for part in parts:
             part[k] = np.empty(0)  # free the parts, else a long run would need twice the memory
-    return found
+    return arrays
 
 
-WHY = "the process of this run ended without a word"
+WHY = "the process of this run ended abnormally"
 
 
 def salvage(folder: Path) -> tuple[Path, int]:

@@ -286,23 +286,25 @@ class RunRecord(_Part):
         index = fmu.sources.get(name, len(self.sources))
         if index >= len(self.sources):
             return NOT_RECORDED
-        one = self.sources[index]
-        return ValueSource(one.kind, one.says, one.file, one.line)
+        source = self.sources[index]
+        return ValueSource(source.kind, source.says, source.file, source.line)
 
     @property
     def all_diagnostics(self) -> tuple[Diagnostic, ...]:
         """The diagnostics, also those of a record of an earlier version."""
-        warned = {one.says for one in self.findings}
+        warned = {record.says for record in self.findings}
         return (
-            *(one.diagnostic for one in self.diagnostics),
+            *(record.diagnostic for record in self.diagnostics),
             *(Diagnostic("earlier-note", text, "info") for text in self.notes if text not in warned),
-            *(one.diagnostic for one in self.findings),
+            *(record.diagnostic for record in self.findings),
         )
 
     @property
     def course_warnings(self) -> tuple[Diagnostic, ...]:
         """The warnings about the course of the run, such as a car that spins."""
-        return tuple(one for one in warnings_in(self.all_diagnostics) if one.location.time is not None)
+        return tuple(
+            warning for warning in warnings_in(self.all_diagnostics) if warning.location.time is not None
+        )
 
     @property
     def scenario_file(self) -> str:
@@ -360,9 +362,7 @@ def load_record(folder: Path, *, settled: bool = False) -> RunRecord:
             ) from None
         except NotADirectoryError:
             holds = f", {folder.parent}" if folder.name in (RUN_FILE, *FILES.values()) else ""
-            raise ResultsError(
-                f"{folder}: is a file; name the folder that holds the results{holds}."
-            ) from None
+            raise ResultsError(f"{folder}: is a file; name the folder of the results{holds}.") from None
         except (OSError, ValueError) as error:
             raise ResultsError(f"{file}: cannot be read: {reason(error)}") from None
         return check_record(run, file)

@@ -121,11 +121,11 @@ def _read_tyres(
         try:
             file = read_tir(os.path.normpath(where.path.parent / name))
         except ScenarioError as error:
-            for one in error.diagnostics:
-                where.report(("tyres",), str(one), one.code)
+            for diagnostic in error.diagnostics:
+                where.report(("tyres",), str(diagnostic), diagnostic.code)
             continue
         document.notes.extend(file.warnings)
-        files |= {axle: file for axle, given in (named or {}).items() if given == name}
+        files |= {axle: file for axle, written in (named or {}).items() if written == name}
     return {axle: files[axle] for axle in named or {} if axle in files}
 
 
@@ -279,12 +279,12 @@ def _below(folder: Path, depth: int | None) -> Iterator[Path]:
 
 def names(kind: str) -> list[str]:
     """Return the names that `find` accepts for a kind of file, without duplicates."""
-    found = (
+    matching = (
         path.relative_to(folder).with_suffix("").as_posix()
         for folder in folders()
         for path, _ in files(folder, [kind], depth=2)
     )
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(matching))
 
 
 def named(name: str | Path, kind: str = "") -> Path | None:
@@ -328,11 +328,11 @@ def _what_is_in(folder: Path, kind: str) -> str:
     if (folder / "run.json").is_file():
         return f"these are the results of a run, not {kind}; 'yawbench plot {folder}' draws them"
     for depth in (1, 2):
-        if found := [str(path) for path, _ in files(folder, [kind], depth=depth)]:
-            return f"a folder, not {kind}; in it there are: {listed(found)}"
+        if paths := [str(path) for path, _ in files(folder, [kind], depth=depth)]:
+            return f"a folder, not {kind}; in it there are: {listed(paths)}"
     for other, command in COMMANDS.items():
-        if found := [str(path) for path, _ in files(folder, [other])]:
-            return f"a folder without {kind}; 'yawbench {command}' takes {listed(found, last='or')}"
+        if paths := [str(path) for path, _ in files(folder, [other])]:
+            return f"a folder without {kind}; 'yawbench {command}' takes {listed(paths, last='or')}"
     known = names(kind)
     return f"a folder without {kind}{f'; by name there are: {listed(known)}' if known else ''}"
 

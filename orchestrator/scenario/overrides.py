@@ -79,12 +79,12 @@ def read_changes(
             errors.append(f"--fault {text}: write --fault 'UNIT.OUTPUT: KIND VALUE from TIME until TIME'")
             continue
         try:
-            one = faults_at(location, line, "--fault")
+            faults_there = faults_at(location, line, "--fault")
         except ScenarioError as error:
             errors += error.diagnostics
             continue
-        at[one.target] = FaultList((*at.get(one.target, ()), *one.faults))
-    changes += [Override(target, given, "--fault") for target, given in at.items()]
+        at[faults_there.target] = FaultList((*at.get(faults_there.target, ()), *faults_there.faults))
+    changes += [Override(target, fault_list, "--fault") for target, fault_list in at.items()]
     if errors:
         raise ScenarioError(errors, code="option-invalid")
     return tuple(changes)
@@ -149,10 +149,10 @@ def changes_of(
 
 def changes_of_run(spec: Any, origin: str) -> list[Override]:
     """Return the overrides in the fields `stop_time`, `step_size` and `algorithm` of a specification."""
-    given = [(name, getattr(spec, name, None)) for name in OF_RUN]
+    fields = [(name, getattr(spec, name, None)) for name in OF_RUN]
     return [
         Override.of(name, float(value) if isinstance(value, Fraction) else value, origin)
-        for name, value in given
+        for name, value in fields
         if value is not None
     ]
 
@@ -161,9 +161,10 @@ def swap_of(unit: str, text: str, origin: str) -> list[Override]:
     """Parse `fmu:parameter=value:parameter=value` for an instance into overrides, its FMU first."""
     match = re.fullmatch(r"(.*?)((?::\w+=[^:]*)*)", text, re.DOTALL)
     assert match is not None
-    given = (one.partition("=") for one in match[2].split(":")[1:])
+    parameters = (part.partition("=") for part in match[2].split(":")[1:])
     brought = [
-        Override(Target.of_instance(unit, name), yaml_lines.scalar(value), origin) for name, _, value in given
+        Override(Target.of_instance(unit, name), yaml_lines.scalar(value), origin)
+        for name, _, value in parameters
     ]
     return [Override(Target.of_instance(unit), match[1], origin), *brought]
 
@@ -245,19 +246,19 @@ def spelled(place: str) -> str:
 
 def _put_faults(document: Document, change: Override, place: str) -> bool:
     """Replace the faults of a location, after those of other locations; return whether they differ."""
-    given = document.data.get(FAULTS) or []
-    if not isinstance(given, list):
+    faults = document.data.get(FAULTS) or []
+    if not isinstance(faults, list):
         return True  # the schema will report what is wrong
     items = [{"on": place, **fault.item} for fault in change.faults]
-    places = [spelled(str(one.get("on"))) if isinstance(one, dict) else None for one in given]
+    places = [spelled(str(fault.get("on"))) if isinstance(fault, dict) else None for fault in faults]
     there = [i for i, at in enumerate(places) if at == place]
-    before = [given[i] for i in there]
-    document.data[FAULTS] = given
+    before = [faults[i] for i in there]
+    document.data[FAULTS] = faults
     for i in reversed(there):
         document.remove((FAULTS,), i)
-    document.overrides |= {(FAULTS, len(given) + k): change for k in range(len(items))}
-    given += items
-    if not given:
+    document.overrides |= {(FAULTS, len(faults) + k): change for k in range(len(items))}
+    faults += items
+    if not faults:
         del document.data[FAULTS]
     return before != items
 

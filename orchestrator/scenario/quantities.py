@@ -254,10 +254,10 @@ def convert(text: str, unit: str | None, definition: UnitDefinition | None = Non
         comma = _COMMA.fullmatch(text) if len(text) <= WRITTEN else None
         point = f"; write a decimal point: {comma[1]}.{comma[2]}" if comma else ""
         raise ValueError(f"{short(text)} is neither a number{wanted} nor a number with its unit{point}")
-    number, given = Fraction(written[0]), written[1]
+    number, written_unit = Fraction(written[0]), written[1]
     if abs(number) > _LARGEST:
         raise ValueError(f"must be a finite number{f' in {unit}' if unit else ''} (got {text!r})")
-    if given == unit:
+    if written_unit == unit:
         return number
     if unit is None:
         raise InvalidValueError(
@@ -269,9 +269,9 @@ def convert(text: str, unit: str | None, definition: UnitDefinition | None = Non
             f"{text!r} cannot be converted to {unit}: give a number in {unit}", code="unit-mismatch"
         )
     try:
-        source = _source(given, target)
+        source = _source(written_unit, target)
     except UnknownUnitError as error:
-        raise InvalidValueError(f"{error}{_guess(given, unit, target)}", code="unit-unknown") from None
+        raise InvalidValueError(f"{error}{_guess(written_unit, unit, target)}", code="unit-unknown") from None
     if source.powers != target.powers:
         raise InvalidValueError(
             f"{text!r} is not a value in {unit}: use {listed(_spellings(unit, target), last='or')}",
@@ -283,19 +283,19 @@ def convert(text: str, unit: str | None, definition: UnitDefinition | None = Non
     return value
 
 
-def _source(given: str, target: Unit) -> Unit:
+def _source(unit: str, target: Unit) -> Unit:
     """Parse the unit of a quantity that is to be converted; for accelerations `g` is standard gravity.
 
     Raises:
         ValueError: not a unit.
     """
-    return _GRAVITY if given == "g" and target.powers == _GRAVITY.powers else parse_unit(given)
+    return _GRAVITY if unit == "g" and target.powers == _GRAVITY.powers else parse_unit(unit)
 
 
-def gain_and_offset(given: str, target: Unit) -> tuple[float, float] | None:
-    """Return the conversion from a unit to another, None if `given` is not a unit or incompatible."""
+def gain_and_offset(unit: str, target: Unit) -> tuple[float, float] | None:
+    """Return the conversion from a unit to another, None if `unit` is not a unit or incompatible."""
     try:
-        return conversion(_source(given, target), target)
+        return conversion(_source(unit, target), target)
     except ValueError:
         return None
 
@@ -316,11 +316,11 @@ def converted(number: Fraction, source: Unit, target: Unit) -> Fraction | float:
     return exact if turns == 0 else value
 
 
-def _guess(given: str, unit: str, target: Unit) -> str:
+def _guess(unknown: str, unit: str, target: Unit) -> str:
     """Return "; did you mean ...?" for an unknown unit, or a list of the compatible units."""
     fitting = _spellings(unit, target)
     plain = {re.sub(r"[^a-z0-9]", "", name.lower()): name for name in reversed([*_COMMON, *fitting])}
-    likely = plain.get(re.sub(r"[^a-z0-9]", "", given.lower())) or closest(given, fitting)
+    likely = plain.get(re.sub(r"[^a-z0-9]", "", unknown.lower())) or closest(unknown, fitting)
     return f"; did you mean {likely!r}?" if likely else f": use {listed(fitting, last='or')}"
 
 
@@ -332,19 +332,21 @@ def _spellings(unit: str, target: Unit) -> list[str]:
     return list(dict.fromkeys((unit, *fitting)))
 
 
-def meant_unit(number: float, given: str, unit: str, fits: Callable[[float], bool]) -> str:
+def meant_unit(number: float, assumed: str, unit: str, fits: Callable[[float], bool]) -> str:
     """Return the unit in which a number would be a plausible value, "" if there is none.
 
     Args:
         number: as written.
-        given: the unit that the number was assumed to be in.
+        assumed: the unit that the number was assumed to be in.
         unit: of the quantity.
         fits: returns whether a value in `unit` is plausible.
     """
     target = parse_unit(unit)
-    others = (one for one in _spellings(unit, target) if one != given)
-    in_unit = ((one, converted(Fraction(number), _source(one, target), target)) for one in others)
-    return next((one for one, value in in_unit if fits(float(value))), "")
+    others = (spelling for spelling in _spellings(unit, target) if spelling != assumed)
+    in_unit = (
+        (spelling, converted(Fraction(number), _source(spelling, target), target)) for spelling in others
+    )
+    return next((spelling for spelling, value in in_unit if fits(float(value))), "")
 
 
 def spellings(unit: str) -> list[str]:

@@ -57,12 +57,12 @@ def location_of(value: object) -> FaultLocation:
     Raises:
         ValueError: not a location.
     """
-    found = _PLACE.fullmatch(value) if isinstance(value, str) else None
-    if found is None or any((part or "").count("*") > 1 for part in found.groups()):
+    parts = _PLACE.fullmatch(value) if isinstance(value, str) else None
+    if parts is None or any((part or "").count("*") > 1 for part in parts.groups()):
         raise ValueError(
             f"must be unit.output, unit.input or unit.output -> unit, with at most one * (got {short(value)})"
         )
-    return FaultLocation(found[1], found[2], found[3] or "", found[4] or "*")
+    return FaultLocation(parts[1], parts[2], parts[3] or "", parts[4] or "*")
 
 
 def read_line(line: str) -> list[dict[str, Value]]:
@@ -78,10 +78,10 @@ def read_line(line: str) -> list[dict[str, Value]]:
         item: dict[str, Value] = {"kind": kind}
         if value:
             item["value"] = yaml_lines.scalar(value.strip())
-        for name, given in zip(rest[::2], rest[1::2], strict=True):
+        for name, option in zip(rest[::2], rest[1::2], strict=True):
             if name in item:
                 raise ValueError(f"has {name} twice")
-            item[name] = yaml_lines.scalar(given.strip())
+            item[name] = yaml_lines.scalar(option.strip())
         items.append(item)
     return items
 
@@ -98,7 +98,7 @@ def parse_faults(location: FaultLocation, items: Sequence[Mapping[str, Value]], 
         document.data = {"on": str(location), **item}
         specs.append(validate(FaultSpec, document))
     if document.errors:
-        raise ScenarioError([replace(one, location=Location(target=where)) for one in document.errors])
+        raise ScenarioError([replace(error, location=Location(target=where)) for error in document.errors])
     return FaultList(spec.fault for spec in specs if spec is not None)
 
 
@@ -167,10 +167,10 @@ class FaultSpec(StrictModel):
 
 def by_location(faults: Iterable[Fault]) -> dict[str, FaultList]:
     """Group faults by location."""
-    found: dict[str, FaultList] = {}
+    lists: dict[str, FaultList] = {}
     for fault in faults:
-        found[str(fault.on)] = FaultList((*found.get(str(fault.on), ()), fault))
-    return found
+        lists[str(fault.on)] = FaultList((*lists.get(str(fault.on), ()), fault))
+    return lists
 
 
 AXLES = ("front", "rear")

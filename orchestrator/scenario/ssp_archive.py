@@ -122,7 +122,7 @@ class SspArchive:
         except _DAMAGE as error:
             raise SspError(f"{member} is damaged: {error}") from None
         if root.tag != tag:
-            raise SspError(f"{member} is no {etree.QName(tag).localname} of SSP 1.0")
+            raise SspError(f"{member} is not a {etree.QName(tag).localname} of SSP 1.0")
         return root
 
     def variables(self, member: str, component: _Element) -> dict[str, SspVariable]:
@@ -147,8 +147,10 @@ class SspArchive:
 def _declared(description: _Element) -> Iterator[tuple[str, SspVariable]]:
     """Yield the variables of a model description of FMI 2.0 or 3.0."""
     types = {
-        str(one.get("name")): (one if one.get("unit") else next(iter(one), one)).get("unit")
-        for one in description.iterfind("TypeDefinitions/*")
+        str(definition.get("name")): (
+            definition if definition.get("unit") else next(iter(definition), definition)
+        ).get("unit")
+        for definition in description.iterfind("TypeDefinitions/*")
     }
     definitions = unit_definitions(description.iterfind("UnitDefinitions/Unit"))
     for variable in description.iterfind("ModelVariables/*"):
@@ -162,7 +164,7 @@ def _declared(description: _Element) -> Iterator[tuple[str, SspVariable]]:
 
 def unit_definitions(units: Iterable[_Element]) -> dict[str, UnitDefinition]:
     """Return the definitions in `Unit` elements of FMI or SSP, by name."""
-    found = {}
+    definitions = {}
     for unit in units:
         base = unit.find("{*}BaseUnit")
         if base is None:
@@ -170,8 +172,8 @@ def unit_definitions(units: Iterable[_Element]) -> dict[str, UnitDefinition]:
         with contextlib.suppress(ValueError):  # a malformed number defines nothing
             powers = tuple(int(base.get(name, "0")) for name in BASE_UNITS)
             scale = (float(base.get(key, default)) for key, default in (("factor", "1"), ("offset", "0")))
-            found[str(unit.get("name"))] = UnitDefinition(powers, *scale)
-    return found
+            definitions[str(unit.get("name"))] = UnitDefinition(powers, *scale)
+    return definitions
 
 
 def _parser() -> etree.XMLParser:

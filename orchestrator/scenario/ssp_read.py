@@ -125,17 +125,17 @@ def _scenario(archive: SspArchive, document: Document) -> dict[str, Any]:
     root = archive.xml(DESCRIPTION_FILE, f"{{{SSD}}}SystemStructureDescription")
     system = root.find(f"{{{SSD}}}System")
     if system is None:
-        raise SspError(f"{DESCRIPTION_FILE} holds no system")
+        raise SspError(f"{DESCRIPTION_FILE} contains no system")
     structure = read_structure(archive, system)
     names = _unit_names(structure, document)
     values = read_values(archive, structure)
     if values.unknown:
         shown = listed(fold(list(dict.fromkeys(values.unknown))))
-        sentence = f"the archive gives values to {shown}: passed over, there are no such variables"
+        sentence = f"the archive gives values to {shown}: ignored, as there are no such variables"
         document.notes.append(Diagnostic("variable-unknown", sentence, "info"))
-    given = _values_through_connectors(structure, values.given)
+    by_end = _values_through_connectors(structure, values.given)
     connections, driven = _connections(structure, names)
-    given = {end: one for end, one in given.items() if end not in driven}
+    by_end = {end: ssp_value for end, ssp_value in by_end.items() if end not in driven}
 
     units: dict[str, Any] = {}
     inputs: dict[str, Any] = {}
@@ -146,11 +146,11 @@ def _scenario(archive: SspArchive, document: Document) -> dict[str, Any]:
         hint = component.element.find(f".//{{{OSP}}}StepSizeHint")
         if hint is not None:
             units[name]["step_size"] = number(hint, "value")
-    for (path, variable), one in given.items():
+    for (path, variable), ssp_value in by_end.items():
         if path not in structure.components:
             continue
         declared = structure.components[path].variables.get(variable)
-        value = one.for_variable(declared)
+        value = ssp_value.for_variable(declared)
         if declared is not None and declared.causality == "input":
             inputs[f"{names[path]}.{variable}"] = value
         else:
@@ -183,35 +183,39 @@ def _unit_names(structure: SspStructure, document: Document) -> dict[ElementPath
         names[path] = name
     renamed = [f"{name} ({'.'.join(path)})" for path, name in names.items() if path != (name,)]
     if renamed:
-        sentence = f"units called otherwise than in the archive: {listed(renamed)}"
+        sentence = f"units renamed from their names in the archive: {listed(renamed)}"
         document.notes.append(Diagnostic("instance-renamed", sentence, "info"))
     return names
 
 
 def _values_through_connectors(
-    structure: SspStructure, given: Mapping[SspEnd, SspValue]
+    structure: SspStructure, values: Mapping[SspEnd, SspValue]
 ) -> dict[SspEnd, SspValue]:
     """Return the values, with those from connectors of systems replacing those of components."""
     passed = {}
     for end in structure.sources:
         through = [
-            one for one in structure.upstream(end) if one in given and one.element in structure.systems
+            connector
+            for connector in structure.upstream(end)
+            if connector in values and connector.element in structure.systems
         ]
         if through and end.element in structure.components:
-            passed[end] = _passed_on(structure, given[through[-1]], through[-1], end)
-    return {**given, **passed}
+            passed[end] = _passed_on(structure, values[through[-1]], through[-1], end)
+    return {**values, **passed}
 
 
-def _passed_on(structure: SspStructure, given: SspValue, connector: SspEnd, end: SspEnd) -> SspValue:
+def _passed_on(structure: SspStructure, ssp_value: SspValue, connector: SspEnd, end: SspEnd) -> SspValue:
     """Return the value of a system's connector after conversion on its way to a component."""
     ways = structure.upstream(end)
     way = scale(structure, [*reversed(ways[: ways.index(connector) + 1]), end])
     if way == AS_IT_IS:
-        return given
-    value = given.for_variable(structure.connector(connector))
+        return ssp_value
+    value = ssp_value.for_variable(structure.connector(connector))
     if not isinstance(value, float):
-        raise SspError(f"{end}: only numbers can be converted on the way from {connector}", given.parameter)
-    return replace(given, value=way[0] * value + way[1], unit=None, factor=1.0, offset=0.0)
+        raise SspError(
+            f"{end}: only numbers can be converted on the way from {connector}", ssp_value.parameter
+        )
+    return replace(ssp_value, value=way[0] * value + way[1], unit=None, factor=1.0, offset=0.0)
 
 
 def _connections(
@@ -239,24 +243,24 @@ def _connections(
 
 def _experiment(root: _Element) -> dict[str, Any]:
     """Return times, algorithm and recorded signals, as far as the archive gives them."""
-    found: dict[str, Any] = {}
+    settings: dict[str, Any] = {}
     experiment = root.find(f"{{{SSD}}}DefaultExperiment")
     if experiment is not None:
         if start := number(experiment, "startTime", 0.0):
-            found["start_time"] = start
+            settings["start_time"] = start
         if experiment.get("stopTime") is not None:
-            found["stop_time"] = number(experiment, "stopTime")
+            settings["stop_time"] = number(experiment, "stopTime")
     for tag, attribute in (
         (f"{{{OMS}}}FixedStepMaster", "stepSize"),
         (f"{{{OSP}}}FixedStepAlgorithm", "baseStepSize"),
     ):
         step = root.find(f".//{tag}")
         if step is not None and step.get(attribute):
-            found["step_size"] = number(step, attribute)
+            settings["step_size"] = number(step, attribute)
     own = root.find(f".//{{{OWN}}}Scenario")
     if own is not None:
-        found["step_size"] = number(own, "stepSize")
-        found["algorithm"] = own.get("algorithm")
-        record = [str(one.get("variable")) for one in own.iterfind(f"{{{OWN}}}Record")]
-        found |= {"record": record} if record else {}
-    return found
+        settings["step_size"] = number(own, "stepSize")
+        settings["algorithm"] = own.get("algorithm")
+        record = [str(element.get("variable")) for element in own.iterfind(f"{{{OWN}}}Record")]
+        settings |= {"record": record} if record else {}
+    return settings

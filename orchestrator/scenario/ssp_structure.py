@@ -90,15 +90,15 @@ class SspStructure:
         Raises:
             SspError: connections form a cycle.
         """
-        found: list[SspEnd] = []
+        ends: list[SspEnd] = []
         while end in self.sources:
             end, connection = self.sources[end]
-            if end in found:
+            if end in ends:
                 raise SspError(f"connections go round in a circle through {end}", connection)
-            found.append(end)
+            ends.append(end)
             if end.element in self.components:
                 break
-        return found
+        return ends
 
     def find(self, path: ElementPath, name: str) -> SspEnd | None:
         """Resolve a hierarchical name in the element `path`, None if there is no such variable."""
@@ -109,9 +109,9 @@ class SspStructure:
             return SspEnd(path, name)
         for inner in (*self.components, *self.systems):
             if inner[:-1] == path and inner and name.startswith(f"{inner[-1]}."):
-                found = self.find(inner, name[len(inner[-1]) + 1 :])
-                if found is not None:
-                    return found
+                end = self.find(inner, name[len(inner[-1]) + 1 :])
+                if end is not None:
+                    return end
         return None
 
 
@@ -136,22 +136,22 @@ def _add_system(
 ) -> None:
     structure.connectors[path] = _connectors(system, definitions)
     names: set[str] = set()
-    for one in system.iterfind(f"{{{SSD}}}Elements/*"):
-        kind, name = etree.QName(one).localname, one.get("name", "")
+    for element in system.iterfind(f"{{{SSD}}}Elements/*"):
+        kind, name = etree.QName(element).localname, element.get("name", "")
         if not name or name in names:
-            raise SspError(f"two elements are called {name!r}" if name else "an element has no name", one)
+            raise SspError(f"two elements are called {name!r}" if name else "an element has no name", element)
         names.add(name)
         inner = (*path, name)
         if kind == "System":
-            _add_system(structure, archive, one, inner, definitions)
+            _add_system(structure, archive, element, inner, definitions)
         elif kind == "Component":
-            structure.components[inner] = _component(archive, one, inner)
-            structure.connectors[inner] = _connectors(one, definitions)
+            structure.components[inner] = _component(archive, element, inner)
+            structure.connectors[inner] = _connectors(element, definitions)
         elif kind == "SignalDictionaryReference":
-            raise SspError(f"a signal dictionary ({name}) is not supported", one, code="ssp-unsupported")
+            raise SspError(f"a signal dictionary ({name}) is not supported", element, code="ssp-unsupported")
         else:
             raise SspError(
-                f"an element of kind {kind} ({name}) is not supported", one, code="ssp-unsupported"
+                f"an element of kind {kind} ({name}) is not supported", element, code="ssp-unsupported"
             )
     for connection in system.iterfind(f"{{{SSD}}}Connections/{{{SSD}}}Connection"):
         source, sink = _directed(structure, connection, path)
@@ -162,11 +162,13 @@ def _add_system(
 
 
 def _connectors(element: _Element, definitions: Mapping[str, UnitDefinition]) -> dict[str, SspVariable]:
-    found = {}
-    for one in element.iterfind(f"{{{SSD}}}Connectors/{{{SSD}}}Connector"):
-        unit = next((kind.get("unit") for kind in one if kind.get("unit")), None)
-        found[str(one.get("name"))] = SspVariable(one.get("kind", ""), unit, definitions.get(str(unit)))
-    return found
+    connectors = {}
+    for connector in element.iterfind(f"{{{SSD}}}Connectors/{{{SSD}}}Connector"):
+        unit = next((kind.get("unit") for kind in connector if kind.get("unit")), None)
+        connectors[str(connector.get("name"))] = SspVariable(
+            connector.get("kind", ""), unit, definitions.get(str(unit))
+        )
+    return connectors
 
 
 def _component(archive: SspArchive, element: _Element, path: ElementPath) -> SspComponent:
@@ -191,7 +193,7 @@ def _component(archive: SspArchive, element: _Element, path: ElementPath) -> Ssp
 def _directed(structure: SspStructure, connection: _Element, path: ElementPath) -> tuple[SspEnd, SspEnd]:
     """Return source and target of a connection in the system `path`."""
     start, end = (_end(structure, connection, which, path) for which in ("start", "end"))
-    start_gives, end_gives = (_gives(structure, one, path) for one in (start, end))
+    start_gives, end_gives = (_gives(structure, side, path) for side in (start, end))
     if start_gives is not None and start_gives == end_gives:
         what = "gives a value" if start_gives else "takes a value"
         raise SspError(f"cannot connect {start} and {end}: each {what}", connection)
@@ -284,12 +286,12 @@ def read_values(archive: SspArchive, structure: SspStructure) -> SspValues:
         SspError: values cannot be read.
     """
     values = SspValues()
-    elements = {path: one.element for path, one in structure.components.items()}
+    elements = {path: component.element for path, component in structure.components.items()}
     for path, element in (elements | structure.systems).items():  # outer ones last
-        for name, given in _bound(archive, element):
+        for name, value in _bound(archive, element):
             end = structure.find(path, name)
             if end is not None:
-                values.given[end] = given
+                values.given[end] = value
             else:
                 values.unknown.append(str(SspEnd(path, name)))
     return values
@@ -307,12 +309,12 @@ def _bound(archive: SspArchive, element: _Element) -> Iterator[tuple[str, SspVal
         mapping = _mapping(archive, binding)
         definitions = unit_definitions(values.iterfind(f"{{{SSV}}}Units/*"))
         for parameter in values.iterfind(f"{{{SSV}}}Parameters/{{{SSV}}}Parameter"):
-            name, given = binding.get("prefix", "") + parameter.get("name", ""), _value(parameter)
-            given = replace(given, definition=definitions.get(str(given.unit)))
+            name, value = binding.get("prefix", "") + parameter.get("name", ""), _value(parameter)
+            value = replace(value, definition=definitions.get(str(value.unit)))
             if mapping is None:
-                yield name, given
+                yield name, value
             for entry in (mapping or {}).get(name, ()):
-                yield entry.get("target", ""), _transformed(given, entry)
+                yield entry.get("target", ""), _transformed(value, entry)
 
 
 def _mapping(archive: SspArchive, binding: _Element) -> dict[str, list[_Element]] | None:
@@ -337,12 +339,12 @@ def _check_type(element: _Element, allowed: str) -> None:
         )
 
 
-def _transformed(given: SspValue, entry: _Element) -> SspValue:
+def _transformed(value: SspValue, entry: _Element) -> SspValue:
     """Return a value with the transformation of a mapping entry."""
     if entry.get("suppressUnitConversion") in ("true", "1"):
-        given = replace(given, unit=None)
+        value = replace(value, unit=None)
     factor, offset = linear(entry)
-    return replace(given, factor=factor, offset=offset)
+    return replace(value, factor=factor, offset=offset)
 
 
 def linear(element: _Element) -> tuple[float, float]:
@@ -351,13 +353,13 @@ def linear(element: _Element) -> tuple[float, float]:
     Raises:
         SspError: the transformation is of another kind, or has a malformed number.
     """
-    for one in element.iterchildren("{*}*"):
-        kind = etree.QName(one).localname
+    for child in element.iterchildren("{*}*"):
+        kind = etree.QName(child).localname
         if kind == "LinearTransformation":
-            return number(one, "factor", 1.0), number(one, "offset", 0.0)
+            return number(child, "factor", 1.0), number(child, "offset", 0.0)
         if kind.endswith("Transformation"):
             raise SspError(
-                f"{kind} is not supported: only LinearTransformation is", one, code="ssp-unsupported"
+                f"{kind} is not supported: only LinearTransformation is", child, code="ssp-unsupported"
             )
     return 1.0, 0.0
 

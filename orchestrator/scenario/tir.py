@@ -43,11 +43,11 @@ def read_entries(raw: bytes) -> Iterator[TirEntry]:
     section = ""
     for number, line in enumerate(_LINE_END.split(_decoded(raw)), start=1):
         line = line.strip()
-        if found := _SECTION.match(line):
-            section = found[1].upper()
-        elif found := _ENTRY.match(line):
-            text = found["value"].strip().strip("'\"").strip()
-            yield TirEntry(number, section, found["key"].upper(), text or None)
+        if match := _SECTION.match(line):
+            section = match[1].upper()
+        elif match := _ENTRY.match(line):
+            text = match["value"].strip().strip("'\"").strip()
+            yield TirEntry(number, section, match["key"].upper(), text or None)
 
 
 def _decoded(raw: bytes) -> str:
@@ -260,7 +260,7 @@ class _Reading:
 
     def _factors(self) -> Callable[[dict[str, int]], float]:
         """Return a function from powers of the file's units to the factor to SI."""
-        given = {}
+        factors = {}
         for name, known in UNITS.items():
             entry = self.units.get(name)
             if entry is None or entry.text is None:
@@ -270,12 +270,12 @@ class _Reading:
             if factor is None:
                 self._refuse(entry, f"{entry.text} is not a known unit of {name.lower()}")
             else:
-                given[name] = factor
-        if "ANGLE" in given and given["ANGLE"] != 1.0:
+                factors[name] = factor
+        if "ANGLE" in factors and factors["ANGLE"] != 1.0:
             self._warn(
                 self.units["ANGLE"], "degrees are taken for ranges only: coefficients are read as in radians"
             )
-        return lambda powers: prod(given.get(name, 1.0) ** power for name, power in powers.items())
+        return lambda powers: prod(factors.get(name, 1.0) ** power for name, power in powers.items())
 
     def _side(self) -> str:
         entry = self.texts.get("TYRESIDE")
@@ -369,12 +369,12 @@ class _Reading:
         sound = load * bend * tan(pi / turn) if turn > 2.0 else inf
         if values["PKX2"] * values["PKX1"] < 0.0:
             sound = min(sound, load * (1.0 - values["PKX1"] / values["PKX2"]))
-        given = self._at("FZMAX")
-        if given <= 0.0:
+        stated = self._at("FZMAX")
+        if stated <= 0.0:
             return min(3.0 * load, 0.9 * sound)
-        if given > sound:
+        if stated > sound:
             self._warn(self.entries["FZMAX"], f"above {sound:.0f} N a stiffness has changed its sign")
-        return given
+        return stated
 
     def _radius(self) -> float | None:
         rim, width, ratio = (self._at(key) for key in ("RIM_RADIUS", "WIDTH", "ASPECT_RATIO"))

@@ -72,9 +72,9 @@ def _another_kind(model: type[BaseModel], data: Any) -> str | None:
     own = [key for key in KINDS if key in model.model_fields]
     if not own or not isinstance(data, dict) or any(key in data for key in own):
         return None
-    found = next((key for key, (_, form, _) in KINDS.items() if isinstance(data.get(key), form)), None)
+    other = next((key for key, (_, form, _) in KINDS.items() if isinstance(data.get(key), form)), None)
     wanted = listed((KINDS[key][0] for key in own), last="or")
-    return f"{KINDS[found][0]}, not {wanted}{KINDS[found][2]}" if found else None
+    return f"{KINDS[other][0]}, not {wanted}{KINDS[other][2]}" if other else None
 
 
 def _place(data: Any, location: KeyPath) -> KeyPath:
@@ -91,7 +91,7 @@ def _place(data: Any, location: KeyPath) -> KeyPath:
 
 
 def _report(model: type[BaseModel], document: Document, key: KeyPath, error: Any) -> None:
-    kind, given = error["type"], error["input"]
+    kind, value = error["type"], error["input"]
     if kind == "missing":
         document.report(key[:-1], f"{str(key[-1])!r} is missing", "key-missing")
     elif kind == "extra_forbidden":
@@ -100,14 +100,14 @@ def _report(model: type[BaseModel], document: Document, key: KeyPath, error: Any
         guess = f"did you mean {likely!r}? " if likely else ""
         document.report(key, f"unknown key; {guess}allowed here: {listed(allowed)}", "key-unknown")
     elif kind == "literal_error":
-        document.report(key, f"must be {error['ctx']['expected']} (got {short(given)})")
+        document.report(key, f"must be {error['ctx']['expected']} (got {short(value)})")
     elif kind == "value_error":
         raised = error["ctx"]["error"]
         document.report(key, str(raised), code_of(raised))
     elif kind in _MUST_BE:
-        document.report(key, f"must be {_MUST_BE[kind]} (got {short(given)})", "value-wrong-type")
+        document.report(key, f"must be {_MUST_BE[kind]} (got {short(value)})", "value-wrong-type")
     else:
-        document.report(key, f"{error['msg']} (got {short(given)})")
+        document.report(key, f"{error['msg']} (got {short(value)})")
 
 
 _MUST_BE = {

@@ -84,11 +84,11 @@ class Document:
     def comment_above(self, key: KeyPath) -> str:
         """Return the comment lines right above a key."""
         line = self.lines.get(key, 0) - 1
-        found: list[str] = []
+        lines: list[str] = []
         while line in self.comment_lines:
-            found.insert(0, self.comment_lines[line])
+            lines.insert(0, self.comment_lines[line])
             line -= 1
-        return " ".join(found)
+        return " ".join(lines)
 
     def remove(self, key: KeyPath, i: int) -> None:
         """Remove item `i` of the list at `key`; the lines and overrides of later items move with them."""
@@ -167,11 +167,11 @@ def _keep_comments(document: Document, text: str, scalars: Sequence[tuple[int, i
     inside = {at for begin, end in scalars for at in range(begin, end)}
     begin = 0
     for number, line in enumerate(text.split("\n"), start=1):
-        for found in _COMMENT.finditer(line):
-            if begin + found.start() not in inside:
-                alone = not line[: found.start()].strip()
+        for comment in _COMMENT.finditer(line):
+            if begin + comment.start() not in inside:
+                alone = not line[: comment.start()].strip()
                 of_kind = document.comment_lines if alone else document.comments
-                of_kind[number] = line[found.end() :].strip()
+                of_kind[number] = line[comment.end() :].strip()
                 break
         begin += len(line) + 1
 
@@ -305,7 +305,7 @@ class _Reader:
 
     def _check_text(self, text: str, key: KeyPath) -> None:
         if (character := unprintable(text)) is not None:
-            self.document.report(key, f"holds the control character {character}")
+            self.document.report(key, f"contains the control character {character}")
 
     def _sequence(self, node: Any, key: KeyPath, above: tuple[int, ...]) -> list[Any]:
         items = []
@@ -345,7 +345,7 @@ class _Reader:
     def _merged(self, name: Any, item: Any) -> list[Any]:
         """Return the mappings that a merge key includes: one, or a list of several."""
         nodes = item.value if item.id == "sequence" else [item]
-        if all(one.id == "mapping" for one in nodes):
+        if all(node.id == "mapping" for node in nodes):
             return list(nodes)
         sentence = "<<: write an alias of a mapping, or a list of such aliases"
         where = Location(self.document.path, name.start_mark.line + 1)
@@ -362,4 +362,4 @@ def _neighbours(path: Path) -> str:
     close = closest(path.stem, names)
     if close is not None:
         return f"; did you mean {str(path.parent / names[close])!r}?"
-    return f"; {path.parent.absolute()} holds {listed(names.values())}" if names else ""
+    return f"; {path.parent.absolute()} contains {listed(names.values())}" if names else ""

@@ -74,7 +74,7 @@ def alike(output: str, name: str) -> bool:
 
     Words of up to two letters do not count, and a reference value does not match an actual value.
     """
-    words = [{word for word in one.split("_") if len(word) > 2} for one in (output, name)]
+    words = [{word for word in name_part.split("_") if len(word) > 2} for name_part in (output, name)]
     return bool(words[0] & words[1]) and ("ref" in words[0]) == ("ref" in words[1])
 
 
@@ -105,15 +105,15 @@ class Connector:
         """Return all wires, and the constants and time series of each instance."""
         wires = self._by_connections()
         self._put_in_order()
-        given = constants(self._system)
-        own = {target for target, constant in given.items() if constant.of_unit}
+        by_input = constants(self._system)
+        own = {target for target, constant in by_input.items() if constant.of_unit}
         self._note_overruled(own - wires.keys())
         ambiguous = self._by_names(wires, own | self._refused)
         values: dict[Input, Value | InputSeries] = {}
-        for target, constant in self._given(given, wires).items():
+        for target, constant in self._given(by_input, wires).items():
             values[target] = constant.value
             self._system.origins[target[0]][target[1]] = constant.origin
-        fed = wires.keys() | given.keys() | ambiguous
+        fed = wires.keys() | by_input.keys() | ambiguous
         for instance, inputs in self._inputs.items():
             for name, variable in inputs.items():
                 if (instance, name) in fed:
@@ -178,18 +178,18 @@ class Connector:
         if ends[0] is None:
             self._refused.update((target, name) for name in inputs.values())
             return []
-        one = ends[0] if isinstance(ends[0], SignalName) else None
-        sources = [one.instance] if one else list(ends[0])
-        from_pattern = one.variable if one else "*"
+        single = ends[0] if isinstance(ends[0], SignalName) else None
+        sources = [single.instance] if single else list(ends[0])
+        from_pattern = single.variable if single else "*"
         if target in sources:
             self._report(key, f"connects {target} to itself", "connection-invalid")
             return []
         self._refuse_twice(sources, (*key, "from"))
-        found = [(source, matching(from_pattern, self._outputs[source])) for source in sources]
-        if one and not found[0][1]:
-            self._no_such((*key, "from"), one.instance, from_pattern, "output")
+        matches = [(source, matching(from_pattern, self._outputs[source])) for source in sources]
+        if single and not matches[0][1]:
+            self._no_such((*key, "from"), single.instance, from_pattern, "output")
         outputs: dict[str, tuple[str, str]] = {}  # part -> first instance that has it, and output
-        for source, named in found:
+        for source, named in matches:
             outputs = {part: (source, name) for part, name in named.items()} | outputs
         if not (outputs and inputs):
             return []
@@ -205,10 +205,10 @@ class Connector:
         else:
             pairs = [(outputs[""], n) for n in inputs.values()]
         if not pairs:
-            given, wanted = listed(outputs, last="or"), listed(inputs, last="or")
+            in_from, in_to = listed(outputs, last="or"), listed(inputs, last="or")
             self._report(
                 key,
-                f"nothing matches: in 'from' the * can be {given}, in 'to' {wanted}",
+                f"nothing matches: in 'from' the * can be {in_from}, in 'to' {in_to}",
                 "connection-matches-nothing",
             )
         return [Wire(source, output, target, name) for (source, output), name in pairs]
@@ -231,10 +231,10 @@ class Connector:
                 "left-out-after-swap", f"{dotted(key)} is left out: no names are equal any more"
             )
             return
-        given, wanted = listed(sources, last="or"), listed(targets, last="or")
+        from_names, to_names = listed(sources, last="or"), listed(targets, last="or")
         self._report(
             key,
-            f"nothing matches: no output of {given} has the name of an input of {wanted}",
+            f"nothing matches: no output of {from_names} has the name of an input of {to_names}",
             "connection-matches-nothing",
         )
 
@@ -318,14 +318,14 @@ class Connector:
         return having, ("units", instance)
 
     def _given(
-        self, given: Mapping[Input, Constant], wires: Mapping[Input, tuple[Wire, KeyPath]]
+        self, by_input: Mapping[Input, Constant], wires: Mapping[Input, tuple[Wire, KeyPath]]
     ) -> dict[Input, Constant]:
         """Return the constants of inputs without a wire; report the others.
 
         Facts are not reported: they apply to those inputs of theirs that nothing drives.
         """
-        for target in [one for one in given if one in wires]:
-            wire, constant = wires[target][0], given[target]
+        for target in [target for target in by_input if target in wires]:
+            wire, constant = wires[target][0], by_input[target]
             if constant.of_fact:
                 continue
             unless = "" if constant.of_unit else f", unless its key names {wire.target}"
@@ -335,7 +335,7 @@ class Connector:
                 f"{driven}: a constant is for inputs that no unit drives{unless}",
                 "constant-overruled",
             )
-        return {target: constant for target, constant in given.items() if target not in wires}
+        return {target: constant for target, constant in by_input.items() if target not in wires}
 
     def _undriven(self, instance: str, variable: Variable) -> str:
         """Return the message for an input without a source."""
@@ -370,8 +370,8 @@ class Connector:
     def _fitted(self, wire: Wire, key: KeyPath) -> Wire:
         """Return a wire with its gain and offset; report incompatible ends."""
         source, target = self._outputs[wire.source][wire.output], self._inputs[wire.target][wire.input]
-        between, given = conversion_between(source, target), self._scale(key)
-        scale = given or between
+        between, scaling = conversion_between(source, target), self._scale(key)
+        scale = scaling or between
         differing = difference(source, target, scale)
         if differing is not None:
             what, of, to = differing
@@ -381,16 +381,16 @@ class Connector:
             return wire
         assert scale is not None
         whole = source.type == "Integer" and all(x.is_integer() for x in scale)
-        if given and source.type != "Real" and not whole:
+        if scaling and source.type != "Real" and not whole:
             self._report(
                 key,
                 f"gain and offset are for Real, and whole ones for Integer, not for {source.type}",
                 "value-wrong-type",
             )
-        if given and between not in (None, (1.0, 0.0), given):
+        if scaling and between not in (None, (1.0, 0.0), scaling):
             self._system.note(
                 "conversion-replaced",
-                f"{dotted(key)}: its gain and offset stand in place of the conversion "
+                f"{dotted(key)}: its gain and offset replace the conversion "
                 f"from {source.unit} to {target.unit}",
             )
         return replace(wire, gain=scale[0], offset=scale[1])

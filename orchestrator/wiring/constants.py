@@ -60,8 +60,8 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
     read = None
     if any(isinstance(raw, SeriesSpec) for raw in scenario.inputs.values()):
         read = _series_reader(scenario)
-    found = dict(_of_facts(system))
-    fact_changed = any(one.level == CHANGED_FACT for one in found.values())
+    by_input = dict(_of_facts(system))
+    fact_changed = any(constant.level == CHANGED_FACT for constant in by_input.values())
     for pattern, raw in scenario.inputs.items():
         key: KeyPath = ("inputs", pattern)
         prefix, name_pattern = SignalName.parse_input(pattern, fmus)
@@ -93,19 +93,19 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
                 system.report(key, f"{error}, for {instance}.{name}", code_of(error))
             level = CHANGED_INPUTS if fact_changed and scenario.document.override(key) else INPUTS
             given_by = origin(scenario, key)
-            one = Constant(value, key, given_by, of_unit, "*" not in pattern, level)
-            other = found.setdefault((instance, name), one)
-            if other.rank < one.rank:
-                found[instance, name] = one
+            constant = Constant(value, key, given_by, of_unit, "*" not in pattern, level)
+            other = by_input.setdefault((instance, name), constant)
+            if other.rank < constant.rank:
+                by_input[instance, name] = constant
             elif other.of_fact and of_unit:  # the overridden fact replaces a constant of the instance
-                found[instance, name] = replace(other, of_unit=True)
-            elif other.rank == one.rank and other is not one:
+                by_input[instance, name] = replace(other, of_unit=True)
+            elif other.rank == constant.rank and other is not constant:
                 system.report(
                     key,
                     f"{instance}.{name} has another constant already, by inputs.{other.key[1]}",
                     "input-ambiguous",
                 )
-    return found
+    return by_input
 
 
 def _of_facts(system: WiringContext) -> Iterator[tuple[Input, Constant]]:
@@ -114,28 +114,31 @@ def _of_facts(system: WiringContext) -> Iterator[tuple[Input, Constant]]:
     for name, fact, raw, changed in facts_of(scenario):
         key: KeyPath = (name,)
         takers = [
-            (instance, one) for instance, inputs in known.items() for one in fact.inputs if one in inputs
+            (instance, variable)
+            for instance, inputs in known.items()
+            for variable in fact.inputs
+            if variable in inputs
         ]
         if fact.inputs and not takers:
-            if not changed and any(system.had(known, one, "input") for one in fact.inputs):
+            if not changed and any(system.had(known, variable, "input") for variable in fact.inputs):
                 system.note(
                     "left-out-after-swap", f"{name} is left out: no unit has such an input after the swap"
                 )
             else:
                 system.report(key, f"no unit has an input {name}", "variable-unknown")
         refused: dict[str, list[str]] = {}
-        for instance, one in takers:
+        for instance, variable in takers:
             value = raw
             try:
-                value = value_for(known[instance][one], raw)
+                value = value_for(known[instance][variable], raw)
             except ValueError as error:
-                refused.setdefault(str(error), []).append(f"{instance}.{one}")
+                refused.setdefault(str(error), []).append(f"{instance}.{variable}")
             level = CHANGED_FACT if changed else FACT
-            yield (instance, one), Constant(value, key, origin(scenario, key), False, True, level)
+            yield (instance, variable), Constant(value, key, origin(scenario, key), False, True, level)
         everywhere = [len(inputs) for inputs in refused.values()] == [len(takers)]
         for sentence, inputs in refused.items():
-            for one in inputs:
-                system.report(key, sentence if everywhere else f"{sentence}, for {one}")
+            for variable in inputs:
+                system.report(key, sentence if everywhere else f"{sentence}, for {variable}")
 
 
 Reader = Callable[[SeriesSpec, str, Variable], InputSeries]

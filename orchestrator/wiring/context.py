@@ -136,10 +136,10 @@ class WiringContext:
         errors: list[Diagnostic] = []
         folded = fold_sentences(self.found)
         for of_vehicle, document in enumerate((self.scenario.document, self.scenario.vehicle_document)):
-            told = [
+            of_document = [
                 Diagnostic(code, text, location=document.location(key))
                 for (which, key, code), text in folded
                 if which == of_vehicle
             ]
-            errors += sorted(dict.fromkeys(told), key=lambda error: error.location.line or 0)
+            errors += sorted(dict.fromkeys(of_document), key=lambda error: error.location.line or 0)
         return errors

@@ -52,7 +52,7 @@ def _follows(name: str, expression: str, words: str = "") -> Derivation:
     `words` replace the expression in messages where it is too long to read.
     """
     known = {"g": G, "in_series": in_series, "of_points": of_points}
-    inputs = tuple(one for one in compile(expression, name, "eval").co_names if one not in known)
+    inputs = tuple(symbol for symbol in compile(expression, name, "eval").co_names if symbol not in known)
     return Derivation(
         name, words or expression, inputs, eval(f"lambda {', '.join(inputs)}: {expression}", known)
     )
@@ -133,60 +133,66 @@ class CarQuantities:
     """Names of the quantities that formulas have used."""
 
 
-def car_of(given: Mapping[str, float]) -> CarQuantities:
+def car_of(quantities: Mapping[str, float]) -> CarQuantities:
     """Derive all quantities that follow from the given ones.
 
     Args:
-        given: name of `CAR` -> value in SI.
+        quantities: name of `CAR` -> value in SI.
     """
-    return _derived(tuple(given.items()))
+    return _derived(tuple(quantities.items()))
 
 
 @lru_cache(maxsize=1024)
-def _derived(given: tuple[tuple[str, float], ...]) -> CarQuantities:
-    values, formulas, used = dict(given), dict[str, str](), set[str]()
-    found = True
-    while found:
-        found = False
-        for one in DERIVATIONS:
-            inputs = [values.get(name, NEUTRAL.get(name)) for name in one.inputs]
-            if one.name in values or None in inputs or not (value := _number(one, inputs)):
+def _derived(quantities: tuple[tuple[str, float], ...]) -> CarQuantities:
+    values, formulas, used = dict(quantities), dict[str, str](), set[str]()
+    progress = True
+    while progress:
+        progress = False
+        for derivation in DERIVATIONS:
+            inputs = [values.get(name, NEUTRAL.get(name)) for name in derivation.inputs]
+            if derivation.name in values or None in inputs or not (value := _number(derivation, inputs)):
                 continue
-            values[one.name], formulas[one.name] = value[0], one.formula
-            used.update(one.inputs)
-            found = True
+            values[derivation.name], formulas[derivation.name] = value[0], derivation.formula
+            used.update(derivation.inputs)
+            progress = True
     return CarQuantities(values, formulas, frozenset(used))
 
 
-def contradictions(given: Mapping[str, float]) -> list[tuple[str, str]]:
+def contradictions(quantities: Mapping[str, float]) -> list[tuple[str, str]]:
     """Return (name, message) of every given value that disagrees with the value derived from the others.
 
     Of several formulas between the same quantities, only the first is checked.
     """
-    known = car_of(given).values
-    found, seen = [], set()
-    for one in DERIVATIONS:
-        among = frozenset((one.name, *one.inputs))
-        if among in seen or one.name not in given or not all(name in known for name in one.inputs):
+    known = car_of(quantities).values
+    messages, checked = [], set()
+    for derivation in DERIVATIONS:
+        among = frozenset((derivation.name, *derivation.inputs))
+        if (
+            among in checked
+            or derivation.name not in quantities
+            or not all(name in known for name in derivation.inputs)
+        ):
             continue
-        seen.add(among)
-        value = _number(one, [known[name] for name in one.inputs])
-        if value and abs(value[0] - given[one.name]) > AGREES * max(abs(value[0]), abs(given[one.name])):
-            measure = CAR[one.name].unit
+        checked.add(among)
+        value = _number(derivation, [known[name] for name in derivation.inputs])
+        if value and abs(value[0] - quantities[derivation.name]) > AGREES * max(
+            abs(value[0]), abs(quantities[derivation.name])
+        ):
+            measure = CAR[derivation.name].unit
             unit = "" if measure == "1" else f" {measure}"
-            found.append(
+            messages.append(
                 (
-                    one.name,
-                    f"{given[one.name]:.6g}{unit} contradicts {one.formula} = {value[0]:.6g}{unit}: "
-                    "leave one of them out",
+                    derivation.name,
+                    f"{quantities[derivation.name]:.6g}{unit} contradicts {derivation.formula} = "
+                    f"{value[0]:.6g}{unit}: omit one of them",
                 )
             )
-    return found
+    return messages
 
 
-def _number(one: Derivation, inputs: Sequence[float | None]) -> tuple[float] | None:
+def _number(derivation: Derivation, inputs: Sequence[float | None]) -> tuple[float] | None:
     """Return the derived value in a tuple (0 must stay true), None if undefined: a car without mass."""
     try:
-        return (float(one.value(*inputs)),)
+        return (float(derivation.value(*inputs)),)
     except (ZeroDivisionError, OverflowError):
         return None

@@ -22,7 +22,7 @@ def faults_of(
 ) -> tuple[FaultySignal, ...]:
     """Return the signals that the faults of a scenario act on."""
     scenario = system.scenario
-    found: list[FaultySignal] = []
+    signals: list[FaultySignal] = []
     record = set(record)
     for i, fault in enumerate(spec.fault for spec in scenario.faults):
         key: KeyPath = ("faults", i)
@@ -39,16 +39,16 @@ def faults_of(
             except ValueError as error:
                 system.report((*key, "value"), f"{unit}.{name}: {error}", "fault-invalid")
                 continue
-            before = sum((f.instance, f.variable, f.of_output) == (unit, name, of_output) for f in found)
+            before = sum((f.instance, f.variable, f.of_output) == (unit, name, of_output) for f in signals)
             text = f"{fault.seed or 0} {unit}.{name} {of_output} {before}"
             stream = int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big")
             drawn = KINDS[fault.kind].drawn
-            found.append(FaultySignal(fault, unit, name, of_output, value, stream if drawn else 0))
+            signals.append(FaultySignal(fault, unit, name, of_output, value, stream if drawn else 0))
         if at and fault.begin >= scenario.stop_time:
             ends = f"the run ends at {float(scenario.stop_time):g} s"
             sentence = f"{_said(scenario, key)} never acts: it begins at {fault.begin:g} s, {ends}"
             system.note("fault-never-acts", sentence)
-    return tuple(found)
+    return tuple(signals)
 
 
 def _value(fault: Fault, variable: Variable) -> float | None:
@@ -127,11 +127,11 @@ class _Finder:
     def _on_wires(self, fault: Fault) -> list[tuple[str, str, bool]]:
         place = fault.on
         between = [w for w in self.wires if (w.source, w.target) == (place.instance, place.target)]
-        found = [
+        matching_wires = [
             w for w in between
             if match(place.variable, w.output) is not None and match(place.input, w.input) is not None
         ]  # fmt: skip
-        if not found:
+        if not matching_wires:
             if {place.instance, place.target} & self.system.scenario.replaced.keys():
                 self._left_out()
                 return []
@@ -139,7 +139,7 @@ class _Finder:
                 f"no wire leads from {place.instance}.{place.variable} to {place.target}{self._way(place)}",
                 "wire-unknown",
             )
-        return [(w.target, w.input, False) for w in found]
+        return [(w.target, w.input, False) for w in matching_wires]
 
     def _way(self, place: FaultLocation) -> str:
         """Return a hint at existing wires similar to the missing one."""
@@ -158,8 +158,8 @@ class _Finder:
         self._report(f"{unit} has neither an output nor an input {pattern!r}{guess}", "variable-unknown")
 
     def _left_out(self) -> None:
-        said = _said(self.system.scenario, self.key)
-        self.system.note("left-out-after-swap", f"{said} is left out: there is no such signal any more")
+        fault = _said(self.system.scenario, self.key)
+        self.system.note("left-out-after-swap", f"{fault} is left out: there is no such signal any more")
 
     def _report(self, sentence: str, code: str) -> None:
         self.system.report((*self.key, "on"), sentence, code)

@@ -47,16 +47,16 @@ def missing_functions(
         if not instance.fmu.lacking:
             continue
         needed: dict[str, list[str]] = {f"fmi{instance.fmu.fmi}{name}": [] for name in CORE[instance.fmu.fmi]}
-        given = [
+        set_names = [
             *instance.parameters,
             *instance.constants,
             *(w.input for w in wires if w.target == instance.name),
         ]
-        asked = [
+        read_names = [
             *(w.output for w in wires if w.source == instance.name),
             *(n for u, n in record if u == instance.name),
         ]
-        for verb, names in (("Set", given), ("Get", asked)):
+        for verb, names in (("Set", set_names), ("Get", read_names)):
             for name in dict.fromkeys(names):
                 kind = instance.fmu.variables[name].place.type
                 needed.setdefault(f"fmi{instance.fmu.fmi}{verb}{kind}", []).append(name)
@@ -79,9 +79,9 @@ def recorded(system: WiringContext) -> tuple[SignalName, ...]:
     chosen: dict[SignalName, None] = {}
     for i, (instance, pattern) in enumerate(record):
         instances = list(fmus) if instance == "*" else [instance]
-        found = _matching(instances, fmus, pattern, _usual) or _matching(instances, fmus, pattern, _all)
-        chosen.update(dict.fromkeys(found))
-        if found:
+        columns = _matching(instances, fmus, pattern, _usual) or _matching(instances, fmus, pattern, _all)
+        chosen.update(dict.fromkeys(columns))
+        if columns:
             continue
         if system.had(instances, pattern):
             sentence = f"record[{i}] is left out: {instance} has no variable {pattern!r} any more"
@@ -170,7 +170,7 @@ def make_plan(
         of_all = missing_functions(instances.values(), wires, record)
     if not errors and not of_all:
         errors += _take_from_tyres(scenario, instances, distributed, measure)
-    errors += [replace(one, location=Location(file=scenario.path)) for one in of_all]
+    errors += [replace(error, location=Location(file=scenario.path)) for error in of_all]
     if errors:
         raise WiringError([*_misplaced(scenario), *errors])
     for loop in evaluation.possible_loops[:1]:
@@ -209,18 +209,18 @@ def _take_from_tyres(
     tyres = [u for u in instances.values() if {v.name for v in u.fmu.of("output")} >= {*TYRE_FORCES}]
     try:
         if len(tyres) != 1 or measure is None:
-            raise ValueError("there is no one unit for the tyres to take it from")
-        found = measure(tyres[0], dict(zip(WHEELS[::2], loads, strict=True)))
+            raise ValueError("this needs exactly one unit that computes the tyre forces")
+        measured = measure(tyres[0], dict(zip(WHEELS[::2], loads, strict=True)))
     except (ValueError, YawbenchError) as error:
         return [
             Diagnostic(
                 "vehicle-incomplete",
-                f"the vehicle file does not give {listed(names)}, and the tyres do not tell: {error}",
+                f"the vehicle file does not give {listed(names)}, and measuring the tyres failed: {error}",
                 location=scenario.document.location(("units", instance)),
             )
             for instance, names in distributed.lacking.items()
         ]
-    stiffness = dict(zip(STIFFNESSES, (2.0 * found[wheel] for wheel in WHEELS[::2]), strict=True))
+    stiffness = dict(zip(STIFFNESSES, (2.0 * measured[wheel] for wheel in WHEELS[::2]), strict=True))
     for instance, names in distributed.lacking.items():
         formula = {
             name: ValueOrigin.derived(f"two of {tyres[0].fmu.name} at {load:.6g} N each")
@@ -259,14 +259,14 @@ def _misplaced(scenario: LoadedScenario) -> list[Diagnostic]:
     """Return an error for every swap to an FMU whose name has the role of another instance."""
     before = {name: scenario.replaced.get(name, spec.fmu) for name, spec in scenario.units.items()}
     roles = {name: role_of(name, Path(fmu).stem) for name, fmu in before.items()}
-    found = []
+    errors = []
     for change in scenario.changes:
         name = Path(str(change.value)).stem
         others = [instance for instance, role in roles.items() if role == role_in(name)]
         if change.swaps and others and change.target.instance not in others:
             sentence = f"by its name {name} is for the unit {others[0]!r}"
-            found.append(Diagnostic("swap-role-mismatch", sentence, location=Location(target=str(change))))
-    return found
+            errors.append(Diagnostic("swap-role-mismatch", sentence, location=Location(target=str(change))))
+    return errors
 
 
 def _open_all(scenario: LoadedScenario, fmus: Path | None, opener: Opener) -> WiringContext:
@@ -290,22 +290,24 @@ def _open_all(scenario: LoadedScenario, fmus: Path | None, opener: Opener) -> Wi
         except ModelDescriptionError:
             return None
 
-    found: dict[str, Fmu] = {}
+    fmus_by_name: dict[str, Fmu] = {}
     not_built: dict[Diagnostic, None] = {}
     for name, spec in scenario.units.items():
         try:
-            found[name] = opened(spec.fmu, spec.validate_)
+            fmus_by_name[name] = opened(spec.fmu, spec.validate_)
         except BuildError as error:  # noqa: PERF203 - all errors are collected
             not_built.update(dict.fromkeys(error.diagnostics))
         except ModelDescriptionError as error:
             where = document.location(("units", name, "fmu"))
-            told = [Diagnostic(one.code, str(one), location=where) for one in error.diagnostics]
-            errors.update(dict.fromkeys(told))
+            located = [
+                Diagnostic(problem.code, str(problem), location=where) for problem in error.diagnostics
+            ]
+            errors.update(dict.fromkeys(located))
     if not_built:
         raise BuildError(not_built)
     if errors:
         raise ModelDescriptionError(errors)
-    return WiringContext(scenario, found, replaced)
+    return WiringContext(scenario, fmus_by_name, replaced)
 
 
 def _check_instances(system: WiringContext) -> None:

@@ -141,10 +141,10 @@ def _shortest_loop(graph: Graph, effort: int) -> tuple[list[Node], int]:
     for start in (node for node in graph if node[1] != UNDECLARED):
         if effort <= 0:
             break
-        found, looked_at = _way_back(graph, start)
+        loop, looked_at = _way_back(graph, start)
         effort -= looked_at
-        if found and (not best or len(found) < len(best)):
-            best = found
+        if loop and (not best or len(loop) < len(best)):
+            best = loop
     return best, effort
 
 
@@ -234,14 +234,14 @@ def _cycles(names: Sequence[str], edges: Iterable[Edge]) -> list[list[str]]:
 
 def _reached(name: str, after: Mapping[str, Sequence[str]]) -> set[str]:
     """Return all instances that can be reached from one, itself only through a cycle."""
-    found: set[str] = set()
+    reached: set[str] = set()
     waiting = list(after[name])
     while waiting:
         other = waiting.pop()
-        if other not in found:
-            found.add(other)
+        if other not in reached:
+            reached.add(other)
             waiting += after[other]
-    return found
+    return reached
 
 
 def _cheapest_order(group: Sequence[str], weights: Mapping[Edge, int]) -> list[str]:

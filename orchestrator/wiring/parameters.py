@@ -38,65 +38,65 @@ LARGEST, LARGEST_SINGLE = sys.float_info.max, (2 - 2**-23) * 2.0**127
 """Largest numbers of double and single precision."""
 
 
-def value_for(variable: Variable, given: Value) -> Value:
+def value_for(variable: Variable, raw: Value) -> Value:
     """Convert a value from a scenario to the type and unit of a variable.
 
     Raises:
         ValueError: the value is not allowed; the message says what is.
     """
     convert = {"Real": _real, "Integer": _integer, "Enumeration": _enumeration}.get(variable.type, _other)
-    value = convert(variable, given)
+    value = convert(variable, raw)
     unit = f" {variable.unit}" if variable.unit and variable.unit != "1" else ""
     if variable.choices is not None and value not in variable.choices:
         likely = closest(str(value), variable.choices)
         guess = f"; did you mean {likely!r}?" if likely else ""
-        raise ValueError(f"must be one of {listed(variable.choices, last='or')} (got {short(given)}){guess}")
+        raise ValueError(f"must be one of {listed(variable.choices, last='or')} (got {short(raw)}){guess}")
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         if variable.minimum is not None and value < variable.minimum:
-            raise ValueError(f"must be at least {variable.minimum:g}{unit} (got {short(given)})")
+            raise ValueError(f"must be at least {variable.minimum:g}{unit} (got {short(raw)})")
         if variable.maximum is not None and value > variable.maximum:
-            raise ValueError(f"must be at most {variable.maximum:g}{unit} (got {short(given)})")
+            raise ValueError(f"must be at most {variable.maximum:g}{unit} (got {short(raw)})")
     return value
 
 
-def _real(variable: Variable, given: Value) -> float:
+def _real(variable: Variable, raw: Value) -> float:
     in_unit = f" in {variable.unit}" if variable.unit and variable.unit != "1" else ""
-    if isinstance(given, bool):
-        raise ValueError(f"must be a number{in_unit} (got {str(given).lower()})")
+    if isinstance(raw, bool):
+        raise ValueError(f"must be a number{in_unit} (got {str(raw).lower()})")
     value = float(
-        quantities.convert(given, variable.unit, variable.definition) if isinstance(given, str) else given
+        quantities.convert(raw, variable.unit, variable.definition) if isinstance(raw, str) else raw
     )
     if not abs(value) <= (LARGEST_SINGLE if variable.encoding == "Float32" else LARGEST):
-        raise ValueError(f"must be a finite number{in_unit} (got {short(given)})")
+        raise ValueError(f"must be a finite number{in_unit} (got {short(raw)})")
     return value
 
 
-def _integer(variable: Variable, given: Value) -> int:
-    if isinstance(given, bool) or not isinstance(given, int):
-        raise ValueError(f"must be a whole number (got {short(given)})")
+def _integer(variable: Variable, raw: Value) -> int:
+    if isinstance(raw, bool) or not isinstance(raw, int):
+        raise ValueError(f"must be a whole number (got {short(raw)})")
     lowest, highest = integer_limits(variable.encoding or "Int32")
-    if not lowest <= given <= highest:
-        raise ValueError(f"must be a whole number from {lowest} to {highest} (got {short(given)})")
-    return given
+    if not lowest <= raw <= highest:
+        raise ValueError(f"must be a whole number from {lowest} to {highest} (got {short(raw)})")
+    return raw
 
 
-def _enumeration(variable: Variable, given: Value) -> int:
+def _enumeration(variable: Variable, raw: Value) -> int:
     items = variable.items or {}
-    if isinstance(given, str) and given in items:
-        return items[given]
-    if given in items.values() and not isinstance(given, (bool, float)):
-        return int(given)
-    raise ValueError(f"must be one of {listed(items, last='or')} (got {short(given)})")
+    if isinstance(raw, str) and raw in items:
+        return items[raw]
+    if raw in items.values() and not isinstance(raw, (bool, float)):
+        return int(raw)
+    raise ValueError(f"must be one of {listed(items, last='or')} (got {short(raw)})")
 
 
-def _other(variable: Variable, given: Value) -> Value:
-    if variable.type == "Boolean" and not isinstance(given, bool):
-        raise ValueError(f"must be true or false (got {short(given)})")
-    if variable.type == "String" and not isinstance(given, str):
-        raise ValueError(f"must be text (got {short(given)}): put it in quotes")
-    if isinstance(given, str) and variable.name in WRITTEN:
-        WRITTEN[variable.name](given)
-    return given
+def _other(variable: Variable, raw: Value) -> Value:
+    if variable.type == "Boolean" and not isinstance(raw, bool):
+        raise ValueError(f"must be true or false (got {short(raw)})")
+    if variable.type == "String" and not isinstance(raw, str):
+        raise ValueError(f"must be text (got {short(raw)}): put it in quotes")
+    if isinstance(raw, str) and variable.name in WRITTEN:
+        WRITTEN[variable.name](raw)
+    return raw
 
 
 def origin(scenario: LoadedScenario, key: KeyPath, *, unit: str | None = None) -> ValueOrigin:
@@ -299,13 +299,13 @@ class Parameters:
         if wrong or not self.car.values.keys() >= {*STATIC_LOADS}:
             return
         for unit, fmu in self._fmus.items():
-            given = self._given[unit]
-            lacks = [v.name for v in fmu.of("parameter") if v.name in CAR and v.name not in given]
+            by_name = self._given[unit]
+            lacks = [v.name for v in fmu.of("parameter") if v.name in CAR and v.name not in by_name]
             of_tyres = [name for name in lacks if name in STIFFNESSES]
             if of_tyres and "tyre_force_y_fl" not in fmu.variables:
                 self.lacking[unit] = of_tyres
             needed = [name for name in lacks if CAR[name].needed]
-            if needed and any(name in self.car.values for name in given):
+            if needed and any(name in self.car.values for name in by_name):
                 self._system.report(
                     ("units", unit),
                     f"{fmu.name} takes its car from the vehicle file, which gives neither "
@@ -349,9 +349,9 @@ def _text_of(path: Path) -> str:
         raise ValueError((error.strerror or "cannot be read").lower()) from None
 
 
-def known_car(given: Mapping[str, Value]) -> CarQuantities:
+def known_car(parameters: Mapping[str, Value]) -> CarQuantities:
     """Return the quantities of a car that follow from the (valid) values of a vehicle file."""
-    of_car = {name: raw for name, raw in given.items() if name in CAR}
+    of_car = {name: raw for name, raw in parameters.items() if name in CAR}
     return car_of({name: float(value_for(_quantity(name), raw)) for name, raw in of_car.items()})
 
 

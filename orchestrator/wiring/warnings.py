@@ -55,22 +55,22 @@ def exact(units: Sequence[Instance], wires: Iterable[Wire]) -> list[Diagnostic]:
     if not any(unit.role == "sensor" for unit in units):
         return []
     steering = _steering(units, wires)
-    found: dict[tuple[str, str], list[str]] = {}
+    inputs: dict[tuple[str, str], list[str]] = {}
     for wire in wires:
         if wire.target in steering and seen_as(wire, units) == TRUTH:
-            found.setdefault((wire.target, wire.source), []).append(wire.input)
-    told = [f"{listed(fold(names))} of {to} (from {of})" for (to, of), names in found.items()]
-    sentence = f"exact, though there is a sensor: {'; '.join(told)}"
-    return [Diagnostic("sensor-bypassed", sentence, "info")] if told else []
+            inputs.setdefault((wire.target, wire.source), []).append(wire.input)
+    parts = [f"{listed(fold(names))} of {to} (from {of})" for (to, of), names in inputs.items()]
+    sentence = f"exact, though there is a sensor: {'; '.join(parts)}"
+    return [Diagnostic("sensor-bypassed", sentence, "info")] if parts else []
 
 
 def _steering(units: Iterable[Instance], wires: Iterable[Wire]) -> set[str]:
     """Return the instances that affect, directly or through others, one outside the control side."""
     inside = {unit.name for unit in units if unit.role in (*CONTROL, "estimator")}
-    found = {unit.name for unit in units} - inside
-    while more := {w.source for w in wires if w.target in found} - found:
-        found |= more
-    return found
+    reached = {unit.name for unit in units} - inside
+    while more := {w.source for w in wires if w.target in reached} - reached:
+        reached |= more
+    return reached
 
 
 INERTIA = ("yaw_inertia", "mass", "cg_to_front_axle", "cg_to_rear_axle")
@@ -89,8 +89,8 @@ class _Given(NamedTuple):
 def suspicious_car(scenario: LoadedScenario, units: Mapping[str, Instance]) -> list[Diagnostic]:
     """Return a warning for every implausible quantity of the car, and for inertias that do not fit."""
     of_file = suspicious_vehicle(scenario.vehicle_file.parameters)
-    told = {(one.name, one.value) for one in _of_file(scenario.vehicle_file.parameters)}
-    own = [one for one in _of_units(scenario, units) if (one.name, one.value) not in told]
+    in_file = {(item.name, item.value) for item in _of_file(scenario.vehicle_file.parameters)}
+    own = [item for item in _of_units(scenario, units) if (item.name, item.value) not in in_file]
     return [*of_file, *filter(None, map(_beyond, own)), *_index(units)]
 
 
@@ -119,22 +119,23 @@ def _of_units(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterat
                 yield _Given(f"{unit.name}.{name}", name, value, raw)
 
 
-def _beyond(one: _Given) -> Diagnostic | None:
+def _beyond(item: _Given) -> Diagnostic | None:
     """Return a warning about a value outside its range, None if it is inside or has no range."""
-    quantity = CAR[one.name]
+    quantity = CAR[item.name]
     if quantity.plausible is None:
         return None
     low, high = quantity.plausible
-    if low <= one.value <= high or one.value == 0.0:
+    if low <= item.value <= high or item.value == 0.0:
         return None
-    written = number_and_unit(one.raw) if isinstance(one.raw, str) else None
-    number, given = written or (f"{one.value:.10g}", quantity.unit)
-    likely = meant_unit(float(number), given, quantity.unit, lambda value: low <= value <= high)
+    written = number_and_unit(item.raw) if isinstance(item.raw, str) else None
+    number, unit_written = written or (f"{item.value:.10g}", quantity.unit)
+    likely = meant_unit(float(number), unit_written, quantity.unit, lambda value: low <= value <= high)
     unit = f" {quantity.unit}" if quantity.unit != "1" else ""
-    says = f"{one.place}: {one.value:.10g}{unit} is no car's, {low:g} to {high:g}{unit} is plausible" + (
-        f"; did you mean '{number} {likely}'?" if likely else ""
+    says = (
+        f"{item.place}: {item.value:.10g}{unit} is implausible for a car, {low:g} to {high:g}{unit} is usual"
+        + (f"; did you mean '{number} {likely}'?" if likely else "")
     )
-    return _warning("value-implausible", one.place, says, one.value)
+    return _warning("value-implausible", item.place, says, item.value)
 
 
 def _index(units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
@@ -145,11 +146,11 @@ def _index(units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
     for unit in units.values():
         values = {name: unit.parameter(name) for name in INERTIA if name in unit.fmu.variables}
         numbers = [value for value in values.values() if isinstance(value, float)]
-        given = any(unit.origins.get(name, DEFAULT) != DEFAULT for name in INERTIA)
-        if not given or len(numbers) < len(INERTIA):
+        is_set = any(unit.origins.get(name, DEFAULT) != DEFAULT for name in INERTIA)
+        if not is_set or len(numbers) < len(INERTIA):
             continue
-        told = (_Given("", name, number, number) for name, number in zip(INERTIA, numbers, strict=True))
-        if any(map(_beyond, told)):
+        items = (_Given("", name, number, number) for name, number in zip(INERTIA, numbers, strict=True))
+        if any(map(_beyond, items)):
             continue
         inertia, mass, front, rear = numbers
         index = inertia / (mass * front * rear)
@@ -163,7 +164,7 @@ def _index(units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
             return
 
 
-OF_CAR = (*(name for name, one in CAR.items() if one.needed), *STIFFNESSES, "steering_ratio")
+OF_CAR = (*(name for name, quantity in CAR.items() if quantity.needed), *STIFFNESSES, "steering_ratio")
 """Parameters that describe the car in any instance."""
 OF_FILES = ("default", "vehicle", "derived", "scenario", "file")
 """Origins of values that are not overrides."""
@@ -208,7 +209,7 @@ def _idle_units(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iter
         if step > lasts:
             says = (
                 f"{unit.name} never takes a step: its step_size, {float(step):g} s, is longer than the run, "
-                f"{float(lasts):g} s; it keeps what it gave at the start"
+                f"{float(lasts):g} s; its outputs keep their initial values"
             )
             yield _warning("instance-never-steps", f"{unit.name}.step_size", says, float(step))
 
@@ -219,19 +220,19 @@ def _of_tyres(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterat
     if not tyres or not scenario.tyre_files:
         return
     law = without_role(tyres[0].fmu.name).removesuffix("_transient")
-    for one in _parameters(units.values()):
-        if one.name == "tyre" and "pcx1_front" in units[one.instance].parameters and one.value != law:
-            says = f"{one.instance}.tyre is {one.value}: it does not ask the law of {tyres[0].name}, {law}"
-            yield _warning("tyre-mismatch", f"{one.instance}.tyre", says)
+    for item in _parameters(units.values()):
+        if item.name == "tyre" and "pcx1_front" in units[item.instance].parameters and item.value != law:
+            says = f"{item.instance}.tyre is {item.value}: {tyres[0].name} follows {law}"
+            yield _warning("tyre-mismatch", f"{item.instance}.tyre", says)
     radii = {str(f.path.name): f.rolling_radius for f in scenario.tyre_files.values() if f.rolling_radius}
-    told = [one for one in _parameters(units.values()) if one.name == "wheel_radius"]
-    for (file, radius), one in product(radii.items(), told):
-        if isinstance(one.value, float) and radius and abs(one.value / radius - 1.0) > RADIUS:
+    wheel_radii = [item for item in _parameters(units.values()) if item.name == "wheel_radius"]
+    for (file, radius), item in product(radii.items(), wheel_radii):
+        if isinstance(item.value, float) and radius and abs(item.value / radius - 1.0) > RADIUS:
             says = (
-                f"{one.instance}.wheel_radius is {one.value:.4g} m, but the tyres of {file} roll on "
+                f"{item.instance}.wheel_radius is {item.value:.4g} m, but the tyres of {file} roll on "
                 f"{radius:.4g} m at nominal load"
             )
-            yield _warning("wheel-radius-mismatch", f"{one.instance}.wheel_radius", says, one.value)
+            yield _warning("wheel-radius-mismatch", f"{item.instance}.wheel_radius", says, item.value)
 
 
 def _two_values(units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
@@ -243,34 +244,34 @@ def _two_values(units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
     """
     in_facts = {name for fact in FACTS.values() for name in (*fact.inputs, *fact.parameters)}
     groups: dict[str, list[GivenValue]] = {}
-    for one in _parameters(units.values()):
-        groups.setdefault(one.name, []).append(one)
-    for name, told in groups.items():
-        if name not in in_facts and _one_matter(name, told) and _differ(told):
-            vehicle = f"--set vehicle.{name}=VALUE gives it to all of them that have no value of their own"
-            yield _values_differ(name, told, vehicle)
+    for item in _parameters(units.values()):
+        groups.setdefault(item.name, []).append(item)
+    for name, items in groups.items():
+        if name not in in_facts and _one_matter(name, items) and _differ(items):
+            vehicle = f"--set vehicle.{name}=VALUE sets it in all of them without a value of their own"
+            yield _values_differ(name, items, vehicle)
     for name, fact in FACTS.items():
-        told = [one for one in _parameters(units.values()) if fact.counts(units[one.instance], one.name)]
-        told += [one for one in _constants(units.values()) if one.name in fact.inputs]
+        items = [item for item in _parameters(units.values()) if fact.counts(units[item.instance], item.name)]
+        items += [item for item in _constants(units.values()) if item.name in fact.inputs]
         meant = ({"scenario"}, {"default"}) if fact.inputs else ()  # a road may differ from wheel to wheel
-        if _differ(told) and {one.origin for one in told} not in meant:
-            yield _values_differ(name, told, f"--set {name}=VALUE gives all of them one value")
+        if _differ(items) and {item.origin for item in items} not in meant:
+            yield _values_differ(name, items, f"--set {name}=VALUE sets it in all of them")
 
 
-def _one_matter(name: str, told: list[GivenValue]) -> bool:
+def _one_matter(name: str, items: list[GivenValue]) -> bool:
     """Return whether a parameter of several instances should have the same value in all of them."""
-    origins = {one.origin for one in told}
-    measured_alike = len({one.variable.unit or "1" for one in told}) == 1
-    if len(told) < 2 or not measured_alike or origins == {"scenario"}:
+    origins = {item.origin for item in items}
+    measured_alike = len({item.variable.unit or "1" for item in items}) == 1
+    if len(items) < 2 or not measured_alike or origins == {"scenario"}:
         return False
     if origins == {"default"}:
         return name in OF_CAR
-    return name in OF_CAR or "vehicle" in origins or not _differ(told, start=True)
+    return name in OF_CAR or "vehicle" in origins or not _differ(items, start=True)
 
 
-def _differ(told: list[GivenValue], *, start: bool = False) -> bool:
+def _differ(items: list[GivenValue], *, start: bool = False) -> bool:
     """Return whether numeric values differ; `start`: whether the FMUs' start values do."""
-    values = [one.variable.start if start else one.value for one in told]
+    values = [item.variable.start if start else item.value for item in items]
     if any(isinstance(value, bool) or not isinstance(value, (int, float)) for value in values):
         return False
     numbers = [float(value) for value in values]  # type: ignore[arg-type]
@@ -294,16 +295,16 @@ def _constants(units: Iterable[Instance]) -> Iterator[GivenValue]:
                 yield GivenValue(unit.name, name, value, origin, unit.fmu.variables[name])
 
 
-def _values_differ(name: str, told: list[GivenValue], way_out: str) -> Diagnostic:
+def _values_differ(name: str, items: list[GivenValue], way_out: str) -> Diagnostic:
     alike: dict[tuple[float, str], list[GivenValue]] = {}
-    for one in told:
-        alike.setdefault((float(one.value), one.origin), []).append(one)
+    for item in items:
+        alike.setdefault((float(item.value), item.origin), []).append(item)
     parts = []
     for (value, origin), some in alike.items():
-        names = fold([f"{one.instance}.{one.name}" for one in some])
+        names = fold([f"{item.instance}.{item.name}" for item in some])
         parts.append(f"{listed(names)} {_measured(value, some[0].variable)} ({origin})")
-    by_change = (one for one in told if one.origin not in OF_FILES)
-    first = next(by_change, told[0])
+    by_change = (item for item in items if item.origin not in OF_FILES)
+    first = next(by_change, items[0])
     says = f"{name} has two values: {', '.join(parts)}; {way_out}"
     return _warning("values-differ", f"{first.instance}.{first.name}", says, float(first.value))
 
@@ -317,40 +318,40 @@ def _other_cars(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iter
 
     A ratio of 1 is exempt: it means that angles are those of the road wheels.
     """
-    found = [
-        one
-        for one in (_parameters(units.values()) if scenario.vehicle_file.parameters else ())
-        if one.name in OF_CAR and one.origin == "default" and one.value != 1
+    defaults = [
+        item
+        for item in (_parameters(units.values()) if scenario.vehicle_file.parameters else ())
+        if item.name in OF_CAR and item.origin == "default" and item.value != 1
     ]
-    if found:
-        told = [f"{one.instance}.{one.name} {_measured(one.value, one.variable)}" for one in found]
-        says = f"not in the vehicle file, so as the FMUs have it: {listed(told)}"
-        first = found[0]
+    if defaults:
+        parts = [f"{item.instance}.{item.name} {_measured(item.value, item.variable)}" for item in defaults]
+        says = f"not in the vehicle file, so defaults of the FMUs apply: {listed(parts)}"
+        first = defaults[0]
         yield _warning("vehicle-incomplete", f"{first.instance}.{first.name}", says, float(first.value))
 
 
 def _slips(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
     """Yield a warning for every number that was probably meant in another unit."""
-    for one in _parameters(units.values()):
-        spec = scenario.units[one.instance].parameters.get(one.name)
-        raw = scenario.vehicle_file.parameters.get(one.name) if spec is None else spec
-        told = [getattr(scenario, name) for name, fact in FACTS.items() if one.name in fact.parameters]
-        with_unit = any(isinstance(given, str) for given in (raw, *told))
-        if one.origin == "default" or with_unit or not isinstance(one.value, float):
+    for item in _parameters(units.values()):
+        spec = scenario.units[item.instance].parameters.get(item.name)
+        raw = scenario.vehicle_file.parameters.get(item.name) if spec is None else spec
+        facts = [getattr(scenario, name) for name, fact in FACTS.items() if item.name in fact.parameters]
+        with_unit = any(isinstance(number, str) for number in (raw, *facts))
+        if item.origin == "default" or with_unit or not isinstance(item.value, float):
             continue
         for unit, largest, meant, factor in SLIPS:
-            if one.variable.unit == unit and abs(one.value) > largest:
+            if item.variable.unit == unit and abs(item.value) > largest:
                 says = (
-                    f"{one.instance}.{one.name}: {one.value:g} {unit} is {factor * one.value:.4g} {meant}; "
-                    f"did you mean '{one.value:g} {meant}'?"
+                    f"{item.instance}.{item.name}: {item.value:g} {unit} is "
+                    f"{factor * item.value:.4g} {meant}; did you mean '{item.value:g} {meant}'?"
                 )
-                yield _warning("unit-suspicious", f"{one.instance}.{one.name}", says, one.value)
-    for one in _constants(units.values()):
-        if one.name in FACTS["friction"].inputs and isinstance(one.value, float) and one.value > 2.0:
-            place = f"{one.instance}.{one.name}"
-            number = f"{one.value:g}"
+                yield _warning("unit-suspicious", f"{item.instance}.{item.name}", says, item.value)
+    for item in _constants(units.values()):
+        if item.name in FACTS["friction"].inputs and isinstance(item.value, float) and item.value > 2.0:
+            place = f"{item.instance}.{item.name}"
+            number = f"{item.value:g}"
             says = f"{place}: a friction of {number} is implausible for a road; did you mean '{number} %'?"
-            yield _warning("unit-suspicious", place, says, one.value)
+            yield _warning("unit-suspicious", place, says, item.value)
             return
 
 

@@ -217,7 +217,7 @@ def test_a_run_whose_worker_died_is_tried_again_in_a_process_that_keeps_nothing(
 def test_an_fmu_that_has_changed_is_opened_anew(kinds):
     unit = kinds[0].plan.instances[-1]
     kept = fmi.KeptInstances()
-    instance = fmi.open_unit(unit, Log(), set())
+    instance = fmi.open_instance(unit, Log(), set())
     kept.keep(unit, instance)
     other = replace(unit, fmu=replace(unit.fmu, sha256="0" * 64))
     assert kept.take(other, Log(), set()) is None

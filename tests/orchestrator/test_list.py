@@ -81,7 +81,7 @@ def test_runs_that_are_the_same_say_so(yawbench, tmp_path):
     ("arguments", "sentence"),
     [
         (("runs", "none"), "none: there is no such folder; name one that holds results"),
-        (("runs", "."), ".: holds no results; make some with 'yawbench run SCENARIO'"),
+        (("runs", "."), ".: contains no results; 'yawbench run SCENARIO' makes some"),
         (("scenarios", "."), ".: holds no file that is a scenario or a study file or a sweep file"),
         (("vehicles", "none"), "none: there is no such folder"),
         (("fmus", "."), ".: contains no FMUs"),

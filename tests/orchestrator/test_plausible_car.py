@@ -66,12 +66,13 @@ def test_a_car_that_can_be_has_no_remarks():
 @pytest.mark.parametrize(
     "car, says",
     [
-        ({"mass": 1650000}, "vehicle.mass: 1650000 kg is no car's, 300 to 5000 kg is plausible; "
+        ({"mass": 1650000}, "vehicle.mass: 1650000 kg is implausible for a car (plausible: 300 to 5000 kg); "
          "did you mean '1650000 g'?"),
-        ({"mass": "1650 t"}, "vehicle.mass: 1650000 kg is no car's, 300 to 5000 kg is plausible; "
+        ({"mass": "1650 t"}, "vehicle.mass: 1650000 kg is implausible for a car (plausible: 300 to 5000 kg); "
          "did you mean '1650 kg'?"),
         ({"mass": 1.65}, "did you mean '1.65 t'?"),
-        ({"yaw_inertia": 26}, "vehicle.yaw_inertia: 26 kg.m2 is no car's, 150 to 15000 kg.m2 is plausible"),
+        ({"yaw_inertia": 26},
+         "vehicle.yaw_inertia: 26 kg.m2 is implausible for a car (plausible: 150 to 15000 kg.m2)"),
         ({"wheel_radius": 320}, "did you mean '320 mm'?"),
         ({"wheelbase": 2750, "cg_to_front_axle": 1200, "cg_to_rear_axle": 1550}, "did you mean '2750 mm'?"),
         ({"cg_height": 55}, "did you mean '55 cm'?"),
@@ -87,7 +88,7 @@ def test_what_is_turned_off_is_meant():
 
 def test_a_value_is_named_once_wherever_it_is_given():
     assert len(remarks("vehicle.mass=1650000")) == 1
-    (own, *others) = [one for one in remarks("plant.mass=1650000") if "no car's" in one]
+    (own, *others) = [one for one in remarks("plant.mass=1650000") if "implausible for a car" in one]
     assert own.startswith("plant.mass: ")
     assert others == []
 

@@ -62,10 +62,10 @@ def test_a_variable_is_found_whatever_its_unit_is_called(folder):
 
 def test_a_role_is_that_of_the_fmu_s_name_else_of_the_unit_s(folder):
     results = load_results(folder)
-    assert results.units_of_role("plant") == ["car"]
-    assert results.units_of_role("controller") == ["ecu"]
-    assert results.units_of_role("tyre") == ["tyre"]
-    assert results.units_of_role("driver") == []
+    assert results.instances_of_role("plant") == ["car"]
+    assert results.instances_of_role("controller") == ["ecu"]
+    assert results.instances_of_role("tyre") == ["tyre"]
+    assert results.instances_of_role("driver") == []
     assert results.column("yaw_rate", role="plant") == "car.yaw_rate"
 
 
@@ -74,8 +74,8 @@ def test_a_recorded_role_comes_before_the_names(folder):
     fmus["car"]["role"] = "plant"
     (folder / "run.json").write_text(json.dumps({**RUN, "fmus": fmus}))
     results = load_results(folder)
-    assert results.units_of_role("plant") == ["car"]
-    assert results.units_of_role("controller") == ["ecu"]
+    assert results.instances_of_role("plant") == ["car"]
+    assert results.instances_of_role("controller") == ["ecu"]
 
 
 def test_a_variable_of_two_units_is_ambiguous_until_a_role_is_given(folder):

@@ -14,7 +14,7 @@ import pytest
 from fmus.build import build_component
 from orchestrator.cli import main
 from orchestrator.master import log_and_process_state as log
-from orchestrator.master.fmi import open_unit
+from orchestrator.master.fmi import open_instance
 from orchestrator.master.simulate import simulate
 from orchestrator.results.read_and_salvage import load_results
 from orchestrator.scenario.find_and_load import load_scenario
@@ -414,7 +414,7 @@ def repeat_runs(scenario, fmus, out):
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 def test_300_runs_in_one_process_neither_leak_nor_take_more_work(fmus, tmp_path):
     scenario = car(tmp_path, stop=0.004)
-    slave = open_unit(make_plan(load_scenario(scenario), fmus=fmus).instances[0], log.Log(), set())
+    slave = open_instance(make_plan(load_scenario(scenario), fmus=fmus).instances[0], log.Log(), set())
     alive = live_components()
     slave.free()
     assert live_components() == alive - 1  # so instances are counted

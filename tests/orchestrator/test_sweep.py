@@ -534,4 +534,4 @@ def test_every_count_on_the_page_of_a_sweep_is_that_of_its_runs(moods, yawbench,
         status: str(sum(row["status"] == status for row in rows)) for status in ("completed", "failed")
     }
     assert f"({len(rows)} runs)" in words_of(page)
-    assert "yawbench 0" in words_of(page).partition("To repeat this")[2].partition("Made by")[0]
+    assert "yawbench 0" in words_of(page).partition("How to reproduce this")[2].partition("Made by")[0]

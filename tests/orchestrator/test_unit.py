@@ -10,7 +10,7 @@ import fmpy
 import pytest
 
 from orchestrator.errors import ModelDescriptionError, SimulationError
-from orchestrator.master.fmi import open_unit
+from orchestrator.master.fmi import open_instance
 from orchestrator.master.isolation import Isolation
 from orchestrator.master.simulate import simulate
 from orchestrator.names import SignalName
@@ -112,7 +112,7 @@ def test_a_warning_with_printf_arguments_is_readable(fmu, held, tmp_path):
 def test_a_number_that_is_no_status_ends_the_run(fmu, answer, isolated, tmp_path):
     plan = chain(fmu, answer)
     with Isolation(plan.instances) as isolation, pytest.raises(SimulationError) as caught:
-        simulate(plan, tmp_path / "out", opener=isolation if isolated else open_unit)
+        simulate(plan, tmp_path / "out", opener=isolation if isolated else open_instance)
     assert caught.value.code == "fmu-call-failed"
     assert golden_in(str(caught.value))
     assert load_results(tmp_path / "out").time[-1] == 0.25
