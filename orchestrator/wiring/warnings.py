@@ -132,8 +132,8 @@ def _beyond(item: _Given) -> Diagnostic | None:
     likely = meant_unit(float(number), unit_written, quantity.unit, lambda value: low <= value <= high)
     unit = f" {quantity.unit}" if quantity.unit != "1" else ""
     says = (
-        f"{item.place}: {item.value:.10g}{unit} is implausible for a car, {low:g} to {high:g}{unit} is usual"
-        + (f"; did you mean '{number} {likely}'?" if likely else "")
+        f"{item.place}: {item.value:.10g}{unit} is implausible for a car "
+        f"(plausible: {low:g} to {high:g}{unit})" + (f"; did you mean '{number} {likely}'?" if likely else "")
     )
     return _warning("value-implausible", item.place, says, item.value)
 

@@ -153,8 +153,8 @@ def test_an_fmu_that_ends_the_process_is_named(foreign, run):
     ("act", "did"),
     [
         ("raise(SIGSEGV);", "died of SIGSEGV"),
-        ("exit(0);", "ended itself with exit status 0"),
-        ("_exit(0);", "ended itself with exit status 0"),
+        ("exit(0);", "ended with exit status 0"),
+        ("_exit(0);", "ended with exit status 0"),
     ],
 )
 @pytest.mark.parametrize("format_", ["csv", "parquet"])

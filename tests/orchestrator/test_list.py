@@ -80,7 +80,7 @@ def test_runs_that_are_the_same_say_so(yawbench, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (("runs", "none"), "none: there is no such folder; name one that holds results"),
+        (("runs", "none"), "none: no such folder; name one with results"),
         (("runs", "."), ".: contains no results; 'yawbench run SCENARIO' makes some"),
         (("scenarios", "."), ".: holds no file that is a scenario or a study file or a sweep file"),
         (("vehicles", "none"), "none: there is no such folder"),
