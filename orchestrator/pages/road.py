@@ -138,7 +138,7 @@ def _friction(run: Results, wheel: str, *, tyre: str) -> str | float | None:
 
 def _parameters(run: Results, role: str) -> Iterator[Mapping[str, Any]]:
     """Yield the parameters of the instances with a role."""
-    for instance in run.units_of_role(role):
+    for instance in run.instances_of_role(role):
         fmu = run.record.fmus[instance]
         yield {**fmu.defaults, **fmu.parameters}
 
