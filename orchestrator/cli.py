@@ -36,6 +36,7 @@ COMMANDS = {
     "report": "experiments",
     "sweep": "experiments",
     "evaluate": "standard_tests",
+    "fit": "measured",
     "drive": "standard_tests",
     "tune": "experiments",
     "rank": "rank",

@@ -58,6 +58,7 @@ if TYPE_CHECKING:
 
     from ._controller import Controller
     from ._experiment import Experiment, Runs, experiment
+    from ._fit import Fit, fit
     from ._linear import LinearModel, linearize
     from ._ranking import Ranking, rank
     from ._run import Run, measured, open
@@ -70,6 +71,7 @@ __all__ = [
     "Diagnostic",
     "Evaluation",
     "Experiment",
+    "Fit",
     "LinearModel",
     "Location",
     "MetricValue",
@@ -91,6 +93,7 @@ __all__ = [
     "YawbenchError",
     "YawbenchWarning",
     "experiment",
+    "fit",
     "linearize",
     "load",
     "measured",
@@ -111,6 +114,7 @@ _MODULES = {
     "orchestrator.plan": ("Override", "Plan"),
     "yawbench._controller": ("Controller",),
     "yawbench._experiment": ("Experiment", "Runs", "experiment"),
+    "yawbench._fit": ("Fit", "fit"),
     "yawbench._linear": ("LinearModel", "linearize"),
     "yawbench._ranking": ("Ranking", "rank"),
     "yawbench._run": ("Run", "measured", "open"),

@@ -1,15 +1,26 @@
-"""`yawbench measured`: what is wrong with a recording."""
+"""`yawbench measured` and `fit`: what is wrong with a recording; parameters fitted to it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from .options import RunOptions, takes
+from .progress import hold, print_tables, say, stoppable
+
+if TYPE_CHECKING:
+    from ..experiments.fit_result import FitResult, FittedModel
+    from ..experiments.tables import Table
+    from ..planner import Planner
+
 MeasuredAction = Annotated[Literal["show"], typer.Argument(help="show: examine the recording.")]
 MeasurementFile = Annotated[Path, typer.Argument(metavar="FILE", help="Measurement file.")]
+FitFile = Annotated[Path, typer.Argument(metavar="FIT", help="Fit file: YAML.")]
+SETS = "sets"
+"""Subfolder of what sets of values gave, until the fit has ended."""
 
 
 def measured(action: MeasuredAction, file: MeasurementFile) -> None:
@@ -21,7 +32,6 @@ def measured(action: MeasuredAction, file: MeasurementFile) -> None:
     from ..experiments.tables import Cell, Table
     from ..measured.flaws import flaws_of
     from ..measured.measurement import load_measurement
-    from .progress import print_tables, say
 
     flaws = flaws_of(file)
     if not any(flaw.kind == "refused" for flaw in flaws):
@@ -37,3 +47,130 @@ def measured(action: MeasuredAction, file: MeasurementFile) -> None:
     if flaws:
         raise typer.Exit(1)
     say("no flaw found")
+
+
+@takes("out", "fmus", "no_build", "jobs")
+def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
+    """Fit parameters of a scenario to a measured car.
+
+    Prints the parameters with their intervals, and the differences on training and held-out windows beside
+    those of a single track with Fiala tyres, fitted to the same windows. Writes fit.json and vehicle.yaml,
+    the vehicle file with the fitted values. Parameters that cannot be identified are refused. Without --out,
+    results go to results/<folder of the fit file>/<its name>. An interrupted fit goes on where it was.
+    """
+    import json
+
+    from ..experiments.fit import load_fit
+    from ..experiments.fit_result import make_fit
+    from ..files import write_whole
+    from ..planner import Planner
+    from ..results.folder_and_lock import default_folder
+
+    loaded = load_fit(file)
+    for note in loaded.measurement.notes:
+        say(f"note: {note}")
+    folder = options.out or default_folder(file)
+    hold(context, folder)
+    planner = Planner(build=options.build)
+    with stoppable(folder):
+        result = make_fit(
+            loaded, planner=planner, workers=options.jobs, fmus=options.fmus, folder=folder / SETS, say=say
+        )
+    write_whole(folder / "fit.json", json.dumps(result.data, indent=1, ensure_ascii=False) + "\n")
+    write_whole(folder / "vehicle.yaml", vehicle_text(result, folder, planner))
+    print_tables([*map(parameter_table, result.models), score_table(result)])
+    say(f"Written: {folder / 'fit.json'}, {folder / 'vehicle.yaml'}")
+
+
+def vehicle_text(result: FitResult, folder: Path, planner: Planner) -> str:
+    """Return the base scenario's vehicle file with the fitted values, for a folder, as YAML."""
+    import json
+    import os
+
+    from ..experiments.fit import MEASURED
+    from ..names import Target
+
+    fit, model = result.fit, result.scenario
+    scenario = planner.load(fit.scenario)
+    intervals = model.estimate.intervals()
+    of = fit.measurement
+    title = f"{scenario.vehicle_file.title or of.title}, fitted"
+    source = f"fitted to {of.title}: {of.origin or of.path.name} ({fit.spec.title})"
+    lines = [
+        f"title: {json.dumps(title, ensure_ascii=False)}",
+        f"source: {json.dumps(source, ensure_ascii=False)}",
+    ]
+    tyres = {axle: os.path.relpath(file.path, folder) for axle, file in scenario.tyre_files.items()}
+    if tyres:
+        lines.append(f"tyres: {json.dumps(tyres)}")
+    fitted = {
+        Target.parse(one.name).variable: one
+        for one in model.parameters
+        if not one.name.startswith(f"{MEASURED}.")
+        and Target.parse(one.name).kind in ("vehicle_parameter", "parameter")
+    }
+    lines.append("parameters:")
+    for name, value in scenario.vehicle_file.parameters.items():
+        if name not in fitted:
+            lines.append(f"  {name}: {json.dumps(value)}")
+    for name, one in fitted.items():
+        interval = intervals[one.name]
+        bounds = f"95 % {interval[0]:.4g} to {interval[1]:.4g}" if interval else "no interval"
+        lines.append(f"  {name}: {model.estimate.values[one.name]:.6g}  # {one.unit}; fitted, {bounds}")
+    return "\n".join(lines) + "\n"
+
+
+def parameter_table(model: FittedModel) -> Table:
+    """Return the table of a model's parameters."""
+    from ..experiments.tables import Table
+
+    table = Table(model.title, ["parameter", "value", "95 % interval", "start", "bounds", "prior"])
+    intervals = model.estimate.intervals()
+    for one in model.parameters:
+        interval = intervals[one.name]
+        words = None
+        if one.name in model.estimate.at_bound:
+            words = "at its bound"
+        elif interval:
+            words = f"{interval[0]:.5g} to {interval[1]:.5g}"
+        prior = one.prior and f"{one.prior[0]:.5g} ± {one.prior[1]:.3g}"
+        value = f"{model.estimate.values[one.name]:.6g} {one.unit if one.unit != '1' else ''}".strip()
+        table.rows.append(
+            [one.name, value, words, f"{one.start:.5g}", f"{one.low:.5g} to {one.high:.5g}", prior]
+        )
+    found = model.estimate
+    table.notes.append(
+        f"condition {found.identifiability.condition:.3g}; {found.sets} sets of values; {found.message}"
+    )
+    if found.covariance is None:
+        table.notes.append(f"no intervals: {found.pieces} pieces of 5 s are too few")
+    for first, second, value in found.correlated():
+        table.notes.append(f"{first} and {second} are correlated: {value:.2f}")
+    return table
+
+
+def score_table(result: FitResult) -> Table:
+    """Return the table of scores, training and held-out side by side."""
+    from vocabulary.signals import SIGNALS
+
+    from ..experiments.fit_result import PARTS
+    from ..experiments.tables import Table
+    from ..metrics.run_metrics import MetricValue
+
+    columns = [f"{what}, {words}" for words in PARTS.values() for what in ("rms", "largest", "fit")]
+    headings = ["signal", "model", *columns]
+    table = Table("Differences", headings, numbers=set(range(2, 8)))
+    for name in result.fit.errors:
+        for model in result.models:
+            row: list[Any] = [name, model.title]
+            for part in PARTS:
+                one = result.scores.get((model.title, part, name))
+                unit = SIGNALS[name].unit
+                row += (
+                    [MetricValue(one.rms, unit), MetricValue(one.largest, unit), f"{one.fit:.1f} %"]
+                    if one
+                    else [None, None, None]
+                )
+            table.rows.append(row)
+    table.notes.append(result.verdict)
+    return table

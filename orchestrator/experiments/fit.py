@@ -1,0 +1,443 @@
+"""Fit files, and the runs of a scenario as a model that is fitted to a measurement.
+
+    title: A saloon fitted to two sine sweeps
+    scenario: sweep.yaml                 # with `inputs: {steer_angle: {file: measured.yaml}}`
+    measured: measured.yaml
+    training:                            # stretches, cut into windows that are simulated one by one
+      - {segment: 1, begin: 0, end: 30 s, window: 10 s}
+    held_out:                            # likewise; never the same seconds
+      - {segment: 2, begin: 0, end: 30 s, window: 10 s}
+    compared: {yaw_rate: 0.1 deg/s, acceleration_y: 0.05 m/s2}      # signal -> expected difference
+    free:                                # targets as of --set, and of the measurement
+      vehicle.yaw_inertia: {low: 1000, high: 4000, start: 2000, prior: {mean: 2100, deviation: 300}}
+      measured.yaw_rate.offset: {low: -1 deg/s, high: 1 deg/s}
+      measured.steer_angle.delay: {low: -50 ms, high: 50 ms}
+
+A window starts from the measured speed, yaw rate and sideslip, as far as they are recorded, and its first
+`settling` seconds are not compared. Inputs follow the measurement unfiltered; what is compared is filtered,
+simulated signals like measured ones. `measured.SIGNAL.delay` and `.offset` belong to the recording: at time t
+it shows what the car had at t - delay, plus the offset. Those of an input change the runs, those of a
+compared signal need none.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+from pydantic import Field
+
+from vocabulary.signals import SIGNALS
+from vocabulary.vehicle import CAR
+
+from ..errors import ScenarioError, YawbenchError, code_of, text_of
+from ..files import reads
+from ..measured.estimate import Simulated, Window
+from ..measured.measurement import Measurement, load_measurement
+from ..measured.segment import LowPass, Segment
+from ..measured.single_track import start_states
+from ..messages import hint
+from ..names import INPUTS, SignalName, Target, match
+from ..plan import InputSeries, Instance, Override, Value, Variable
+from ..planner import Planner
+from ..results.plan_record_and_freshness import key_of
+from ..scenario import yaml_lines
+from ..scenario.quantities import convert, gain_and_offset, measure_of
+from ..scenario.scenario_schema import Scalar, SeriesSpec
+from ..scenario.validation import Instant, StrictModel, Time, validate
+from ..scenario.yaml_lines import Document
+from ..workers import Pool
+from .jobs import Job, execute
+
+MEASURED = "measured"
+"""Prefix of the free parameters of a measurement."""
+MARGIN = 0.5
+"""Time before and after a window [s] for which inputs are kept; chosen: longer than any delay."""
+TRANSIENT = 2.0
+"""Periods of the filter's cut-off by which a run is longer than its window; chosen: its end has died away."""
+
+
+class PriorSpec(StrictModel):
+    """What is known of a parameter beforehand."""
+
+    mean: Scalar
+    deviation: Scalar = Field(description="Standard deviation; weighs as much as one sample at its error")
+
+
+class FreeSpec(StrictModel):
+    """A free parameter; numbers in SI or with a unit."""
+
+    low: Scalar = Field(description="Lower bound")
+    high: Scalar = Field(description="Upper bound")
+    start: Scalar | None = Field(None, description="Default: the scenario's value; of the measurement: 0")
+    prior: PriorSpec | None = None
+
+
+class StretchSpec(StrictModel):
+    """A stretch of a segment, cut into windows."""
+
+    segment: int | None = Field(None, description="Number of the segment, from 1; default: the only one")
+    begin: Instant = Field(description="s, in the segment's time")
+    end: Time = Field(description="s")
+    window: Time | None = Field(None, description="s, longest duration of a window; default: all of it")
+
+
+class FitSpec(StrictModel):
+    """A fit file."""
+
+    title: str = Field(min_length=1)
+    source: str = Field("", description="Where the choices of this file come from")
+    scenario: str = Field(min_length=1, description="Relative to this file")
+    measured: str = Field(min_length=1, description="Measurement file, relative to this file")
+    training: list[StretchSpec] = Field(min_length=1, description="What parameters are fitted to")
+    held_out: list[StretchSpec] = Field([], description="What the fitted models are judged by")
+    compared: dict[str, Scalar] = Field(
+        min_length=1, description="Signal of the plant -> expected difference"
+    )
+    free: dict[str, FreeSpec] = Field(min_length=1, description="Free parameters: target -> range")
+    settling: Time = Field(Fraction(1, 2), description="s, not compared at the start of each window")
+    most_sets: int = Field(300, ge=2, description="Sets of values after which the search stops")
+
+
+@dataclass(frozen=True)
+class FitWindow:
+    """A window, and the segment that it is cut from: filtered for what is compared, raw for inputs."""
+
+    window: Window
+    filtered: Segment
+    raw: Segment
+
+
+@dataclass(frozen=True)
+class LoadedFit:
+    """A fit file with its measurement."""
+
+    path: Path
+    spec: FitSpec
+    measurement: Measurement
+    errors: Mapping[str, float]  # compared signal -> expected difference, in SI
+    training: Sequence[FitWindow]
+    held_out: Sequence[FitWindow]
+
+    @property
+    def scenario(self) -> Path:
+        """The scenario file."""
+        return self.path.parent / self.spec.scenario
+
+    @property
+    def settling(self) -> float:
+        """Time that is not compared at the start of a window [s]."""
+        return float(self.spec.settling)
+
+
+@reads("fit file", ScenarioError)
+def load_fit(path: Path | str) -> LoadedFit:
+    """Load a fit file and its measurement.
+
+    Raises:
+        ScenarioError: one of them is invalid; lists all errors.
+    """
+    path = Path(path)
+    document = yaml_lines.read(path, what="fit file")
+    spec = validate(FitSpec, document)
+    if spec is None or document.errors:
+        raise ScenarioError(document.sorted_errors())
+    file = path.parent / spec.measured
+    filtered = load_measurement(file)
+    raw = load_measurement(file, filtered=False) if filtered.filter else filtered
+    errors = {}
+    for name, value in spec.compared.items():
+        key = ("compared", name)
+        if name not in SIGNALS or any(name not in one.signals for one in filtered.segments):
+            known = filtered.segments[0].signals
+            document.report(key, f"is not measured{hint(name, known, lead='measured are')}", "signal-unknown")
+            continue
+        try:
+            errors[name] = number_in(value, SIGNALS[name].unit)
+            if not errors[name] > 0.0:
+                raise ValueError(f"must be above 0 (got {value})")
+        except ValueError as error:
+            document.report(key, str(error), code_of(error))
+    parts = {}
+    if not document.errors:
+        for name in ("training", "held_out"):
+            parts[name] = list(_windows(document, name, getattr(spec, name), filtered, raw, errors))
+    _refuse_overlaps(document, spec)
+    if document.errors:
+        raise ScenarioError(document.sorted_errors())
+    return LoadedFit(path, spec, filtered, errors, parts["training"], parts["held_out"])
+
+
+def number_in(value: Value, unit: str | None) -> float:
+    """Return a number in SI; text has a unit.
+
+    Raises:
+        ValueError: it is not a number, or its unit does not fit.
+    """
+    if isinstance(value, str):
+        return float(convert(value, unit))
+    if isinstance(value, bool):
+        raise ValueError(f"must be a number (got {value})")
+    return float(value)
+
+
+def _windows(
+    document: Document,
+    name: str,
+    stretches: Sequence[StretchSpec],
+    filtered: Measurement,
+    raw: Measurement,
+    compared: Mapping[str, float],
+) -> Iterator[FitWindow]:
+    for number, stretch in enumerate(stretches):
+        try:
+            segment, unfiltered = filtered.segment(stretch.segment), raw.segment(stretch.segment)
+        except ValueError as error:
+            document.report((name, number), str(error), "segment-unknown")
+            continue
+        begin, end = float(stretch.begin), float(stretch.end)
+        first, last = float(segment.time[0]), float(segment.time[-1])
+        if not first - 1e-6 <= begin < end <= last + 1e-6:
+            words = f"{begin:g} to {end:g} s is not within {segment.name}, {first:g} to {last:g} s"
+            document.report((name, number), words, "fit-window")
+            continue
+        longest = float(stretch.window or end - begin)
+        count = max(1, math.ceil((end - begin) / longest - 1e-9))
+        for k in range(count):
+            start = begin + k * longest
+            part = segment.between(start, min(start + longest, end)).even()
+            if len(part.time) < 3:
+                document.report((name, number), "a window has less than three samples", "fit-window")
+                break
+            label = f"{segment.name}, {part.time[0]:g} to {part.time[-1]:g} s"
+            measured = {signal: part.signals[signal] for signal in compared}
+            yield FitWindow(Window(label, part.time, measured), segment, unfiltered)
+
+
+def _refuse_overlaps(document: Document, spec: FitSpec) -> None:
+    for number, held in enumerate(spec.held_out):
+        for one in spec.training:
+            if one.segment == held.segment and one.begin < held.end and held.begin < one.end:
+                words = f"{float(held.begin):g} to {float(held.end):g} s shares seconds with 'training'"
+                document.report(("held_out", number), words, "fit-window")
+
+
+@dataclass(frozen=True)
+class WindowJob(Job):
+    """A run of a window, with what is returned of it."""
+
+    times: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    wanted: tuple[tuple[str, str], ...] = ()  # (compared signal, column)
+    low_pass: LowPass | None = None
+
+
+def run_window(job: Job) -> Simulated:
+    """Execute the run of a window; return the compared signals, filtered, at its times."""
+    from ..master.simulate import simulate_in_memory
+
+    assert isinstance(job, WindowJob) and job.plan is not None
+    results = simulate_in_memory(job.plan)
+    if results.time[-1] < job.times[-1] - 1e-6:
+        return None
+    found = {}
+    for name, column in job.wanted:
+        values = results[column]
+        if job.low_pass:
+            values = job.low_pass(values, 1.0 / float(job.plan.step))
+        found[name] = np.interp(job.times, results.time, values)
+    return found
+
+
+class ScenarioModel:
+    """The runs of a scenario in windows, for `measured.estimate`.
+
+    Args:
+        fit: its scenario and measurement.
+        windows: of the measurement.
+        planner: makes the plans.
+        pool: makes the runs.
+        fmus: folder of the FMUs.
+
+    Raises:
+        YawbenchError: the scenario is wrong, or follows no measured signal.
+    """
+
+    def __init__(
+        self,
+        fit: LoadedFit,
+        windows: Sequence[FitWindow],
+        *,
+        planner: Planner,
+        pool: Pool,
+        fmus: Path | None = None,
+    ) -> None:
+        self.fit, self.windows, self.planner, self.pool, self.fmus = fit, windows, planner, pool, fmus
+        scenario = planner.load(fit.scenario)
+        self._series = {
+            key: spec
+            for key, spec in scenario.inputs.items()
+            if isinstance(spec, SeriesSpec)
+            and (fit.scenario.parent / spec.file).resolve() == fit.measurement.path.resolve()
+        }
+        if not self._series:
+            raise ScenarioError(
+                f"{fit.scenario}: no input follows {fit.spec.measured}; write "
+                f"'inputs: {{steering_wheel_angle: {{file: {fit.spec.measured}}}}}'",
+                code="fit-inputs",
+            )
+        self._still = tuple(Override.of(f"{INPUTS}.{key}", 0.0, "fit") for key in self._series)
+        self.base = planner.plan(planner.load(fit.scenario, self._still), fmus=fmus)
+        self.followed = dict(self._followed())
+        self.step = float(self.base.step)
+        self.plant = next((one for one in self.base.instances if one.role == "plant"), None)
+        if self.plant is None:
+            raise ScenarioError(f"{fit.scenario}: has no plant to compare", code="fit-inputs")
+        self.columns = {name: f"{self.plant.name}.{name}" for name in fit.errors}
+        for column in self.columns.values():
+            if column not in map(str, self.base.record):
+                raise ScenarioError(
+                    f"{fit.scenario}: {column} is compared, but not recorded",
+                    code="signal-unknown",
+                )
+        self.identity = json.dumps([
+            key_of(self.base), fit.measurement.sha256, sorted(fit.errors), [w.window.name for w in windows]
+        ])  # fmt: skip
+        self.failure = ""  # why the last run that failed did
+        self._windows = [self._of_window(one) for one in windows]
+
+    def __call__(self, sets: Sequence[Mapping[str, float]]) -> list[list[Simulated]]:
+        """Run all windows for sets of values; see `measured.estimate.Model`."""
+        found: list[list[Simulated]] = [[None] * len(self.windows) for _ in sets]
+        jobs, places = [], []
+        for number, values in enumerate(sets):
+            for k in range(len(self.windows)):
+                try:
+                    jobs.append(self._job(k, values))
+                    places.append((number, k))
+                except YawbenchError as error:  # noqa: PERF203 - a value is out of range
+                    self.failure = text_of(error.diagnostics)
+        outcomes = execute(jobs, run=run_window, pool=self.pool) if jobs else []
+        for (number, k), outcome in zip(places, outcomes, strict=True):
+            found[number][k] = outcome.value
+            self.failure = outcome.reason or self.failure
+        return found
+
+    def value_of(self, target: Target) -> tuple[float | None, str | None]:
+        """Return the scenario's value of a target and its unit; None where it has none.
+
+        Raises:
+            ValueError: nothing in the scenario takes it.
+        """
+        name = target.variable
+        if target.kind == "fact":
+            units = {"friction": "1", "speed": "m/s"}
+            value = self.planner.load(self.fit.scenario).friction if name == "friction" else None
+            return (value if isinstance(value, float) else None), units[name]
+        having = [
+            one
+            for one in self.base.instances
+            if name in one.fmu.variables and target.instance in ("", one.name)
+        ]
+        if target.kind == "vehicle_parameter" and not having and name in CAR:
+            return None, CAR[name].unit
+        if target.kind == "input":
+            return None, None
+        if target.kind not in ("parameter", "vehicle_parameter") or not having:
+            raise ValueError(f"{target}: nothing in the scenario takes it")
+        value = having[0].parameter(name)
+        number = float(value) if isinstance(value, (int, float)) else None
+        return number, having[0].fmu.variables[name].unit
+
+    def _of_window(self, one: FitWindow) -> tuple[tuple[Override, ...], Fraction, Fraction]:
+        """Return the overrides of a window's runs, and their start and stop time [s]."""
+        step, times = self.base.step, one.window.times
+        begin = Fraction(round(times[0] / float(step))) * step
+        filtered = self.fit.measurement.filter
+        extra = TRANSIENT / filtered.cut_off if filtered else 0.0
+        end = min(times[-1] + extra, one.filtered.time[-1])
+        stop = begin + step * math.ceil((max(end, times[-1]) - float(begin)) / float(step) - 1e-6)
+        changes = {"start_time": float(begin), "stop_time": float(stop)}
+        assert self.plant is not None
+        for parameter, signal in start_states(one.filtered, float(begin)).items():
+            if parameter in self.plant.fmu.variables:
+                changes[f"{self.plant.name}.{parameter}"] = signal
+        own = (Override.of(name, value, "fit") for name, value in changes.items())
+        return (*self._still, *own), begin, stop
+
+    def _job(self, k: int, values: Mapping[str, float]) -> WindowJob:
+        """Return the planned job of a window with a set of values."""
+        one, (changes, begin, stop) = self.windows[k], self._windows[k]
+        own = [
+            Override.of(name, value, "fit")
+            for name, value in values.items()
+            if not name.startswith(f"{MEASURED}.")
+        ]
+        scenario = self.planner.load(self.fit.scenario, (*changes, *own))
+        plan = self.planner.plan(scenario, fmus=self.fmus, record=tuple(self.columns.values()))
+        plan = replace(
+            plan, instances=tuple(self._following(x, one, begin, stop, values) for x in plan.instances)
+        )
+        wanted = tuple(self.columns.items())
+        return WindowJob(
+            one.window.name, self.fit.scenario, Path(), plan=plan, keep=False, times=one.window.times,
+            wanted=wanted, low_pass=self.fit.measurement.filter,
+        )  # fmt: skip
+
+    def _followed(self) -> Iterator[tuple[tuple[str, str], str]]:
+        """Yield (instance, input) and the measured signal that it follows.
+
+        Raises:
+            ScenarioError: the signal is not measured, or of another kind.
+        """
+        instances = [one.name for one in self.base.instances]
+        for key, spec in self._series.items():
+            pattern = SignalName.parse_input(key, instances)
+            for instance in self.base.instances:
+                for name in instance.constants:
+                    if not pattern.matches(instance.name, name):
+                        continue
+                    signal = (spec.column or name).replace("*", match(pattern.variable, name) or "")
+                    variable = instance.fmu.variables[name]
+                    if any(signal not in one.raw.signals for one in self.windows):
+                        known = hint(signal, self.windows[0].raw.signals, lead="measured are")
+                        raise ScenarioError(
+                            f"{self.fit.scenario}: inputs.{key}: {signal} is not measured{known}",
+                            code="signal-unknown",
+                        )
+                    if _conversion(signal, variable) is None:
+                        raise ScenarioError(
+                            f"{self.fit.scenario}: inputs.{key}: {signal} does not fit the input's unit "
+                            f"{variable.unit}",
+                            code="fit-inputs",
+                        )
+                    yield (instance.name, name), signal
+
+    def _following(
+        self, instance: Instance, one: FitWindow, begin: Fraction, stop: Fraction, values: Mapping[str, float]
+    ) -> Instance:
+        """Return an instance whose inputs follow the measurement, corrected by a set of values."""
+        series, constants = dict(instance.series), dict(instance.constants)
+        part = one.raw.between(float(begin) - MARGIN, float(stop) + MARGIN)
+        for (name, variable), signal in self.followed.items():
+            if name != instance.name:
+                continue
+            delay, offset = (values.get(f"{MEASURED}.{signal}.{of}", 0.0) for of in ("delay", "offset"))
+            gain, shift = _conversion(signal, instance.fmu.variables[variable]) or (1.0, 0.0)
+            numbers = gain * (part.signals[signal] - offset) + shift
+            file = self.fit.measurement
+            series[variable] = InputSeries(
+                file.path.name, signal, file.sha256, False, part.time - delay, numbers
+            )
+            constants[variable] = series[variable].first(float(begin))
+        return replace(instance, series=series, constants=constants)
+
+
+def _conversion(signal: str, variable: Variable) -> tuple[float, float] | None:
+    """Return gain and offset from a measured signal to an input, None if their units differ in kind."""
+    wanted = measure_of(variable.unit, variable.definition)
+    return gain_and_offset(SIGNALS[signal].unit, wanted) if wanted else (1.0, 0.0)

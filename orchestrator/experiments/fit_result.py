@@ -1,0 +1,438 @@
+"""Fits: the search, the single track beside it, scores on training and held-out windows.
+
+A model is better if the mean square of its differences, each over its expected difference, is smaller;
+held-out windows decide. fit % is 100 (1 - |e| / |y - mean|) with Euclidean norms, of all compared samples of
+a signal; the mean is that of the window.
+
+Source of fit %: L. Ljung, System Identification Toolbox, `compare` (normalized root mean square).
+"""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vocabulary.signals import SIGNALS
+
+from ..errors import ScenarioError, code_of
+from ..measured.estimate import (
+    LEVEL,
+    Estimate,
+    NotIdentifiable,
+    Parameter,
+    Residuals,
+    Simulated,
+    StartFailed,
+    as_measured,
+    estimate,
+)
+from ..measured.single_track import PARAMETERS, SingleTrack, SingleTrackWindow, start_states
+from ..measured.single_track import SIGNALS as OF_SINGLE_TRACK
+from ..messages import hint
+from ..names import Target
+from ..planner import Planner
+from ..scenario import yaml_lines
+from ..workers import Pool
+from .fit import MARGIN, MEASURED, FitWindow, FreeSpec, LoadedFit, ScenarioModel, number_in
+from .jobs import NEEDED
+
+if TYPE_CHECKING:
+    pass
+
+STIFFNESS_PER_LOAD = 12.0
+"""Start value of an axle's cornering stiffness over its load [1/rad]; chosen: a passenger car's tyres."""
+PARTS = {"training": "training", "held_out": "held-out"}
+
+
+@dataclass(frozen=True)
+class Score:
+    """Differences of a signal between a model and the measurement."""
+
+    rms: float
+    largest: float
+    fit: float  # [%]
+
+
+@dataclass(frozen=True)
+class FittedModel:
+    """A model with its estimate, and what it simulates in the windows of each part."""
+
+    title: str
+    parameters: Sequence[Parameter]
+    estimate: Estimate
+    simulated: Mapping[str, Sequence[Simulated]]  # part -> a window's signals, as the measurement shows them
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """A fit: the scenario's model, and the single track beside it or why there is none."""
+
+    fit: LoadedFit
+    scenario: FittedModel
+    single_track: FittedModel | None
+    without: str  # why there is no single track
+
+    @property
+    def models(self) -> list[FittedModel]:
+        """The models."""
+        return [self.scenario, *([self.single_track] if self.single_track else [])]
+
+    def windows(self, part: str) -> Sequence[FitWindow]:
+        """Return the windows of a part."""
+        return self.fit.training if part == "training" else self.fit.held_out
+
+    @cached_property
+    def scores(self) -> dict[tuple[str, str, str], Score]:
+        """(Title of the model, part, signal) -> score."""
+        found = {}
+        for model in self.models:
+            for part in PARTS:
+                for name in self.fit.errors:
+                    pairs = self._pairs(model, part, name)
+                    if pairs:
+                        found[model.title, part, name] = score_of(pairs)
+        return found
+
+    def _pairs(self, model: FittedModel, part: str, name: str) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Return measured and simulated values of the compared samples of each window."""
+        pairs = []
+        for one, signals in zip(self.windows(part), model.simulated[part], strict=True):
+            if signals is None or name not in signals:
+                return []
+            compared = one.window.times >= one.window.times[0] + self.fit.settling - 1e-9
+            pairs.append((one.window.measured[name][compared], signals[name][compared]))
+        return pairs
+
+    def loss(self, model: FittedModel, part: str) -> float:
+        """Return the mean square of differences over expected ones; infinite if a run failed."""
+        own = [(self.scores.get((model.title, part, name)), error) for name, error in self.fit.errors.items()]
+        return float(np.mean([math.inf if one is None else (one.rms / error) ** 2 for one, error in own]))
+
+    @property
+    def verdict(self) -> str:
+        """Whether the scenario's model is better than the single track, in words."""
+        part = "held_out" if self.fit.held_out else "training"
+        if self.single_track is None:
+            return f"no single track beside it: {self.without}"
+        own, other = self.loss(self.scenario, part), self.loss(self.single_track, part)
+        seen = f"on {PARTS[part]} windows: mean square {own:.3g} against {other:.3g}"
+        if own < other:
+            return f"better than a single track with Fiala tyres {seen}"
+        return f"not better than a single track with Fiala tyres {seen}"
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """All numbers, as JSON-ready data."""
+        of = self.fit.measurement
+        return {
+            "title": self.fit.spec.title,
+            "measurement": {
+                "car": of.car, "source": of.source, "licence": of.licence, "date": of.date,
+                "sha256": of.sha256,
+            },
+            "verdict": self.verdict,
+            "models": {one.title: self._of_model(one) for one in self.models},
+        }  # fmt: skip
+
+    def _of_model(self, model: FittedModel) -> dict[str, Any]:
+        found, intervals = model.estimate, model.estimate.intervals()
+        return {
+            "parameters": {
+                one.name: {
+                    "value": found.values[one.name], "interval": intervals[one.name], "start": one.start,
+                    "low": one.low, "high": one.high, "prior": one.prior, "unit": one.unit,
+                    "at_bound": one.name in found.at_bound,
+                }
+                for one in model.parameters
+            },
+            "level": LEVEL,
+            "pieces": found.pieces,
+            "condition": found.identifiability.condition,
+            "weakest": found.identifiability.weakest,
+            "correlations": found.correlated(),
+            "sets": found.sets,
+            "loss": found.loss,
+            "ended": found.message,
+            "scores": {
+                part: {
+                    name: vars(self.scores[model.title, part, name])
+                    for name in self.fit.errors
+                    if (model.title, part, name) in self.scores
+                }
+                for part in PARTS
+            },
+        }  # fmt: skip
+
+
+def score_of(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> Score:
+    """Return the score of (measured, simulated) values of windows."""
+    differences = np.concatenate([simulated - measured for measured, simulated in pairs])
+    spread = np.concatenate([measured - measured.mean() for measured, _ in pairs])
+    length = float(np.linalg.norm(spread))
+    fit = 100.0 * (1.0 - float(np.linalg.norm(differences)) / length) if length else -math.inf
+    return Score(float(np.sqrt(np.mean(differences**2))), float(np.abs(differences).max()), fit)
+
+
+def make_fit(
+    fit: LoadedFit,
+    *,
+    planner: Planner,
+    workers: int | None = None,
+    fmus: Path | None = None,
+    folder: Path | None = None,
+    say: Callable[[str], None] = lambda text: None,
+) -> FitResult:
+    """Fit the scenario and the single track, and simulate all windows with both.
+
+    Args:
+        fit: as loaded.
+        planner: makes the plans.
+        workers: number of processes; None: one per core.
+        fmus: folder of the FMUs.
+        folder: keeps what sets of values gave until the fit has ended, so that it goes on if interrupted.
+        say: called with a line of progress after every set of runs.
+
+    Raises:
+        ScenarioError: the fit cannot be made: a run of the start values fails, or the parameters cannot be
+            identified.
+        Interrupted: Ctrl-C; sets of values that are finished are kept in the folder.
+    """
+    with Pool(workers, preload=NEEDED) as pool:
+        training, held = (
+            ScenarioModel(fit, windows, planner=planner, pool=pool, fmus=fmus)
+            for windows in (fit.training, fit.held_out)
+        )
+        parameters = free_parameters(fit, training)
+        own = _fitted(fit, training, parameters, say, folder)
+        values = own.estimate.values
+        simulated = {"training": own.estimate.simulated, "held_out": held([values])[0]}
+    scenario = replace(own, simulated=_shown(fit, values, simulated))
+    if folder:
+        shutil.rmtree(folder, ignore_errors=True)
+    try:
+        single = _single_track(fit, training, parameters, say)
+    except ValueError as error:
+        return FitResult(fit, scenario, None, str(error))
+    return FitResult(fit, scenario, single, "")
+
+
+def _fitted(
+    fit: LoadedFit,
+    model: ScenarioModel,
+    parameters: Sequence[Parameter],
+    say: Callable[[str], None],
+    known: Path | None,
+) -> FittedModel:
+    windows = [one.window for one in fit.training]
+    residuals = Residuals(
+        model, windows, parameters, fit.errors,
+        settling=fit.settling, say=say, folder=known, identity=model.identity,
+    )  # fmt: skip
+    try:
+        found = estimate(residuals, most_sets=fit.spec.most_sets)
+    except NotIdentifiable as error:
+        condition = error.identifiability.condition
+        raise ScenarioError(
+            f"{fit.path}: {error}: condition {condition:.2g}; fix one of them, give it a prior, or compare "
+            "more signals or other manoeuvres",
+            code="fit-not-identifiable",
+        ) from None
+    except StartFailed as error:
+        raise ScenarioError(
+            f"{fit.path}: the run of the start values in {error} fails: {model.failure or 'it ended early'}",
+            code="fit-start",
+        ) from None
+    return FittedModel(model.base.title or "scenario", parameters, found, {})
+
+
+def _shown(
+    fit: LoadedFit, values: Mapping[str, float], simulated: Mapping[str, Sequence[Simulated]]
+) -> dict[str, Sequence[Simulated]]:
+    """Return simulated signals with the delays and offsets of the measurement."""
+    windows = {"training": fit.training, "held_out": fit.held_out}
+
+    def as_seen(one: FitWindow, signals: Simulated) -> Simulated:
+        return signals and {
+            name: as_measured(
+                one.window.times,
+                x,
+                *(values.get(f"{MEASURED}.{name}.{of}", 0.0) for of in ("delay", "offset")),
+            )
+            for name, x in signals.items()
+        }
+
+    return {
+        part: [as_seen(one, signals) for one, signals in zip(windows[part], several, strict=True)]
+        for part, several in simulated.items()
+    }
+
+
+def _single_track(
+    fit: LoadedFit, model: ScenarioModel, parameters: Sequence[Parameter], say: Callable[[str], None]
+) -> FittedModel:
+    """Fit the single track to the same windows.
+
+    Raises:
+        ValueError: it cannot be made from what is measured, or not be fitted.
+    """
+    errors = {name: error for name, error in fit.errors.items() if name in OF_SINGLE_TRACK}
+    if not errors:
+        raise ValueError("none of its signals is compared")
+    assert model.plant is not None
+    known = dict(fit.measurement.vehicle)
+    wanted = ("mass", "cg_to_front_axle", "cg_to_rear_axle")
+    car = [known.get(name, model.plant.parameter(name)) for name in wanted]
+    if not all(isinstance(one, (int, float)) for one in car):
+        raise ValueError("the plant has no mass, or no distances of its axles")
+    mass, front, rear = map(float, car)  # type: ignore[arg-type]
+    weight = mass * 9.81 / (front + rear)
+    starts = (
+        STIFFNESS_PER_LOAD * weight * rear, STIFFNESS_PER_LOAD * weight * front, 1.0, 1.0, mass * front * rear
+    )  # fmt: skip
+    own = [
+        Parameter(name, start, 0.2 * start, 5.0 * start)
+        for name, start in zip(PARAMETERS, starts, strict=True)
+    ]
+    steering = {"steer_angle", "steering_wheel_angle"}
+    for one in parameters:
+        _, _, rest = one.name.partition(".")
+        signal, _, of = rest.rpartition(".")
+        if one.name.startswith(f"{MEASURED}."):
+            if signal in steering:
+                ratio = _ratio(fit, model) if signal != "steer_angle" and of == "offset" else 1.0
+                own.append(
+                    replace(one, name=f"steer_angle.{of}", start=one.start / ratio, low=one.low / ratio,
+                            high=one.high / ratio, prior=None)
+                )  # fmt: skip
+            elif one.kind != "run" and signal in errors:
+                own.append(one)
+    parts = {"training": fit.training, "held_out": fit.held_out}
+    models = {
+        part: SingleTrack([_inputs(fit, model, one) for one in windows], mass, front, rear)
+        for part, windows in parts.items()
+    }
+    filtered = {part: _Filtered(fit, one) for part, one in models.items()}
+    residuals = Residuals(
+        filtered["training"],
+        [one.window for one in fit.training],
+        own,
+        errors,
+        settling=fit.settling,
+        say=say,
+    )
+    found = estimate(residuals, most_sets=fit.spec.most_sets)
+    simulated = {part: one([found.values])[0] for part, one in filtered.items()}
+    return FittedModel("single track with Fiala tyres", own, found, _shown(fit, found.values, simulated))
+
+
+@dataclass(frozen=True)
+class _Filtered:
+    """The single track, filtered like the measurement."""
+
+    fit: LoadedFit
+    model: SingleTrack
+
+    def __call__(self, sets: Sequence[Mapping[str, float]]) -> list[list[Simulated]]:
+        low_pass = self.fit.measurement.filter
+        found = self.model(sets)
+        if low_pass is None:
+            return found
+        rates = [1.0 / float(one.window.times[1] - one.window.times[0]) for one in self.model.windows]
+        return [
+            [
+                signals and {name: low_pass(x, rate) for name, x in signals.items()}
+                for signals, rate in zip(several, rates, strict=True)
+            ]
+            for several in found
+        ]
+
+
+def _inputs(fit: LoadedFit, model: ScenarioModel, one: FitWindow) -> SingleTrackWindow:
+    """Return a window with the inputs of the single track.
+
+    Raises:
+        ValueError: steering or speed is not measured.
+    """
+    times = one.window.times
+    raw = one.raw.between(float(times[0]) - MARGIN, float(times[-1]) + MARGIN)
+    if "steer_angle" in raw.signals:
+        steer_angle = raw.signals["steer_angle"]
+    elif "steering_wheel_angle" in raw.signals:
+        steer_angle = raw.signals["steering_wheel_angle"] / _ratio(fit, model)
+    else:
+        raise ValueError("no steering angle is measured")
+    if "velocity_x" not in raw.signals:
+        raise ValueError("velocity_x is not measured")
+    start = start_states(one.filtered, float(times[0]))
+    sideways = start["initial_speed"] * math.sin(start.get("initial_sideslip", 0.0))
+    states = sideways, start.get("initial_yaw_rate", 0.0)
+    return SingleTrackWindow(one.window, raw.time, steer_angle, raw.signals["velocity_x"], states)
+
+
+def _ratio(fit: LoadedFit, model: ScenarioModel) -> float:
+    """Return the ratio of hand wheel to road wheels.
+
+    Raises:
+        ValueError: neither the measurement nor the scenario has it.
+    """
+    known = fit.measurement.vehicle.get("steering_ratio")
+    units = (one.parameter("steering_ratio") for one in model.base.instances)
+    ratio = known or next((float(one) for one in units if isinstance(one, (int, float))), None)
+    if ratio is None:
+        raise ValueError("the steering ratio is unknown")
+    return ratio
+
+
+def free_parameters(fit: LoadedFit, model: ScenarioModel) -> list[Parameter]:
+    """Return the free parameters in SI.
+
+    Raises:
+        ScenarioError: a target or a range is wrong; lists all errors.
+    """
+    document = yaml_lines.read(fit.path, what="fit file")
+    followed = set(model.followed.values())
+    found = []
+    for name, spec in fit.spec.free.items():
+        try:
+            found.append(_parameter(name, spec, fit, model, followed))
+        except ValueError as error:  # noqa: PERF203 - all are reported
+            document.report(("free", name), str(error), code_of(error))
+    if document.errors:
+        raise ScenarioError(document.sorted_errors())
+    return found
+
+
+def _parameter(
+    name: str, spec: FreeSpec, fit: LoadedFit, model: ScenarioModel, followed: set[str]
+) -> Parameter:
+    kind, signal, start, unit = "run", "", None, None
+    if name.startswith(f"{MEASURED}."):
+        _, signal, *rest = [*name.split("."), ""]
+        if rest[:1] not in (["delay"], ["offset"]) or signal not in {*fit.errors, *followed}:
+            known = [f"{MEASURED}.{one}.offset" for one in (*fit.errors, *sorted(followed))]
+            guess = hint(name, known, lead="known are")
+            raise ValueError(f"must be delay or offset of a signal that is compared or followed{guess}")
+        unit = "s" if rest[0] == "delay" else SIGNALS[signal].unit
+        start, kind = 0.0, "run" if signal in followed else rest[0]
+    else:
+        start, unit = model.value_of(Target.parse(name))
+    if spec.start is not None:
+        start = number_in(spec.start, unit)
+    low, high = number_in(spec.low, unit), number_in(spec.high, unit)
+    if start is None:
+        raise ValueError("'start' is missing: the scenario gives no single value")
+    if not low < start < high:
+        raise ValueError(f"start {start:g} must lie between low {low:g} and high {high:g}")
+    prior = None
+    if spec.prior is not None:
+        prior = number_in(spec.prior.mean, unit), number_in(spec.prior.deviation, unit)
+        if not prior[1] > 0.0:
+            raise ValueError("prior: its deviation must be above 0")
+    return Parameter(name, start, low, high, kind, signal, prior, unit or "1")  # type: ignore[arg-type]

@@ -1,0 +1,160 @@
+"""A single track with Fiala's tyres, simulated in all windows at once: every fit is compared with its own.
+
+    m (dv_y/dt + v_x r) = F_f cos(delta) + F_r,      I_z dr/dt = a F_f cos(delta) - b F_r
+    F = -C t + C^2 |t| t / (3 mu F_z) - C^3 t^3 / (27 (mu F_z)^2),  t = tan(alpha),  |t| < 3 mu F_z / C
+    F = -mu F_z sign(alpha)                                                           beyond
+
+with steer angle and v_x as measured, static axle loads, and friction mu per axle: five parameters that any
+car has. A model with more of them that is not better on runs it was not fitted to explains nothing more.
+
+Source: E. Fiala, Seitenkräfte am rollenden Luftreifen, VDI-Zeitschrift 96, 1954; in this form, with friction,
+J. Pacejka, Tire and Vehicle Dynamics, 3rd edition, 2012, section 3.2.1 (brush model of parabolic pressure).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vocabulary.gravity import G
+
+from .estimate import Simulated, Window
+from .segment import Segment
+
+LEAST_SPEED = 3.0
+"""Speed [m/s] below which slip angles refer to it; chosen: slower, tyre and step are stiff."""
+STEP = 0.01
+"""Longest step of the integration [s] (Runge-Kutta of fourth order); chosen: stable above `LEAST_SPEED`."""
+PARAMETERS = ("stiffness_front", "stiffness_rear", "friction_front", "friction_rear", "yaw_inertia")
+SIGNALS = ("yaw_rate", "acceleration_y", "sideslip")
+
+
+@dataclass(frozen=True)
+class SingleTrackWindow:
+    """Inputs of a window.
+
+    Attributes:
+        window: compared times and signals.
+        times: of the inputs, evenly spaced [s], beyond the window's by a margin for delays.
+        steer_angle, velocity_x: at these times [rad], [m/s].
+        start: v_y [m/s] and r [rad/s] at the window's start.
+    """
+
+    window: Window
+    times: np.ndarray
+    steer_angle: np.ndarray
+    velocity_x: np.ndarray
+    start: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class SingleTrack:
+    """The model; mass [kg], distances of the axles from the centre of mass [m].
+
+    Its parameters are `PARAMETERS`; `steer_angle.delay` [s] and `steer_angle.offset` [rad] of the measurement
+    are zero unless a set has them.
+    """
+
+    windows: Sequence[SingleTrackWindow]
+    mass: float
+    front: float
+    rear: float
+
+    def __call__(self, sets: Sequence[Mapping[str, float]]) -> list[list[Simulated]]:
+        """Simulate all windows for sets of values, those of equal length at once; see `estimate.Model`."""
+        by_grid: dict[tuple[int, float], list[int]] = {}
+        for i, one in enumerate(self.windows):
+            times = one.window.times
+            by_grid.setdefault((len(times), round(times[1] - times[0], 9)), []).append(i)
+        found: list[list[Simulated]] = [[None] * len(self.windows) for _ in sets]
+        for alike in by_grid.values():
+            kept = self._simulate([self.windows[i] for i in alike], sets)
+            for k, (at, i) in enumerate(itertools.product(range(len(sets)), alike)):
+                if np.isfinite(kept[:, :, k]).all():
+                    found[at][i] = dict(zip(SIGNALS, kept[:, :, k], strict=True))
+        return found
+
+    def _simulate(
+        self, windows: Sequence[SingleTrackWindow], sets: Sequence[Mapping[str, float]]
+    ) -> np.ndarray:
+        """Return `SIGNALS` of windows of one grid, shape (3, times, sets * windows)."""
+        n = len(windows[0].window.times) - 1
+        step = windows[0].window.times[1] - windows[0].window.times[0]
+        parts = max(1, int(np.ceil(step / STEP - 1e-9)))
+        h = step / parts
+        since = 0.5 * h * np.arange(2 * n * parts + 3)  # with the middle of each step, and one step more
+        columns = len(sets) * len(windows)
+        tangent, cosine, speed = (np.empty((len(since), columns)) for _ in range(3))
+        for k, (values, one) in enumerate(itertools.product(sets, windows)):
+            times = one.window.times[0] + since
+            late, offset = (values.get(f"steer_angle.{name}", 0.0) for name in ("delay", "offset"))
+            delta = np.interp(times + late, one.times, one.steer_angle) - offset
+            tangent[:, k], cosine[:, k] = np.tan(delta), np.cos(delta)
+            speed[:, k] = np.interp(times, one.times, one.velocity_x)
+        c_f, c_r, mu_f, mu_r, inertia = (
+            np.repeat([values[name] for values in sets], len(windows)) for name in PARAMETERS
+        )
+        load = self.mass * G / (self.front + self.rear)
+        front, rear = Axle(c_f, mu_f * load * self.rear), Axle(c_r, mu_r * load * self.front)
+        referred = np.maximum(speed, LEAST_SPEED)
+
+        def rates(v_y: np.ndarray, r: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+            """Return dv_y/dt [m/s2], dr/dt [rad/s2] and a_y [m/s2] at the k-th half step."""
+            u = (v_y + self.front * r) / referred[k]
+            f = front.force((u - tangent[k]) / (1.0 + u * tangent[k])) * cosine[k]
+            q = rear.force((v_y - self.rear * r) / referred[k])
+            a_y = (f + q) / self.mass
+            return a_y - speed[k] * r, (self.front * f - self.rear * q) / inertia, a_y
+
+        v_y, r = np.tile(np.array([one.start for one in windows]).T, (1, len(sets)))
+        kept = np.empty((len(SIGNALS), n + 1, columns))
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is no result
+            for k in range(n * parts + 1):
+                v_1, r_1, a_y = rates(v_y, r, 2 * k)
+                if k % parts == 0:
+                    kept[:, k // parts] = r, a_y, np.arctan2(v_y, speed[2 * k])
+                v_2, r_2, _ = rates(v_y + 0.5 * h * v_1, r + 0.5 * h * r_1, 2 * k + 1)
+                v_3, r_3, _ = rates(v_y + 0.5 * h * v_2, r + 0.5 * h * r_2, 2 * k + 1)
+                v_4, r_4, _ = rates(v_y + h * v_3, r + h * r_3, 2 * k + 2)
+                v_y = v_y + h / 6.0 * (v_1 + 2.0 * (v_2 + v_3) + v_4)
+                r = r + h / 6.0 * (r_1 + 2.0 * (r_2 + r_3) + r_4)
+        return kept
+
+
+class Axle:
+    """An axle with Fiala's tyres.
+
+    Args:
+        stiffness: cornering stiffness C [N/rad], one per column.
+        grip: friction times load [N].
+    """
+
+    def __init__(self, stiffness: np.ndarray, grip: np.ndarray) -> None:
+        self.minus_grip, self.per_tangent = -grip, stiffness / (3.0 * grip)
+
+    def force(self, tangent: np.ndarray) -> np.ndarray:
+        """Return the lateral force [N] at a slip angle with this tangent; with s = C |t| / (3 mu F_z) <= 1,
+        F = -mu F_z sign(t) (3 s - 3 s^2 + s^3).
+        """
+        s = self.per_tangent * tangent
+        left = 1.0 - np.minimum(np.abs(s), 1.0)
+        force: np.ndarray = self.minus_grip * np.copysign(1.0 - left * left * left, s)
+        return force
+
+
+def start_states(segment: Segment, time: float) -> dict[str, float]:
+    """Return parameters of plants that begin a run at a time [s] as the car was measured."""
+    at = {name: float(np.interp(time, segment.time, x)) for name, x in segment.signals.items()}
+    forward, sideways = at.get("velocity_x", at.get("speed")), at.get("velocity_y")
+    sideslip = at.get("sideslip")
+    if sideslip is None and sideways is not None and forward:
+        sideslip = math.atan2(sideways, forward)
+    states = {"initial_yaw_rate": at.get("yaw_rate"), "initial_sideslip": sideslip}
+    if forward is not None:
+        along = math.cos(sideslip or 0.0) if "velocity_x" in at else 1.0
+        states["initial_speed"] = forward / along
+    return {name: value for name, value in states.items() if value is not None}

@@ -1,0 +1,92 @@
+"""Fits to measurements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from orchestrator.experiments.fit import load_fit
+from orchestrator.experiments.fit_result import FitResult, FittedModel, make_fit
+from orchestrator.planner import Planner
+
+from . import arguments
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def fit(
+    path: str | Path, *, workers: int | None = None, progress: Callable[[str], None] | None = None
+) -> Fit:
+    """Fit parameters of a scenario to a measurement, as `yawbench fit` does; nothing is written.
+
+    Args:
+        path: a fit file.
+        workers: number of processes; default: one per core.
+        progress: called with a line after every few simulations.
+
+    Raises:
+        ScenarioError: the file is invalid, or the parameters cannot be identified.
+    """
+    loaded = load_fit(arguments.path(path, "path"))
+    planner = Planner(build=True, tell=lambda text: None)
+    return Fit(make_fit(loaded, planner=planner, workers=workers, say=progress or (lambda text: None)))
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Parameters fitted to a measurement; made by `fit`."""
+
+    __module__ = "yawbench"
+
+    result: FitResult
+
+    @property
+    def verdict(self) -> str:
+        """Whether the scenario's car is better than a fitted single track, in words."""
+        return self.result.verdict
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Free parameter -> fitted value in SI."""
+        return self.result.scenario.estimate.values
+
+    @property
+    def parameters(self) -> pd.DataFrame:
+        """The parameters of both models: value, interval (low, high) of 95 %, start, unit."""
+        import pandas as pd
+
+        rows = [row for model in self.result.models for row in _rows(model)]
+        return pd.DataFrame(rows).set_index(["model", "parameter"])
+
+    @property
+    def scores(self) -> pd.DataFrame:
+        """Differences of both models on training and held-out windows: rms, largest, fit in per cent."""
+        import pandas as pd
+
+        keys = ["model", "part", "signal"]
+        rows = [dict(zip(keys, key, strict=True)) | vars(one) for key, one in self.result.scores.items()]
+        return pd.DataFrame(rows).set_index(keys)
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """All numbers, as in fit.json."""
+        return self.result.data
+
+    def __repr__(self) -> str:
+        return f"<Fit of {len(self.values)} parameters: {self.verdict}>"
+
+
+def _rows(model: FittedModel) -> list[dict[str, Any]]:
+    intervals = model.estimate.intervals()
+    rows = []
+    for one in model.parameters:
+        low, high = intervals[one.name] or (None, None)
+        value = model.estimate.values[one.name]
+        rows.append({
+            "model": model.title, "parameter": one.name, "value": value, "low": low, "high": high,
+            "start": one.start, "unit": one.unit,
+        })  # fmt: skip
+    return rows
