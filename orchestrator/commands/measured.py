@@ -144,8 +144,8 @@ def parameter_table(model: FittedModel) -> Table:
     )
     if found.covariance is None:
         table.notes.append(f"no intervals: {found.pieces} pieces of 5 s are too few")
-    for first, second, value in found.correlated():
-        table.notes.append(f"{first} and {second} are correlated: {value:.2f}")
+    for first, second, shared in found.correlated():
+        table.notes.append(f"{first} and {second} are correlated: {shared:.2f}")
     return table
 
 

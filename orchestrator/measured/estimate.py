@@ -36,7 +36,7 @@ import numpy as np
 from ..files import write_whole
 
 PIECE = 5.0
-"""Duration of a piece [s]; chosen: longer than a bend, and ten times a correlation of 0.5 s."""
+"""Duration of a piece [s]; chosen: longer than a bend, ten times a correlation of 0.5 s."""
 LEAST_PIECES = 5
 """Pieces that an interval needs; chosen: with fewer, t quantiles exceed 3 and say little."""
 LARGEST_CONDITION = 1e4
@@ -95,7 +95,6 @@ class Model(Protocol):
 
     def __call__(self, sets: Sequence[Mapping[str, float]]) -> list[list[Simulated]]:
         """Return for each set the signals in each window."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -298,9 +297,8 @@ class Residuals:
         return [self._known[key] for key in keys]
 
     def _file(self, key: tuple[float, ...]) -> Path:
-        assert self.folder is not None
         digest = hashlib.sha256(f"{self.identity} {key}".encode()).hexdigest()
-        return self.folder / f"{digest[:20]}.npz"
+        return (self.folder or Path()) / f"{digest[:20]}.npz"
 
     def _kept(self, key: tuple[float, ...]) -> list[Simulated] | None:
         """Return what a set of values gave before an interruption; None if it is not kept, or unreadable."""
@@ -405,8 +403,7 @@ def estimate(residuals: Residuals, *, most_sets: int) -> Estimate:
             raise StartFailed(window.name)
     require_identifiable(residuals.jacobian(start), names)
     best = start, np.inf
-    loss_at_start = None
-    message = "the loss or the parameters no longer change"
+    loss_at_start, message = None, "the loss or the parameters no longer change"
 
     def values(point: np.ndarray) -> np.ndarray:
         nonlocal best, loss_at_start
