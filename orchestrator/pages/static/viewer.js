@@ -72,16 +72,17 @@ class Viewer {
       return element;
     };
     const head = find('runs').tHead.rows[0];
-    if (several) head.append(made('th', 'baseline', {scope: 'col'}));
+    if (several) head.append(made('th', 'baseline', {scope: 'col', id: `${key}-baseline`}));
     for (const [title] of data.metrics) head.append(made('th', title, {scope: 'col', className: 'yv-metric'}));
     data.runs.forEach((run, k) => {
       const row = find('runs').tBodies[0].insertRow();
       row.dataset.run = k;
       const label = made('label', made('input', '', {type: 'checkbox', className: 'yv-show'}));
-      label.append(' ', made('span', '', {className: 'yv-swatch'}), ` ${run.label}`);
+      label.append(' ', made('span', '', {className: 'yv-swatch'}), ' ', made('span', run.label, {id: `${key}-run-${k}`}));
       row.append(made('th', label, {scope: 'row'}));
       if (several) {
-        const base = made('input', '', {type: 'radio', className: 'yv-base', name: `${key}-baseline`, ariaLabel: `${run.label} is the baseline`});
+        const base = made('input', '', {type: 'radio', className: 'yv-base', name: `${key}-baseline`});
+        base.setAttribute('aria-labelledby', `${key}-run-${k} ${key}-baseline`);
         row.append(made('td', base));
       }
       for (const [, values] of data.metrics) row.append(made('td', values[k] || '–', {className: 'yv-metric'}));
