@@ -31,7 +31,7 @@ def fit(
         ScenarioError: the file is invalid, or the parameters cannot be identified.
     """
     loaded = load_fit(arguments.path(path, "path"))
-    planner = Planner(build=True, tell=lambda text: None)
+    planner = Planner(build=True, report=lambda text: None)
     return Fit(make_fit(loaded, planner=planner, workers=workers, say=progress or (lambda text: None)))
 
 
