@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from orchestrator.experiments.confidence import Bounds
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.verdict_tables import (
     FAILS,
@@ -19,8 +20,8 @@ from orchestrator.experiments.verdict_tables import (
     NO_FLIP,
     UNDECIDED,
     flip_words,
-    held_words,
     share,
+    share_words,
 )
 from orchestrator.messages import listed
 from orchestrator.pages.report import found_studies
@@ -29,8 +30,9 @@ from tests.checkout import ROOT
 FILE = ROOT / "docs" / "verdicts.md"
 HEAD = """# Every verdict, and how far it carries
 
-All claims of the four papers, judged over the values that each of them leaves open. A verdict in **bold** is
-robust: no point of the region and no single open value flips it.
+All claims of the four papers, judged over the values that each of them leaves open. "Holds" and "does not
+reproduce" are robust: with 95 % confidence less than 10 % of the region flips the verdict. The others are
+undecided.
 [How far a verdict carries](regions.md) explains the runs and the columns; the ranges of the open values, and
 the reason for each, are in the study files and in `results/report.html`.
 
@@ -48,16 +50,6 @@ class Row(NamedTuple):
     region: str
     flip: str
 
-    @property
-    def robust(self) -> bool:
-        """Whether nothing flips the verdict."""
-        return self.verdict.startswith("**")
-
-    @property
-    def kind(self) -> str:
-        """The verdict without emphasis."""
-        return self.verdict.strip("*")
-
 
 def studies() -> dict[str, Path]:
     """Return title -> file of all studies with a region, in the order of the report."""
@@ -72,12 +64,16 @@ def rows_of(file: Path) -> list[Row]:
 
 
 def _row(one: Mapping[str, str]) -> Row:
-    mark = "**" if one["robust"] == "true" else ""
     return Row(
         one["says"],
-        f"{mark}{one['verdict']}{mark}",
+        one["verdict"],
         share(float(one["margin [1]"])),
-        held_words(int(one["holds at"]), int(one["points"]), int(one["without result"])),
+        share_words(
+            int(one["flips"]),
+            int(one["points"]),
+            Bounds(float(one["share from [1]"]), float(one["share to [1]"])),
+            int(one["without result"]),
+        ),
         flip_words(one["flips by"], one["flips at"], one["chosen"]) if one["flips by"] else NO_FLIP,
     )
 
@@ -97,13 +93,13 @@ def recorded() -> dict[str, list[Row]]:
 def page(found: Mapping[str, list[Row]]) -> str:
     """Return the page."""
     files = studies()
-    parts = [HEAD, _lines(("study", "claims", "robust", *KINDS), summary(found))]
+    parts = [HEAD, _lines(("study", "claims", *KINDS), summary(found))]
     for title, rows in found.items():
         spec = load_experiment(files[title]).spec
         assert spec.region
         where = files[title].relative_to(ROOT)
         parts.append(
-            f"## {title}\n\n`yawbench study {where}`; {spec.region.points} points over "
+            f"## {title}\n\n`yawbench study {where}`; {spec.region.points} to {spec.region.most} points over "
             f"{listed(spec.region.open_values, last='and')}.\n"
         )
         parts.append(_lines(("the paper says", "verdict", "margin", "region", "nearest flip"), rows))
@@ -114,8 +110,8 @@ def summary(found: Mapping[str, list[Row]]) -> list[tuple[str, ...]]:
     """Return how many claims of each study have which verdict."""
     return [
         (
-            title, str(len(rows)), str(sum(row.robust for row in rows)),
-            *(str(sum(row.kind == kind for row in rows)) for kind in KINDS),
+            title, str(len(rows)),
+            *(str(sum(row.verdict == kind for row in rows)) for kind in KINDS),
         )
         for title, rows in found.items()
     ]  # fmt: skip

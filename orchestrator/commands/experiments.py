@@ -87,17 +87,22 @@ def _over_region(
 ) -> ExperimentResult:
     """Return the findings with the verdicts over the region added; the journal has the runs already made."""
     from ..experiments.execution import left_to_do
-    from ..experiments.region import judge_region, plan_region
+    from ..experiments.region import judge_region, next_jobs, plan_region
 
-    with execute.display.planning(0) as planning:
-        plan = plan_region(planned, execute.folder, planner=execute.planner, progress=planning)
-    jobs = {job.key: job for job in plan.jobs.values()}
+    plan = plan_region(planned, execute.folder, planner=execute.planner)
     records = execute.journal.records
-    if execute.runner is None and (left := left_to_do(list(jobs.values()), records)):
-        say(f"note: {counted(len(left), 'run')} of the region not made yet; the region is omitted")
-        return findings
     title = f"{planned.experiment.spec.title}, region of the verdicts"
-    execute.run(title, list(jobs.values()), journaled=True)
+    while True:
+        with execute.display.planning(0) as planning:
+            more = next_jobs(plan, findings, records, progress=planning)
+        if not more:
+            break
+        if execute.runner is None and (left := left_to_do(more, records)):
+            say(f"note: {counted(len(left), 'run')} of the region not made yet; the region is omitted")
+            return findings
+        execute.run(title, more, journaled=True)
+        title = f"{planned.experiment.spec.title}, claims undecided so far at further points"
+    jobs = {job.key: job for job in plan.jobs.values()}
     failed = {jobs[key].label: str(records[key].reason) for key in jobs if not records[key].ok}
     say_failed(failed)
     if failed:

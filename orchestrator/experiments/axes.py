@@ -253,9 +253,26 @@ class OpenValueSpec(AxisSpec):
 class RegionSpec(StrictModel):
     """Where claims are judged again: along each open value, and over all of them together."""
 
-    points: int = Field(24, ge=10, le=10_000, description="Of a Latin hypercube over all open values")
+    points: int = Field(
+        16,
+        ge=10,
+        le=10_000,
+        description="Of a Latin hypercube over all open values; so many are added at once",
+    )
+    most: int = Field(128, ge=10, le=10_000, description="Points after which a claim stays undecided")
     seed: int = Field(1, ge=0, description="Of the Latin hypercube")
     open_values: dict[str, OpenValueSpec] = Field(description="Name -> range", min_length=1)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> RegionSpec:
+        if self.most < self.points:
+            raise ValueError(f"most must be at least points (got {self.most} and {self.points})")
+        return self
+
+    @property
+    def looks(self) -> tuple[int, ...]:
+        """The numbers of points after which the verdict on a claim may be decided."""
+        return (*range(self.points, self.most, self.points), self.most)
 
 
 RUN = "run"
@@ -320,12 +337,34 @@ def latin_hypercube(axes: Sequence[AxisSpec], runs: int, seed: int) -> list[Desi
     An axis of listed values takes each of them equally often, up to the remainder of the division.
     Source: McKay, Beckman, Conover, Technometrics 21 (1979) 239-245.
     """
+    return extended_hypercube(axes, runs, runs, seed)
+
+
+def extended_hypercube(axes: Sequence[AxisSpec], runs: int, most: int, seed: int) -> list[DesignPoint]:
+    """Return a Latin hypercube of `runs` points followed by more, see `places_of_hypercube`."""
+    places = places_of_hypercube(len(axes), runs, most, seed)
+    return [
+        tuple(level_at(axis, float(place)) for axis, place in zip(axes, row, strict=True)) for row in places
+    ]
+
+
+def places_of_hypercube(axes: int, runs: int, most: int, seed: int) -> np.ndarray:
+    """Return relative positions, 0 to 1, of a Latin hypercube that is extended: an array of (most, axes).
+
+    The first `runs` rows are a Latin hypercube, and so are the first 2, 4, 8 ... times as many: when each
+    part of a range is halved, the new points fill the halves that have none. So no point is ever given up.
+    Source: M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239-245; for the extension
+    C. J. Sallaberry, J. C. Helton, S. C. Hora, Reliability Engineering and System Safety 93 (2008) 1047-1059.
+    """
     generator = np.random.Generator(np.random.PCG64(seed))
-    columns: list[list[Level]] = []
-    for axis in axes:
-        places = (generator.permutation(runs) + generator.random(runs)) / runs
-        columns.append([level_at(axis, float(place)) for place in places])
-    return list(zip(*columns, strict=True))
+    draws = [(generator.permutation(runs) + generator.random(runs)) / runs for _ in range(axes)]
+    places = np.stack(draws, axis=1)
+    while len(places) < most:
+        parts = 2 * len(places)
+        free = [np.setdiff1d(np.arange(parts), (column * parts).astype(int)) for column in places.T]
+        more = [(generator.permutation(halves) + generator.random(len(halves))) / parts for halves in free]
+        places = np.concatenate([places, np.stack(more, axis=1)])
+    return places[:most]
 
 
 def level_at(axis: AxisSpec, place: float) -> Level:

@@ -17,11 +17,13 @@ from ..errors import ScenarioError
 from ..figures.style import DIGITS, digits_apart, digits_of, shown
 from ..metrics.run_metrics import MetricValue
 from ..metrics.verdict import Status, Verdict, compare, worst
+from .confidence import Bounds
 from .judged_schema import Assertion, Claim, Condition, MetricReference, si_number
+from .sequential import Decision, SequentialTest
 
 ONE_IN = 10
-"""A verdict is undecided if it differs at one in ten points of a region, or at more. Chosen: fewer are
-exceptions that can be named."""
+"""A verdict is robust if it flips in less than one tenth of a region. Chosen: fewer are exceptions that can
+be named."""
 TIMES = "× as chosen"
 """Unit of an open value that is a factor, where the runs have different chosen values."""
 
@@ -111,6 +113,7 @@ class Region:
     chosen: Verdict
     points: tuple[Verdict, ...]  # of a Latin hypercube over all open values together
     lines: tuple[OpenValueScan, ...]  # of one open value each
+    test: SequentialTest  # of the share of points with another verdict
 
     @property
     def holding(self) -> int:
@@ -125,7 +128,7 @@ class Region:
     @property
     def agreeing(self) -> float:
         """The share of points with the same verdict as the chosen point."""
-        return sum(point.holds == self.chosen.holds for point in self.points) / len(self.points)
+        return 1.0 - self.flipping / len(self.points)
 
     @property
     def spread(self) -> float | None:
@@ -142,24 +145,25 @@ class Region:
         return max(sign * self.chosen.margin - worst_tenth, 0.0)
 
     @property
-    def decided(self) -> bool:
-        """Whether more than nine tenths of the points have the verdict of the chosen point.
+    def flipping(self) -> int:
+        """The number of points with another verdict than the chosen point."""
+        return sum(point.holds != self.chosen.holds for point in self.points)
 
-        Equivalently: the margin exceeds its spread.
-        """
-        others = sum(point.holds != self.chosen.holds for point in self.points)
-        return ONE_IN * others < len(self.points)
+    @property
+    def flip_bounds(self) -> Bounds:
+        """The confidence interval of the share of the region with another verdict."""
+        return self.test.bounds(self.flipping, len(self.points))
+
+    @property
+    def robust(self) -> bool:
+        """Whether it is known that less than one tenth of the region flips the verdict."""
+        return self.test.decision(self.flipping, len(self.points)) is Decision.BELOW
 
     @property
     def flip(self) -> Flip | None:
         """The flip nearest to the chosen point, by distance relative to each range."""
         flips = [flip for line in self.lines if (flip := line.flip)]
         return min(flips, key=lambda flip: flip.distance, default=None)
-
-    @property
-    def robust(self) -> bool:
-        """Whether the verdict flips neither at a point nor along any open value."""
-        return self.agreeing == 1.0 and self.flip is None
 
 
 MetricTable = Mapping[tuple[str, str], MetricValue]
@@ -198,7 +202,7 @@ class ClaimResult(Judgement):
     @property
     def status(self) -> Status:
         """Status of the verdict; undecided if chance or the region could change it."""
-        undecided = not self.certain or (self.region is not None and not self.region.decided)
+        undecided = not self.certain or (self.region is not None and not self.region.robust)
         return Status.UNDECIDED if undecided and self.verdict.holds is not None else self.verdict.status
 
 
@@ -277,7 +281,10 @@ def _range(known: Sequence[tuple[MetricValue, str]], missing: bool, digits: int)
     """Return the value as text, or the smallest and largest with their runs where they read differently."""
     ends: dict[str, str] = {}
     for value, run in (*known[:1], *known[-1:]):
-        ends.setdefault(shown(value.number, value.unit, digits=digits, half=value.half), run)
+        ends.setdefault(
+            shown(value.number, value.unit, digits=digits, half=value.half, between=value.between),
+            run,
+        )
     text = " to ".join(f"{number} ({run})" if run else number for number, run in ends.items())
     return " and ".join(filter(None, [text, "no result" if missing else ""]))
 

@@ -95,7 +95,7 @@ def grid_tables(spec: GridSpec, values: MetricTable, verdicts: Mapping[tuple[str
     ((_, rows),) = spec.rows.items()
     ((_, columns),) = spec.columns.items()
     inside_all = [values.get(cell.key) for cell in cells(spec)]
-    if spec.holds or spec.derived or any(value and value.half for value in inside_all):
+    if spec.holds or spec.derived or any(value and (value.half or value.between) for value in inside_all):
         return [_display_table(spec, values, verdicts)]
     units = {value.unit for (_, key), value in values.items() if key == spec.metric}
     unit = "" if units <= {"1", "%"} else f" [{units.pop()}]"
@@ -145,12 +145,18 @@ def _display_table(spec: GridSpec, values: MetricTable, verdicts: Mapping[tuple[
         words = []
         for cell in (one for one in every if one.row == row):
             value = values.get(cell.key)
-            text = "-" if value is None else shown(value.number, value.unit, half=value.half)
+            text = (
+                "-"
+                if value is None
+                else shown(value.number, value.unit, half=value.half, between=value.between)
+            )
             words.append(f"{text} {verdicts.get(cell.key, '')}".rstrip() if spec.holds else text)
         table.rows.append([row, *words])
     for cell in (one for one in every if not one.column):
         value = values.get(cell.key)
-        text = "-" if value is None else shown(value.number, value.unit, half=value.half)
+        text = (
+            "-" if value is None else shown(value.number, value.unit, half=value.half, between=value.between)
+        )
         table.rows.append([cell.row, *[text] * len(columns)])
     if spec.holds:
         table.rows.append([spec.holds, *(_down_to(spec, column, verdicts) for column in columns.values())])

@@ -15,7 +15,7 @@ import operator
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, PlainValidator, PrivateAttr, Tag, model_validator
@@ -197,6 +197,11 @@ class MetricSpec(StrictModel):
     metric: MetricName = Field(description="measure(signal)")
     window: WindowField | None = Field(None, description="[from, to] in s; default: the whole run")
     heading: str = Field("", description="Heading of its column; default: the formula")
+    over_repeats: Literal["mean", "median", "share"] = Field(
+        "mean",
+        description="Of repeats: mean with Student's interval; median and range, of those that have a value; "
+        "share of those that are not 0, with the interval of Clopper and Pearson",
+    )
 
     def during(self, lead: str = "") -> str:
         """Return the window to end a phrase with: ", 1 to 6 s", after a `lead` such as "from "."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import statistics
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,7 +20,7 @@ from ..results.folder_and_lock import RUN_FILE
 from ..results.read_and_salvage import Results
 from .axes import RUN, DesignPoint, Level
 from .claims import ClaimResult, Judgement, MetricTable, Region, judge
-from .confidence import interval
+from .confidence import interval, share_bounds
 from .experiment import Case, LoadedExperiment, NamedRun
 from .grids import correlation
 from .jobs import NOT_MADE, MeasuredRun, Outcome, measured, read_back
@@ -31,6 +32,21 @@ from .tables import Cell, Table
 K = TypeVar("K")
 Each = Callable[..., Iterable[Any]]
 """`map`, or a parallel equivalent such as `Pool.map`."""
+
+
+def _median(values: Sequence[MetricValue]) -> MetricValue:
+    """Return the median of repeats with their range."""
+    numbers = [value.number for value in values]
+    median, low, high = statistics.median(numbers), min(numbers), max(numbers)
+    between = (low, high) if low < high else None
+    return MetricValue(median, values[0].unit, max(high - median, median - low), between)
+
+
+def _share(values: Sequence[MetricValue]) -> MetricValue:
+    """Return the share of repeats whose value is not 0, with the interval of Clopper and Pearson."""
+    count, number = sum(value.number != 0.0 for value in values), len(values)
+    share, bounds = count / number, share_bounds(count, number)
+    return MetricValue(share, "%", max(bounds.high - share, share - bounds.low), (bounds.low, bounds.high))
 
 
 @dataclass(frozen=True)
@@ -93,8 +109,14 @@ class ExperimentResult:
 
     @cached_property
     def at(self) -> dict[DesignPoint, dict[tuple[str, str], MetricValue]]:
-        """Setting -> (run, metric) -> value, where there is one; over repeats the mean."""
-        return self._means(self._at_points, lambda key, setting: len(self._cases.get((key[0], setting), ())))
+        """Setting -> (run, metric) -> value, where there is one; over repeats the mean, median or share."""
+        repeated = any(axis.repeats for axis in self.spec.axes.values())
+        kinds = {key: one.over_repeats for key, one in self.spec.metrics.items()} if repeated else {}
+        return self._means(
+            self._at_points,
+            lambda key, setting: len(self._cases.get((key[0], setting), ())),
+            lambda key: kinds.get(key[1], "mean"),
+        )
 
     @cached_property
     def _at_points(self) -> dict[DesignPoint, dict[tuple[str, str], MetricValue]]:
@@ -124,10 +146,12 @@ class ExperimentResult:
         self,
         found: Mapping[DesignPoint, Mapping[K, MetricValue]],
         repeats_of: Callable[[K, DesignPoint], int] | None = None,
+        kind_of: Callable[[K], str] = lambda key: "mean",
     ) -> dict[DesignPoint, dict[K, MetricValue]]:
         """Return setting -> key -> mean over repeats, of the keys that all repeats have.
 
         `repeats_of`: number of repeats of a key at a setting; default: all points of the setting.
+        `kind_of`: which statistic of a key, as in a metric's `over_repeats`.
         """
         repeats: dict[DesignPoint, list[Mapping[K, MetricValue]]] = {}
         for point, values in found.items():
@@ -138,6 +162,10 @@ class ExperimentResult:
             for key in dict.fromkeys(itertools.chain(*several)):
                 every = [values[key] for values in several if key in values]
                 number = repeats_of(key, setting) if repeats_of else len(several)
+                if number > 1 and (kind := kind_of(key)) != "mean":
+                    if kind == "median" or len(every) == number:
+                        here[key] = _median(every) if kind == "median" else _share(every)
+                    continue
                 over = interval([value.number for value in every]) if len(every) == number else None
                 if over is not None:
                     here[key] = MetricValue(over.mean, every[0].unit, over.half)

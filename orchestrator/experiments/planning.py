@@ -9,8 +9,9 @@ from typing import Any
 
 from ..errors import Diagnostic, Location, ScenarioError
 from ..metrics.run_metrics import STANDARD, metric, results_to_be, unit_in
-from ..names import SignalName, Target
-from ..plan import Fmu, Instance, Plan, Variable
+from ..names import OF_RUN, SignalName, Target
+from ..plan import DEFAULT, Fmu, Instance, Plan, Variable
+from ..plan import Value as Given
 from ..planner import Planner
 from ..results.read_and_salvage import Results
 from ..scenario import quantities
@@ -219,3 +220,27 @@ def reached(plan: Plan, target: Target) -> Iterator[tuple[Instance, Variable]]:
             own = instance.fmu.variables.get(target.variable)
             if target.instance in ("", instance.name) and own and own.causality == "parameter":
                 yield instance, own
+
+
+def found_at(plan: Plan, target: Target) -> tuple[Given, str] | None:
+    """Return the value and unit that an override target has in a plan; None if it has no such target."""
+    instance = next((one for one in plan.instances if one.name == target.instance), None)
+    if target.kind == "fmu":
+        return (instance.fmu.name, "") if instance else None
+    if target.kind == "vehicle_file":
+        return (str(plan.scenario["vehicle"]), "") if plan.scenario.get("vehicle") else None
+    if target.kind == "tyres":
+        files = {axle: str(file["file"]) for axle, file in plan.scenario.get("tyre_files", {}).items()}
+        return (files[target.variable or "front"], "") if files else None
+    if target.kind == "run":
+        times = float(plan.start), plan.time(plan.n_steps), float(plan.step)
+        values: dict[str, Given] = dict(zip(OF_RUN, (*times, plan.algorithm), strict=True))
+        return values[target.variable], "s"
+    if target.kind == "setting" and target.is_time and instance:
+        return float(instance.period * plan.step), "s"
+    for instance, variable in reached(plan, target):
+        given = {**instance.parameters, **instance.constants}.get(variable.name, variable.start)
+        of_vehicle = instance.origins.get(variable.name, DEFAULT).kind == "vehicle"
+        if given is not None and (of_vehicle or target.kind != "vehicle_parameter"):
+            return given, variable.unit or ""
+    return None

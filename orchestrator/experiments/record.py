@@ -63,6 +63,7 @@ def verdict_columns(findings: ExperimentResult) -> Table:
     """Return columns with verdict, margin and region, a row per claim and check."""
     every = findings.judgements
     regions = [one.region for one in every]
+    bounds = [region.flip_bounds if region else None for region in regions]
     flips = [region.flip if region else None for region in regions]
     return Table.of_columns(
         [
@@ -73,6 +74,9 @@ def verdict_columns(findings: ExperimentResult) -> Table:
             column("spread", "float64", [at.spread if at else None for at in regions], {"unit": "1"}),
             column("points", "int64", [len(region.points) if region else None for region in regions]),
             column("holds at", "int64", [region.holding if region else None for region in regions]),
+            column("flips", "int64", [region.flipping if region else None for region in regions]),
+            column("share from", "float64", [one.low if one else None for one in bounds], {"unit": "1"}),
+            column("share to", "float64", [one.high if one else None for one in bounds], {"unit": "1"}),
             column("without result", "int64", [at.without_result if at else None for at in regions]),
             column("flips by", "string", [flip.open_value if flip else None for flip in flips]),
             column("flips at", "string", [flip.words if flip else None for flip in flips]),
@@ -227,8 +231,9 @@ def _hashes(results: Results | None) -> dict[str, str]:
 
 def _value(value: MetricValue) -> dict[str, Any]:
     number = value.number if math.isfinite(value.number) else "inf"
-    half = {"half": value.half} if value.half else {}
-    return {"value": number, "unit": si(value.unit), **half}
+    half = {"half": value.half} if value.half and not value.between else {}
+    between = {"between": [*map(_finite, value.between)]} if value.between else {}
+    return {"value": number, "unit": si(value.unit), **half, **between}
 
 
 def _judgement(one: ClaimResult) -> dict[str, Any]:
@@ -254,7 +259,8 @@ def _region(region: Region) -> dict[str, Any]:
         "holds_at": region.holding,
         "without_result": region.without_result,
         "spread": _finite(region.spread),
-        "decided": region.decided,
+        "flipping": region.flipping,
+        "flip_bounds": [*region.flip_bounds],
         "robust": region.robust,
         "flip": flip and {"open_value": flip.open_value, "at": flip.number, "words": flip.words,
                           "chosen": flip.chosen or None},

@@ -5,10 +5,9 @@ The runs keep no results. At the chosen point the named runs themselves are used
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -16,18 +15,19 @@ from ..errors import Diagnostic, Location, ScenarioError
 from ..messages import hint, listed
 from ..metrics.run_metrics import MetricValue
 from ..metrics.verdict import Verdict
-from ..names import OF_RUN, Target
-from ..plan import DEFAULT, Override, Plan
+from ..names import Target
+from ..plan import Override
 from ..plan import Value as Given
 from ..planner import Planner
-from .axes import Level, OpenValueSpec, OpenVariantSpec, changes_at, latin_hypercube, levels_of
-from .claims import TIMES, ClaimResult, LevelVerdict, OpenValueScan, Region, judge
+from .axes import Level, OpenValueSpec, OpenVariantSpec, changes_at, extended_hypercube, levels_of
+from .claims import ONE_IN, TIMES, ClaimResult, LevelVerdict, OpenValueScan, Region, judge
 from .experiment import RUNS, LoadedExperiment, NamedRun
 from .grids import ranked
 from .jobs import Job, MeasuredRun, keyed, ready
 from .judged_schema import Claim, MetricReference
 from .outcome import ExperimentResult, derive
-from .planning import PlannedExperiment, metrics_of, number_of, reached
+from .planning import PlannedExperiment, found_at, metrics_of, number_of
+from .sequential import Decision, SequentialTest
 
 ORIGIN = "region"
 """Origin of overrides that open values make."""
@@ -38,30 +38,6 @@ RegionCell = tuple[str, RegionPoint]
 """A named run, and the open values that change it."""
 RegionKey = tuple[str, int]
 """(`claims` or `checks`, index) of what is judged."""
-
-
-def found_at(plan: Plan, target: Target) -> tuple[Given, str] | None:
-    """Return the value and unit that an override target has in a plan; None if it has no such target."""
-    instance = next((one for one in plan.instances if one.name == target.instance), None)
-    if target.kind == "fmu":
-        return (instance.fmu.name, "") if instance else None
-    if target.kind == "vehicle_file":
-        return (str(plan.scenario["vehicle"]), "") if plan.scenario.get("vehicle") else None
-    if target.kind == "tyres":
-        files = {axle: str(file["file"]) for axle, file in plan.scenario.get("tyre_files", {}).items()}
-        return (files[target.variable or "front"], "") if files else None
-    if target.kind == "run":
-        times = float(plan.start), plan.time(plan.n_steps), float(plan.step)
-        values: dict[str, Given] = dict(zip(OF_RUN, (*times, plan.algorithm), strict=True))
-        return values[target.variable], "s"
-    if target.kind == "setting" and target.is_time and instance:
-        return float(instance.period * plan.step), "s"
-    for instance, variable in reached(plan, target):
-        given = {**instance.parameters, **instance.constants}.get(variable.name, variable.start)
-        of_vehicle = instance.origins.get(variable.name, DEFAULT).kind == "vehicle"
-        if given is not None and (of_vehicle or target.kind != "vehicle_parameter"):
-            return given, variable.unit or ""
-    return None
 
 
 class RegionRuns:
@@ -211,65 +187,103 @@ class RegionQuestion:
 
     claim: Claim
     runs: tuple[str, ...]
-    points: list[RegionPoint]  # of the Latin hypercube
+    points: list[RegionPoint]  # of the Latin hypercube, as many as may be needed
     lines: dict[str, list[Level]]  # open value it depends on -> levels
 
 
-@dataclass(frozen=True)
+@dataclass
 class RegionPlan:
-    """All planned runs of a region."""
+    """The runs of a region planned so far, and the verdicts that follow from those made.
+
+    Args:
+        runs: of the region.
+        folder: results folder of the experiment.
+        planner: makes the plans.
+        test: of the share of points that flip a verdict.
+        asked: what is judged.
+        jobs: runs of the region; `next_jobs` adds those of further points.
+        verdicts: on each claim, point by point.
+    """
 
     runs: RegionRuns
+    folder: Path
+    planner: Planner
+    test: SequentialTest
     asked: dict[RegionKey, RegionQuestion]
-    jobs: dict[RegionCell, Job]
+    jobs: dict[RegionCell, Job] = field(default_factory=dict)
+    verdicts: dict[RegionKey, list[Verdict]] = field(default_factory=dict)
 
-    def cells(self, asked: RegionQuestion) -> Iterator[RegionCell]:
-        """Yield every run of a claim at every point it is judged at."""
-        along = (((key, level),) for key, levels in asked.lines.items() for level in levels)
-        for place in itertools.chain(asked.points, along):
-            yield from (self.runs.cell(run, place) for run in asked.runs)
+    def cells(self, asked: RegionQuestion, places: Iterable[RegionPoint]) -> list[RegionCell]:
+        """Return the runs of a claim at points, without those that no open value changes there."""
+        every = (self.runs.cell(run, place) for place in places for run in asked.runs)
+        return [cell for cell in every if cell[1]]
+
+    def along(self, asked: RegionQuestion) -> list[RegionCell]:
+        """Return the runs of a claim along each open value."""
+        places = [((key, level),) for key, levels in asked.lines.items() for level in levels]
+        return self.cells(asked, places)
 
 
-def plan_region(
-    planned: PlannedExperiment,
-    folder: Path,
-    *,
-    planner: Planner,
-    progress: Callable[[int], None] = lambda done: None,
-) -> RegionPlan:
-    """Plan the runs for judging all claims over the region; checks only reuse these runs.
+def plan_region(planned: PlannedExperiment, folder: Path, *, planner: Planner) -> RegionPlan:
+    """Return the plan for judging all claims over the region, without runs yet; checks only reuse the runs.
 
     Args:
         planned: the experiment, whose file has a region.
         folder: results folder of the experiment.
         planner: makes the plans.
-        progress: called with the number of runs planned so far.
 
     Raises:
-        ScenarioError: an open value applies to no run, or a run cannot take one of its levels.
+        ScenarioError: an open value applies to no run.
     """
     runs = RegionRuns(planned)
     spec = runs.experiment.spec
-    assert spec.region is not None
+    region = spec.region
+    assert region is not None
     continuous = [one.continuous for one in runs.open_values.values()]
-    hypercube = latin_hypercube(continuous, spec.region.points, spec.region.seed)
-    asked: dict[RegionKey, RegionQuestion] = {}
-    for group, claims in (("claims", spec.claims), ("checks", spec.checks)):
-        for number, claim in enumerate(claims):
-            asked[group, number] = _asked(runs, claim, hypercube)
-    plan = RegionPlan(runs, asked, {})
-    wanted = dict.fromkeys(
-        cell for (group, _), one in asked.items() if group == "claims" for cell in plan.cells(one) if cell[1]
-    )
-    jobs, open_value_of = [], dict[str, str]()  # override in words -> open value that makes it
+    hypercube = extended_hypercube(continuous, region.points, region.most, region.seed)
+    asked = {
+        (group, number): _asked(runs, claim, hypercube)
+        for group, claims in (("claims", spec.claims), ("checks", spec.checks))
+        for number, claim in enumerate(claims)
+    }
+    test = SequentialTest(region.looks, 1 / ONE_IN)
+    return RegionPlan(runs, folder, planner, test, {key: one for key, one in asked.items() if one.lines})
+
+
+def next_jobs(
+    plan: RegionPlan,
+    findings: ExperimentResult,
+    records: Mapping[str, MeasuredRun],
+    *,
+    progress: Callable[[int], None] = lambda done: None,
+) -> list[Job]:
+    """Plan the runs of the next points, for claims that are not decided yet; none if all are.
+
+    Args:
+        plan: of the region; the runs are added to it.
+        findings: the result at the chosen point.
+        records: job key -> record of the run, of all runs planned before.
+        progress: called with the number of runs planned so far.
+
+    Raises:
+        ScenarioError: a run cannot take a level of an open value.
+    """
+    runs, wanted = plan.runs, dict[RegionCell, None]()
+    for key, asked in plan.asked.items():
+        if key[0] == "claims":
+            wanted |= dict.fromkeys(plan.along(asked))
+            wanted |= dict.fromkeys(plan.cells(asked, _further_points(plan, key, findings, records)))
+    jobs, open_value_of = dict[RegionCell, Job](), dict[str, str]()  # override in words -> open value
     for name, place in wanted:
+        if (name, place) in plan.jobs:
+            continue
         scenario, own = runs.changes(name, place)
-        for key, level in place:
-            open_value_of |= {str(one): key for one in runs.changes(name, ((key, level),))[1]}
-        label = ", ".join([name, *(f"{key} {level.words}" for key, level in place)])
+        for key_, level in place:
+            open_value_of |= {str(one): key_ for one in runs.changes(name, ((key_, level),))[1]}
+        label = ", ".join([name, *(f"{key_} {level.words}" for key_, level in place)])
         changes = (*runs.jobs[name].changes, *own)
         job = replace(runs.jobs[name], label=label, scenario=scenario, changes=changes, plan=None)
-        jobs.append(replace(job, out=folder / RUNS, keep=False))
+        jobs[name, place] = replace(job, out=plan.folder / RUNS, keep=False)
 
     def about(error: Diagnostic) -> tuple[Hashable, Diagnostic]:
         """Report an error of an open value once, with its key in the file."""
@@ -280,13 +294,34 @@ def plan_region(
         return key, Diagnostic(error.code, str(error), location=where)
 
     metrics = metrics_of(runs.experiment)
-    made = [keyed(job, metrics) for job in ready(jobs, planner=planner, progress=progress, group=about)]
-    known = {
-        key: one
-        for key, one in asked.items()
-        if one.lines and all(cell in wanted for cell in plan.cells(one) if cell[1])
-    }
-    return RegionPlan(runs, known, dict(zip(wanted, made, strict=True)))
+    planned = ready([*jobs.values()], planner=plan.planner, progress=progress, group=about)
+    made = [keyed(job, metrics) for job in planned]
+    plan.jobs |= zip(jobs, made, strict=True)
+    return made
+
+
+def _at_chosen(findings: ExperimentResult, key: RegionKey) -> ClaimResult:
+    """Return a claim or check with its verdict at the chosen point."""
+    return (findings.claims if key[0] == "claims" else findings.checks)[key[1]]
+
+
+def _further_points(
+    plan: RegionPlan, key: RegionKey, findings: ExperimentResult, records: Mapping[str, MeasuredRun]
+) -> list[RegionPoint]:
+    """Judge a claim at the points made, look by look; return those up to the next look, if there is one."""
+    asked, chosen = plan.asked[key], _at_chosen(findings, key)
+    verdicts = plan.verdicts.setdefault(key, [])
+    for look in plan.test.looks:
+        flips = sum(one.holds != chosen.verdict.holds for one in verdicts)
+        if plan.test.decision(flips, len(verdicts)) is not Decision.OPEN or chosen.verdict.holds is None:
+            break
+        places = asked.points[len(verdicts) : look]
+        if any(
+            cell not in plan.jobs or plan.jobs[cell].key not in records for cell in plan.cells(asked, places)
+        ):
+            return places
+        verdicts += [_verdict_at(plan, asked, chosen, findings, records, place) for place in places]
+    return []
 
 
 def _asked(runs: RegionRuns, claim: Claim, hypercube: list[tuple[Level, ...]]) -> RegionQuestion:
@@ -323,70 +358,74 @@ def runs_of(experiment: LoadedExperiment, claim: Claim) -> tuple[str, ...]:
 def judge_region(
     plan: RegionPlan, findings: ExperimentResult, records: Mapping[str, MeasuredRun]
 ) -> dict[RegionKey, Region]:
-    """Judge all claims and checks over the region.
+    """Judge all claims over the region, and the checks for which their runs suffice.
 
     Args:
         plan: of the region.
         findings: the result at the chosen point.
         records: job key -> record of the run.
     """
-    chosen = {"claims": findings.claims, "checks": findings.checks}
-    return {
-        (group, number): _judged(plan, one, chosen[group][number], findings, records)
-        for (group, number), one in plan.asked.items()
-    }
+    found = {}
+    for key, asked in plan.asked.items():
+        if all(cell in plan.jobs for cell in plan.along(asked)):
+            _further_points(plan, key, findings, records)
+            if plan.verdicts[key]:
+                found[key] = _judged(plan, key, findings, records)
+    return found
 
 
-def _judged(
+def _verdict_at(
     plan: RegionPlan,
     asked: RegionQuestion,
     chosen: ClaimResult,
     findings: ExperimentResult,
     records: Mapping[str, MeasuredRun],
-) -> Region:
-    runs = plan.runs
+    place: RegionPoint,
+) -> Verdict:
+    """Return the verdict on a claim at a point."""
+    values = {}
+    for name in asked.runs:
+        cell = plan.runs.cell(name, place)
+        record = records[plan.jobs[cell].key] if cell[1] else None
+        for key in findings.spec.metrics:
+            measured = record and record.values.get(key)
+            value = (
+                MetricValue(*measured) if measured else None if record else findings.values.get((name, key))
+            )
+            if value is not None:
+                values[name, key] = value
     words = {run.name: run.row for run in findings.experiment.runs.values()}
+    return judge(asked.claim, values, words, derive(findings.spec, values)).scaled(chosen)
 
-    def verdict_at(place: RegionPoint) -> Verdict:
-        values = {}
-        for name in asked.runs:
-            cell = runs.cell(name, place)
-            record = records[plan.jobs[cell].key] if cell[1] else None
-            for key in findings.spec.metrics:
-                measured = record and record.values.get(key)
-                value = (
-                    MetricValue(*measured)
-                    if measured
-                    else None
-                    if record
-                    else findings.values.get((name, key))
-                )
-                if value is not None:
-                    values[name, key] = value
-        return judge(asked.claim, values, words, derive(findings.spec, values)).scaled(chosen)
 
+def _judged(
+    plan: RegionPlan, key: RegionKey, findings: ExperimentResult, records: Mapping[str, MeasuredRun]
+) -> Region:
+    runs, asked = plan.runs, plan.asked[key]
+    chosen = _at_chosen(findings, key)
     lines = []
-    for key, levels in asked.lines.items():
-        one = runs.open_values[key]
+    for name, levels in asked.lines.items():
+        one = runs.open_values[name]
         judged = []
         for level in levels:
-            place = ((key, level),)
-            if any(runs.cell(name, place)[1] for name in asked.runs):  # otherwise this is the chosen level
-                number = runs.number(key, level) if one.numeric else None
-                judged.append(LevelVerdict(level.words, number, verdict_at(place)))
-        unit, factor = _shown(runs, key, asked.runs) if one.numeric else ("", 1.0)
-        at = runs.chosen_number(key, asked.runs) if one.numeric else None
+            place = ((name, level),)
+            if plan.cells(asked, [place]):  # otherwise this is the chosen level
+                number = runs.number(name, level) if one.numeric else None
+                verdict = _verdict_at(plan, asked, chosen, findings, records, place)
+                judged.append(LevelVerdict(level.words, number, verdict))
+        unit, factor = _shown(runs, name, asked.runs) if one.numeric else ("", 1.0)
+        at = runs.chosen_number(name, asked.runs) if one.numeric else None
         lines.append(
             OpenValueScan(
-                key,
-                one.says or key,
+                name,
+                one.says or name,
                 unit,
                 factor,
                 LevelVerdict("as chosen", at, chosen.verdict),
                 tuple(judged),
             )
         )
-    return Region(chosen.verdict, tuple(verdict_at(place) for place in asked.points), tuple(lines))
+    return Region(chosen.verdict, tuple(plan.verdicts[key]), tuple(lines), plan.test)
 
 
 def _shown(runs: RegionRuns, key: str, names: Iterable[str]) -> tuple[str, float]:

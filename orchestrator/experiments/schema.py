@@ -63,7 +63,7 @@ A verdict at one point may flip nearby. A region names the values that the paper
 range; claims are judged again along each of them, and at the points of a Latin hypercube over all together.
 
     region:
-      points: 24
+      points: 16
       seed: 1
       open_values:
         amplitude: {vary: driver.amplitude, times: true, from: 0.8, to: 1.2, says: steering amplitude,

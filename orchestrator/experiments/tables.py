@@ -142,7 +142,7 @@ def _shown(cell: Cell, unit: str = "") -> str:
     if isinstance(cell, int):
         return str(cell)
     value = cell if isinstance(cell, MetricValue) else MetricValue(cell, unit or "1")
-    return shown(value.number, value.unit, half=value.half)
+    return shown(value.number, value.unit, half=value.half, between=value.between)
 
 
 def for_terminal(table: Table) -> rich.console.Group:

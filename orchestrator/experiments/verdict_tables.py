@@ -10,12 +10,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from ..evaluation.standard_tests import Evaluation, StandardTest, TestQuantity, TestSeries
-from ..figures.style import shown
+from ..figures.style import digits_of, shown
 from ..messages import changed
 from ..metrics.run_metrics import MetricValue, metric
 from ..metrics.verdict import Status, Verdict
 from .axes import levels_of
 from .claims import ClaimResult
+from .confidence import Bounds
 from .experiment import NamedRun
 from .grids import cells, grid_tables, side_by_side
 from .jobs import NOT_MADE
@@ -128,13 +129,13 @@ def tally_words(counts: Mapping[str, int]) -> str:
 
 
 def region_words(judgement: ClaimResult) -> list[str]:
-    """Describe the robustness of a verdict: `holds in 71 % of 24 points`, `flips at amplitude 0.08 rad`."""
+    """Describe the robustness of a verdict: `0 of 48 flip, at most 7.4 %`, `flips at amplitude 0.08 rad`."""
     region = judgement.region
     if region is None:
         return []
     flip = region.flip
     return [
-        held_words(region.holding, len(region.points), region.without_result),
+        share_words(region.flipping, len(region.points), region.flip_bounds, region.without_result),
         flip_words(flip.says, flip.words, flip.chosen) if flip else NO_FLIP,
     ]
 
@@ -142,10 +143,13 @@ def region_words(judgement: ClaimResult) -> list[str]:
 NO_FLIP = "no flip along any open value"
 
 
-def held_words(holding: int, points: int, without_result: int = 0) -> str:
-    """Describe the share of points at which a claim holds."""
-    failed = f", {without_result} without a result" if without_result else ""
-    return f"holds in {100 * holding / points:.0f} % of {points} points{failed}"
+def share_words(flipping: int, points: int, bounds: Bounds, without_result: int = 0) -> str:
+    """Describe the share of a region that flips a verdict: `4 of 112 flip, 1.1 to 9.7 %`."""
+    low, high = (f"{digits_of(100 * bound, 2)} %" for bound in bounds)
+    between = f"{low.removesuffix(' %')} to {high}"
+    interval = f"at most {high}" if not flipping else f"at least {low}" if flipping == points else between
+    failed = f", {without_result} of them without a result" if without_result else ""
+    return f"{flipping} of {points} flip{failed}, {interval}"
 
 
 def flip_words(says: str, level: str, chosen: str = "") -> str:
@@ -265,7 +269,7 @@ def region_table(findings: ExperimentResult) -> Table:
             one.says or name, None if one.times else chosen,
             f"{words} × as chosen" if one.times else f"{words} {unit}".rstrip(), one.because,
         ])  # fmt: skip
-    title = f"Open values: {region.points} points over all together, and one at a time"
+    title = f"Open values: {region.points} to {region.most} points over all together, and one at a time"
     return Table(title, ["open value", "chosen", "range", "because"], [*rows])
 
 

@@ -293,12 +293,23 @@ def shown_unit(unit: str) -> tuple[str, float]:
     return text, to_si * factor
 
 
-def shown(value: float, unit: str, *, digits: int = DIGITS, half: float = 0.0) -> str:
+def shown(
+    value: float,
+    unit: str,
+    *,
+    digits: int = DIGITS,
+    half: float = 0.0,
+    between: tuple[float, float] | None = None,
+) -> str:
     """Format an SI value in its displayed unit, e.g. `3.94 %`; smaller than the resolution: `< 0.001 °`.
 
-    With `half`, half the width of its confidence interval: `3.94 ± 0.12 %`.
+    With `half`, half the width of its confidence interval: `3.94 ± 0.12 %`; with `between`, two bounds:
+    `3.94 (3.61 to 4.02) %`.
     """
     text, factor = shown_unit(unit)
+    if between is not None:
+        low, high = (digits_of(bound * factor, digits) for bound in between)
+        return f"{digits_of(value * factor, digits)} ({low} to {high}) {text}".rstrip()
     coarse = digits <= DIGITS and not half
     if text.startswith("°") and 0 < abs(value * factor) < RESOLUTION and coarse:
         return f"< {RESOLUTION:g} {text}"

@@ -126,7 +126,8 @@ def _times_seconds(unit: str, power: int) -> str:
 class MetricValue:
     """The value of a metric in one run, in SI; `unit` "%" marks a ratio that is shown in per cent.
 
-    Over several repeats it is the mean, and `half` is half the width of its confidence interval.
+    Over several repeats it is the mean, and `half` is half the width of its confidence interval. If it is
+    their median or a share, `between` has their range or the share's interval, `half` its larger distance.
 
     >>> peak = run.metrics()["peak(sideslip)"]
     >>> round(peak.number, 4), peak.unit
@@ -136,6 +137,7 @@ class MetricValue:
     number: float
     unit: str
     half: float = 0.0
+    between: tuple[float, float] | None = None
 
 
 MetricValue.__module__ = "yawbench"  # where users import it from

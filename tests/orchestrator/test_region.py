@@ -18,7 +18,8 @@ from orchestrator.experiments.jobs import MeasuredRun
 from orchestrator.experiments.judged_schema import Claim
 from orchestrator.experiments.outcome import ExperimentResult
 from orchestrator.experiments.planning import plan_experiment
-from orchestrator.experiments.region import judge_region, plan_region, runs_of
+from orchestrator.experiments.region import judge_region, next_jobs, plan_region, runs_of
+from orchestrator.experiments.sequential import SequentialTest
 from orchestrator.experiments.verdict_tables import region_words, verdict
 from orchestrator.metrics.run_metrics import MetricValue
 from orchestrator.metrics.verdict import Status, Verdict, compare, not_judged, worst
@@ -55,6 +56,7 @@ tables:
   - {title: Peaks, runs: ["*"], metrics: [peak]}
 region:
   points: 20
+  most: 20
   seed: 1
   open_values:
     amplitude: {vary: driver.amplitude, times: true, from: 0.5, to: 1.5, because: "chosen: to show"}
@@ -92,7 +94,9 @@ def judged(tmp_path, fmus):
 
         findings = ExperimentResult(experiment, [record(job) for job in planned.jobs], {}, planned)
         plan = plan_region(planned, tmp_path / "o", planner=planner)
-        records = {job.key: record(job) for job in plan.jobs.values()}
+        records = {}
+        while more := next_jobs(plan, findings, records):
+            records |= {job.key: record(job) for job in more}
         regions = judge_region(plan, findings, records)
         return ExperimentResult(experiment, findings.records, {}, planned, regions)
 
@@ -122,17 +126,30 @@ def test_the_share_of_a_latin_hypercube_along_one_value_is_that_of_the_closed_fo
 
 def test_the_share_over_two_values_together_approaches_the_area(judged):
     ranges = ("values: [0.5, 1, 2]", "from: 0.5, to: 2")
-    region = judged(ranges, ("points: 20", "points: 200")).claims[0].region
+    region = judged(ranges, ("points: 20", "points: 200"), ("most: 20", "most: 200")).claims[0].region
     assert region.agreeing == pytest.approx(0.5 + 0.275, abs=0.03)  # of {f < 1.2 r}, over 1 x 1.5
 
 
-def test_a_claim_is_decided_exactly_if_its_margin_is_larger_than_the_spread(judged):
-    findings = judged()
-    for one in (*findings.claims, *findings.checks):
-        if one.region:
-            assert one.region.decided == (abs(one.verdict.margin) > one.region.spread), one.claim.says
+def test_points_are_added_to_a_claim_until_it_is_decided(judged):
+    findings = judged(("points: 20\n  most: 20", "points: 16\n  most: 128"))
     verdicts = [verdict(one) for one in findings.claims]
     assert verdicts == ["undecided", "holds", "undecided", "undecided"]
+    below, above, less, _ = (one.region for one in findings.claims)
+    assert (above.flipping, len(above.points), above.robust) == (0, 48, True)
+    assert above.flip_bounds.high < 0.1
+    for region in (below, less):
+        assert len(region.points) < 128
+        assert region.flip_bounds.low > 0.1
+        assert not region.robust
+    assert golden(region_words(findings.claims[0])[0])
+    assert golden(region_words(findings.claims[1])[0])
+
+
+def test_one_look_of_few_points_cannot_make_a_verdict_robust(judged):
+    region = judged().claims[1].region
+    assert (region.flipping, len(region.points)) == (0, 20)
+    assert not region.robust
+    assert region.flip_bounds.high > 0.1
 
 
 def test_a_claim_depends_on_what_touches_its_runs_or_on_what_it_names(judged):
@@ -148,7 +165,7 @@ def test_a_claim_depends_on_what_touches_its_runs_or_on_what_it_names(judged):
 
 def test_a_check_is_judged_over_the_region_where_the_runs_of_claims_are_all_it_needs(judged):
     both, doubled = judged().checks
-    assert both.region.robust
+    assert (both.region.flipping, len(both.region.points)) == (0, 20)
     assert both.verdict.margin == pytest.approx(1.0)  # of the number itself, where the threshold is 0
     assert both.region.lines[0].margins == (pytest.approx(0.5), pytest.approx(1.5))
     assert doubled.region.agreeing == pytest.approx(0.6)  # 0.1 times more than 0.9, of 0.5 to 1.5
@@ -172,7 +189,7 @@ def test_failed_runs_count_as_another_verdict_and_are_said(judged):
     both = judged(failing=lambda peak: peak > 0.12).claims[1]
     assert both.region.without_result > 0
     assert both.region.agreeing == pytest.approx(1 - both.region.without_result / 20)
-    assert f"{both.region.without_result} without a result" in region_words(both)[0]
+    assert f"{both.region.without_result} of them without a result" in region_words(both)[0]
     assert both.region.spread == math.inf
 
 
@@ -210,6 +227,7 @@ def test_a_variant_may_put_another_scenario_in_place_of_a_runs(judged):
             ("times: true, from: 0.5, to: 1.5", "times: true, values: [a, b]"),
             "times: factors are plain numbers",
         ),
+        (("most: 20", "most: 12"), "region: most must be at least points (got 12 and 20)"),
         (("points: 20", "points: 2"), "region.points: Input should be greater than or equal to 10 (got 2)"),
     ],
 )
@@ -282,10 +300,11 @@ def at_margin(margin: float) -> Verdict:
 
 def test_the_spread_is_how_far_the_worst_tenth_comes_towards_the_threshold():
     points = tuple(at_margin(m) for m in (0.5, 0.4, 0.3, 0.2, 0.1, -0.1, 0.6, 0.7, 0.8, 0.9))
-    assert Region(at_margin(0.5), points, ()).spread == pytest.approx(0.6)
-    assert not Region(at_margin(0.5), points, ()).decided
-    assert Region(at_margin(0.05), points[:5] * 2, ()).spread == 0.0
-    assert Region(at_margin(-0.5), points, ()).spread == pytest.approx(1.4)
+    ten = SequentialTest((10,), 0.1)
+    assert Region(at_margin(0.5), points, (), ten).spread == pytest.approx(0.6)
+    assert not Region(at_margin(0.5), points, (), ten).robust
+    assert Region(at_margin(0.05), points[:5] * 2, (), ten).spread == 0.0
+    assert Region(at_margin(-0.5), points, (), ten).spread == pytest.approx(1.4)
 
 
 def test_study_makes_the_runs_of_the_region_once_and_quick_leaves_them_out(
@@ -306,6 +325,8 @@ def test_study_makes_the_runs_of_the_region_once_and_quick_leaves_them_out(
     out, said, record = study("--jobs", "1")
     assert golden_in(said)  # 2 x 2 and 4 of plain alone, 2 of double
     region = record["claims"][0]["region"]
+    assert region["points"] == 20
+    assert region["flip_bounds"][0] < region["flipping"] / 20 < region["flip_bounds"][1]
     assert region["flip"] == {
         "open_value": "ratio",
         "at": pytest.approx(0.9),

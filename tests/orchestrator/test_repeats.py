@@ -8,13 +8,14 @@ import pytest
 
 from components.sensing.noise import key, normal
 from orchestrator.errors import ScenarioError
-from orchestrator.experiments.confidence import interval
+from orchestrator.experiments.confidence import interval, share_bounds
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.figures import draw_over_axes
 from orchestrator.experiments.jobs import run_job
 from orchestrator.experiments.outcome import judge_records
 from orchestrator.experiments.planning import plan_experiment
 from orchestrator.experiments.verdict_tables import limit_tables, run_tables, verdict
+from orchestrator.figures.style import shown
 from orchestrator.metrics.run_metrics import MetricValue
 from tests.sentences import golden, texts_of
 
@@ -118,6 +119,24 @@ def test_a_threshold_within_confidence_leaves_the_verdict_open(load, findings):
     sure = load(("at_least: 90 %", "at_least: 75 %"))
     judged = replace(findings, experiment=sure).checks
     assert golden([verdict(one) for one in judged])
+
+
+def test_a_metric_may_have_median_and_range_or_a_share_over_its_repeats(load, findings):
+    numbers = sorted(told(range(1, 5)))
+
+    def over(kind):
+        experiment = load(
+            ("metric: final(sensor.yaw_rate)", f"metric: final(sensor.yaw_rate), over_repeats: {kind}")
+        )
+        return replace(findings, experiment=experiment).values
+
+    median = over("median")["right/noisy", "last"]
+    assert median.number == pytest.approx(0.5 * (numbers[1] + numbers[2]))
+    assert median.between == pytest.approx((numbers[0], numbers[-1]))
+    assert over("median")["right/quiet", "last"].between is None
+    share = over("share")["right/noisy", "last"]
+    assert (share.number, share.unit, share.between) == (1.0, "%", tuple(share_bounds(4, 4)))
+    assert golden(shown(share.number, share.unit, between=share.between))
 
 
 def test_a_grid_says_how_far_down_its_columns_hold(findings):

@@ -58,7 +58,7 @@ def test_the_page_on_papers_tells_of_verdicts_what_the_page_does():
         [paper.removeprefix("Paper "), *row]
         for paper, rows in found.items()
         for row in rows
-        if row.kind != UNDECIDED
+        if row.verdict != UNDECIDED
     ]
     assert told[2 + len(found) :] == decided
     total = sum(map(len, found.values()))
@@ -71,4 +71,4 @@ def test_the_page_on_papers_tells_how_far_the_best_of_26_carries():
     (best,) = (row for row in recorded()[title] if row.says.startswith("In proportion to load is the best"))
     section = (ROOT / "docs" / "papers.md").read_text(encoding="utf-8").partition("## Paper B")[2]
     told = " ".join(section.partition("\n## ")[0].split())
-    assert f"the best of 26, by {best.margin}. That is {best.kind}: it {best.region}, {best.flip}" in told
+    assert f"the best of 26, by {best.margin}. That is {best.verdict}: {best.region}, it {best.flip}" in told

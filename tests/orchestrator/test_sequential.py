@@ -1,0 +1,109 @@
+"""The sequential test of a share: errors of its decisions, its interval, the points that it takes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from orchestrator.experiments.axes import RegionSpec, places_of_hypercube
+from orchestrator.experiments.claims import ONE_IN
+from orchestrator.experiments.confidence import share_bounds
+from orchestrator.experiments.sequential import Decision, SequentialTest
+
+CLAIMS = 1000
+REGION = RegionSpec.model_validate(
+    {"open_values": {"a": {"vary": "a.b", "from": 0, "to": 1, "because": "chosen: to show"}}}
+)
+TEST = SequentialTest(REGION.looks, 1 / ONE_IN)
+WRONG = {
+    0.05: {Decision.ABOVE},
+    0.10: {Decision.ABOVE, Decision.BELOW},
+    0.20: {Decision.BELOW},
+}
+"""Share of points that flip -> what would be a wrong decision."""
+
+
+def decided(outcomes: np.ndarray) -> Decision:
+    number = TEST.stop(outcomes)
+    assert number is not None
+    return TEST.decision(int(outcomes[:number].sum()), number)
+
+
+@pytest.mark.parametrize("share", WRONG)
+def test_of_a_thousand_claims_at_most_one_in_twenty_is_decided_wrongly(share):
+    chance = np.random.default_rng(1)
+    found = Counter(decided(one) for one in chance.random((CLAIMS, TEST.looks[-1])) < share)
+    assert found.total() == CLAIMS
+    assert sum(found[one] for one in WRONG[share]) <= 0.05 * CLAIMS
+
+
+@pytest.mark.parametrize("share", WRONG)
+def test_so_it_is_at_the_points_of_the_extended_hypercube(share):
+    chance = np.random.default_rng(2)
+    found = Counter[Decision]()
+    for seed in range(CLAIMS):
+        places = places_of_hypercube(4, REGION.points, REGION.most, seed)
+        start = chance.random(4)  # a box of this volume, wrapped around: flips depend on all open values
+        sides = share ** chance.dirichlet(np.ones(4))
+        found[decided(np.all((places - start) % 1.0 < sides, axis=1))] += 1
+    assert sum(found[one] for one in WRONG[share]) <= 0.05 * CLAIMS
+
+
+def test_claims_far_from_the_limit_are_decided_early():
+    chance = np.random.default_rng(3)
+
+    def numbers(share: float) -> list[int]:
+        return [TEST.stop(one) for one in chance.random((200, TEST.looks[-1])) < share]
+
+    assert set(numbers(0.0)) == {48}  # 0.9**48 is below what may be spent there, 0.9**32 is not
+    assert np.mean(numbers(0.5)) < 25
+    assert np.mean(numbers(0.1)) > 110
+
+
+def test_the_errors_at_the_limit_are_exact_and_nowhere_exceed_what_may_be_spent():
+    low, high = TEST._tails(TEST.limit, TEST.boundaries[-1][0], TEST.looks[-1])
+    assert 0.5 * TEST.tail < low <= TEST.tail
+    assert high <= 1.0
+    _, high = TEST._tails(TEST.limit, TEST.boundaries[-1][1], TEST.looks[-1])
+    assert 0.5 * TEST.tail < high <= TEST.tail
+    chance = np.random.default_rng(4)
+    found = Counter(decided(one) for one in chance.random((20_000, TEST.looks[-1])) < TEST.limit)
+    assert found[Decision.BELOW] / 20_000 == pytest.approx(low, abs=0.004)  # 4 standard deviations
+    assert found[Decision.ABOVE] / 20_000 == pytest.approx(high, abs=0.005)
+
+
+def test_the_interval_agrees_with_the_decision_and_has_its_level():
+    for look, (low, high) in zip(TEST.looks, TEST.boundaries, strict=True):
+        if low >= 0:
+            assert TEST.bounds(low, look).high <= TEST.limit
+        assert TEST.bounds(low + 1, look).high > TEST.limit or look < TEST.looks[-1]
+        assert TEST.bounds(high, look).low >= TEST.limit
+    chance, share = np.random.default_rng(5), 0.08
+    missed = 0
+    for outcomes in chance.random((2000, TEST.looks[-1])) < share:
+        number = TEST.stop(outcomes)
+        low, high = TEST.bounds(int(outcomes[:number].sum()), number)
+        missed += not low <= share <= high
+    assert missed <= 0.05 * 2000
+
+
+def test_a_single_look_has_the_interval_of_clopper_and_pearson():
+    single = SequentialTest((46,), 0.1)
+    for count in (0, 1, 5, 46):
+        assert single.bounds(count, 46) == pytest.approx(share_bounds(count, 46), abs=1e-9)
+    with pytest.raises(ValueError, match="needs a count at a look"):
+        single.bounds(1, 45)
+
+
+def test_a_hypercube_is_extended_without_giving_up_a_point():
+    places = places_of_hypercube(5, 16, 128, 1)
+    assert np.array_equal(places[:16], places_of_hypercube(5, 16, 16, 1))
+    for number in (16, 32, 64, 128):
+        parts = np.sort((places[:number] * number).astype(int), axis=0)
+        assert np.array_equal(parts, np.tile(np.arange(number)[:, None], 5))
+    assert np.array_equal(places[:112], places_of_hypercube(5, 16, 112, 1))
+    assert all(a < b for a, b in pairwise(REGION.looks))
+    assert REGION.looks == (16, 32, 48, 64, 80, 96, 112, 128)
