@@ -60,8 +60,9 @@ if TYPE_CHECKING:
     from ._experiment import Experiment, Runs, experiment
     from ._fit import Fit, fit
     from ._linear import LinearModel, linearize
+    from ._open import RecordedRuns, open
     from ._ranking import Ranking, rank
-    from ._run import Run, measured, open
+    from ._run import Run, measured
     from ._scenario import Scenario, load
     from ._view import View, view
 
@@ -80,6 +81,7 @@ __all__ = [
     "Plan",
     "Ranking",
     "RecordWarning",
+    "RecordedRuns",
     "ResultsError",
     "Run",
     "Runs",
@@ -117,7 +119,8 @@ _MODULES = {
     "yawbench._fit": ("Fit", "fit"),
     "yawbench._linear": ("LinearModel", "linearize"),
     "yawbench._ranking": ("Ranking", "rank"),
-    "yawbench._run": ("Run", "measured", "open"),
+    "yawbench._open": ("RecordedRuns", "open"),
+    "yawbench._run": ("Run", "measured"),
     "yawbench._scenario": ("Scenario", "load"),
     "yawbench._view": ("View", "view"),
 }

@@ -19,7 +19,7 @@ from orchestrator.messages import hint, short
 from orchestrator.metrics.run_metrics import STANDARD, MetricValue, evaluate, evaluate_all, metric, why_none
 from orchestrator.plan import Override
 from orchestrator.results.measured import measured_results
-from orchestrator.results.read_and_salvage import Results, load_results
+from orchestrator.results.read_and_salvage import Results
 
 from . import arguments
 
@@ -27,18 +27,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
     from matplotlib.figure import Figure
-
-
-def open(folder: str | Path) -> Run:
-    """Return the run recorded in a results folder.
-
-        >>> yb.open("results/mine").title
-        'Sideslip tracking at 25 m/s, mu 0.65'
-
-    Raises:
-        ResultsError: they are missing or unreadable.
-    """
-    return Run(load_results(arguments.path(folder, "folder")))
 
 
 def measured(file: str | Path, segment: int | None = None) -> Run:
