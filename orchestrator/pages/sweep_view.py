@@ -179,7 +179,7 @@ def _axes(findings: ExperimentResult) -> Iterator[tuple[dict[str, Any], list[int
             "name": name,
             "label": axis.says or name,
             "unit": planned.axis_unit(name).strip(" []").replace(".", "·"),
-            "words": [level.words for level in levels],
+            "words": _texts(levels) if axis.numeric else [level.words for level in levels],
             "numbers": [_number(level) for level in levels] if axis.numeric else None,
             "log": axis.spacing == "log",
             "repeats": axis.repeats,
@@ -188,6 +188,15 @@ def _axes(findings: ExperimentResult) -> Iterator[tuple[dict[str, Any], list[int
         }
         index = {level: number for number, level in enumerate(levels)}
         yield about, [index[case.point[k]] for case in experiment.cases]
+
+
+def _texts(levels: Sequence[Level]) -> list[str]:
+    """Return the words of numbers, rounded as far as the numbers stay apart."""
+    for digits in range(3, 7):
+        texts = [min(level.words, digits_of(_number(level), digits), key=len) for level in levels]
+        if len({*texts}) == len(levels):
+            return texts
+    return [level.words for level in levels]
 
 
 def _words(changes: Sequence[Override]) -> list[str]:

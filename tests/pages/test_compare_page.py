@@ -64,14 +64,14 @@ def test_the_runs_have_the_format_that_the_command_was_told(page):
 
 
 def test_it_tells_where_the_runs_part(tree):
-    headings = [text for text in texts(tree, "h4") if " against " in text]
+    headings = [text for text in texts(tree, "h3") if " against " in text]
     assert len(headings) == 2
     said = tree.text_content()
     assert golden_in(" ".join(said.split()))
 
 
 def test_it_shows_the_system_its_parameters_and_how_to_repeat_it(tree):
-    assert golden([text.partition(":")[0] for text in texts(tree, "h3")])  # fmt: skip
+    assert golden([text.partition(":")[0] for text in texts(tree, "h2")])  # fmt: skip
     assert len(tree.cssselect("svg.diagonal, svg.stack")) == 2
     assert "controller_fuzzy_feedback" in texts(tree, "svg.diagonal text")
     assert len(tree.cssselect(".fmus td:last-child")) == len(UNITS)

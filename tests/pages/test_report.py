@@ -21,7 +21,7 @@ from tests.orchestrator.recorded import record_text
 from tests.sentences import golden, golden_in, refused
 
 from .browser import DESK, PHONE
-from .flaws import flaws, open_all
+from .flaws import flaws, inaccessible, open_all
 from .made_up import data_in
 
 ROOT = Path(__file__).parents[2]
@@ -205,6 +205,7 @@ def test_nothing_is_cut_overlapping_or_empty_at_any_width(chromium, paper, width
     assert flaws(chromium) == []
     open_all(chromium)
     assert flaws(chromium) == []
+    assert inaccessible(chromium) == []
 
 
 def test_the_system_is_drawn_for_the_width_of_the_page(chromium, paper):

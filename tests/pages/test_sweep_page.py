@@ -14,6 +14,7 @@ from orchestrator.cli import main
 from orchestrator.results.read_and_salvage import load_results
 
 from .browser import DESK, PHONE, Browser
+from .flaws import inaccessible
 
 UNITS = ("driver_sine", "reference_single_track")
 
@@ -76,6 +77,47 @@ def test_the_page_is_drawn_at_every_width_within_its_budgets(chromium, sweep, wi
     assert chromium.overflow() <= 0
     assert chromium.run("return document.querySelectorAll('*').length") <= MOST_ELEMENTS
     assert sweep.page.stat().st_size < 500_000
+    chromium.run(VIEW + "view.open(view.data.sides.indexOf(true))")
+    chromium.wait_for("document.querySelector('.ys-run .yv-ready')")
+    assert inaccessible(chromium) == []
+
+
+TEXTS = """
+const texts = [...document.querySelectorAll(`${arguments[0]} svg text`)].filter((one) => one.textContent);
+const boxes = texts.map((one) => [one.textContent, one.getBoundingClientRect()]);
+const across = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left);
+const down = (a, b) => Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
+return boxes.flatMap(([text, a], k) => boxes.slice(k + 1)
+  .filter(([, b]) => across(a, b) > -1 && down(a, b) > 4).map(([other]) => `${text} / ${other}`));
+"""
+
+
+@pytest.mark.parametrize("width", [390, 1440])
+def test_no_label_touches_another(chromium, sweep, width):
+    opened(chromium, sweep.page, width=width)
+    assert chromium.run(TEXTS, ".ys-map") == []
+    assert chromium.run(TEXTS, ".ys-lines") == []
+
+
+@pytest.mark.exhaustive  # a minute
+def test_the_page_of_two_thousand_runs_keeps_its_budgets(chromium, tmp_path, fmus):
+    (tmp_path / "half.yaml").write_text(SCENARIO)
+    large = SWEEP.replace("count: 4", "count: 100").replace("count: 5", "count: 10")
+    (tmp_path / "large.yaml").write_text(large)
+    with pytest.raises(SystemExit) as ended:
+        main(["sweep", str(tmp_path / "large.yaml"), "--out", str(tmp_path / "out"), "--fmus", str(fmus)])
+    assert not ended.value.code
+    page = tmp_path / "out" / "report.html"
+    assert page.stat().st_size < 5_000_000
+    for width in (PHONE, DESK):
+        opened(chromium, page, width=width)
+        assert chromium.run(VIEW + "return view.count") == 2000
+        assert chromium.run("return document.querySelectorAll('*').length") <= MOST_ELEMENTS
+        (caption,) = chromium.run(
+            "return [...document.querySelectorAll('table.grid + .notes')].map((one) => one.textContent)"
+        )
+        assert caption.startswith("The first 40 of 200 rows")
+        assert chromium.console() == []
 
 
 def test_numbers_in_the_cells_and_every_count_are_those_of_the_table(chromium, sweep):

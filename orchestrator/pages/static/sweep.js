@@ -348,11 +348,13 @@ class Sweep {
       const brush = this.state.brush[dim.id];
       const label = `${dim.label}${dim.unit ? ` in ${dim.unit}` : ''}`;
       const step = dims.length > 1 ? this.xs[1] - this.xs[0] : wide;
-      const lines = wrapped(label, Math.max(8, Math.floor(step / 6.4)), 3);
+      const last = k === dims.length - 1 && k > 0;
+      const room = Math.max(8, Math.floor((k === 0 || last ? edge + step / 2 - 8 : step - 6) / 6.6)); // characters beside the neighbours
+      const lines = wrapped(label, room, 3);
       const named = dim.words && (!dim.numbers || dim.words.length <= 6);
       const ends = named ? dim.words.map((word, i) => [dim.numbers ? dim.numbers[i] : i, word]) : dim.range.map((one, i) => [one, dim.words ? dim.words.at(-i) : signed(digitsOf(one, 3))]);
-      const last = k === dims.length - 1 && k > 0;
-      const ticks = ends.map(([value, word]) => `<text x="${x + (last ? -6 : 6)}" y="${(this.high(dim, value) + (value === dim.range[0] ? -3 : value === dim.range[1] ? 11 : 4)).toFixed(1)}" font-size="11" text-anchor="${last ? 'end' : 'start'}" paint-order="stroke" stroke="var(--yv-ground)" stroke-width="3">${escaped(wrapped(word, Math.max(8, Math.floor(step / 6.4)), 1)[0])}</text>`);
+      const left = last && Math.max(...ends.map(([, word]) => word.length)) * 6.2 > edge - 8;
+      const ticks = ends.map(([value, word]) => `<text x="${x + (left ? -6 : 6)}" y="${(this.high(dim, value) + (value === dim.range[0] ? -3 : value === dim.range[1] ? 11 : 4)).toFixed(1)}" font-size="11" text-anchor="${left ? 'end' : 'start'}" paint-order="stroke" stroke="var(--yv-ground)" stroke-width="3">${escaped(wrapped(word, Math.max(8, Math.floor((left || k === dims.length - 2 ? step / 2 : step) / 6.4)), 1)[0])}</text>`);
       const limit = dim === this.metric && this.state.limit !== null && this.state.limit >= dim.range[0] && this.state.limit <= dim.range[1]
         ? `<path class="ys-bar-limit" d="M${x - 12} ${this.high(dim, this.state.limit).toFixed(1)}h24"/>` : '';
       const [a, b] = brush ? [this.high(dim, Math.min(brush[1], dim.range[1])), this.high(dim, Math.max(brush[0], dim.range[0]))] : [0, 0];
@@ -542,7 +544,7 @@ class Sweep {
     const quoted = (text) => `"${String(text ?? '').replaceAll('"', '""')}"`;
     const {data} = this;
     const head = ['run', ...this.dims.map((dim) => `${dim.discrete ? dim.id : dim.name}${dim.unit ? ` [${dim.unit}]` : ''}`), 'status', 'key'];
-    const lines = this.visible.map((row) => [row + 1, ...this.dims.map((dim) => (dim.words ? dim.words[dim.level(row)] : dim.at(row) ?? '')), data.statuses[data.status[row]], data.keys[row]]);
+    const lines = this.visible.map((row) => [row + 1, ...this.dims.map((dim) => (dim.discrete && !dim.numbers ? dim.words[dim.level(row)] : dim.at(row) ?? '')), data.statuses[data.status[row]], data.keys[row]]);
     return [head, ...lines].map((line) => line.map(quoted).join(',')).join('\n') + '\n';
   }
 
@@ -563,6 +565,7 @@ class Sweep {
     const {open} = this.state;
     const [title, remark] = [this.root.querySelector('.ys-run > h3'), this.find('remark')];
     title.hidden = !open.length;
+    title.setAttribute('aria-level', headingLevel(title));
     title.textContent = open.length ? this.title(open.at(-1)) : '';
     const kept = open.filter((row) => this.data.sides[row]);
     remark.replaceChildren();

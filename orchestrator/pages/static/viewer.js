@@ -25,6 +25,14 @@ function writeAddress(key, words) {
   return written;
 }
 
+// Level of a heading at a place of the page: one below the last heading before it.
+function headingLevel(place) {
+  const before = [...document.querySelectorAll('h1, h2, h3, h4')].filter((one) => !one.closest('.yv') && one.checkVisibility()
+    && one.compareDocumentPosition(place) === Node.DOCUMENT_POSITION_FOLLOWING);
+  const last = before.at(-1);
+  return last ? Number(last.getAttribute('aria-level') ?? last.tagName[1]) + 1 : 2;
+}
+
 class Viewer {
   constructor(root, data, runs) {
     Object.assign(this, {root, data, runs});

@@ -104,7 +104,7 @@ class Panel {
       + '<thead class="yv-hidden"><tr><th scope="col">run</th><th scope="col">at the cursor</th>'
       + '<th scope="col">smallest</th><th scope="col">largest</th></tr></thead><tbody></tbody></table><p class="yv-hidden"></p>';
     root.querySelector('h4').textContent = unit ? `${label} in ${unit}` : label;
-    root.querySelector('h4').setAttribute('aria-level', viewer.level);
+    root.querySelector('h4').setAttribute('aria-level', headingLevel(viewer.root));
     const names = root.querySelector('small');
     names.textContent = names.title = this.signals.join(', ');
     root.querySelector('caption').textContent = `Values of ${label}`;

@@ -1,0 +1,48 @@
+"""The page of a ranking in a browser: its matrix, and the runs that its cells open."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from orchestrator.cli import main
+from tests.orchestrator.test_ranking import SMALL
+
+from .browser import DESK, PHONE, Browser
+from .flaws import inaccessible
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory) -> Path:
+    """The page of two controllers in two conditions."""
+    folder = tmp_path_factory.mktemp("ranking")
+    (folder / "small.yaml").write_text(SMALL)
+    with pytest.raises(SystemExit) as ended:
+        main(["rank", str(folder / "small.yaml"), "--out", str(folder / "out")])
+    assert not ended.value.code
+    return folder / "out" / "report.html"
+
+
+@pytest.mark.parametrize("width", [PHONE, DESK])
+def test_the_first_cell_is_open_and_all_of_it_can_be_read_by_everyone(chromium: Browser, page, width):
+    chromium.open(page, width=width)
+    chromium.wait_for("document.querySelector('.chosen .yv-ready')")
+    assert chromium.console() == []
+    assert chromium.overflow() <= 0
+    assert chromium.run("return document.querySelectorAll('main').length") == 1
+    assert inaccessible(chromium) == []
+
+
+def test_a_cell_shows_its_worst_run_while_the_matrix_stays_in_sight(chromium: Browser, page):
+    chromium.open(page, width=1440)
+    chromium.wait_for("document.querySelector('.chosen .yv-ready')")
+    for cell in ("fuzzy-pid-in-low", "none-in-low"):
+        chromium.run("document.querySelector(`td.cell a[href$='${arguments[0]}']`).click()", cell)
+        chromium.wait_for(f"document.querySelector('.ranking').dataset.shown === '{cell}'")
+        chromium.wait_for("document.querySelector('.chosen .yv-ready')")
+        top = chromium.run("return document.querySelector('.matrix').getBoundingClientRect().top")
+        assert 0 <= top < 900
+        assert len(chromium.run("return document.querySelector('.chosen .yv').viewer.runs")) == 1
+    assert chromium.console() == []
+    assert all(one.startswith("file://") for one in chromium.requests())
