@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from .errors import ScenarioError
-from .fmu.opener import Opener
+from .fmu.opener import Opener, report_to_stderr
 from .messages import hint
 from .names import match
-from .plan import Instance, Override, Plan
+from .plan import Fmu, Instance, Override, Plan
 from .scenario import yaml_lines
 from .scenario.find_and_load import LoadedScenario, load_scenario
 from .scenario.yaml_lines import Document
@@ -24,13 +24,21 @@ class Planner:
     """Makes plans; reads every file, opens every FMU and measures every tyre once for all of them.
 
     Args:
-        options: of the `Opener`.
+        build: as of the `Opener`.
+        report: as of the `Opener`.
+        opened: as of the `Opener`.
     """
 
-    def __init__(self, **options: Any) -> None:
+    def __init__(
+        self,
+        *,
+        build: bool = False,
+        report: Callable[[str], None] = report_to_stderr,
+        opened: Mapping[Path, Fmu] | None = None,
+    ) -> None:
         self._documents: dict[Path, Document] = {}
         self._stiffnesses: dict[Hashable, dict[str, float]] = {}
-        self.opener = Opener(**options)
+        self.opener = Opener(build=build, report=report, opened=opened)
 
     def load(
         self,

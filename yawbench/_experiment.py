@@ -108,13 +108,13 @@ def experiment(
     return Experiment(changed, Design(base.path, checked, {"": run}, (), changed.changes))
 
 
-def _checked(model: type[Model], given: dict[str, Any]) -> Model:
+def _checked(model: type[Model], fields: dict[str, Any]) -> Model:
     """Validate data against a schema; all errors are raised together."""
-    document = Document(Path(), given)
+    document = Document(Path(), fields)
     made = validate(model, document)
     if made is None:
         raise ScenarioError([
-            replace(one, location=Location(target=one.location.target)) for one in document.errors
+            replace(error, location=Location(target=error.location.target)) for error in document.errors
         ], code="argument-invalid")  # fmt: skip
     return made
 

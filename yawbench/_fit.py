@@ -67,7 +67,7 @@ class Fit:
         import pandas as pd
 
         keys = ["model", "part", "signal"]
-        rows = [dict(zip(keys, key, strict=True)) | vars(one) for key, one in self.result.scores.items()]
+        rows = [dict(zip(keys, key, strict=True)) | vars(score) for key, score in self.result.scores.items()]
         return pd.DataFrame(rows).set_index(keys)
 
     @property
@@ -82,11 +82,11 @@ class Fit:
 def _rows(model: FittedModel) -> list[dict[str, Any]]:
     intervals = model.estimate.intervals()
     rows = []
-    for one in model.parameters:
-        low, high = intervals[one.name] or (None, None)
-        value = model.estimate.values[one.name]
+    for parameter in model.parameters:
+        low, high = intervals[parameter.name] or (None, None)
+        value = model.estimate.values[parameter.name]
         rows.append({
-            "model": model.title, "parameter": one.name, "value": value, "low": low, "high": high,
-            "start": one.start, "unit": one.unit,
+            "model": model.title, "parameter": parameter.name, "value": value, "low": low, "high": high,
+            "start": parameter.start, "unit": parameter.unit,
         })  # fmt: skip
     return rows

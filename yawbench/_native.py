@@ -125,8 +125,8 @@ def zipped(files: dict[str, bytes]) -> bytes:
 
 def _functions(cls: type) -> list[Any]:
     """Return the functions of a class, with those that they have from around them."""
-    found = [member for member in vars(cls).values() if inspect.isfunction(member)]
-    for function in found:
+    functions = [member for member in vars(cls).values() if inspect.isfunction(member)]
+    for function in functions:
         cells = (cell.cell_contents for cell in function.__closure__ or ())
-        found += [held for held in cells if inspect.isfunction(held) and held not in found]
-    return found
+        functions += [held for held in cells if inspect.isfunction(held) and held not in functions]
+    return functions

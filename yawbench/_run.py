@@ -196,8 +196,8 @@ class Run:
             raise ScenarioError(f"{test} takes no angle: omit it", code="option-invalid")
         if angle is not None:
             with arguments.as_scenario_errors():
-                given = arguments.number(angle, "angle")
-            if not 0.0 < given < 2.0 * math.pi:
+                amplitude = arguments.number(angle, "angle")
+            if not 0.0 < amplitude < 2.0 * math.pi:
                 raise ScenarioError(
                     f"angle: must be a number between 0 and 2 pi rad (got {short(angle)})",
                     code="argument-invalid",
@@ -250,10 +250,12 @@ class Run:
     def _repr_html_(self) -> str:
         from orchestrator.figures.style import shown
 
-        changed = "".join(f"<br>{escape(str(one.target))} = {escape(str(one.plain))}" for one in self.changes)
+        changed = "".join(
+            f"<br>{escape(str(change.target))} = {escape(str(change.plain))}" for change in self.changes
+        )
         cells = [(metric(name).title, shown(x.number, x.unit)) for name, x in self.metrics().items()]
         rows = "".join(f"<tr><td>{escape(title)}</td><td>{escape(value)}</td></tr>" for title, value in cells)
-        noted = "".join(f"<br>⚠ {escape(str(one))}" for one in warnings_in(self.diagnostics))
+        noted = "".join(f"<br>⚠ {escape(str(warning))}" for warning in warnings_in(self.diagnostics))
         return f"<b>{escape(self.title)}</b>{changed}{noted}<table>{rows}</table>"
 
 

@@ -79,7 +79,7 @@ class Scenario:
         if not arguments.is_a(self.path, Path):
             arguments.refuse("path", "a Path; yawbench.load takes names, too", self.path)
         if not arguments.is_a(self.changes, tuple) or not all(
-            arguments.is_a(one, Override) for one in self.changes
+            arguments.is_a(change, Override) for change in self.changes
         ):
             arguments.refuse("changes", "changes as `set`, `swap` and `fault` make them", self.changes)
         if not arguments.is_a(self.programs, dict):

@@ -51,9 +51,11 @@ def view(
         ResultsError: there are no or too many runs, or no run has recorded the signal of a panel.
     """
     labelled = _labelled(runs)
-    wanted = [arguments.text(one, f"panels[{k}]") for k, one in enumerate(panels)]
+    wanted = [arguments.text(panel, f"panels[{k}]") for k, panel in enumerate(panels)]
     for name in wanted:
-        parts = [part.strip().removesuffix("_error") for one in name.split(",") for part in one.split(" - ")]
+        parts = [
+            part.strip().removesuffix("_error") for panel in name.split(",") for part in panel.split(" - ")
+        ]
         for part in parts:
             if not any(columns_of(run.results, part) for run in labelled):
                 raise ResultsError(f"panel {name!r}: no run has recorded {part!r}.")
@@ -104,7 +106,9 @@ class View:
     height: int = HEIGHT
 
     def __post_init__(self) -> None:
-        if not arguments.is_a(self.labels, tuple) or not all(arguments.is_a(one, str) for one in self.labels):
+        if not arguments.is_a(self.labels, tuple) or not all(
+            arguments.is_a(label, str) for label in self.labels
+        ):
             arguments.refuse("labels", "labels as `view` makes them", self.labels)
         if not arguments.is_a(self.html, str):
             arguments.refuse("html", "a page as `view` makes it", self.html)

@@ -269,7 +269,7 @@ class EvaluatedRuns:
             "test": self.test.name,
             "A": self.angle,
             "runs": [run.as_data() for run in self.judged],
-            "series": self.series.found if self.series else None,
+            "series": self.series.data if self.series else None,
         }
         write_whole(self.folder / FILE, json.dumps(data, indent=1))
         if len(self.judged) == 1:

@@ -123,9 +123,9 @@ def _braking_start(trace: Trace) -> float:
         if pressed.size:
             return float(t[pressed[0]])
     elif "acceleration_x" in trace:
-        found = first_crossing(t, -trace["acceleration_x"], BRAKED, float(t[0]))
-        if found is not None:
-            return found
+        start = first_crossing(t, -trace["acceleration_x"], BRAKED, float(t[0]))
+        if start is not None:
+            return start
     else:
         raise NotJudged("neither drive_force nor acceleration_x is recorded, so braking cannot be detected")
     raise NotJudged("the car is not braked")
@@ -164,11 +164,11 @@ def _add_jump(judged: Evaluation, trace: Trace, begin: float, end: float) -> Non
     t = trace.time
     frictions = [trace[name] for name in ("friction_fl", "friction_fr")]
     changed = [np.abs(mu - mu[np.searchsorted(t, begin)]) > JUMP for mu in frictions]
-    found = np.flatnonzero(changed[0] & changed[1] & (t > begin) & (t < end))
-    if not found.size:
+    jumps = np.flatnonzero(changed[0] & changed[1] & (t > begin) & (t < end))
+    if not jumps.size:
         return
-    jump = float(t[found[0]])
-    mu = [float(np.mean([friction[k] for friction in frictions])) for k in (found[0] - 1, found[0])]
+    jump = float(t[jumps[0]])
+    mu = [float(np.mean([friction[k] for friction in frictions])) for k in (jumps[0] - 1, jumps[0])]
     judged.add("jump", "the friction jumps", jump, "s", f"from {mu[0]:.2f} to {mu[1]:.2f} in front")
     judged.add("jump_speed", "speed there", at(t, trace["velocity_x"], jump), "m/s")
     even = trace.even

@@ -105,11 +105,11 @@ def judge_entry_speeds(runs: Sequence[Evaluation]) -> TestSeries:
     clean = list(itertools.takewhile(is_clean, ordered))
     highest = clean[-1]["entry"] if clean else None
     touched = ordered[len(clean)]["entry"] if len(clean) < len(ordered) else None
-    said = "No run is clean."
+    summary = "No run is clean."
     if highest is not None:
         above = "" if touched is None else f"; not clean at {3.6 * touched:.1f} km/h"
-        said = f"Highest clean entry speed: {3.6 * highest:.1f} km/h{above}."
-    return TestSeries(ordered, said, {"highest_clean_entry_speed": highest, "lowest_not_clean": touched})
+        summary = f"Highest clean entry speed: {3.6 * highest:.1f} km/h{above}."
+    return TestSeries(ordered, summary, {"highest_clean_entry_speed": highest, "lowest_not_clean": touched})
 
 
 def is_clean(run: Evaluation) -> bool:
@@ -207,7 +207,7 @@ def draw_series(series: TestSeries, note: str) -> Figure:
                 style: dict[str, Any] = {"color": MARKS[status], "markersize": 6.0, "linestyle": ""}
                 axes.plot([v for v, _ in shown], [value for _, value in shown], marker=marker, **style)
             axes.set_title(says)
-            if (highest := series.found["highest_clean_entry_speed"]) is not None:
+            if (highest := series.data["highest_clean_entry_speed"]) is not None:
                 axes.axvline(3.6 * highest, color=CHANGED, linewidth=1.2)
         grid[0, 0].set_yscale("symlog", linthresh=0.1, linscale=0.5)
         grid[0, 0].set_ylim(-0.02, 2.0 * max([0.1, *(run["overrun"] or 0.0 for run in series.runs)]))

@@ -152,9 +152,9 @@ def _start(t: np.ndarray, angle: np.ndarray, rate: float, notes: list[str]) -> f
     side = _first_side(t, angle - angle[0], float(t[0]))
     lasting = max(1, round(LASTS * rate))  # samples
     stays = np.convolve(side * turning > RATE, np.ones(lasting), "valid") >= lasting - 0.5
-    found = np.flatnonzero(stays)
-    if found.size:
-        return float(t[found[0]])
+    starts = np.flatnonzero(stays)
+    if starts.size:
+        return float(t[starts[0]])
     notes.append(
         f"zeroed before the first instant above {math.degrees(RATE):g} deg/s: the first half wave does not "
         f"stay above it for {1000 * LASTS:g} ms"
@@ -175,11 +175,11 @@ def _check_answers(
     """Raise NotJudged if the car does not respond to the first half wave, or responds to the wrong side."""
     first = (t >= begin) & (t <= reversed_)
     refuse_opposed(angle[first], r[first], "yaw rate")
-    found = likeness(angle[first], r[first])
-    if found < FOLLOWS:
+    correlation = likeness(angle[first], r[first])
+    if correlation < FOLLOWS:
         raise NotJudged(
             "the yaw rate does not follow the steering: their likeness in the first half wave is "
-            f"{found:.2f}, at least {FOLLOWS:g} is needed"
+            f"{correlation:.2f}, at least {FOLLOWS:g} is needed"
         )
     if at(t, displacement, min(begin + AT, float(t[-1]))) < 0.0:
         raise opposed("lateral acceleration")
@@ -203,8 +203,8 @@ def _second_peak(t: np.ndarray, r: np.ndarray, begin: float, reversed_: float, e
             f"{math.degrees(before):.2g} deg/s in the first half wave"
         )
     peaks, _ = find_peaks(x, prominence=PROMINENCE * float(x.max()), height=LEAST_PEAK * before)
-    found = instants[peaks]
-    return float(found[0]) if found.size and found[0] <= latest else None
+    peak_times = instants[peaks]
+    return float(peak_times[0]) if peak_times.size and peak_times[0] <= latest else None
 
 
 def _displacement(t: np.ndarray, a_y: np.ndarray, begin: float) -> np.ndarray:
@@ -212,9 +212,9 @@ def _displacement(t: np.ndarray, a_y: np.ndarray, begin: float) -> np.ndarray:
     late = t > begin
     times = np.concatenate([[begin], t[late]])
     a = np.concatenate([[at(t, a_y, begin)], a_y[late]])
-    found = np.zeros_like(t)
-    found[late] = running_integral(times, running_integral(times, a))[1:]
-    return found
+    displacement = np.zeros_like(t)
+    displacement[late] = running_integral(times, running_integral(times, a))[1:]
+    return displacement
 
 
 def percent(ratio: float) -> str:
@@ -299,23 +299,23 @@ def _responsiveness(
 ) -> None:
     instant = course.begin + AT
     there = instant <= course.time[-1]
-    found = at(course.time, course.displacement, instant) if there else None
+    displacement = at(course.time, course.displacement, instant) if there else None
     reading = "double integral of the filtered lateral acceleration of the centre of mass"
-    judged.add("displacement", f"lateral displacement at BOS + {AT:g} s", found, "m", reading)
+    judged.add("displacement", f"lateral displacement at BOS + {AT:g} s", displacement, "m", reading)
     criterion = "responsiveness"
     if angle is None:
         judged.rule(criterion, not_judged("A is unknown: give runs of slowly increasing steer"))
     elif amplitude < FROM * angle * (1.0 - SLIGHT):
         return  # the criterion does not apply to this run
-    elif found is None:
+    elif displacement is None:
         judged.rule(criterion, not_judged(f"the record ends before BOS + {AT:g} s"))
     elif trace.friction is not None and trace.friction < DRY * (1.0 - SLIGHT):
         why = f"friction {trace.friction:g}; a dry road, {DRY:g}, is required"
         judged.rule(criterion, not_judged(why))
     else:
         least = FAR_HEAVY if trace.mass is not None and trace.mass > HEAVY else FAR
-        why = f"{found:.2f} m of at least {least:g} m"
-        judged.rule(criterion, compare(found, "at_least", least, "m", why=why))
+        why = f"{displacement:.2f} m of at least {least:g} m"
+        judged.rule(criterion, compare(displacement, "at_least", least, "m", why=why))
         if trace.mass is None:
             judged.notes.append(f"mass unknown: assumed to be at most {HEAVY:g} kg")
 
@@ -361,16 +361,16 @@ def amplitudes(angle: float) -> list[float]:
     a = math.degrees(angle)
     last = min(max(LAST * a, LEAST), MOST)
     steps = int((last / a - FIRST) / STEP + 1e-9)
-    found = [(FIRST + STEP * k) * a for k in range(steps + 1)] if FIRST * a < last else []
-    if not found or last - found[-1] > 1e-6:
-        found.append(last)
-    return [math.radians(round(x, 6)) for x in found]
+    in_degrees = [(FIRST + STEP * k) * a for k in range(steps + 1)] if FIRST * a < last else []
+    if not in_degrees or last - in_degrees[-1] > 1e-6:
+        in_degrees.append(last)
+    return [math.radians(round(x, 6)) for x in in_degrees]
 
 
 def is_series(runs: Sequence[Evaluation]) -> bool:
     """Return whether runs can form a series: more than one, all with different amplitudes."""
-    found = sorted(_amplitude(run) for run in runs if run["amplitude"] is not None)
-    return len(runs) > 1 and all(b - a > SAME for a, b in itertools.pairwise(found))
+    ordered = sorted(_amplitude(run) for run in runs if run["amplitude"] is not None)
+    return len(runs) > 1 and all(b - a > SAME for a, b in itertools.pairwise(ordered))
 
 
 def judge_together(runs: Sequence[Evaluation], angle: float | None) -> TestSeries | None:
@@ -407,8 +407,10 @@ def judge_series(runs: Sequence[Evaluation], angle: float) -> TestSeries:
     passed = all(verdict.holds for verdict in criteria.values())
     status = Status.PASSED if passed else Status.FAILED
     data = {name: verdict.as_data() for name, verdict in criteria.items()}
-    found = {"A": angle, "verdict": status, "criteria": data}
-    return TestSeries(ordered, f"A = {shown(angle, 'rad')}; the series has {status.value}.", found, criteria)
+    series_data = {"A": angle, "verdict": status, "criteria": data}
+    return TestSeries(
+        ordered, f"A = {shown(angle, 'rad')}; the series has {status.value}.", series_data, criteria
+    )
 
 
 def _over_runs(criterion: str, runs: Sequence[Evaluation], missing: Sequence[float]) -> Verdict:
@@ -438,7 +440,7 @@ def _failures(runs: Sequence[Evaluation]) -> str:
     """Describe how many runs fail in each direction, and the smallest failing amplitude."""
     words = []
     for name, side in (("left first", 1.0), ("right first", -1.0)):
-        found = [math.degrees(abs(_amplitude(run))) for run in runs if side * _amplitude(run) > 0]
-        if found:
-            words.append(f"{name}: {len(found)}, the smallest of {min(found):.1f} degrees")
+        failed = [math.degrees(abs(_amplitude(run))) for run in runs if side * _amplitude(run) > 0]
+        if failed:
+            words.append(f"{name}: {len(failed)}, the smallest of {min(failed):.1f} degrees")
     return "; ".join(words)

@@ -50,7 +50,7 @@ def draw_run(trace: Trace, judged: Evaluation) -> Figure | None:
         panels[-1].set_xlabel("Time [s]")
         side = "left" if course.side > 0 else "right"
         title = f"Sine with dwell, {math.degrees(abs(judged['amplitude'] or 0)):.1f}°, {side} first"
-        said = f"{title}: {_verdicts(judged)}"
+        heading = f"{title}: {_verdicts(judged)}"
         note = " · ".join(
             [
                 *filter(None, [trace.title, trace.name]),
@@ -58,7 +58,7 @@ def draw_run(trace: Trace, judged: Evaluation) -> Figure | None:
                 *judged.notes,
             ]
         )
-        frame(figure, 2.0 * sum(heights), [], said, note)
+        frame(figure, 2.0 * sum(heights), [], heading, note)
     return figure
 
 
@@ -115,16 +115,16 @@ def _displaced(axes: Axes, course: DwellCourse, judged: Evaluation, trace: Trace
     shown = course.time <= course.end + 0.3
     axes.plot(course.time[shown], course.displacement[shown], **line_style(0))
     axes.set_title("Lateral displacement, double integral of the lateral acceleration [m]")
-    found, instant = judged["displacement"], course.begin + AT
-    if found is None:
+    displacement, instant = judged["displacement"], course.begin + AT
+    if displacement is None:
         return
     verdict = judged.criteria.get(RESPONSE)
     colour = MARKS[verdict.status] if verdict else QUIET
     axes.axvline(instant, color=QUIET, linewidth=0.8, linestyle=(0, (1, 2)), zorder=1)
-    axes.plot([instant], [found], "D", color=colour, markersize=5.5, zorder=4)
-    asked = "" if verdict else ", not required at this amplitude"
-    text = f"{found:.2f} m at BOS + {AT:g} s{asked}"
-    _label(axes, instant, found, text, (-7, 4), color=colour, ha="right")
+    axes.plot([instant], [displacement], "D", color=colour, markersize=5.5, zorder=4)
+    remark = "" if verdict else ", not required at this amplitude"
+    text = f"{displacement:.2f} m at BOS + {AT:g} s{remark}"
+    _label(axes, instant, displacement, text, (-7, 4), color=colour, ha="right")
     if verdict and verdict.bound is not None:
         least = verdict.bound
         axes.plot([instant, instant + 0.35], [least] * 2, color=CHANGED, linewidth=2.2, zorder=3)
@@ -162,8 +162,8 @@ def draw_series(series: TestSeries, note: str) -> Figure:
                     color=CHANGED,
                     ha="right",
                 )
-        asked = [run for run in series.runs if RESPONSE in run.criteria]
-        judged = [run for run in asked if run.criteria[RESPONSE].holds is not None]
+        required = [run for run in series.runs if RESPONSE in run.criteria]
+        judged = [run for run in required if run.criteria[RESPONSE].holds is not None]
         if judged:
             x = [math.degrees(abs(run["amplitude"] or 0.0)) for run in judged]
             grid[1, 0].plot([min(x), max(x)], [FAR] * 2, color=CHANGED, linewidth=1.5)
@@ -176,8 +176,10 @@ def draw_series(series: TestSeries, note: str) -> Figure:
             Line2D([], [], label=name, marker="os"[k], **line_style(k))
             for k, name in enumerate(("left first", "right first"))
         ]
-        said = "; ".join(f"{name} {one.status.value}: {one.why}" for name, one in series.criteria.items())
-        angle, verdict = math.degrees(series.found["A"]), series.found["verdict"].value
+        verdicts = "; ".join(
+            f"{name} {criterion.status.value}: {criterion.why}" for name, criterion in series.criteria.items()
+        )
+        angle, verdict = math.degrees(series.data["A"]), series.data["verdict"].value
         title = f"Sine with dwell, A = {angle:.1f}°: the series has {verdict}"
-        frame(figure, 5.0, handles, title, f"{said} · {note}")
+        frame(figure, 5.0, handles, title, f"{verdicts} · {note}")
     return figure

@@ -102,7 +102,10 @@ class Evaluation:
         return {
             "label": self.label,
             "verdict": self.verdict and self.verdict.status,
-            "quantities": {key: asdict(one) | {"unit": si(one.unit)} for key, one in self.quantities.items()},
+            "quantities": {
+                key: asdict(quantity) | {"unit": si(quantity.unit)}
+                for key, quantity in self.quantities.items()
+            },
             "criteria": {name: verdict.as_data() for name, verdict in self.criteria.items()},
             "notes": self.notes,
         }
@@ -137,7 +140,7 @@ class TestSeries:
 
     runs: list[Evaluation]  # in their order
     summary: str  # in a sentence
-    found: dict[str, Any]  # plain data, for files
+    data: dict[str, Any]  # plain, for files
     criteria: dict[str, Verdict] = field(default_factory=dict)
 
 
@@ -220,8 +223,8 @@ class StandardTest:
 
     def marks(self, judged: Evaluation) -> tuple[list[Mark], list[Limit]]:
         """Return the instants and limits of an evaluated run, to be drawn with its signals."""
-        found: tuple[list[Mark], list[Limit]] = _named(self.marking)(judged) if self.marking else ([], [])
-        return found
+        drawn: tuple[list[Mark], list[Limit]] = _named(self.marking)(judged) if self.marking else ([], [])
+        return drawn
 
     def draw_series(self, series: TestSeries, note: str) -> Figure:
         """Return the figure of a series; only for tests with a drawing module."""

@@ -85,8 +85,8 @@ def evaluate_understeer(judged: Evaluation, trace: Trace) -> None:
     a_y, extra = a_y[: last + 1], extra[: last + 1]
     refuse_opposed(side * hand[: last + 1], a_y, "lateral acceleration")
     refuse_opposed(hand[: last + 1], r[: last + 1], "yaw rate")
-    found = gradients(a_y, extra)
-    gradient = found.pop(0.0)
+    slopes = gradients(a_y, extra)
+    gradient = slopes.pop(0.0)
     if gradient is None:
         raise NotJudged(
             f"lateral acceleration does not rise slowly through {FIT_RANGE[0]:g} to {FIT_RANGE[1]:g} m/s2"
@@ -98,7 +98,7 @@ def evaluate_understeer(judged: Evaluation, trace: Trace) -> None:
         speed = math.sqrt((front + rear) / gradient)
         judged.add("characteristic_speed", "characteristic speed", speed, "m/s", "sqrt(L / K_us)")
     reading = f"straight line over {2 * HALF:g} m/s2"
-    for level, local in found.items():
+    for level, local in slopes.items():
         judged.add(f"gradient_{level:g}", f"understeer gradient at {level:g} m/s2", local, UNIT, reading)
     judged.add("largest", "largest lateral acceleration", float(a_y.max()), "m/s2")
 
@@ -152,9 +152,9 @@ def evaluate_slow_steer(judged: Evaluation, trace: Trace) -> None:
             f"{end - begin} samples between {SLOW_STEER_WINDOW[0] / G:g} and {SLOW_STEER_WINDOW[1] / G:g} g"
         )
     slope, intercept = np.polyfit(a_y[begin:end], delta[begin:end], 1)
-    found = math.radians(round(math.degrees(intercept + slope * SLOW_STEER_LEVEL), 1))
+    magnitude = math.radians(round(math.degrees(intercept + slope * SLOW_STEER_LEVEL), 1))
     reading = "straight line through 0.1 to 0.375 g, rounded to 0.1 degrees"
-    judged.add("angle", "hand-wheel angle at 0.3 g", side * found, "rad", reading)
+    judged.add("angle", "hand-wheel angle at 0.3 g", side * magnitude, "rad", reading)
     judged.add("slope", "hand-wheel angle per lateral acceleration", slope, "rad.s2/m", "of that line")
     spread = delta[begin:end] - (intercept + slope * a_y[begin:end])
     judged.add("spread", "largest distance from the line", float(np.max(np.abs(spread))), "rad")
@@ -169,11 +169,11 @@ def characteristic_angle(judged: Sequence[Evaluation]) -> float:
     Raises:
         NotJudged: a run has no angle, or there are no runs.
     """
-    without = next((one for one in judged if one["angle"] is None), None)
+    without = next((run for run in judged if run["angle"] is None), None)
     if without or not judged:
         why = "; ".join(without.notes) if without else "no runs"
         raise NotJudged(f"slowly increasing steer{f', {without.label}' if without else ''}: {why}")
-    mean = float(np.mean([abs(one["angle"] or 0.0) for one in judged]))
+    mean = float(np.mean([abs(run["angle"] or 0.0) for run in judged]))
     return math.radians(round(math.degrees(mean), 1))
 
 
@@ -274,8 +274,8 @@ def evaluate_sweep(judged: Evaluation, trace: Trace) -> None:
         ):  # lags by more than a quarter period at 0.2 Hz, or has the wrong sign
             raise opposed(name)
     for key, (name, unit) in SWEEP_RESPONSES.items():
-        found = responses[key]
-        gain, phase = np.abs(found), np.angle(found)
+        values = responses[key]
+        gain, phase = np.abs(values), np.angle(values)
         for f in FREQUENCIES:
             k = int(np.argmin(np.abs(GRID - f)))
             there = bool(np.isfinite(gain[k]))

@@ -154,9 +154,9 @@ def trace_of(results: Results, label: str = "") -> Trace:
     for name in SIGNALS:
         if "*" in name:
             continue
-        found = columns_of(results, name)
-        if found:
-            signals[name] = results.columns[found[0]] * si_of(results.units[found[0]])[1]
+        columns = columns_of(results, name)
+        if columns:
+            signals[name] = results.columns[columns[0]] * si_of(results.units[columns[0]])[1]
     own = Counter(name.variable for name in results.names.values())
     for column, values in results.columns.items():  # signals of a single instance, such as overruns of cones
         name = results.names[column].variable
@@ -190,11 +190,11 @@ def _friction(results: Results, fmus: Mapping[str, FmuRecord], parameters: Mappi
     """Return the lowest friction at any wheel: as recorded, else from the parameters of road and tyres."""
     if columns := columns_of(results, "friction_*"):
         return float(min(results.columns[column].min() for column in columns))
-    found = [parameters.get(unit, {}).get("base_friction") for unit in results.instances_of_role("road")]
-    found += [values.get("friction") for values in parameters.values()]
+    frictions = [parameters.get(unit, {}).get("base_friction") for unit in results.instances_of_role("road")]
+    frictions += [values.get("friction") for values in parameters.values()]
     for fmu in fmus.values():
-        found += [value for name, value in fmu.constants.items() if name.startswith("friction_")]
-    return min((float(value) for value in found if isinstance(value, (int, float))), default=None)
+        frictions += [value for name, value in fmu.constants.items() if name.startswith("friction_")]
+    return min((float(value) for value in frictions if isinstance(value, (int, float))), default=None)
 
 
 def likeness(hand: np.ndarray, answer: np.ndarray) -> float:

@@ -56,7 +56,7 @@ def _target(value: object) -> Target:
 
 def _levels(value: object) -> dict[Any, str]:
     """Return the values of an axis with their labels."""
-    if isinstance(value, dict) and value and all(isinstance(said, str) for said in value.values()):
+    if isinstance(value, dict) and value and all(isinstance(words, str) for words in value.values()):
         return dict(value)
     if not isinstance(value, list) or not all(_is_plain(v) for v in value):
         raise ValueError("must be a list of values, or a mapping of values to words")
@@ -94,7 +94,7 @@ class OverrideSpec(StrictModel):
     def targets(self) -> list[Target]:
         """The targets of these overrides."""
         own = [Target.parse(name) for name in (VEHICLE, *OF_RUN) if getattr(self, name, None) is not None]
-        faults = [Target("faults", variable=str(one.on)) for one in self.faults]
+        faults = [Target("faults", variable=str(fault.on)) for fault in self.faults]
         return [*map(Target.of_instance, self.swap), *self.set, *faults, *own]
 
 
@@ -128,7 +128,7 @@ class AxisSpec(StrictModel):
     @property
     def targets(self) -> list[Target]:
         """The targets that the axis overrides."""
-        return self.vary or list(dict.fromkeys(t for one in self.variants.values() for t in one.targets))
+        return self.vary or list(dict.fromkeys(t for spec in self.variants.values() for t in spec.targets))
 
     @property
     def length(self) -> int | None:
@@ -150,8 +150,8 @@ class AxisSpec(StrictModel):
         if bool(self.vary) == bool(self.variants):
             raise ValueError("needs either vary or variants")
         if self.variants:
-            given = (self.values, self.start, self.end, self.count, self.unit)
-            if any(one is not None for one in given):
+            bounds = (self.values, self.start, self.end, self.count, self.unit)
+            if any(bound is not None for bound in bounds):
                 raise ValueError("variants have no values, from, to, count or unit")
             return self
         if Target.of_instance(INPUTS) in self.vary:
@@ -291,7 +291,7 @@ class Level:
 
 def axis_of_levels(target: str, levels: Iterable[Level], **more: Any) -> DesignAxisSpec:
     """Return an axis over computed levels of a target; `more`: its other fields."""
-    values = {one.value: one.words for one in levels}
+    values = {level.value: level.words for level in levels}
     return DesignAxisSpec.model_construct(vary=[Target.parse(target)], values=values, **more)
 
 
@@ -398,12 +398,12 @@ def _given(axis: AxisSpec, level: Level) -> Value:
     return yaml_lines.scalar(level.value) if isinstance(level.value, str) else level.value
 
 
-def changes_of_file(given: OverrideSpec, folder: Path, origin: str) -> list[Override]:
+def changes_of_file(spec: OverrideSpec, folder: Path, origin: str) -> list[Override]:
     """Return the overrides in one part of an experiment file; file names are relative to `folder`."""
-    vehicle = [Override.of(VEHICLE, str(folder / given.vehicle), origin)] if given.vehicle else []
-    of_run = overrides.changes_of_run(given, origin)
-    at = by_location(spec.fault for spec in given.faults)
+    vehicle = [Override.of(VEHICLE, str(folder / spec.vehicle), origin)] if spec.vehicle else []
+    of_run = overrides.changes_of_run(spec, origin)
+    at = by_location(entry.fault for entry in spec.faults)
     faults = [
         Override(Target("faults", variable=str(location)), ones, origin) for location, ones in at.items()
     ]
-    return vehicle + of_run + overrides.changes_of(given.swap, given.set, folder, origin) + faults
+    return vehicle + of_run + overrides.changes_of(spec.swap, spec.set, folder, origin) + faults

@@ -121,9 +121,9 @@ class Drawing:
         if axis == RUN:
             return "Run"
         spec = self.axes[axis]
-        said = spec.says or (_in_words(spec.vary[0]) if spec.vary else axis)
+        text = spec.says or (_in_words(spec.vary[0]) if spec.vary else axis)
         unit = self.unit_of(axis)
-        return f"{said.strip()} in {unit}" if unit else said.strip()
+        return f"{text.strip()} in {unit}" if unit else text.strip()
 
     def unit_of(self, axis: str) -> str:
         """Return the display unit of an axis."""
@@ -185,9 +185,9 @@ class ValueDrawing(Drawing):
         self.mark = None if marked is None else self.number(marked)
         self.mark_text = "" if marked is None else shown(si_number(marked, unit), unit)
 
-    def number(self, given: float | str) -> float:
+    def number(self, value: float | str) -> float:
         """Convert a number of the experiment file to the display unit."""
-        return self.factor * si_number(given, self.quantity)
+        return self.factor * si_number(value, self.quantity)
 
     def shown(self, value: MetricValue | None) -> tuple[float, float]:
         """Return a number and its confidence half width in the display unit; NaN if missing."""
@@ -342,11 +342,11 @@ def edges(values: Sequence[float], *, log: bool) -> np.ndarray:
     """Return the edges of cells around sorted values: halfway between neighbours."""
     centres = np.log(values) if log else np.array(values, dtype=float)
     if len(centres) == 1:
-        found = np.array([centres[0] - 0.5, centres[0] + 0.5])
+        borders = np.array([centres[0] - 0.5, centres[0] + 0.5])
     else:
         middle = (centres[1:] + centres[:-1]) / 2
-        found = np.concatenate([[2 * centres[0] - middle[0]], middle, [2 * centres[-1] - middle[-1]]])
-    return np.exp(found) if log else found
+        borders = np.concatenate([[2 * centres[0] - middle[0]], middle, [2 * centres[-1] - middle[-1]]])
+    return np.exp(borders) if log else borders
 
 
 def boundary(
@@ -380,8 +380,8 @@ class LimitDrawing(Drawing):
         limits = [limit for limit in self._found if limit.others in settings]
         ends = []
         for (level, style), hatch in zip(self.lines(), cycle(HATCHES), strict=False):
-            mine = [one for one in limits if level is None or one.others[self.spec.lines] == level]
-            placed = {self.place(one.others[self.spec.x], self.spec.x): one for one in mine}
+            mine = [limit for limit in limits if level is None or limit.others[self.spec.lines] == level]
+            placed = {self.place(limit.others[self.spec.x], self.spec.x): limit for limit in mine}
             x = sorted(placed)
             low = [self._smallest if (last := placed[at].largest) is None else last for at in x]
             high = [self._largest if (first := placed[at].beyond) is None else first for at in x]

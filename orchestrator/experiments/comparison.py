@@ -104,7 +104,7 @@ def variants(scenario: Path, swaps: Sequence[str], changes: Sequence[Override]) 
         name = re.sub(r"[^\w.+=-]+", "_", label.replace(" + ", "+")).strip("_")
         if any(run.name == name for run in runs):
             name = f"{name}_{len(runs) + 1}"
-        swapped_in = [one for unit, text in chosen.items() for one in swap_of(unit, text, "--swap")]
+        swapped_in = [swap for unit, text in chosen.items() for swap in swap_of(unit, text, "--swap")]
         runs.append(NamedRun(name, label, label, scenario, tuple(swapped_in)))
     return runs
 
@@ -129,8 +129,10 @@ def _label(text: str, choices: Sequence[str]) -> str:
     fmu, *brought = swap_of("", text, "--swap")
     others = [swap_of("", other, "--swap") for other in choices]
     name = str(fmu.value)
-    shared = [one for one in brought if all(one in other for other in others)]
-    values = [f"{one.target.variable}={text_of(one.value)}" for one in brought if one not in shared]
+    shared = [change for change in brought if all(change in other for other in others)]
+    values = [
+        f"{change.target.variable}={text_of(change.value)}" for change in brought if change not in shared
+    ]
     one_fmu = all(other[0] == fmu for other in others)
     return " ".join([*([] if one_fmu and values else [Path(name).stem if is_path(name) else name]), *values])
 
@@ -247,13 +249,13 @@ def _given(run: NamedRun, setting: str) -> Plain:
     return next(change.plain for change in reversed(run.changes) if str(change.target) == setting)
 
 
-def _samples(found: Results | None, signal: str, why: str) -> tuple[np.ndarray | None, float | None, str]:
+def _samples(results: Results | None, signal: str, why: str) -> tuple[np.ndarray | None, float | None, str]:
     """Return the signal and the wall time [s], or None for both and the reason."""
-    if found is None:
+    if results is None:
         return None, None, why
-    if not np.issubdtype(found[signal].dtype, np.number):
+    if not np.issubdtype(results[signal].dtype, np.number):
         return None, None, f"{signal} is not a number"
-    return found[signal], found.record.wall_time, ""
+    return results[signal], results.record.wall_time, ""
 
 
 def _common(x: np.ndarray | None, k: int) -> np.ndarray | None:

@@ -128,9 +128,9 @@ class Executor(AbstractContextManager["Executor"]):
             YawbenchError: a run cannot start.
         """
         with self.display.planning(len(experiment.cases)) as progress:
-            given = {**self.of_jobs, **of_jobs}
+            options = {**self.of_jobs, **of_jobs}
             planned = plan_experiment(
-                experiment, self.folder, planner=self.planner, progress=progress, **given
+                experiment, self.folder, planner=self.planner, progress=progress, **options
             )
         self.display.planned(planned)
         return planned
@@ -161,8 +161,12 @@ class Executor(AbstractContextManager["Executor"]):
         journal = self.journal if journaled else None
         again = self.fresh and not journaled
         left = list(jobs) if again else left_to_do(jobs, journal.records if journal else {})
-        with self.display.running(title, jobs, left, journaled=journaled) as told:
-            return finish(left, journal, runner=self.runner, told=told) if self.runner and left else []
+        with self.display.running(title, jobs, left, journaled=journaled) as on_outcome:
+            return (
+                finish(left, journal, runner=self.runner, on_outcome=on_outcome)
+                if self.runner and left
+                else []
+            )
 
     def keeping(self, findings: ExperimentResult, numbers: Collection[int]) -> ExperimentResult:
         """Return a result whose cases with these numbers keep their results.
@@ -184,8 +188,8 @@ class Executor(AbstractContextManager["Executor"]):
         if self.runner and lacking:
             title = f"{findings.spec.title}: results to keep"
             left = [*lacking.values()]
-            with self.display.running(title, left, left, journaled=True) as told:
-                finish(left, None, runner=self.runner, told=told)
+            with self.display.running(title, left, left, journaled=True) as on_outcome:
+                finish(left, None, runner=self.runner, on_outcome=on_outcome)
         return replace(findings, planned=replace(findings.planned, jobs=jobs))
 
 
@@ -244,7 +248,7 @@ def side_by_side(
         searches: name -> search.
         passing: maps the value that each search asks for in a round to whether it passes.
     """
-    found: dict[K, T] = {}
+    returned: dict[K, T] = {}
     answers: Mapping[K, bool | None] = dict.fromkeys(searches)  # None starts a generator
     while answers:
         values = {}
@@ -252,9 +256,9 @@ def side_by_side(
             try:
                 values[name] = searches[name].send(answer)  # type: ignore[arg-type]
             except StopIteration as end:  # noqa: PERF203 - this is how a generator returns
-                found[name] = end.value
+                returned[name] = end.value
         answers = passing(values) if values else {}
-    return found
+    return returned
 
 
 def left_to_do(jobs: Sequence[Job], records: Mapping[str, MeasuredRun]) -> list[Job]:
@@ -300,7 +304,7 @@ def _units(plan: Plan, metrics: MetricRequests) -> dict[str, str]:
 
 
 def finish(
-    left: Sequence[Job], journal: Journal | None, *, runner: Runner, told: OnOutcome = lambda _: None
+    left: Sequence[Job], journal: Journal | None, *, runner: Runner, on_outcome: OnOutcome = lambda _: None
 ) -> list[Outcome]:
     """Execute jobs, add each to the journal (if any) as it ends, and return the outcomes.
 
@@ -315,7 +319,7 @@ def finish(
         if journal:
             journal.add(outcome.job.key, outcome.record, last=final)
         outcomes.append(outcome)
-        told(outcome)
+        on_outcome(outcome)
 
     runner(left, done)
     if journal and any(job.key not in journal.records for job in left):
@@ -334,7 +338,7 @@ def runner_of(workers: int | None, scheduler: str | None) -> Runner:
         ScenarioError: the package `distributed` is missing.
     """
     if not scheduler:
-        return lambda jobs, told: execute(jobs, workers=workers, done=told)
+        return lambda jobs, on_outcome: execute(jobs, workers=workers, done=on_outcome)
     try:
         from .cluster import run_on_cluster
     except ImportError:

@@ -87,8 +87,8 @@ class ForBinding:
 
         if not self.values:
             return entry
-        given = entry.model_dump(by_alias=True, exclude_defaults=True, exclude={"for_each"})
-        return type(entry).model_validate(fill(given))
+        fields = entry.model_dump(by_alias=True, exclude_defaults=True, exclude={"for_each"})
+        return type(entry).model_validate(fill(fields))
 
 
 def fillings(
@@ -117,32 +117,32 @@ def expanded(spec: ExperimentSpec, document: Document) -> ExperimentSpec:
     derived: dict[str, DerivedSpec] = {}
     for name, number in spec.derived.items():
         key: KeyPath = ("derived", name)
-        for one in fillings(document, key, number.for_each, "numbers"):
-            made = one.fill(name) if number.for_each else name
+        for binding in fillings(document, key, number.for_each, "numbers"):
+            made = binding.fill(name) if number.for_each else name
             if made in derived:
                 document.report(key, f"there is already a derived number {made!r}", "name-duplicate")
-            derived[made] = one.filled(number)
-    said: dict[str, list[Claim]] = {"claims": [], "checks": []}
-    for group, every in said.items():
+            derived[made] = binding.filled(number)
+    expanded_claims: dict[str, list[Claim]] = {"claims": [], "checks": []}
+    for group, every in expanded_claims.items():
         for i, claim in enumerate(getattr(spec, group)):
-            for one in fillings(document, (group, i), claim.for_each, group):
-                every.append(one.filled(claim))
+            for binding in fillings(document, (group, i), claim.for_each, group):
+                every.append(binding.filled(claim))
                 every[-1]._number = i
-    return spec.model_copy(update={"derived": derived, **said})
+    return spec.model_copy(update={"derived": derived, **expanded_claims})
 
 
 def named_runs(document: Document, i: int, entry: RunSpec) -> Iterator[NamedRun]:
     """Yield the runs of the i-th entry, up to the first with an error, which is reported."""
     key: KeyPath = ("runs", i)
     folder, known = document.path.parent, len(document.errors)
-    for one in fillings(document, key, entry.for_each, "runs"):
-        name = one.fill(entry.name, "name")
-        _check_folder(name, one)
+    for binding in fillings(document, key, entry.for_each, "runs"):
+        name = binding.fill(entry.name, "name")
+        _check_folder(name, binding)
         changes: dict[Target, Override] = {}
-        for part in (entry, *one.choices):
-            swaps = {unit: one.fill(fmu, "swap", unit) for unit, fmu in part.swap.items()}
+        for part in (entry, *binding.choices):
+            swaps = {unit: binding.fill(fmu, "swap", unit) for unit, fmu in part.swap.items()}
             settings = {
-                target: yaml_lines.scalar(one.fill(value, "set", str(target)))
+                target: yaml_lines.scalar(binding.fill(value, "set", str(target)))
                 if isinstance(value, str)
                 else value
                 for target, value in part.set.items()
@@ -152,15 +152,15 @@ def named_runs(document: Document, i: int, entry: RunSpec) -> Iterator[NamedRun]
                 if change.target in changes:
                     document.report((*key, "for"), f"{change.target} is given twice", "name-duplicate")
                 changes[change.target] = change
-        label = one.fill(entry.label, "label", sentence=True) or name
-        row = one.fill(entry.row, "row", sentence=True) or label
-        scenario = folder / one.fill(entry.scenario, "scenario")
+        label = binding.fill(entry.label, "label", sentence=True) or name
+        row = binding.fill(entry.row, "row", sentence=True) or label
+        scenario = folder / binding.fill(entry.scenario, "scenario")
         if len(document.errors) > known:
             return
         yield NamedRun(name, label, row, scenario, tuple(changes.values()))
 
 
-def _check_folder(name: str, one: ForBinding) -> None:
+def _check_folder(name: str, binding: ForBinding) -> None:
     """Report a run name that cannot be a folder name."""
     parts = name.split("/")
     if all(_FOLDER.fullmatch(part) and part.strip(".") for part in parts) and parts[0] != FIGURES:
@@ -168,7 +168,7 @@ def _check_folder(name: str, one: ForBinding) -> None:
     sentence = f"{short(name)} cannot name a run: use letters, digits, . _ + - and / between folders"
     if any(len(part) > LONGEST for part in parts):
         sentence = f"{short(name)} is too long: at most {LONGEST} characters between two /"
-    one.document.report((*one.key, "name"), sentence, "name-duplicate")
+    binding.document.report((*binding.key, "name"), sentence, "name-duplicate")
 
 
 RUNS = "runs"
@@ -254,10 +254,10 @@ class LoadedExperiment:
     @cached_property
     def first_cases(self) -> list[Case]:
         """All runs at all settings, only the first of their repeats."""
-        found: dict[tuple[str, DesignPoint], Case] = {}
+        first: dict[tuple[str, DesignPoint], Case] = {}
         for case in self.cases:
-            found.setdefault((case.run.name, self.setting(case.point)), case)
-        return list(found.values())
+            first.setdefault((case.run.name, self.setting(case.point)), case)
+        return list(first.values())
 
     def matching(self, patterns: Sequence[str]) -> list[NamedRun]:
         """Return the runs whose names match any pattern, in the order of the patterns."""
@@ -269,7 +269,7 @@ class LoadedExperiment:
         if self.design:
             return None
         changes = itertools.chain.from_iterable(map(self._at, self.points))
-        change = next((one for one in changes if str(one) == place), None)
+        change = next((change for change in changes if str(change) == place), None)
         axes = self.spec.axes.items()
         target = change.target if change else None
         return next(((name, target) for name, axis in axes if target in axis.targets), None)
@@ -342,10 +342,10 @@ def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> Lo
             if run.name in runs:
                 document.report(("runs", i, "name"), f"there is already a run {run.name!r}", "name-duplicate")
             runs[run.name] = run
-    given = {change.target: change for change in changes}
+    overridden = {change.target: change for change in changes}
     own = changes_of_file(spec, path.parent, "sweep" if spec.axes else "study")
-    for_all = tuple(one for one in own if one.target not in given)
-    experiment = LoadedExperiment(path, spec, runs, for_all, tuple(given.values()))
+    for_all = tuple(change for change in own if change.target not in overridden)
+    experiment = LoadedExperiment(path, spec, runs, for_all, tuple(overridden.values()))
     if not document.errors:
         check_axes(spec, document)
         check_names(experiment, document)

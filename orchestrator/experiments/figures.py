@@ -105,11 +105,11 @@ def draw_over_axes(findings: ExperimentResult, spec: FigureSpec) -> Figure:
 
 def _legend(drawn: Sequence[Axes]) -> list[Artist]:
     """Return one handle per label over all panels, with that of failed runs last."""
-    found: dict[str, Artist] = {}
+    by_label: dict[str, Artist] = {}
     for axes in drawn:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            found.setdefault(label, handle)
-    return sorted(found.values(), key=lambda handle: handle.get_label() == FAILED["label"])
+            by_label.setdefault(label, handle)
+    return sorted(by_label.values(), key=lambda handle: handle.get_label() == FAILED["label"])
 
 
 def _provenance(findings: ExperimentResult) -> str:

@@ -153,7 +153,7 @@ def load_fit(path: Path | str) -> LoadedFit:
     errors = {}
     for name, value in spec.compared.items():
         key = ("compared", name)
-        if name not in SIGNALS or any(name not in one.signals for one in filtered.segments):
+        if name not in SIGNALS or any(name not in segment.signals for segment in filtered.segments):
             known = filtered.segments[0].signals
             document.report(key, f"is not measured{hint(name, known, lead='measured are')}", "signal-unknown")
             continue
@@ -221,8 +221,8 @@ def _windows(
 
 def _refuse_overlaps(document: Document, spec: FitSpec) -> None:
     for number, held in enumerate(spec.held_out):
-        for one in spec.training:
-            if one.segment == held.segment and one.begin < held.end and held.begin < one.end:
+        for stretch in spec.training:
+            if stretch.segment == held.segment and stretch.begin < held.end and held.begin < stretch.end:
                 words = f"{float(held.begin):g} to {float(held.end):g} s shares seconds with 'training'"
                 document.report(("held_out", number), words, "fit-window")
 
@@ -244,13 +244,13 @@ def run_window(job: Job) -> Simulated:
     results = simulate_in_memory(job.plan)
     if results.time[-1] < job.times[-1] - 1e-6:
         return None
-    found = {}
+    signals = {}
     for name, column in job.wanted:
         values = results[column]
         if job.low_pass:
             values = job.low_pass(values, 1.0 / float(job.plan.step))
-        found[name] = np.interp(job.times, results.time, values)
-    return found
+        signals[name] = np.interp(job.times, results.time, values)
+    return signals
 
 
 class ScenarioModel:
@@ -294,7 +294,7 @@ class ScenarioModel:
         self.base = planner.plan(planner.load(fit.scenario, self._still), fmus=fmus)
         self.followed = dict(self._followed())
         self.step = float(self.base.step)
-        self.plant = next((one for one in self.base.instances if one.role == "plant"), None)
+        self.plant = next((instance for instance in self.base.instances if instance.role == "plant"), None)
         if self.plant is None:
             raise ScenarioError(f"{fit.scenario}: has no plant to compare", code="fit-inputs")
         self.columns = {name: f"{self.plant.name}.{name}" for name in fit.errors}
@@ -308,11 +308,11 @@ class ScenarioModel:
             key_of(self.base), fit.measurement.sha256, sorted(fit.errors), [w.window.name for w in windows]
         ])  # fmt: skip
         self.failure = ""  # why the last run that failed did
-        self._windows = [self._of_window(one) for one in windows]
+        self._windows = [self._of_window(window) for window in windows]
 
     def __call__(self, sets: Sequence[Mapping[str, float]]) -> list[list[Simulated]]:
         """Run all windows for sets of values; see `measured.estimate.Model`."""
-        found: list[list[Simulated]] = [[None] * len(self.windows) for _ in sets]
+        simulated: list[list[Simulated]] = [[None] * len(self.windows) for _ in sets]
         jobs, places = [], []
         for number, values in enumerate(sets):
             for k in range(len(self.windows)):
@@ -323,9 +323,9 @@ class ScenarioModel:
                     self.failure = text_of(error.diagnostics)
         outcomes = execute(jobs, run=run_window, pool=self.pool) if jobs else []
         for (number, k), outcome in zip(places, outcomes, strict=True):
-            found[number][k] = outcome.value
+            simulated[number][k] = outcome.value
             self.failure = outcome.reason or self.failure
-        return found
+        return simulated
 
     def value_of(self, target: Target) -> tuple[float | None, str | None]:
         """Return the scenario's value of a target and its unit; None where it has none.
@@ -339,9 +339,9 @@ class ScenarioModel:
             value = self.planner.load(self.fit.scenario).friction if name == "friction" else None
             return (value if isinstance(value, float) else None), units[name]
         having = [
-            one
-            for one in self.base.instances
-            if name in one.fmu.variables and target.instance in ("", one.name)
+            instance
+            for instance in self.base.instances
+            if name in instance.fmu.variables and target.instance in ("", instance.name)
         ]
         if target.kind == "vehicle_parameter" and not having and name in CAR:
             return None, CAR[name].unit
@@ -353,17 +353,17 @@ class ScenarioModel:
         number = float(value) if isinstance(value, (int, float)) else None
         return number, having[0].fmu.variables[name].unit
 
-    def _of_window(self, one: FitWindow) -> tuple[tuple[Override, ...], Fraction, Fraction]:
+    def _of_window(self, fit_window: FitWindow) -> tuple[tuple[Override, ...], Fraction, Fraction]:
         """Return the overrides of a window's runs, and their start and stop time [s]."""
-        step, times = self.base.step, one.window.times
+        step, times = self.base.step, fit_window.window.times
         begin = Fraction(round(times[0] / float(step))) * step
         filtered = self.fit.measurement.filter
         extra = TRANSIENT / filtered.cut_off if filtered else 0.0
-        end = min(times[-1] + extra, one.filtered.time[-1])
+        end = min(times[-1] + extra, fit_window.filtered.time[-1])
         stop = begin + step * math.ceil((max(end, times[-1]) - float(begin)) / float(step) - 1e-6)
         changes = {"start_time": float(begin), "stop_time": float(stop)}
         assert self.plant is not None
-        for parameter, signal in start_states(one.filtered, float(begin)).items():
+        for parameter, signal in start_states(fit_window.filtered, float(begin)).items():
             if parameter in self.plant.fmu.variables:
                 changes[f"{self.plant.name}.{parameter}"] = signal
         own = (Override.of(name, value, "fit") for name, value in changes.items())
@@ -371,7 +371,7 @@ class ScenarioModel:
 
     def _job(self, k: int, values: Mapping[str, float]) -> WindowJob:
         """Return the planned job of a window with a set of values."""
-        one, (changes, begin, stop) = self.windows[k], self._windows[k]
+        fit_window, (changes, begin, stop) = self.windows[k], self._windows[k]
         own = [
             Override.of(name, value, "fit")
             for name, value in values.items()
@@ -380,12 +380,12 @@ class ScenarioModel:
         scenario = self.planner.load(self.fit.scenario, (*changes, *own))
         plan = self.planner.plan(scenario, fmus=self.fmus, record=tuple(self.columns.values()))
         plan = replace(
-            plan, instances=tuple(self._following(x, one, begin, stop, values) for x in plan.instances)
+            plan, instances=tuple(self._following(x, fit_window, begin, stop, values) for x in plan.instances)
         )
         wanted = tuple(self.columns.items())
         return WindowJob(
-            one.window.name, self.fit.scenario, Path(), plan=plan, keep=False, times=one.window.times,
-            wanted=wanted, low_pass=self.fit.measurement.filter,
+            fit_window.window.name, self.fit.scenario, Path(), plan=plan, keep=False,
+            times=fit_window.window.times, wanted=wanted, low_pass=self.fit.measurement.filter,
         )  # fmt: skip
 
     def _followed(self) -> Iterator[tuple[tuple[str, str], str]]:
@@ -394,7 +394,7 @@ class ScenarioModel:
         Raises:
             ScenarioError: the signal is not measured, or of another kind.
         """
-        instances = [one.name for one in self.base.instances]
+        instances = [instance.name for instance in self.base.instances]
         for key, spec in self._series.items():
             pattern = SignalName.parse_input(key, instances)
             for instance in self.base.instances:
@@ -403,7 +403,7 @@ class ScenarioModel:
                         continue
                     signal = (spec.column or name).replace("*", match(pattern.variable, name) or "")
                     variable = instance.fmu.variables[name]
-                    if any(signal not in one.raw.signals for one in self.windows):
+                    if any(signal not in window.raw.signals for window in self.windows):
                         known = hint(signal, self.windows[0].raw.signals, lead="measured are")
                         raise ScenarioError(
                             f"{self.fit.scenario}: inputs.{key}: {signal} is not measured{known}",
@@ -418,11 +418,16 @@ class ScenarioModel:
                     yield (instance.name, name), signal
 
     def _following(
-        self, instance: Instance, one: FitWindow, begin: Fraction, stop: Fraction, values: Mapping[str, float]
+        self,
+        instance: Instance,
+        fit_window: FitWindow,
+        begin: Fraction,
+        stop: Fraction,
+        values: Mapping[str, float],
     ) -> Instance:
         """Return an instance whose inputs follow the measurement, corrected by a set of values."""
         series, constants = dict(instance.series), dict(instance.constants)
-        part = one.raw.between(float(begin) - MARGIN, float(stop) + MARGIN)
+        part = fit_window.raw.between(float(begin) - MARGIN, float(stop) + MARGIN)
         for (name, variable), signal in self.followed.items():
             if name != instance.name:
                 continue

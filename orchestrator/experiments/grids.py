@@ -32,15 +32,15 @@ def cells(spec: GridSpec) -> list[GridCell]:
     """Return the cells row by row, then the runs outside the grid, whose column is empty."""
     ((row_key, rows),) = spec.rows.items()
     ((column_key, columns),) = spec.columns.items()
-    found = []
+    in_grid = []
     for (i, row), (k, column) in itertools.product(enumerate(rows), enumerate(columns)):
         run, derived = (
             text.replace(f"{{{row_key}}}", row).replace(f"{{{column_key}}}", column)
             for text in (spec.run, spec.derived)
         )
         published = spec.published[i][k] if spec.published else None
-        found.append(GridCell(run, spec.metric or derived, rows[row], columns[column], published))
-    return found + [GridCell(one.run, spec.metric, one.says, "", one.published) for one in spec.beside]
+        in_grid.append(GridCell(run, spec.metric or derived, rows[row], columns[column], published))
+    return in_grid + [GridCell(cell.run, spec.metric, cell.says, "", cell.published) for cell in spec.beside]
 
 
 def ranked(spec: GridSpec, only: Mapping[str, Collection[str]] | None = None) -> list[GridCell]:
@@ -114,13 +114,13 @@ def grid_tables(spec: GridSpec, values: MetricTable, verdicts: Mapping[tuple[str
         tables.append(Table(f"{title}: published values", headings, [*printed], [], numbers))
     table = tables[-1]
     for cell in beside:
-        said = f", the paper: {_digits(cell.published)}" if cell.published is not None else ""
-        table.notes.append(f"{cell.row}: {_digits(_measured(cell, values))}{said}")
+        published = f", the paper: {_digits(cell.published)}" if cell.published is not None else ""
+        table.notes.append(f"{cell.row}: {_digits(_measured(cell, values))}{published}")
     if spec.published:
-        found = correlation(spec, values)
+        coefficient = correlation(spec, values)
         table.notes.append(
             f"rank correlation (Spearman) with the paper over {_count(every)} runs: "
-            f"{'not all runs have results' if found is None else digits_of(found)}"
+            f"{'not all runs have results' if coefficient is None else digits_of(coefficient)}"
         )
     return tables
 
@@ -130,7 +130,7 @@ def side_by_side(tables: Sequence[Table]) -> Table:
     if len(tables) == 1:
         return tables[0]
     ours, theirs = tables
-    rows = [[*one, *other] for one, other in zip(ours.rows, theirs.rows, strict=True)]
+    rows = [[*left, *right] for left, right in zip(ours.rows, theirs.rows, strict=True)]
     columns = [*ours.columns, Column("the paper:"), *theirs.columns[1:]]
     return Table(ours.title, columns, rows, theirs.notes)
 
@@ -143,7 +143,7 @@ def _display_table(spec: GridSpec, values: MetricTable, verdicts: Mapping[tuple[
     table = Table(spec.title, [spec.corner, *columns.values()], numbers=set(range(1, len(columns) + 1)))
     for row in rows.values():
         words = []
-        for cell in (one for one in every if one.row == row):
+        for cell in (other for other in every if other.row == row):
             value = values.get(cell.key)
             text = (
                 "-"
@@ -152,7 +152,7 @@ def _display_table(spec: GridSpec, values: MetricTable, verdicts: Mapping[tuple[
             )
             words.append(f"{text} {verdicts.get(cell.key, '')}".rstrip() if spec.holds else text)
         table.rows.append([row, *words])
-    for cell in (one for one in every if not one.column):
+    for cell in (other for other in every if not other.column):
         value = values.get(cell.key)
         text = (
             "-" if value is None else shown(value.number, value.unit, half=value.half, between=value.between)
@@ -166,7 +166,7 @@ def _display_table(spec: GridSpec, values: MetricTable, verdicts: Mapping[tuple[
 def _down_to(spec: GridSpec, column: str, verdicts: Mapping[tuple[str, str], str]) -> str:
     """Return the last row of a column down to which all claims about its cells hold."""
     last = ""
-    for cell in (one for one in cells(spec) if one.column == column):
+    for cell in (other for other in cells(spec) if other.column == column):
         if verdicts.get(cell.key):
             return last or "-"
         last = cell.row

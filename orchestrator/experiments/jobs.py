@@ -109,7 +109,7 @@ class MeasuredRun:
     @property
     def warning_codes(self) -> tuple[str, ...]:
         """Codes of the warnings about the course of the run."""
-        return tuple(one.code for one in warnings_in(self.diagnostics))
+        return tuple(diagnostic.code for diagnostic in warnings_in(self.diagnostics))
 
     @property
     def reason(self) -> str | None:
@@ -184,25 +184,25 @@ def ready(
         BuildError: stale FMUs cannot be built.
         ScenarioError: some jobs cannot start; lists each error once.
     """
-    planner, found = planner or Planner(), []
+    planner, planned_jobs = planner or Planner(), []
     errors: dict[Hashable, Diagnostic] = {}
     plan: Plan | None = None
     for number, job in enumerate(jobs, start=1):
         try:
             plan = planned(job, planner)[1].sharing(plan)
-            found.append(replace(job, plan=plan))
+            planned_jobs.append(replace(job, plan=plan))
         except BuildError:
             raise
         except YawbenchError as error:
-            for one in error.diagnostics:
-                errors.setdefault(*group(one))
+            for diagnostic in error.diagnostics:
+                errors.setdefault(*group(diagnostic))
         progress(number)
     if errors:
         shown = list(errors.values())[:MANY]
         more = f"and {len(errors) - MANY} more problems"
         omitted = [Diagnostic("errors-omitted", more)] if len(errors) > MANY else []
         raise ScenarioError([*shown, *omitted])
-    return found
+    return planned_jobs
 
 
 def keyed(job: Job, metrics: MetricRequests = ()) -> Job:
@@ -226,8 +226,8 @@ def run_job(job: Job, opener: OpenInstance | None = None) -> MeasuredRun:
 
     plan, clock, run = job.plan or planned(job)[1], StepClock(), None
     with opener_of(plan, job.call_limit) as own:
-        given = opener or own
-        timed = timing(given, job.timed, clock) if job.timed and job.call_limit is None else given
+        opening = opener or own
+        timed = timing(opening, job.timed, clock) if job.timed and job.call_limit is None else opening
         if job.keep:
             apart = timed is own  # a step clock and instances in plain Python need this process
             run = simulate(plan, job.out, opener=timed, format=job.format, apart=apart).id
@@ -271,7 +271,8 @@ def _judged(results: Results, name: str, angle: float | None) -> MetricValues:
 
     judged = TESTS[name].evaluate(trace_of(results, name), angle)
     quantities = {
-        key: None if one.value is None else (one.value, one.unit) for key, one in judged.quantities.items()
+        key: None if quantity.value is None else (quantity.value, quantity.unit)
+        for key, quantity in judged.quantities.items()
     }
     verdicts = {
         criterion: None if verdict.holds is None else (float(verdict.holds), "1")

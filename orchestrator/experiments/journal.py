@@ -153,10 +153,10 @@ class Journal:
         if whole != [line + b"\n" for line in lines]:
             self._replace(b"".join(whole))
 
-    def _check(self, found: _Head, wanted: _Head) -> None:
-        if found.sweep != wanted.sweep:
-            self._refuse(found.sweep)
-        if found.format != wanted.format:
+    def _check(self, head: _Head, wanted: _Head) -> None:
+        if head.sweep != wanted.sweep:
+            self._refuse(head.sweep)
+        if head.format != wanted.format:
             self._refuse("another version of this program")
 
     def _refuse(self, other: str) -> NoReturn:
@@ -189,7 +189,7 @@ class Journal:
                 _Entry(
                     key=key,
                     values=record.values,
-                    diagnostics=[one.record() for one in record.diagnostics],
+                    diagnostics=[diagnostic.record() for diagnostic in record.diagnostics],
                     ended=record.ended,
                 )
             )
@@ -222,12 +222,12 @@ def _content(line: bytes) -> dict[str, Any]:
         ValueError: it is not a JSON object.
     """
     try:
-        found = json.loads(line)
+        content = json.loads(line)
     except (ValueError, RecursionError):
         raise ValueError("is no JSON") from None
-    if not isinstance(found, dict):
+    if not isinstance(content, dict):
         raise ValueError("is not a JSON object")
-    return found
+    return content
 
 
 def _is_earlier(line: bytes) -> bool:

@@ -40,13 +40,13 @@ def is_finite(value: object) -> bool:
     return abs(value) <= sys.float_info.max  # also right for integers too large for a float
 
 
-def si_number(given: float | str, unit: str) -> float:
+def si_number(value: float | str, unit: str) -> float:
     """Return a number in SI units, from a plain number or text with a unit; `%` is a ratio.
 
     Raises:
         ValueError: the text is not a quantity of this unit; says what is expected.
     """
-    return float(convert(given, "1" if unit == "%" else unit) if isinstance(given, str) else given)
+    return float(convert(value, "1" if unit == "%" else unit) if isinstance(value, str) else value)
 
 
 def _number(value: object) -> float | int:
@@ -144,8 +144,8 @@ def ranks(x: Sequence[float]) -> np.ndarray:
     array = np.asarray(x, dtype=float)
     below = (array[:, None] > array[None, :]).sum(axis=1)
     equal = (array[:, None] == array[None, :]).sum(axis=1)
-    found: np.ndarray = below + (equal + 1) / 2
-    return found
+    average: np.ndarray = below + (equal + 1) / 2
+    return average
 
 
 def rank_correlation(x: Sequence[float], y: Sequence[float]) -> float | None:

@@ -62,7 +62,7 @@ def check_names(experiment: LoadedExperiment, document: Document) -> None:
     _check_correlations(spec, document)
     _check_limits(spec, document)
     for i, figure in enumerate(spec.figures):
-        if figure.name in [one.name for one in spec.figures[:i]]:
+        if figure.name in [other.name for other in spec.figures[:i]]:
             document.report(
                 ("figures", i, "name"), f"there is already a figure {figure.name!r}", "name-duplicate"
             )
@@ -135,8 +135,8 @@ def _patterns(spec: ExperimentSpec) -> Iterator[tuple[Sequence[str], KeyPath]]:
         yield axis.runs, ("axes", name)
     for i, table in enumerate(spec.tables):
         yield table.runs, ("tables", i)
-    for name, one in spec.region.open_values.items() if spec.region else ():
-        yield one.runs, ("region", "open_values", name)
+    for name, open_value in spec.region.open_values.items() if spec.region else ():
+        yield open_value.runs, ("region", "open_values", name)
     if spec.tuning:
         yield spec.tuning.runs, ("tuning",)
     for i, figure in enumerate(spec.figures):

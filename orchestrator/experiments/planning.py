@@ -119,12 +119,12 @@ def plan_experiment(
     plans = [job.plan for job in jobs if job.plan]
     made_up = list(map(results_to_be, {tuple(plan.record): plan for plan in plans}.values()))
     if not experiment.spec.metrics and not any(job.test for job in jobs):
-        found = {
+        standard = {
             name: MetricSpec.model_validate({"metric": name})
             for name in STANDARD
             if any(unit_in(results, metric(name)) for results in made_up)
         }
-        experiment = replace(experiment, spec=experiment.spec.model_copy(update={"metrics": found}))
+        experiment = replace(experiment, spec=experiment.spec.model_copy(update={"metrics": standard}))
     units, metric_units = _units(experiment, plans), _metric_units(experiment, made_up)
     if experiment.spec.axes:
         requests = {name: metrics_of(experiment, run) for name, run in experiment.runs.items()}
@@ -145,8 +145,8 @@ def _metric_units(experiment: LoadedExperiment, made_up: list[Results]) -> dict[
     units: dict[str, str] = {}
     errors = []
     for key, spec in experiment.spec.metrics.items():
-        found = (unit_in(results, metric(spec.metric)) for results in made_up)
-        unit = next((unit for unit in found if unit is not None), None)
+        units_of_metric = (unit_in(results, metric(spec.metric)) for results in made_up)
+        unit = next((unit for unit in units_of_metric if unit is not None), None)
         if unit is None:
             place = f"{experiment.path}: metrics.{key}"
             errors.append(f"{place}: no run records the signals of {spec.metric}")
@@ -172,8 +172,8 @@ def _bounds(experiment: LoadedExperiment, units: dict[str, str]) -> Iterable[tup
             yield dotted(key), unit, condition.bound
     for i, figure in enumerate(spec.figures):
         for name in ("largest", "mark"):
-            if figure.metric in units and (given := getattr(figure, name)) is not None:
-                yield f"figures[{i}].{name}", units[figure.metric], given
+            if figure.metric in units and (bound := getattr(figure, name)) is not None:
+                yield f"figures[{i}].{name}", units[figure.metric], bound
 
 
 def _units(experiment: LoadedExperiment, every: list[Plan]) -> dict[str, str]:

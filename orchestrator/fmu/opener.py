@@ -28,7 +28,8 @@ HOME = Path(fmus.__file__).resolve().parent
 """Folder of the FMUs of the project's own components."""
 
 
-def _say(text: str) -> None:
+def report_to_stderr(text: str) -> None:
+    """Print a line, at once."""
     print(printable(text), file=sys.stderr, flush=True)
 
 
@@ -46,7 +47,7 @@ class Opener:
         self,
         *,
         build: bool = False,
-        report: Callable[[str], None] = _say,
+        report: Callable[[str], None] = report_to_stderr,
         opened: Mapping[Path, Fmu] | None = None,
     ) -> None:
         self.build = build

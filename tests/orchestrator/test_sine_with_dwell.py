@@ -283,13 +283,13 @@ def test_a_series_passes_only_if_no_run_is_missing_fails_or_is_not_judged():
             made[5].rule("stability", spoil)
         return [one for k, one in enumerate(made) if k != without]
 
-    assert judge_series(runs(), A).found["verdict"] is Status.PASSED
+    assert judge_series(runs(), A).data["verdict"] is Status.PASSED
     missing = judge_series(runs(without=3), A)
-    assert missing.found["verdict"] is Status.FAILED
+    assert missing.data["verdict"] is Status.FAILED
     assert golden(missing.criteria["stability"].why)
     failed = judge_series(runs(spoil=Verdict(Status.FAILED)), A)
     assert golden(failed.criteria["stability"].why)
-    assert judge_series(runs(spoil=not_judged("too short")), A).found["verdict"] is Status.FAILED
+    assert judge_series(runs(spoil=not_judged("too short")), A).data["verdict"] is Status.FAILED
 
 
 def test_runs_of_one_amplitude_are_no_series():

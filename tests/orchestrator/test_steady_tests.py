@@ -203,7 +203,7 @@ def test_a_series_counts_no_clean_run_above_one_that_was_not():
             run(15.0, Status.PASSED),
         ]
     )
-    assert series.found == {"highest_clean_entry_speed": 16.0, "lowest_not_clean": 17.0}
+    assert series.data == {"highest_clean_entry_speed": 16.0, "lowest_not_clean": 17.0}
     assert golden(series.summary)
     assert golden(judge_entry_speeds([run(15.0, False)]).summary)
 
