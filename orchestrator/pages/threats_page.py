@@ -244,10 +244,13 @@ def gains_sentence(found: GainsAndLaws) -> str:
 
 
 def discipline_tables(result: ThreatResult) -> list[Table]:
-    """Return a table per discipline: quantities as means over cars, and their score with interval."""
+    """Return a table per discipline driven: quantities as means over cars, and their score with interval."""
     titles, tables = titles_of(result), []
     entries = result.complete[result.threats.main]
+    driven = {discipline for discipline, _, _ in result.quantities}
     for name, spec in result.threats.spec.disciplines.items():
+        if name not in driven:
+            continue
         cars = spec.cars or result.threats.spec.cars
         magnitudes = np.array([
             [
