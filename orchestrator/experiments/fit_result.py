@@ -91,29 +91,31 @@ class FitResult:
     @cached_property
     def scores(self) -> dict[tuple[str, str, str], Score]:
         """(Title of the model, part, signal) -> score."""
-        found = {}
+        scores = {}
         for model in self.models:
             for part in PARTS:
                 for name in self.fit.errors:
                     pairs = self._pairs(model, part, name)
                     if pairs:
-                        found[model.title, part, name] = score_of(pairs)
-        return found
+                        scores[model.title, part, name] = score_of(pairs)
+        return scores
 
     def _pairs(self, model: FittedModel, part: str, name: str) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return measured and simulated values of the compared samples of each window."""
         pairs = []
-        for one, signals in zip(self.windows(part), model.simulated[part], strict=True):
+        for fit_window, signals in zip(self.windows(part), model.simulated[part], strict=True):
             if signals is None or name not in signals:
                 return []
-            compared = one.window.times >= one.window.times[0] + self.fit.settling - 1e-9
-            pairs.append((one.window.measured[name][compared], signals[name][compared]))
+            compared = fit_window.window.times >= fit_window.window.times[0] + self.fit.settling - 1e-9
+            pairs.append((fit_window.window.measured[name][compared], signals[name][compared]))
         return pairs
 
     def loss(self, model: FittedModel, part: str) -> float:
         """Return the mean square of differences over expected ones; infinite if a run failed."""
         own = [(self.scores.get((model.title, part, name)), error) for name, error in self.fit.errors.items()]
-        return float(np.mean([math.inf if one is None else (one.rms / error) ** 2 for one, error in own]))
+        return float(
+            np.mean([math.inf if score is None else (score.rms / error) ** 2 for score, error in own])
+        )
 
     @property
     def verdict(self) -> str:
@@ -138,28 +140,29 @@ class FitResult:
                 "sha256": of.sha256,
             },
             "verdict": self.verdict,
-            "models": {one.title: self._of_model(one) for one in self.models},
+            "models": {model.title: self._of_model(model) for model in self.models},
         }  # fmt: skip
 
     def _of_model(self, model: FittedModel) -> dict[str, Any]:
-        found, intervals = model.estimate, model.estimate.intervals()
+        fitted, intervals = model.estimate, model.estimate.intervals()
         return {
             "parameters": {
-                one.name: {
-                    "value": found.values[one.name], "interval": intervals[one.name], "start": one.start,
-                    "low": one.low, "high": one.high, "prior": one.prior, "unit": one.unit,
-                    "at_bound": one.name in found.at_bound,
+                parameter.name: {
+                    "value": fitted.values[parameter.name], "interval": intervals[parameter.name],
+                    "start": parameter.start, "low": parameter.low, "high": parameter.high,
+                    "prior": parameter.prior, "unit": parameter.unit,
+                    "at_bound": parameter.name in fitted.at_bound,
                 }
-                for one in model.parameters
+                for parameter in model.parameters
             },
             "level": LEVEL,
-            "pieces": found.pieces,
-            "condition": found.identifiability.condition,
-            "weakest": found.identifiability.weakest,
-            "correlations": found.correlated(),
-            "sets": found.sets,
-            "loss": found.loss,
-            "ended": found.message,
+            "pieces": fitted.pieces,
+            "condition": fitted.identifiability.condition,
+            "weakest": fitted.identifiability.weakest,
+            "correlations": fitted.correlated(),
+            "sets": fitted.sets,
+            "loss": fitted.loss,
+            "ended": fitted.message,
             "scores": {
                 part: {
                     name: vars(self.scores[model.title, part, name])
@@ -230,13 +233,13 @@ def _fitted(
     say: Callable[[str], None],
     known: Path | None,
 ) -> FittedModel:
-    windows = [one.window for one in fit.training]
+    windows = [fit_window.window for fit_window in fit.training]
     residuals = Residuals(
         model, windows, parameters, fit.errors,
         settling=fit.settling, say=say, folder=known, identity=model.identity,
     )  # fmt: skip
     try:
-        found = estimate(residuals, most_sets=fit.spec.most_sets)
+        fitted = estimate(residuals, most_sets=fit.spec.most_sets)
     except NotIdentifiable as error:
         condition = error.identifiability.condition
         raise ScenarioError(
@@ -249,7 +252,7 @@ def _fitted(
             f"{fit.path}: the run of the start values in {error} fails: {model.failure or 'it ended early'}",
             code="fit-start",
         ) from None
-    return FittedModel(model.base.title or "scenario", parameters, found, {})
+    return FittedModel(model.base.title or "scenario", parameters, fitted, {})
 
 
 def _shown(
@@ -258,10 +261,10 @@ def _shown(
     """Return simulated signals with the delays and offsets of the measurement."""
     windows = {"training": fit.training, "held_out": fit.held_out}
 
-    def as_seen(one: FitWindow, signals: Simulated) -> Simulated:
+    def as_seen(fit_window: FitWindow, signals: Simulated) -> Simulated:
         return signals and {
             name: as_measured(
-                one.window.times,
+                fit_window.window.times,
                 x,
                 *(values.get(f"{MEASURED}.{name}.{of}", 0.0) for of in ("delay", "offset")),
             )
@@ -269,7 +272,7 @@ def _shown(
         }
 
     return {
-        part: [as_seen(one, signals) for one, signals in zip(windows[part], several, strict=True)]
+        part: [as_seen(window, signals) for window, signals in zip(windows[part], several, strict=True)]
         for part, several in simulated.items()
     }
 
@@ -289,7 +292,7 @@ def _single_track(
     known = dict(fit.measurement.vehicle)
     wanted = ("mass", "cg_to_front_axle", "cg_to_rear_axle")
     car = [known.get(name, model.plant.parameter(name)) for name in wanted]
-    if not all(isinstance(one, (int, float)) for one in car):
+    if not all(isinstance(value, (int, float)) for value in car):
         raise ValueError("the plant has no mass, or no distances of its axles")
     mass, front, rear = map(float, car)  # type: ignore[arg-type]
     weight = mass * 9.81 / (front + rear)
@@ -301,35 +304,35 @@ def _single_track(
         for name, start in zip(PARAMETERS, starts, strict=True)
     ]
     steering = {"steer_angle", "steering_wheel_angle"}
-    for one in parameters:
-        _, _, rest = one.name.partition(".")
+    for parameter in parameters:
+        _, _, rest = parameter.name.partition(".")
         signal, _, of = rest.rpartition(".")
-        if one.name.startswith(f"{MEASURED}."):
+        if parameter.name.startswith(f"{MEASURED}."):
             if signal in steering:
                 ratio = _ratio(fit, model) if signal != "steer_angle" and of == "offset" else 1.0
                 own.append(
-                    replace(one, name=f"steer_angle.{of}", start=one.start / ratio, low=one.low / ratio,
-                            high=one.high / ratio, prior=None)
+                    replace(parameter, name=f"steer_angle.{of}", start=parameter.start / ratio,
+                            low=parameter.low / ratio, high=parameter.high / ratio, prior=None)
                 )  # fmt: skip
-            elif one.kind != "run" and signal in errors:
-                own.append(one)
+            elif parameter.kind != "run" and signal in errors:
+                own.append(parameter)
     parts = {"training": fit.training, "held_out": fit.held_out}
     models = {
-        part: SingleTrack([_inputs(fit, model, one) for one in windows], mass, front, rear)
+        part: SingleTrack([_inputs(fit, model, fit_window) for fit_window in windows], mass, front, rear)
         for part, windows in parts.items()
     }
-    filtered = {part: _Filtered(fit, one) for part, one in models.items()}
+    filtered = {part: _Filtered(fit, single_track) for part, single_track in models.items()}
     residuals = Residuals(
         filtered["training"],
-        [one.window for one in fit.training],
+        [fit_window.window for fit_window in fit.training],
         own,
         errors,
         settling=fit.settling,
         say=say,
     )
-    found = estimate(residuals, most_sets=fit.spec.most_sets)
-    simulated = {part: one([found.values])[0] for part, one in filtered.items()}
-    return FittedModel("single track with Fiala tyres", own, found, _shown(fit, found.values, simulated))
+    fitted = estimate(residuals, most_sets=fit.spec.most_sets)
+    simulated = {part: single_track([fitted.values])[0] for part, single_track in filtered.items()}
+    return FittedModel("single track with Fiala tyres", own, fitted, _shown(fit, fitted.values, simulated))
 
 
 @dataclass(frozen=True)
@@ -341,27 +344,27 @@ class _Filtered:
 
     def __call__(self, sets: Sequence[Mapping[str, float]]) -> list[list[Simulated]]:
         low_pass = self.fit.measurement.filter
-        found = self.model(sets)
+        responses = self.model(sets)
         if low_pass is None:
-            return found
-        rates = [1.0 / float(one.window.times[1] - one.window.times[0]) for one in self.model.windows]
+            return responses
+        rates = [1.0 / float(w.window.times[1] - w.window.times[0]) for w in self.model.windows]
         return [
             [
                 signals and {name: low_pass(x, rate) for name, x in signals.items()}
                 for signals, rate in zip(several, rates, strict=True)
             ]
-            for several in found
+            for several in responses
         ]
 
 
-def _inputs(fit: LoadedFit, model: ScenarioModel, one: FitWindow) -> SingleTrackWindow:
+def _inputs(fit: LoadedFit, model: ScenarioModel, fit_window: FitWindow) -> SingleTrackWindow:
     """Return a window with the inputs of the single track.
 
     Raises:
         ValueError: steering or speed is not measured.
     """
-    times = one.window.times
-    raw = one.raw.between(float(times[0]) - MARGIN, float(times[-1]) + MARGIN)
+    times = fit_window.window.times
+    raw = fit_window.raw.between(float(times[0]) - MARGIN, float(times[-1]) + MARGIN)
     if "steer_angle" in raw.signals:
         steer_angle = raw.signals["steer_angle"]
     elif "steering_wheel_angle" in raw.signals:
@@ -370,10 +373,10 @@ def _inputs(fit: LoadedFit, model: ScenarioModel, one: FitWindow) -> SingleTrack
         raise ValueError("no steering angle is measured")
     if "velocity_x" not in raw.signals:
         raise ValueError("velocity_x is not measured")
-    start = start_states(one.filtered, float(times[0]))
+    start = start_states(fit_window.filtered, float(times[0]))
     sideways = start["initial_speed"] * math.sin(start.get("initial_sideslip", 0.0))
     states = sideways, start.get("initial_yaw_rate", 0.0)
-    return SingleTrackWindow(one.window, raw.time, steer_angle, raw.signals["velocity_x"], states)
+    return SingleTrackWindow(fit_window.window, raw.time, steer_angle, raw.signals["velocity_x"], states)
 
 
 def _ratio(fit: LoadedFit, model: ScenarioModel) -> float:
@@ -383,8 +386,11 @@ def _ratio(fit: LoadedFit, model: ScenarioModel) -> float:
         ValueError: neither the measurement nor the scenario has it.
     """
     known = fit.measurement.vehicle.get("steering_ratio")
-    units = (one.parameter("steering_ratio") for one in model.base.instances)
-    ratio = known or next((float(one) for one in units if isinstance(one, (int, float))), None)
+    ratios = (instance.parameter("steering_ratio") for instance in model.base.instances)
+    ratio = known or next(
+        (float(value) for value in ratios if isinstance(value, (int, float))),
+        None,
+    )
     if ratio is None:
         raise ValueError("the steering ratio is unknown")
     return ratio
@@ -398,15 +404,15 @@ def free_parameters(fit: LoadedFit, model: ScenarioModel) -> list[Parameter]:
     """
     document = yaml_lines.read(fit.path, what="fit file")
     followed = set(model.followed.values())
-    found = []
+    free = []
     for name, spec in fit.spec.free.items():
         try:
-            found.append(_parameter(name, spec, fit, model, followed))
+            free.append(_parameter(name, spec, fit, model, followed))
         except ValueError as error:  # noqa: PERF203 - all are reported
             document.report(("free", name), str(error), code_of(error))
     if document.errors:
         raise ScenarioError(document.sorted_errors())
-    return found
+    return free
 
 
 def _parameter(
@@ -416,7 +422,7 @@ def _parameter(
     if name.startswith(f"{MEASURED}."):
         _, signal, *rest = [*name.split("."), ""]
         if rest[:1] not in (["delay"], ["offset"]) or signal not in {*fit.errors, *followed}:
-            known = [f"{MEASURED}.{one}.offset" for one in (*fit.errors, *sorted(followed))]
+            known = [f"{MEASURED}.{name}.offset" for name in (*fit.errors, *sorted(followed))]
             guess = hint(name, known, lead="known are")
             raise ValueError(f"must be delay or offset of a signal that is compared or followed{guess}")
         unit = "s" if rest[0] == "delay" else SIGNALS[signal].unit

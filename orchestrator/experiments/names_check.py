@@ -92,7 +92,7 @@ def _names(spec: ExperimentSpec) -> Iterator[tuple[str, str, KeyPath]]:
             yield "metric", source.metric, ("derived", name, "of", word, "metric")
         if number.rank_correlation is not None:
             yield "grid", number.rank_correlation, ("derived", name, "rank_correlation")
-    for group, i, claim in spec.said():
+    for group, i, claim in spec.assertions():
         for k, name in enumerate(claim.open_values or ()):
             yield "open value", name, (group, i, "open_values", k)
     if spec.tuning:

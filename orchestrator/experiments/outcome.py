@@ -84,7 +84,7 @@ class ExperimentResult:
         """Name and SHA-256 of the FMUs of all runs, from the plans or else from the run records; sorted."""
         if self.planned:
             return sorted((fmu.name, digest) for digest, fmu in self.planned.fmus.items())
-        recorded = (fmu for one in self.results.values() for fmu in one.record.fmus.values())
+        recorded = (fmu for results in self.results.values() for fmu in results.record.fmus.values())
         return sorted({(fmu.name, fmu.sha256) for fmu in recorded if fmu.name and fmu.sha256})
 
     def words(self, case: Case) -> str:
@@ -97,21 +97,21 @@ class ExperimentResult:
 
     def value(self, case: Case, key: str) -> MetricValue | None:
         """Return a metric of a case; None if the case failed or yields none."""
-        found = self.record(case).values.get(key)
-        return None if found is None else MetricValue(*found)
+        numbers = self.record(case).values.get(key)
+        return None if numbers is None else MetricValue(*numbers)
 
     def unit(self, key: str) -> str:
         """Return the unit of a metric."""
         if self.planned:
             return self.planned.metric_units[key]
-        found = (self.value(case, key) for case in self.experiment.cases)
-        return next((value.unit for value in found if value), "1")
+        values = (self.value(case, key) for case in self.experiment.cases)
+        return next((value.unit for value in values if value), "1")
 
     @cached_property
     def at(self) -> dict[DesignPoint, dict[tuple[str, str], MetricValue]]:
         """Setting -> (run, metric) -> value, where there is one; over repeats the mean, median or share."""
         repeated = any(axis.repeats for axis in self.spec.axes.values())
-        kinds = {key: one.over_repeats for key, one in self.spec.metrics.items()} if repeated else {}
+        kinds = {key: spec.over_repeats for key, spec in self.spec.metrics.items()} if repeated else {}
         return self._means(
             self._at_points,
             lambda key, setting: len(self._cases.get((key[0], setting), ())),
@@ -120,13 +120,13 @@ class ExperimentResult:
 
     @cached_property
     def _at_points(self) -> dict[DesignPoint, dict[tuple[str, str], MetricValue]]:
-        found: dict[DesignPoint, dict[tuple[str, str], MetricValue]] = {}
+        at_points: dict[DesignPoint, dict[tuple[str, str], MetricValue]] = {}
         for case in self.experiment.cases:
-            here = found.setdefault(case.point, {})
+            here = at_points.setdefault(case.point, {})
             for key in self.spec.metrics:
                 if (value := self.value(case, key)) is not None:
                     here[case.run.name, key] = value
-        return found
+        return at_points
 
     @property
     def values(self) -> MetricTable:
@@ -144,7 +144,7 @@ class ExperimentResult:
 
     def _means(
         self,
-        found: Mapping[DesignPoint, Mapping[K, MetricValue]],
+        at_points: Mapping[DesignPoint, Mapping[K, MetricValue]],
         repeats_of: Callable[[K, DesignPoint], int] | None = None,
         kind_of: Callable[[K], str] = lambda key: "mean",
     ) -> dict[DesignPoint, dict[K, MetricValue]]:
@@ -154,7 +154,7 @@ class ExperimentResult:
         `kind_of`: which statistic of a key, as in a metric's `over_repeats`.
         """
         repeats: dict[DesignPoint, list[Mapping[K, MetricValue]]] = {}
-        for point, values in found.items():
+        for point, values in at_points.items():
             repeats.setdefault(self.experiment.setting(point), []).append(values)
         means: dict[DesignPoint, dict[K, MetricValue]] = {}
         for setting, several in repeats.items():
@@ -177,10 +177,10 @@ class ExperimentResult:
 
     @cached_property
     def _cases(self) -> dict[tuple[str, DesignPoint], list[Case]]:
-        found: dict[tuple[str, DesignPoint], list[Case]] = {}
+        cases: dict[tuple[str, DesignPoint], list[Case]] = {}
         for case in self.experiment.cases:
-            found.setdefault((case.run.name, self.experiment.setting(case.point)), []).append(case)
-        return found
+            cases.setdefault((case.run.name, self.experiment.setting(case.point)), []).append(case)
+        return cases
 
     def failure(self, run: NamedRun, setting: DesignPoint) -> str:
         """Return why a run, or the first failed repeat of it, failed at a setting; "" if none did."""
@@ -241,7 +241,7 @@ class ExperimentResult:
         planned = self.planned and replace(self.planned, jobs=[], fmus={
             digest: replace(fmu, variables={}) for digest, fmu in self.planned.fmus.items()
         })  # fmt: skip
-        recorded = {} if planned else {k: replace(one, columns={}) for k, one in self.results.items()}
+        recorded = {} if planned else {k: replace(results, columns={}) for k, results in self.results.items()}
         return ExperimentResult(self.experiment, self.records, recorded, planned)
 
     def remarkable(self) -> str:
@@ -253,8 +253,8 @@ class ExperimentResult:
 
 def judge_records(planned: PlannedExperiment, records: Mapping[str, MeasuredRun]) -> ExperimentResult:
     """Return the result of an experiment with axes; `records`: job key -> record of the run."""
-    found = [records.get(job.key, NOT_MADE) for job in planned.jobs]
-    return ExperimentResult(planned.experiment, found, {}, planned)
+    recorded = [records.get(job.key, NOT_MADE) for job in planned.jobs]
+    return ExperimentResult(planned.experiment, recorded, {}, planned)
 
 
 def judge_results(
@@ -296,18 +296,18 @@ def judge_results(
 
 def derive(spec: ExperimentSpec, values: MetricTable) -> dict[str, MetricValue]:
     """Compute the derived numbers, without those whose runs are missing."""
-    found: dict[str, MetricValue] = {}
-    for key, one in spec.derived.items():
+    derived: dict[str, MetricValue] = {}
+    for key, entry in spec.derived.items():
         number = None
-        if one.rank_correlation is not None:
-            number = correlation(spec.grids[one.rank_correlation], values, one.only)
-        elif one.expression is not None:
-            known = {word: values.get((source.run, source.metric)) for word, source in one.of.items()}
+        if entry.rank_correlation is not None:
+            number = correlation(spec.grids[entry.rank_correlation], values, entry.only)
+        elif entry.expression is not None:
+            known = {word: values.get((source.run, source.metric)) for word, source in entry.of.items()}
             numbers = {word: value.number for word, value in known.items() if value is not None}
-            number = calculate(one.expression, numbers) if len(numbers) == len(known) else None
+            number = calculate(entry.expression, numbers) if len(numbers) == len(known) else None
         if number is not None:
-            found[key] = MetricValue(number, one.unit)
-    return found
+            derived[key] = MetricValue(number, entry.unit)
+    return derived
 
 
 @dataclass(frozen=True)
@@ -330,12 +330,12 @@ def limits_of(findings: ExperimentResult, spec: LimitSpec) -> list[Limit]:
     for case in experiment.first_cases:
         setting = experiment.setting(case.point)
         lines.setdefault((case.run.name, setting[:at] + setting[at + 1 :]), []).append(case)
-    found = []
+    limits = []
     for (name, setting), cases in lines.items():
         others = {RUN: Level(name, cases[0].run.label)} if name else {}
-        others |= zip((one for one in names if one != spec.of), setting, strict=True)
-        found.append(_limit(findings, spec, others, cases, at))
-    return found
+        others |= zip((axis for axis in names if axis != spec.of), setting, strict=True)
+        limits.append(_limit(findings, spec, others, cases, at))
+    return limits
 
 
 def _limit(
@@ -366,12 +366,13 @@ def kept_cases(findings: ExperimentResult) -> frozenset[int]:
         return frozenset()
     if spec.keep == "all":
         return frozenset(case.number for case in cases)
-    limits = [limit for one in spec.limits.values() for limit in limits_of(findings, one)]
+    limits = [limit for limit_spec in spec.limits.values() for limit in limits_of(findings, limit_spec)]
     beside = {case.number for limit in limits for case in limit.cases if findings.record(case).made}
     failed = {
         case.number
         for case in cases
-        if (record := findings.record(case)).failed and not {one.code for one in record.diagnostics} & {*LOST}
+        if (record := findings.record(case)).failed
+        and not {diagnostic.code for diagnostic in record.diagnostics} & {*LOST}
     }
     return frozenset(beside | failed)
 
@@ -380,11 +381,11 @@ def limit_table(findings: ExperimentResult, name: str) -> Table:
     """Return the table of a limit, one row per run and setting of the other axes."""
     planned, spec = findings.planned, findings.spec.limits[name]
     assert planned is not None
-    found = limits_of(findings, spec)
-    others = [one if one == RUN else f"{one}{planned.axis_unit(one)}" for one in found[0].others]
+    limits = limits_of(findings, spec)
+    others = [axis if axis == RUN else f"{axis}{planned.axis_unit(axis)}" for axis in limits[0].others]
     title, headings = f"{spec.says}{planned.axis_unit(spec.of)}", [*others, "up to", "not any more at"]
     table = Table(title, headings, numbers={len(others), len(others) + 1})
-    for limit in found:
+    for limit in limits:
         words: list[Cell] = [level.words for level in limit.others.values()]
         up_to = "-" if limit.largest is None else digits_of(limit.largest)
         beyond = "-" if limit.beyond is None else digits_of(limit.beyond)

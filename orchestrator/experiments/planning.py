@@ -224,7 +224,7 @@ def reached(plan: Plan, target: Target) -> Iterator[tuple[Instance, Variable]]:
 
 def found_at(plan: Plan, target: Target) -> tuple[Given, str] | None:
     """Return the value and unit that an override target has in a plan; None if it has no such target."""
-    instance = next((one for one in plan.instances if one.name == target.instance), None)
+    instance = next((planned for planned in plan.instances if planned.name == target.instance), None)
     if target.kind == "fmu":
         return (instance.fmu.name, "") if instance else None
     if target.kind == "vehicle_file":
@@ -239,8 +239,8 @@ def found_at(plan: Plan, target: Target) -> tuple[Given, str] | None:
     if target.kind == "setting" and target.is_time and instance:
         return float(instance.period * plan.step), "s"
     for instance, variable in reached(plan, target):
-        given = {**instance.parameters, **instance.constants}.get(variable.name, variable.start)
+        value = {**instance.parameters, **instance.constants}.get(variable.name, variable.start)
         of_vehicle = instance.origins.get(variable.name, DEFAULT).kind == "vehicle"
-        if given is not None and (of_vehicle or target.kind != "vehicle_parameter"):
-            return given, variable.unit or ""
+        if value is not None and (of_vehicle or target.kind != "vehicle_parameter"):
+            return value, variable.unit or ""
     return None

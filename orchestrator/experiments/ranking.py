@@ -86,10 +86,10 @@ class ConditionSpec(OverrideSpec):
 
     @field_validator("repeats")
     @classmethod
-    def _one_place(cls, given: dict[str, list[Scalar]]) -> dict[str, list[Scalar]]:
-        if len(given) > 1 or not all(given.values()):
+    def _one_place(cls, levels: dict[str, list[Scalar]]) -> dict[str, list[Scalar]]:
+        if len(levels) > 1 or not all(levels.values()):
             raise ValueError("repeats: one unit.parameter with its values")
-        return given
+        return levels
 
 
 class EntrySpec(StrictModel):
@@ -111,7 +111,7 @@ class EntriesSpec(StrictModel):
     @property
     def content(self) -> dict[str, Any]:
         """The entries as plain data, which the checksums are of."""
-        return {name: one.model_dump(exclude_defaults=True) for name, one in self.entries.items()}
+        return {name: entry.model_dump(exclude_defaults=True) for name, entry in self.entries.items()}
 
     @property
     def edited(self) -> str:
@@ -119,7 +119,7 @@ class EntriesSpec(StrictModel):
         if self.checksums:
             words = what_changed(self.content, self.checksums)
             return f"{words} since `yawbench tune` wrote it" if words else ""
-        if any(one.gains == "tuned" for one in self.entries.values()):
+        if any(entry.gains == "tuned" for entry in self.entries.values()):
             return "has no checksums, so its tuned gains are taken as they are"
         return ""
 
@@ -187,15 +187,15 @@ class LoadedRanking:
     def conditions(self) -> dict[str, ConditionSpec]:
         """The selected conditions."""
         return {
-            name: one
-            for name, one in self.spec.conditions.items()
-            if (name in self.chosen if self.chosen else one.quick or not self.quick)
+            name: condition
+            for name, condition in self.spec.conditions.items()
+            if (name in self.chosen if self.chosen else condition.quick or not self.quick)
         }
 
     @cached_property
     def cars(self) -> list[str]:
         """Names of the cars of the selected conditions."""
-        return list(dict.fromkeys(one.car for one in self.conditions.values()))
+        return list(dict.fromkeys(condition.car for condition in self.conditions.values()))
 
     def changes(self, *parts: OverrideSpec, stop: bool = True) -> tuple[Override, ...]:
         """Return the overrides of the ranking and of parts of its file; the last one of a target counts."""
@@ -204,7 +204,10 @@ class LoadedRanking:
             for name, value in (("step_size", self.spec.step_size), ("stop_time", self.spec.stop_time))
             if value is not None and (stop or name != "stop_time")
         ]
-        return (*own, *(one for part in parts for one in changes_of_file(part, self.path.parent, "ranking")))
+        return (
+            *own,
+            *(change for part in parts for change in changes_of_file(part, self.path.parent, "ranking")),
+        )
 
     def variant(self, name: str) -> VariantSpec:
         """Return an entry as a level of an axis: its controller is put into a scenario."""
@@ -248,29 +251,29 @@ def load_ranking(
     spec = validate(RankingSpec, document)
     if spec is None or document.errors:
         raise ScenarioError(document.sorted_errors())
-    entries = {name: (one, path.parent) for name, one in spec.entries.items()}
+    entries = {name: (entry, path.parent) for name, entry in spec.entries.items()}
     edited: list[str] = []
     for name in spec.more_entries:
         file = path.parent / name
         listed = yaml_lines.read(file, what="file of entries")
-        found = validate(EntriesSpec, listed)
-        if found is None or listed.errors:
+        validated = validate(EntriesSpec, listed)
+        if validated is None or listed.errors:
             raise ScenarioError(listed.sorted_errors())
-        if words := found.edited:
+        if words := validated.edited:
             edited.append(f"{file}: {words}")
             warn_of_record(edited[-1])
-        for key, one in found.entries.items():
+        for key, entry in validated.entries.items():
             if key in entries:
                 raise ScenarioError(
                     f"{file}: entries.{key}: there is already an entry {key!r}", code="name-duplicate"
                 )
-            entries[key] = (one, file.parent)
-    for key, one in (more or {}).items():
+            entries[key] = (entry, file.parent)
+    for key, entry in (more or {}).items():
         if key in entries:
             raise ScenarioError(
                 f"there is already an entry {key!r}: give the controller another name", code="name-duplicate"
             )
-        entries[key] = (one, Path())
+        entries[key] = (entry, Path())
     for name in chosen:
         if name not in spec.conditions:
             raise ScenarioError(
@@ -298,12 +301,12 @@ def angle_experiment(
         car = ranking.spec.cars[name]
         scenario, changes = ranking.path.parent / car.slow_steer, ranking.changes(car, stop=False)
         runs.append(NamedRun(name, car.title, car.title, scenario, changes, (SLOW, None)))
-    given = [
+    steer_amplitudes = [
         slow_steer_amplitude(plan, run.scenario) for run, plan in zip(runs, execute.plans(runs), strict=True)
     ]
     design = [
         (run.name, (Level(side * amplitude, words),))
-        for run, amplitude in zip(runs, given, strict=True)
+        for run, amplitude in zip(runs, steer_amplitudes, strict=True)
         for words, side in SIDES
     ]
     axes = {"side": axis_of_levels(AMPLITUDE, [level for _, (level,) in design])}
@@ -312,7 +315,7 @@ def angle_experiment(
 
 
 def angles_of(
-    ranking: LoadedRanking, found: ExperimentResult, cars: Sequence[str] | None = None
+    ranking: LoadedRanking, result: ExperimentResult, cars: Sequence[str] | None = None
 ) -> dict[str, float]:
     """Return car -> angle A [rad], from the result of `angle_experiment` for the same cars.
 
@@ -322,7 +325,7 @@ def angles_of(
     angles = {}
     for car in ranking.cars if cars is None else cars:
         judged = []
-        for case, record in zip(found.experiment.cases, found.records, strict=True):
+        for case, record in zip(result.experiment.cases, result.records, strict=True):
             if case.run.name == car:
                 measured = record.values.get("angle")
                 judged.append(Evaluation(car))
@@ -369,8 +372,10 @@ def dwell_experiment(
         "entry": DesignAxisSpec.model_construct(variants={n: ranking.variant(n) for n in ranking.entries})
     }
     for place, levels in repeated.items():
-        of = [name for name, one in ranking.conditions.items() if place in one.repeats]
-        axes[place] = axis_of_levels(place, [Level(*one) for one in levels.items()], runs=of, repeats=True)
+        of = [name for name, condition in ranking.conditions.items() if place in condition.repeats]
+        axes[place] = axis_of_levels(
+            place, [Level(*level) for level in levels.items()], runs=of, repeats=True
+        )
     axes["amplitude"] = axis_of_levels(AMPLITUDE, [point[-1] for _, point in design])
     return experiment_of(
         ranking.path, runs, title=ranking.spec.title, axes=axes, design=design, origin="ranking",

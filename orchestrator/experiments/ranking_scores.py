@@ -68,8 +68,8 @@ class RankedRun:
 
     def __getitem__(self, key: str) -> float | None:
         if key in ("margin", "speed_lost"):
-            found: float | None = getattr(self, key)
-            return found
+            value: float | None = getattr(self, key)
+            return value
         measured = self.record.values.get(key) if self.record else None
         return measured[0] if measured else None
 
@@ -78,8 +78,8 @@ class RankedRun:
         """Whether the regulation's criteria are met."""
         if self["stability"] != 1.0:
             return False
-        asked = self.dry and self.responsiveness_asked
-        return not asked or self["responsiveness"] == 1.0
+        required = self.dry and self.responsiveness_asked
+        return not required or self["responsiveness"] == 1.0
 
     @property
     def responsiveness_asked(self) -> bool:
@@ -133,29 +133,29 @@ class RankingCell:
     @property
     def missing(self) -> int:
         """The number of missing runs."""
-        return sum(one.record is None for one in self.runs)
+        return sum(run.record is None for run in self.runs)
 
     @property
     def passed(self) -> bool:
         """Whether all runs passed."""
-        return all(one.passed for one in self.runs)
+        return all(run.passed for run in self.runs)
 
     @property
     def state(self) -> str:
         """`passed`; `spun`: the criteria are met, beyond 20 degrees of sideslip; `failed`; `missing`."""
         if self.missing:
             return "missing"
-        return "passed" if self.passed else "spun" if all(one.met for one in self.runs) else "failed"
+        return "passed" if self.passed else "spun" if all(run.met for run in self.runs) else "failed"
 
     @property
     def worst(self) -> RankedRun:
         """The run that says most of the cell: one that fails before one that passes, of least margin."""
 
-        def rank(one: RankedRun) -> tuple[bool, bool, float, float]:
-            margin, slip = one["margin"], one["sideslip"]
+        def rank(run: RankedRun) -> tuple[bool, bool, float, float]:
+            margin, slip = run["margin"], run["sideslip"]
             return (
-                one.passed,
-                one.met,
+                run.passed,
+                run.met,
                 WORST if margin is None else margin,
                 -(math.pi if slip is None else slip),
             )
@@ -165,14 +165,14 @@ class RankingCell:
     @property
     def share(self) -> float:
         """Share of the runs that passed."""
-        return sum(one.passed for one in self.runs) / len(self.runs)
+        return sum(run.passed for run in self.runs) / len(self.runs)
 
     def _over_repeats(self, number: Callable[[list[RankedRun]], float]) -> ConfidenceInterval | None:
         """Average over repeats a number computed from the runs of each."""
         if self.missing:
             return None
-        repeats = dict.fromkeys(one.repeat for one in self.runs)
-        return interval([number([one for one in self.runs if one.repeat == r]) for r in repeats])
+        repeats = dict.fromkeys(run.repeat for run in self.runs)
+        return interval([number([run for run in self.runs if run.repeat == r]) for r in repeats])
 
     @cached_property
     def margin(self) -> ConfidenceInterval | None:
@@ -187,21 +187,21 @@ class RankingCell:
     @cached_property
     def displacement(self) -> float | None:
         """Smallest displacement of the runs at amplitudes where responsiveness counts [m]."""
-        asked = [one for one in self.runs if one.responsiveness_asked]
-        return min((x for one in asked if (x := one["displacement"]) is not None), default=None)
+        required = [run for run in self.runs if run.responsiveness_asked]
+        return min((x for run in required if (x := run["displacement"]) is not None), default=None)
 
     def number(self, key: str) -> float | None:
         """Return the margin, the sideslip, or the mean of another metric over all runs that have it."""
         if key in ("margin", "sideslip"):
             over: ConfidenceInterval | None = getattr(self, key)
             return over.mean if over else None
-        found = [x for one in self.runs if (x := one[key]) is not None]
-        return sum(found) / len(found) if found else None
+        known = [x for run in self.runs if (x := run[key]) is not None]
+        return sum(known) / len(known) if known else None
 
 
 def _known(runs: Sequence[RankedRun], key: str, lost: float) -> Iterator[float]:
     """Yield a number of all runs; `lost` replaces a missing one."""
-    return (lost if (x := one[key]) is None else x for one in runs)
+    return (lost if (x := run[key]) is None else x for run in runs)
 
 
 @dataclass(frozen=True)
@@ -229,15 +229,15 @@ class EntryScore:
 
     def mean(self, key: str) -> float | None:
         """Return the mean of a number over conditions; None if a condition lacks it."""
-        found = [cell.number(key) for cell in self.cells.values()]
-        known = [x for x in found if x is not None]
-        return sum(known) / len(known) if known and len(known) == len(found) else None
+        numbers = [cell.number(key) for cell in self.cells.values()]
+        known = [x for x in numbers if x is not None]
+        return sum(known) / len(known) if known and len(known) == len(numbers) else None
 
     @property
     def step_time(self) -> float | None:
         """Processor time of a step of the controller [s]: the median over conditions."""
-        found = sorted(x for cell in self.cells.values() if (x := cell.number(STEP_TIME)) is not None)
-        return found[len(found) // 2] if found else None
+        times = sorted(x for cell in self.cells.values() if (x := cell.number(STEP_TIME)) is not None)
+        return times[len(times) // 2] if times else None
 
     @property
     def order(self) -> tuple[float, float, float]:
@@ -274,24 +274,24 @@ class Digits(NamedTuple):
 def deciding_digits(ranked: Sequence[EntryScore]) -> Digits:
     """Return the digits for shares and mean peak sideslips; `ranked`: best first."""
     share, slip = [], []
-    for one, next_ in pairwise(one for one in ranked if one.place):
-        if one.order[0] != next_.order[0]:
+    for entry, next_ in pairwise(entry for entry in ranked if entry.place):
+        if entry.order[0] != next_.order[0]:
             continue
-        if one.order[1] != next_.order[1]:
-            share.append((one.share, next_.share))
-        elif one.order[2] != next_.order[2]:
-            slip.append((one.order[2], next_.order[2]))
+        if entry.order[1] != next_.order[1]:
+            share.append((entry.share, next_.share))
+        elif entry.order[2] != next_.order[2]:
+            slip.append((entry.order[2], next_.order[2]))
     return Digits(digits_apart(share, "%", 2), digits_apart(slip, "rad"))
 
 
 def placed(every: Sequence[EntryScore]) -> list[EntryScore]:
     """Return the scores in order, with places; equal ones share a place."""
-    whole = sorted((one for one in every if not one.missing), key=lambda one: one.order)
-    found: list[EntryScore] = []
-    for number, one in enumerate(whole, start=1):
-        same = found and found[-1].order == one.order
-        found.append(replace(one, place=found[-1].place if same else number))
-    return found + [one for one in every if one.missing]
+    whole = sorted((entry for entry in every if not entry.missing), key=lambda entry: entry.order)
+    ordered: list[EntryScore] = []
+    for number, entry in enumerate(whole, start=1):
+        same = ordered and ordered[-1].order == entry.order
+        ordered.append(replace(entry, place=ordered[-1].place if same else number))
+    return ordered + [entry for entry in every if entry.missing]
 
 
 @dataclass(frozen=True)
@@ -328,30 +328,30 @@ def run_ranking(
             )
     angles = angles_of(ranking, slow)
     dwell = dwell_experiment(ranking, angles, execute)
-    found = execute(
+    result = execute(
         dwell,
         only=lambda case: not only or case.point[0].value in only,
         keep=False,
         record=RECORDED,
         timed=CONTROLLER,
     )
-    runs = _ranked_runs(ranking, angles, found)
+    runs = _ranked_runs(ranking, angles, result)
     scores = scores_of(ranking, runs)
     if keep:
-        worst = {id(cell.worst) for one in scores for cell in one.cells.values()}
+        worst = {id(cell.worst) for score in scores for cell in score.cells.values()}
         kept = [number for number, run in enumerate(runs) if id(run) in worst and run.record is not None]
-        runs = _ranked_runs(ranking, angles, execute.keeping(found, kept))
+        runs = _ranked_runs(ranking, angles, execute.keeping(result, kept))
         scores = scores_of(ranking, runs)
     return RankingResult(ranking, angles, runs, scores)
 
 
 def _ranked_runs(
-    ranking: LoadedRanking, angles: Mapping[str, float], found: ExperimentResult
+    ranking: LoadedRanking, angles: Mapping[str, float], result: ExperimentResult
 ) -> list[RankedRun]:
-    assert found.planned is not None
-    names = [*found.spec.axes]
+    assert result.planned is not None
+    names = [*result.spec.axes]
     runs = []
-    for case, job, record in zip(found.experiment.cases, found.planned.jobs, found.records, strict=True):
+    for case, job, record in zip(result.experiment.cases, result.planned.jobs, result.records, strict=True):
         condition, at = ranking.spec.conditions[case.run.name], dict(zip(names, case.point, strict=True))
         repeat = next((at[place].value for place in condition.repeats), None)
         runs.append(

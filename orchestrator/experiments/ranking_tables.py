@@ -34,13 +34,13 @@ def sign_of(cell: RankingCell) -> str:
         return "–"
     if cell.state == "passed":
         return "✓"
-    passed = sum(one.passed for one in cell.runs)
+    passed = sum(run.passed for run in cell.runs)
     return f"{passed}/{len(cell.runs)}"
 
 
-def place_words(one: EntryScore) -> str:
+def place_words(score: EntryScore) -> str:
     """Return the place of an entry as text, `–` if it is not ranked."""
-    return str(one.place) if one.place else "–"
+    return str(score.place) if score.place else "–"
 
 
 def draw_matrix(ranked: RankingResult, note: str) -> Figure:
@@ -54,16 +54,16 @@ def draw_matrix(ranked: RankingResult, note: str) -> Figure:
     beside = ((-5.1, "right", "place"), (wide + 0.15, "left", "passed"), (wide + 2.05, "right", "runs"))
     with new_figure() as figure:
         axes = figure.subplots()
-        for i, one in enumerate(rows):
+        for i, score in enumerate(rows):
             for k, name in enumerate(conditions):
-                cell = one.cells[name]
+                cell = score.cells[name]
                 colour = COLOURS[cell.state]
                 axes.add_patch(Rectangle((k, i), 1, 1, facecolor=colour, edgecolor="white", linewidth=1.2))
                 axes.text(k + 0.5, i + 0.52, sign_of(cell), ha="center", va="center", fontsize=7.5)
-            axes.text(-0.15, i + 0.52, literal(one.spec.title), va="center", ha="right", fontsize=8.5)
-            counted = f"{one.count('passed')} of {wide}" if one.place else f"{one.missing} missing"
-            share = shown(one.share, "%", digits=digits.share) if one.place else ""
-            for (x, side, _), text in zip(beside, (place_words(one), counted, share), strict=True):
+            axes.text(-0.15, i + 0.52, literal(score.spec.title), va="center", ha="right", fontsize=8.5)
+            counted = f"{score.count('passed')} of {wide}" if score.place else f"{score.missing} missing"
+            share = shown(score.share, "%", digits=digits.share) if score.place else ""
+            for (x, side, _), text in zip(beside, (place_words(score), counted, share), strict=True):
                 weight = "bold" if x < 0 else "normal"
                 axes.text(x, i + 0.52, text, va="center", ha=side, fontsize=8, weight=weight)
         for k, spec in enumerate(conditions.values()):
@@ -90,12 +90,12 @@ def draw_pareto(ranked: RankingResult, note: str) -> Figure:
         ResultsError: there is no controller to draw.
     """
     every = [
-        (1e-3 * x, y, one)
-        for one in ranked.scores
-        if (x := one.mean("intervention")) is not None and (y := one.mean("margin")) is not None
+        (1e-3 * x, y, score)
+        for score in ranked.scores
+        if (x := score.mean("intervention")) is not None and (y := score.mean("margin")) is not None
     ]
     points = [point for point in every if point[2].mean("effort")]
-    left_out = [f"{one.spec.title}: {y:.0f} points" for _, y, one in every if not one.mean("effort")]
+    left_out = [f"{score.spec.title}: {y:.0f} points" for _, y, score in every if not score.mean("effort")]
     if not points:
         raise ResultsError(
             "nothing to draw: no controller that acts has all of its runs.", code="nothing-to-draw"
@@ -107,20 +107,20 @@ def draw_pareto(ranked: RankingResult, note: str) -> Figure:
     ]
     with new_figure() as figure:
         axes = figure.subplots()
-        for x, y, one in points[::-1]:
-            marker, colour = TUNED[one.spec.gains]
+        for x, y, score in points[::-1]:
+            marker, colour = TUNED[score.spec.gains]
             axes.plot(
                 [x], [y], marker, color=colour, markersize=13, zorder=3, markeredgecolor="white",
-                label=f"gains: {one.spec.gains}",
+                label=f"gains: {score.spec.gains}",
             )  # fmt: skip
             axes.text(
-                x, y, str(one.place), color="white", fontsize=7, weight="bold", ha="center", va="center",
+                x, y, str(score.place), color="white", fontsize=7, weight="bold", ha="center", va="center",
                 zorder=3,
             )  # fmt: skip
         best = [x for x, *_ in front], [y for _, y, _ in front]
         axes.plot(*best, color=QUIET, linewidth=1.0, zorder=1, label="none is better in both:")
-        for _, _, one in front:
-            axes.plot([], [], " ", label=f"{one.place}  {one.spec.title}")
+        for _, _, score in front:
+            axes.plot([], [], " ", label=f"{score.place}  {score.spec.title}")
         axes.set_xlabel("Intervention: ∫|torque| dt of the wheel that gets most, once steered, mean [kN·m·s]")
         axes.set_title("Stability margin: points of per cent below the limits, least of each condition, mean")
         handles = {str(line.get_label()): line for line in axes.get_lines()}
@@ -155,42 +155,46 @@ def words_of(number: float | None, unit: str) -> Cell:
     return f"{digits_of(1e6 * number)} µs" if unit == "s" else MetricValue(number, unit)
 
 
-def spread(one: ConfidenceInterval | None, words: Callable[[float], str]) -> str | None:
+def spread(confidence: ConfidenceInterval | None, words: Callable[[float], str]) -> str | None:
     """Return a mean over repeats with the half width of its confidence interval, if any."""
-    if one is None:
+    if confidence is None:
         return None
-    return f"{words(one.mean)} ± {words(one.half)}" if one.half else words(one.mean)
+    return (
+        f"{words(confidence.mean)} ± {words(confidence.half)}" if confidence.half else words(confidence.mean)
+    )
 
 
-def row_of(one: EntryScore, digits: Digits) -> dict[str, Cell]:
+def row_of(score: EntryScore, digits: Digits) -> dict[str, Cell]:
     """Return the row of a controller: heading -> cell; `digits`: of the numbers that decide places."""
-    slip = one.mean("sideslip")
+    slip = score.mean("sideslip")
     means = {
-        key.replace("_", " "): words_of(one.mean(key), unit) for key, unit in UNITS.items() if key != "effort"
+        key.replace("_", " "): words_of(score.mean(key), unit)
+        for key, unit in UNITS.items()
+        if key != "effort"
     }
     if slip is not None:
         means["sideslip"] = shown(slip, "rad", digits=digits.sideslip)
     row: dict[str, Cell] = {
-        "place": place_words(one),
-        "controller": one.spec.title,
-        "gains": one.spec.gains,
-        "passed": str(one.count("passed")),
-        "spun": str(one.count("spun")),
-        "runs": shown(one.share, "%", digits=digits.share),
+        "place": place_words(score),
+        "controller": score.spec.title,
+        "gains": score.spec.gains,
+        "passed": str(score.count("passed")),
+        "spun": str(score.count("spun")),
+        "runs": shown(score.share, "%", digits=digits.share),
         **means,
-        "time per step": words_of(one.step_time, "s"),
+        "time per step": words_of(score.step_time, "s"),
     }
-    if one.place:
+    if score.place:
         return row
     kept = {"place", "controller", "gains"}
     lacking: dict[str, Cell] = {heading: row[heading] if heading in kept else None for heading in row}
-    return {**lacking, "passed": f"{one.missing} missing"}
+    return {**lacking, "passed": f"{score.missing} missing"}
 
 
 def table_of(ranked: RankingResult, *left_out: str) -> Table:
     """Return the table of controllers, best first; `left_out`: headings to omit."""
     digits = deciding_digits(ranked.scores)
-    rows = [row_of(one, digits) for one in ranked.scores]
+    rows = [row_of(score, digits) for score in ranked.scores]
     kept = [heading for heading in rows[0] if heading not in left_out]
     texts = ("place", "passed", "spun", "runs", "margin", "sideslip", "time per step")
     numbers = {kept.index(heading) for heading in texts if heading in kept}
@@ -200,29 +204,29 @@ def table_of(ranked: RankingResult, *left_out: str) -> Table:
 
 def runs_table(cell: RankingCell) -> Table:
     """Return the table of all runs of a cell."""
-    repeated = len({one.repeat for one in cell.runs}) > 1
-    mirrored = any(one.amplitude < 0 for one in cell.runs)
+    repeated = len({run.repeat for run in cell.runs}) > 1
+    mirrored = any(run.amplitude < 0 for run in cell.runs)
     units = {"displacement": "m", **{key: unit for key, unit in UNITS.items() if unit != "points"}}
     rows: list[dict[str, Cell]] = [
         {
-            "amplitude": degrees(one.amplitude),
-            "over A": f"{one.multiple:.2f}",
-            **({"first to the": "left" if one.amplitude > 0 else "right"} if mirrored else {}),
-            **({"seed": str(one.repeat)} if repeated else {}),
-            "COS + 1 s": _ratio(one["ratio_1000"]),
-            "COS + 1.75 s": _ratio(one["ratio_1750"]),
-            **{k.replace("_", " "): words_of(one[k], unit) for k, unit in units.items() if k != "effort"},
-            "verdict": one.verdict,
+            "amplitude": degrees(run.amplitude),
+            "over A": f"{run.multiple:.2f}",
+            **({"first to the": "left" if run.amplitude > 0 else "right"} if mirrored else {}),
+            **({"seed": str(run.repeat)} if repeated else {}),
+            "COS + 1 s": _ratio(run["ratio_1000"]),
+            "COS + 1.75 s": _ratio(run["ratio_1750"]),
+            **{k.replace("_", " "): words_of(run[k], unit) for k, unit in units.items() if k != "effort"},
+            "verdict": run.verdict,
         }
-        for one in cell.runs
+        for run in cell.runs
     ]  # fmt: skip
     headings = list(rows[0])
     texts = ("amplitude", "over A", "COS + 1 s", "COS + 1.75 s")
     return Table("", headings, [[*row.values()] for row in rows], numbers=set(map(headings.index, texts)))
 
 
-def _ratio(found: float | None) -> Cell:
-    return None if found is None else percent(found)
+def _ratio(ratio: float | None) -> Cell:
+    return None if ratio is None else percent(ratio)
 
 
 def _text(name: str, values: Iterable[object]) -> tuple[Column, Sequence[Cell]]:
@@ -242,38 +246,40 @@ def columns_of_entries(ranked: RankingResult) -> Table:
     rows = ranked.scores
     return Table.of_columns(
         [
-            _text("entry", (one.entry for one in rows)),
-            _text("title", (one.spec.title for one in rows)),
-            _text("gains", (one.spec.gains for one in rows)),
-            _counts("place", (one.place for one in rows)),
-            _counts("conditions", (len(one.cells) for one in rows)),
-            _counts("passed", (one.count("passed") for one in rows)),
-            _counts("spun", (one.count("spun") for one in rows)),
-            _counts("missing", (one.missing for one in rows)),
-            _numbers("share", "1", (None if one.missing else one.share for one in rows)),
-            *(_numbers(key, unit, [one.mean(key) for one in rows]) for key, unit in UNITS.items()),
-            _numbers("step_time", "s", (one.step_time for one in rows)),
+            _text("entry", (score.entry for score in rows)),
+            _text("title", (score.spec.title for score in rows)),
+            _text("gains", (score.spec.gains for score in rows)),
+            _counts("place", (score.place for score in rows)),
+            _counts("conditions", (len(score.cells) for score in rows)),
+            _counts("passed", (score.count("passed") for score in rows)),
+            _counts("spun", (score.count("spun") for score in rows)),
+            _counts("missing", (score.missing for score in rows)),
+            _numbers("share", "1", (None if score.missing else score.share for score in rows)),
+            *(_numbers(key, unit, [score.mean(key) for score in rows]) for key, unit in UNITS.items()),
+            _numbers("step_time", "s", (score.step_time for score in rows)),
         ]
     )
 
 
 def columns_of_cells(ranked: RankingResult) -> Table:
     """Return columns with a row per controller and condition, in SI units."""
-    cells = [cell for one in ranked.scores for cell in one.cells.values()]
+    cells = [cell for score in ranked.scores for cell in score.cells.values()]
     numbers = []
     for key, unit in {**UNITS, STEP_TIME: "s"}.items():
-        numbers.append(_numbers(key, unit, [None if one.missing else one.number(key) for one in cells]))
+        numbers.append(_numbers(key, unit, [None if cell.missing else cell.number(key) for cell in cells]))
         if key in ("margin", "sideslip"):
-            over = [getattr(one, key) for one in cells]
-            numbers.append(_numbers(f"{key}_half_width", unit, [one and one.half for one in over]))
-    least = _numbers("displacement", "m", (None if one.missing else one.displacement for one in cells))
+            over = [getattr(cell, key) for cell in cells]
+            numbers.append(
+                _numbers(f"{key}_half_width", unit, [confidence and confidence.half for confidence in over])
+            )
+    least = _numbers("displacement", "m", (None if cell.missing else cell.displacement for cell in cells))
     return Table.of_columns(
         [
-            _text("entry", (one.entry for one in cells)),
-            _text("condition", (one.condition for one in cells)),
-            _text("state", (one.state for one in cells)),
-            _counts("runs", (len(one.runs) for one in cells)),
-            _counts("passed", (sum(run.passed for run in one.runs) for one in cells)),
+            _text("entry", (cell.entry for cell in cells)),
+            _text("condition", (cell.condition for cell in cells)),
+            _text("state", (cell.state for cell in cells)),
+            _counts("runs", (len(cell.runs) for cell in cells)),
+            _counts("passed", (sum(run.passed for run in cell.runs) for cell in cells)),
             *numbers[:4],
             least,
             *numbers[4:],
@@ -283,7 +289,7 @@ def columns_of_cells(ranked: RankingResult) -> Table:
 
 def columns_of_runs(ranked: RankingResult) -> Table:
     """Return columns with a row per run, in SI units."""
-    runs = [run for one in ranked.scores for cell in one.cells.values() for run in cell.runs]
+    runs = [run for score in ranked.scores for cell in score.cells.values() for run in cell.runs]
     units = {
         "ratio_1000": "1", "ratio_1750": "1", "displacement": "m", "sideslip": "rad", "speed": "m/s",
         "speed_end": "m/s", "intervention": "N.m.s", "effort": "N.m.s", "chatter": "N.m/s",

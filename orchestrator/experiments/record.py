@@ -46,13 +46,17 @@ def columns_of(findings: ExperimentResult) -> Table:
             columns.append(column(name, "string", [case.point[i].words for case in cases], about))
     codes = {"description": "codes of the warnings about the run, see docs/diagnostics.md"}
     columns += [
-        column("status", "string", [one.status for one in records]),
-        column("reason", "string", [one.reason for one in records]),
-        column("warnings", "string", [", ".join(one.warning_codes) or None for one in records], codes),
+        column("status", "string", [record.status for record in records]),
+        column("reason", "string", [record.reason for record in records]),
+        column("warnings", "string", [", ".join(record.warning_codes) or None for record in records], codes),
     ]
-    for key, one in spec.metrics.items():
-        chosen, unit = metric(one.metric), findings.unit(key)
-        about = {"metric": chosen.name, "description": f"{chosen.definition}{one.during()}", "unit": si(unit)}
+    for key, metric_spec in spec.metrics.items():
+        chosen, unit = metric(metric_spec.metric), findings.unit(key)
+        about = {
+            "metric": chosen.name,
+            "description": f"{chosen.definition}{metric_spec.during()}",
+            "unit": si(unit),
+        }
         values = [findings.value(case, key) for case in cases]
         columns.append(column(key, "float64", [value.number if value else None for value in values], about))
     keys = [job.key for job in planned.jobs] if planned else [None] * len(cases)
@@ -62,21 +66,23 @@ def columns_of(findings: ExperimentResult) -> Table:
 def verdict_columns(findings: ExperimentResult) -> Table:
     """Return columns with verdict, margin and region, a row per claim and check."""
     every = findings.judgements
-    regions = [one.region for one in every]
+    regions = [result.region for result in every]
     bounds = [region.flip_bounds if region else None for region in regions]
     flips = [region.flip if region else None for region in regions]
     return Table.of_columns(
         [
-            column("group", "string", [one.group for one in every]),
-            column("says", "string", [one.claim.says for one in every]),
-            column("verdict", "string", [verdict(one) for one in every]),
-            column("margin", "float64", [one.verdict.margin for one in every], {"unit": "1"}),
+            column("group", "string", [result.group for result in every]),
+            column("says", "string", [result.claim.says for result in every]),
+            column("verdict", "string", [verdict(result) for result in every]),
+            column("margin", "float64", [result.verdict.margin for result in every], {"unit": "1"}),
             column("spread", "float64", [at.spread if at else None for at in regions], {"unit": "1"}),
             column("points", "int64", [len(region.points) if region else None for region in regions]),
             column("holds at", "int64", [region.holding if region else None for region in regions]),
             column("flips", "int64", [region.flipping if region else None for region in regions]),
-            column("share from", "float64", [one.low if one else None for one in bounds], {"unit": "1"}),
-            column("share to", "float64", [one.high if one else None for one in bounds], {"unit": "1"}),
+            column(
+                "share from", "float64", [bound.low if bound else None for bound in bounds], {"unit": "1"}
+            ),
+            column("share to", "float64", [bound.high if bound else None for bound in bounds], {"unit": "1"}),
             column("without result", "int64", [at.without_result if at else None for at in regions]),
             column("flips by", "string", [flip.open_value if flip else None for flip in flips]),
             column("flips at", "string", [flip.words if flip else None for flip in flips]),
@@ -152,8 +158,8 @@ def write_findings(findings: ExperimentResult, drawn: dict[str, str], out: Path)
 def _warn_if_edited(file: Path) -> None:
     """Warn if a record that is about to be overwritten was edited since it was written."""
     try:
-        found = json.loads(read_bytes(file, largest=LARGEST))
-        words = changed_since(found) if isinstance(found, dict) else "it is not a record"
+        content = json.loads(read_bytes(file, largest=LARGEST))
+        words = changed_since(content) if isinstance(content, dict) else "it is not a record"
     except FileNotFoundError:
         return
     except (OSError, ValueError, RecursionError):
@@ -197,26 +203,26 @@ def _record(findings: ExperimentResult, drawn: dict[str, str]) -> dict[str, Any]
         },
         "derived": {
             key: {
-                "says": one.says,
-                "expression": one.expression,
-                "of": {word: [source.run, source.metric] for word, source in one.of.items()},
-                "rank_correlation": one.rank_correlation,
-                "published": None if one.published is None else si_number(one.published, one.unit),
+                "says": number.says,
+                "expression": number.expression,
+                "of": {word: [source.run, source.metric] for word, source in number.of.items()},
+                "rank_correlation": number.rank_correlation,
+                "published": None if number.published is None else si_number(number.published, number.unit),
                 **(_value(findings.derived[key]) if key in findings.derived else {"value": None}),
             }
-            for key, one in spec.derived.items()
+            for key, number in spec.derived.items()
         },
-        "claims": [_judgement(one) for one in findings.claims],
-        "checks": [_judgement(one) for one in findings.checks],
+        "claims": [_judgement(result) for result in findings.claims],
+        "checks": [_judgement(result) for result in findings.checks],
         "limits": {
             key: [
                 {
-                    "at": {axis: level.value for axis, level in one.others.items()},
-                    "up_to": one.largest,
-                    "not_at": one.beyond,
-                    **one.verdict.as_data(),
+                    "at": {axis: level.value for axis, level in reached.others.items()},
+                    "up_to": reached.largest,
+                    "not_at": reached.beyond,
+                    **reached.verdict.as_data(),
                 }
-                for one in limits_of(findings, limit)
+                for reached in limits_of(findings, limit)
             ]
             for key, limit in spec.limits.items()
         },
@@ -236,18 +242,18 @@ def _value(value: MetricValue) -> dict[str, Any]:
     return {"value": number, "unit": si(value.unit), **half, **between}
 
 
-def _judgement(one: ClaimResult) -> dict[str, Any]:
-    deciding = one.verdict.as_data()
+def _judgement(result: ClaimResult) -> dict[str, Any]:
+    deciding = result.verdict.as_data()
     return {
-        "says": one.claim.says,
-        "source": one.claim.source,
-        "holds_if": [str(condition) for condition in one.claim.holds_if],
-        "measured": list(one.measured),
-        "holds": one.verdict.holds,
-        "verdict": verdict(one),
+        "says": result.claim.says,
+        "source": result.claim.source,
+        "holds_if": [str(condition) for condition in result.claim.holds_if],
+        "measured": list(result.measured),
+        "holds": result.verdict.holds,
+        "verdict": verdict(result),
         **{key: deciding[key] for key in ("value", "relation", "bound", "unit", "margin")},
-        "region": one.region and _region(one.region),
-        "note": one.claim.note,
+        "region": result.region and _region(result.region),
+        "note": result.claim.note,
     }
 
 
@@ -264,7 +270,7 @@ def _region(region: Region) -> dict[str, Any]:
         "robust": region.robust,
         "flip": flip and {"open_value": flip.open_value, "at": flip.number, "words": flip.words,
                           "chosen": flip.chosen or None},
-        "margins": [_finite(one.margin) for one in region.points],
+        "margins": [_finite(point.margin) for point in region.points],
         "open_values": {
             line.open_value: {
                 "chosen": line.chosen.number,

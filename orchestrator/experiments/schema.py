@@ -165,8 +165,8 @@ class ChoiceSpec(OverrideSpec):
 
 def _choices(value: object) -> Any:
     """Normalize the values of a run's `for`: a label alone becomes `{says: label}`."""
-    if isinstance(value, dict) and any(isinstance(one, dict) for one in value.values()):
-        return {str(k): {"says": one} if isinstance(one, str) else one for k, one in value.items()}
+    if isinstance(value, dict) and any(isinstance(entry, dict) for entry in value.values()):
+        return {str(k): {"says": entry} if isinstance(entry, str) else entry for k, entry in value.items()}
     return {k: {"says": words} for k, words in alternatives(value).items()}
 
 
@@ -290,22 +290,22 @@ class FigureSpec(StrictModel):
     @property
     def axes(self) -> dict[str, str]:
         """Key -> axis, of the axes used."""
-        given = {"x": self.x, "y": self.y, "lines": self.lines, "panels": self.panel_axis}
-        return {key: axis for key, axis in given.items() if axis}
+        axes = {"x": self.x, "y": self.y, "lines": self.lines, "panels": self.panel_axis}
+        return {key: axis for key, axis in axes.items() if axis}
 
     @model_validator(mode="after")
     def _complete(self) -> FigureSpec:
         shows, upwards = self.what.shows, self.what.upwards
         if shows == "runs":
-            given = self.model_fields_set - {"name", "title", "kind", "runs", "panels"}
-            if not self.runs or not isinstance(self.panels, list) or not self.panels or given:
-                also = f", no {min(given)}" if given else ""
+            extra = self.model_fields_set - {"name", "title", "kind", "runs", "panels"}
+            if not self.runs or not isinstance(self.panels, list) or not self.panels or extra:
+                also = f", no {min(extra)}" if extra else ""
                 raise ValueError(f"an overlay needs runs and a list of panels{also}; else give its kind")
             return self
         if shows == "grid":
-            given = self.model_fields_set - {"name", "title", "kind", "grid", "scale", "largest", "mark"}
-            if not self.grid or given:
-                raise ValueError(f"a grid needs grid{f' and no {min(given)}' if given else ''}")
+            extra = self.model_fields_set - {"name", "title", "kind", "grid", "scale", "largest", "mark"}
+            if not self.grid or extra:
+                raise ValueError(f"a grid needs grid{f' and no {min(extra)}' if extra else ''}")
             return self
         if self.runs or ("panels" in self.model_fields_set and not self.panel_axis):
             raise ValueError(f"a {self.kind} has no runs; its panels are those of one axis")
@@ -386,18 +386,18 @@ class ExperimentSpec(OverrideSpec):
             raise ValueError(f"{number} runs; at most {MOST} are allowed")
         return self
 
-    def said(self) -> Iterator[tuple[str, int, Claim]]:
+    def assertions(self) -> Iterator[tuple[str, int, Claim]]:
         """Yield every claim and check as (group, index in the file, claim)."""
-        for group, said in (("claims", self.claims), ("checks", self.checks)):
-            for i, one in enumerate(said):
-                yield group, one.number(i), one
+        for group, claims in (("claims", self.claims), ("checks", self.checks)):
+            for i, claim in enumerate(claims):
+                yield group, claim.number(i), claim
 
     def conditions(self) -> Iterator[tuple[KeyPath, Condition]]:
         """Yield every condition of claims, checks and limits, with its key in the file."""
-        judged: list[tuple[str, str | int, Assertion]] = [*self.said()]
+        judged: list[tuple[str, str | int, Assertion]] = [*self.assertions()]
         judged += [("limits", name, limit) for name, limit in self.limits.items()]
-        for group, which, one in judged:
-            for k, condition in enumerate(one.holds_if):
+        for group, which, assertion in judged:
+            for k, condition in enumerate(assertion.holds_if):
                 yield (group, which, "holds_if", k), condition
 
     @property

@@ -68,8 +68,8 @@ class TestDriver:
         Raises:
             ScenarioError: it has none above 0.
         """
-        given = self._planned[0].speed
-        speed = 0.0 if given is None else float(convert(str(given), "m/s"))
+        initial = self._planned[0].speed
+        speed = 0.0 if initial is None else float(convert(str(initial), "m/s"))
         if speed <= 0.0:
             raise ScenarioError(
                 f"{self.scenario}: has no speed above 0, from which the series could start",
@@ -117,9 +117,9 @@ def slow_steer_runs(scenario: Path, changes: Sequence[Override], execute: Execut
         ScenarioError: the scenario is wrong, or its driver has no amplitude.
     """
     (plan,) = execute.plans([NamedRun("", "", "", scenario, (*changes,))])
-    given = slow_steer_amplitude(plan, scenario)
+    amplitude = slow_steer_amplitude(plan, scenario)
     return [
-        _run(f"{SLOW_STEER}/{name}", scenario, changes, Override.of(AMPLITUDE, side * given, STEERED))
+        _run(f"{SLOW_STEER}/{name}", scenario, changes, Override.of(AMPLITUDE, side * amplitude, STEERED))
         for name, side in SIDES
     ]
 
@@ -145,8 +145,8 @@ def slow_steer_amplitude(plan: Plan, scenario: Path) -> float:
         ScenarioError: the driver has none; names the scenario.
     """
     target = Target.parse(AMPLITUDE)
-    for one in plan.instances:
-        value = one.parameter(target.variable) if one.name == target.instance else None
+    for instance in plan.instances:
+        value = instance.parameter(target.variable) if instance.name == target.instance else None
         if isinstance(value, (int, float)) and value != 0:
             return abs(float(value))
     raise ScenarioError(

@@ -273,7 +273,7 @@ PEAKS = ("sideslip", "yaw_rate", "acceleration_y")
 def runs_table(runs: Sequence[FoundRun]) -> Table:
     """Return a table of runs: start, scenario, overrides, status, a few peaks."""
     peaks = [metric(f"peak({signal})") for signal in PEAKS]
-    headings = ["run", "begun", "scenario", "changed", "status", *(one.formula for one in peaks)]
+    headings = ["run", "begun", "scenario", "changed", "status", *(measure.formula for measure in peaks)]
     table = Table("", headings)
     for run in runs:
         file = Path(run.record.scenario_file)
@@ -299,12 +299,12 @@ def _peak(record: RunRecord, signal: str) -> MetricValue | None:
     """Return the peak of a signal from the run record, without reading the results."""
     units = {name: unit or "" for name, unit in record.units.items()}
     columns = {name: np.empty(0) for name in units if name != "time"}
-    found = columns_of(Results(Path(), np.empty(0), columns, units, record), signal)
-    ends = [of_column.get(name) for name in found for of_column in (record.smallest, record.largest)]
+    names = columns_of(Results(Path(), np.empty(0), columns, units, record), signal)
+    ends = [of_column.get(name) for name in names for of_column in (record.smallest, record.largest)]
     numbers = [float(end) for end in ends if end is not None]
     if not numbers or any(map(math.isnan, numbers)):
         return None
-    return MetricValue(max(map(abs, numbers)), units[found[0]] or "1")
+    return MetricValue(max(map(abs, numbers)), units[names[0]] or "1")
 
 
 def files_table(folder: Path | None, kinds: Sequence[str]) -> Table:
@@ -336,14 +336,14 @@ def files_table(folder: Path | None, kinds: Sequence[str]) -> Table:
 
 def fmus_in(folder: Path) -> tuple[list[Fmu], list[Diagnostic]]:
     """Return the FMUs in a folder, and the errors of those that cannot be used."""
-    found: list[Fmu] = []
+    opened: list[Fmu] = []
     errors: list[Diagnostic] = []
     for path in sorted(folder.glob("*.fmu")):
         try:
-            found.append(open_fmu(path))
+            opened.append(open_fmu(path))
         except ModelDescriptionError as error:  # noqa: PERF203 - the others are listed all the same
             errors += error.diagnostics
-    return found, errors
+    return opened, errors
 
 
 def fmus_table(fmus: Sequence[Fmu], errors: Sequence[Diagnostic]) -> Table:
@@ -366,11 +366,11 @@ def units_table(fmus: Sequence[Fmu]) -> Table:
 
 def signals_table(fmus: Sequence[Fmu]) -> Table:
     """Return a table of the signals that FMUs exchange, with sources and users; wheels share a row."""
-    given: dict[str, list[str]] = {}
-    taken: dict[str, list[str]] = {}
+    producers: dict[str, list[str]] = {}
+    consumers: dict[str, list[str]] = {}
     about: dict[str, tuple[str, str]] = {}
     for fmu in fmus:
-        for users, causality in ((given, "output"), (taken, "input")):
+        for users, causality in ((producers, "output"), (consumers, "input")):
             for variable in fmu.of(causality):
                 name = star(variable.name) if variable.name.endswith(WHEELS) else variable.name
                 about.setdefault(name, (variable.unit or "", star(_one_line(variable.description))))
@@ -378,7 +378,7 @@ def signals_table(fmus: Sequence[Fmu]) -> Table:
     table = Table("", ["signal", "", "unit", "given by", "taken by", "description"])
     for name in sorted(about):
         unit, text = about[name]
-        users_of = [_some(dict.fromkeys(users.get(name, ()))) for users in (given, taken)]
+        users_of = [_some(dict.fromkeys(users.get(name, ()))) for users in (producers, consumers)]
         sign = symbol(name)
         table.rows.append([name, sign if sign != name else None, unit or None, *users_of, text or None])
     return table
@@ -398,8 +398,10 @@ def recorded_table(plan: Plan) -> Table:
 def metrics_table() -> Table:
     """Return a table of all measures of a signal x."""
     table = Table("", ["metric", "what it is", "", "unit", "needs"])
-    for one in measures():
-        table.rows.append([f"{one.name}(x)", one.definition, one.formula, one.unit, one.needs or None])
+    for measure in measures():
+        table.rows.append(
+            [f"{measure.name}(x)", measure.definition, measure.formula, measure.unit, measure.needs or None]
+        )
     table.notes = [f"'standard' stands for {', '.join(STANDARD)}."]
     return table
 

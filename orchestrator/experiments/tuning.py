@@ -108,17 +108,19 @@ def search(experiment: LoadedExperiment, judged: JudgeExperiment) -> list[TunedL
 
     tuning = tuning_of(experiment)
     fixed = _fixed(experiment, judged)
-    found = []
+    tuned_laws = []
     for name, law in tuning.laws.items():
         axes, trials = law.axes.values(), list[Trial]()
 
         def costs(places: Any, name: str = name, law: LawSpec = law, trials: list[Trial] = trials) -> Any:
             values = [_values(law, column) for column in np.asarray(places).T]
-            tried = [_changes(law, one) for one in values]
-            findings = judged(_trials(experiment, {f"{name}, {k + 1}": one for k, one in enumerate(tried)}))
+            tried = [_changes(law, place) for place in values]
+            findings = judged(
+                _trials(experiment, {f"{name}, {k + 1}": changes for k, changes in enumerate(tried)})
+            )
             objectives = [_objective(experiment, {**fixed, **at}) for at in findings.at.values()]
             number = len(trials) // tuning.population + 1
-            trials += [Trial(number, *one) for one in zip(values, objectives, strict=True)]
+            trials += [Trial(number, *pair) for pair in zip(values, objectives, strict=True)]
             return np.array([trial.cost for trial in trials[-len(values) :]])
 
         chance = np.random.default_rng(tuning.seed)
@@ -128,14 +130,16 @@ def search(experiment: LoadedExperiment, judged: JudgeExperiment) -> list[TunedL
             costs, [(0.0, 1.0)] * len(axes), init=first, maxiter=tuning.generations - 1, rng=chance,
             tol=0.0, atol=0.0, polish=False, vectorized=True, updating="deferred",
         )  # fmt: skip
-        found.append(TunedLaw(name, trials))
-    return found
+        tuned_laws.append(TunedLaw(name, trials))
+    return tuned_laws
 
 
-def best_of(experiment: LoadedExperiment, found: Sequence[TunedLaw]) -> LoadedExperiment:
+def best_of(experiment: LoadedExperiment, tuned_laws: Sequence[TunedLaw]) -> LoadedExperiment:
     """Return the experiment with the best trial of every law."""
     laws = tuning_of(experiment).laws
-    return _trials(experiment, {one.law: _changes(laws[one.law], one.best.values) for one in found})
+    return _trials(
+        experiment, {tuned.law: _changes(laws[tuned.law], tuned.best.values) for tuned in tuned_laws}
+    )
 
 
 def _fixed(experiment: LoadedExperiment, judged: JudgeExperiment) -> MetricTable:
@@ -173,43 +177,43 @@ def _changes(law: LawSpec, values: dict[Target, float]) -> VariantSpec:
 
 
 def _objective(experiment: LoadedExperiment, values: MetricTable) -> float | None:
-    found = derive(experiment.spec, values).get(tuning_of(experiment).objective)
-    return None if found is None or not math.isfinite(found.number) else found.number
+    value = derive(experiment.spec, values).get(tuning_of(experiment).objective)
+    return None if value is None or not math.isfinite(value.number) else value.number
 
 
-def tuning_table(experiment: LoadedExperiment, found: Sequence[TunedLaw]) -> Table:
+def tuning_table(experiment: LoadedExperiment, tuned_laws: Sequence[TunedLaw]) -> Table:
     """Return the table of laws: objective in the middle of the ranges, smallest objective, its values."""
     tuning = tuning_of(experiment)
     spec = experiment.spec.derived[tuning.objective]
     budget = f"{tuning.population} x {tuning.generations} trials each, seed {tuning.seed}"
     table = Table(f"{spec.says}: {budget}", ["law", "middle of the ranges", "found", "with"])
-    for one in found:
+    for tuned in tuned_laws:
         first, best = (
             "failed" if trial.objective is None else MetricValue(trial.objective, spec.unit)
-            for trial in (one.trials[0], one.best)
+            for trial in (tuned.trials[0], tuned.best)
         )
-        units = {target: axis.unit for axis in tuning.laws[one.law].axes.values() for target in axis.vary}
+        units = {target: axis.unit for axis in tuning.laws[tuned.law].axes.values() for target in axis.vary}
         settings = [
             f"{target}: {number:g} {units[target] or ''}".rstrip()
-            for target, number in one.best.values.items()
+            for target, number in tuned.best.values.items()
         ]
-        table.rows.append([one.law, first, best, "\n".join(settings)])
+        table.rows.append([tuned.law, first, best, "\n".join(settings)])
     return table
 
 
-def entries_of(experiment: LoadedExperiment, found: Sequence[TunedLaw]) -> dict[str, dict[str, Any]]:
+def entries_of(experiment: LoadedExperiment, tuned_laws: Sequence[TunedLaw]) -> dict[str, dict[str, Any]]:
     """Return the best trials as entries of a ranking: name -> title, FMU, parameters, source."""
     tuning = tuning_of(experiment)
     entries = {}
-    for one in found:
-        if one.best.objective is None:
+    for tuned in tuned_laws:
+        if tuned.best.objective is None:
             continue  # all trials failed
-        law = tuning.laws[one.law]
-        settings = _changes(law, one.best.values).set
-        made = f"{experiment.identity}: {len(one.trials)} trials, seed {tuning.seed}"
-        comes_to = f"{tuning.objective} {one.best.cost:.4g}, {one.trials[0].cost:.4g} amid the ranges"
-        entries[re.sub(r"\W+", "_", f"{one.law.lower()}_tuned")] = {
-            "title": f"{one.law}, tuned",
+        law = tuning.laws[tuned.law]
+        settings = _changes(law, tuned.best.values).set
+        made = f"{experiment.identity}: {len(tuned.trials)} trials, seed {tuning.seed}"
+        comes_to = f"{tuning.objective} {tuned.best.cost:.4g}, {tuned.trials[0].cost:.4g} amid the ranges"
+        entries[re.sub(r"\W+", "_", f"{tuned.law.lower()}_tuned")] = {
+            "title": f"{tuned.law}, tuned",
             "fmu": law.swap[tuning.entries],
             "gains": "tuned",
             "parameters": {target.variable: value for target, value in settings.items()},
@@ -233,9 +237,9 @@ def entries_text(entries: dict[str, dict[str, Any]], command: str) -> str:
     return f"# Written by: {command}\n{stream.getvalue()}"
 
 
-def columns_of(found: Sequence[TunedLaw]) -> Table:
+def columns_of(tuned_laws: Sequence[TunedLaw]) -> Table:
     """Return all trials as columns: law, generation, objective, and every varied target."""
-    rows = [(one.law, trial) for one in found for trial in one.trials]
+    rows = [(tuned.law, trial) for tuned in tuned_laws for trial in tuned.trials]
     targets = dict.fromkeys(target for _, trial in rows for target in trial.values)
     return Table.of_columns(
         [
@@ -250,7 +254,7 @@ def columns_of(found: Sequence[TunedLaw]) -> Table:
     )
 
 
-def history_figure(experiment: LoadedExperiment, found: Sequence[TunedLaw], note: str) -> Figure:
+def history_figure(experiment: LoadedExperiment, tuned_laws: Sequence[TunedLaw], note: str) -> Figure:
     """Draw the smallest objective so far over the number of trials, a line per law."""
     from matplotlib.lines import Line2D
 
@@ -261,10 +265,10 @@ def history_figure(experiment: LoadedExperiment, found: Sequence[TunedLaw], note
         spec = experiment.spec.derived[tuning_of(experiment).objective]
         unit, factor = shown_unit(spec.unit)
         handles = []
-        for k, one in enumerate(found):
-            least = [factor * cost for cost in itertools.accumulate((t.cost for t in one.trials), min)]
+        for k, tuned in enumerate(tuned_laws):
+            least = [factor * cost for cost in itertools.accumulate((t.cost for t in tuned.trials), min)]
             axes.step(range(1, len(least) + 1), least, where="post", **line_style(k))
-            handles.append(Line2D([], [], label=one.law, **line_style(k)))
+            handles.append(Line2D([], [], label=tuned.law, **line_style(k)))
         axes.set(xlabel="trials", ylabel=f"least so far{f' [{unit}]' if unit else ''}")
         axes.set_title(spec.says)
         frame(figure, 3.4, handles, experiment.spec.title, note)

@@ -45,7 +45,7 @@ def limit_tables(findings: ExperimentResult) -> list[Table]:
     """Return the tables of all limits, and the grids with `holds`."""
     tables = [limit_table(findings, name) for name in findings.spec.limits]
     tables += [
-        one for grid in findings.spec.grids.values() if grid.holds for one in _grid_tables(findings, grid)
+        table for grid in findings.spec.grids.values() if grid.holds for table in _grid_tables(findings, grid)
     ]
     if words := changed(findings.experiment.by_options):
         for table in tables:
@@ -56,10 +56,10 @@ def limit_tables(findings: ExperimentResult) -> list[Table]:
 def _grid_tables(findings: ExperimentResult, grid: GridSpec) -> list[Table]:
     """Return the tables of a grid: measured numbers with signs of verdicts, and published numbers."""
     signs: dict[tuple[str, str], str] = {}
-    for one in findings.judgements if grid.holds else ():
-        about = {(c.run, c.derived or c.metric) for c in one.claim.holds_if}
+    for result in findings.judgements if grid.holds else ():
+        about = {(c.run, c.derived or c.metric) for c in result.claim.holds_if}
         if len(about) == 1:
-            word = verdict(one)
+            word = verdict(result)
             (key,) = about
             signs[key] = signs.get(key) or ("" if word == HOLDS else "✗" if word in FAILS.values() else "?")
     return grid_tables(grid, findings.values_of_grids, signs)
@@ -73,17 +73,19 @@ def derived_tables(findings: ExperimentResult, *, apart: bool = False) -> list[T
     spec, tables = findings.spec, []
     for grid in spec.grids.values():
         if not grid.holds:
-            found = _grid_tables(findings, grid)
-            tables += found if apart else [side_by_side(found)]
+            of_grid = _grid_tables(findings, grid)
+            tables += of_grid if apart else [side_by_side(of_grid)]
     in_grids = {cell.metric for grid in spec.grids.values() if grid.derived for cell in cells(grid)}
-    if alone := {key: one for key, one in spec.derived.items() if key not in in_grids}:
-        rows: list[list[Cell]] = [[one.says, findings.derived.get(key)] for key, one in alone.items()]
+    if alone := {key: entry for key, entry in spec.derived.items() if key not in in_grids}:
+        rows: list[list[Cell]] = [[entry.says, findings.derived.get(key)] for key, entry in alone.items()]
         headings = ["what", "value"]
-        if any(one.published is not None for one in alone.values()):
+        if any(entry.published is not None for entry in alone.values()):
             headings.append("the paper says")
-            for row, one in zip(rows, alone.values(), strict=True):
-                printed = one.published
-                row.append(None if printed is None else MetricValue(si_number(printed, one.unit), one.unit))
+            for row, entry in zip(rows, alone.values(), strict=True):
+                printed = entry.published
+                row.append(
+                    None if printed is None else MetricValue(si_number(printed, entry.unit), entry.unit)
+                )
         tables.append(Table("Computed from several runs", headings, [*rows]))
     return tables
 
@@ -119,7 +121,7 @@ def reach(findings: ExperimentResult) -> str:
         return ""
     if not findings.regions:
         return "at the chosen point only; the region of the open values has not been run"
-    alone = [replace(one, region=None) for one in findings.claims]
+    alone = [replace(claim, region=None) for claim in findings.claims]
     return f"over the region of the open values; at the chosen point alone {tally_words(counts_of(alone))}"
 
 
@@ -159,7 +161,7 @@ def flip_words(says: str, level: str, chosen: str = "") -> str:
 
 def counts_of(judgements: Sequence[ClaimResult]) -> dict[str, int]:
     """Return verdict -> number of judgements, of the verdicts that occur."""
-    words = [verdict(one) for one in judgements]
+    words = [verdict(result) for result in judgements]
     every = (HOLDS, UNDECIDED, *FAILS.values(), NOT_JUDGED)
     return {word: words.count(word) for word in every if word in words}
 
@@ -173,7 +175,7 @@ def _run_table(findings: ExperimentResult, spec: TableSpec) -> Table:
     study = findings.experiment
     runs = study.matching(spec.runs)
     alone = len(study.settings) == 1
-    said = {run.name: _said_of(findings, run, spec) if alone else [] for run in runs}
+    claims = {run.name: _claims_of(findings, run, spec) if alone else [] for run in runs}
     columns = [study.spec.metrics[key] for key in spec.metrics]
     table = Table(spec.title, ["run", *map(heading, columns)])
     formulas: dict[str, list[str]] = {}
@@ -181,7 +183,7 @@ def _run_table(findings: ExperimentResult, spec: TableSpec) -> Table:
         if column.heading:
             formulas.setdefault(metric(column.metric).formula, []).append(column.heading)
     table.notes = [f"{', '.join(named)}: {formula}" for formula, named in formulas.items()]
-    some = any(said.values())
+    some = any(claims.values())
     carries = CARRIES if findings.regions else CARRIES[:1]
     if some and not findings.regions and (only := reach(findings)):
         table.notes.append(f"verdicts: {only}")
@@ -202,8 +204,8 @@ def _run_table(findings: ExperimentResult, spec: TableSpec) -> Table:
                     f"{row}: {early}; metrics of the whole run or of later windows have no value"
                 )
             if some:
-                cells[1:1] = _beside(said[run.name], len(carries))
-                table.notes += [f"{run.row}: {j.claim.note}" for j in said[run.name] if j.claim.note]
+                cells[1:1] = _beside(claims[run.name], len(carries))
+                table.notes += [f"{run.row}: {j.claim.note}" for j in claims[run.name] if j.claim.note]
         results = findings.results.get(run.name)
         table.rows.append([marked(row, results) if results else row, *cells])
         table.notes += remarks([(row, results)]) if results else []
@@ -213,13 +215,14 @@ def _run_table(findings: ExperimentResult, spec: TableSpec) -> Table:
 def _beside(judged: Sequence[ClaimResult], carries: int) -> list[Cell]:
     """Return the cells of a run's claims: claim, verdict, robustness; several claims share the cells."""
     rows = [
-        [f"{one.claim.short} ({one.claim.source})", verdict(one), *_carries(one, carries)] for one in judged
+        [f"{result.claim.short} ({result.claim.source})", verdict(result), *_carries(result, carries)]
+        for result in judged
     ]
     columns: Iterable[Sequence[str | None]] = zip(*rows, strict=True) if rows else [()] * (2 + carries)
     return ["; ".join(filter(None, column)) or None for column in columns]
 
 
-def _said_of(findings: ExperimentResult, run: NamedRun, table: TableSpec) -> list[ClaimResult]:
+def _claims_of(findings: ExperimentResult, run: NamedRun, table: TableSpec) -> list[ClaimResult]:
     """Return the claims with a `short` text that are only about the table's first metric of this run."""
     return [
         judgement
@@ -257,17 +260,21 @@ def region_table(findings: ExperimentResult) -> Table:
     """Return a table of a region's open values: chosen value, range, reason for the range."""
     region = findings.spec.region
     assert region is not None
-    lines = {line.open_value: line for one in findings.regions.values() for line in one.lines}
+    lines = {line.open_value: line for result in findings.regions.values() for line in result.lines}
     rows: list[list[Cell]] = []
-    for name, one in region.open_values.items():
-        line, levels = lines.get(name), levels_of(one.stepped)
-        unit = one.unit or (line.unit if line and line.unit != "1" and not one.times else "")
-        ends = [levels[0].words, levels[-1].words] if one.start is not None else [one.words for one in levels]
-        words = " to ".join(ends) if one.start is not None else ", ".join(ends)
+    for name, open_value in region.open_values.items():
+        line, levels = lines.get(name), levels_of(open_value.stepped)
+        unit = open_value.unit or (line.unit if line and line.unit != "1" and not open_value.times else "")
+        ends = (
+            [levels[0].words, levels[-1].words]
+            if open_value.start is not None
+            else [level.words for level in levels]
+        )
+        words = " to ".join(ends) if open_value.start is not None else ", ".join(ends)
         chosen = line.words(line.chosen.number) if line and line.chosen.number is not None else None
         rows.append([
-            one.says or name, None if one.times else chosen,
-            f"{words} × as chosen" if one.times else f"{words} {unit}".rstrip(), one.because,
+            open_value.says or name, None if open_value.times else chosen,
+            f"{words} × as chosen" if open_value.times else f"{words} {unit}".rstrip(), open_value.because,
         ])  # fmt: skip
     title = f"Open values: {region.points} to {region.most} points over all together, and one at a time"
     return Table(title, ["open value", "chosen", "range", "because"], [*rows])
@@ -279,7 +286,7 @@ def claim_tables(findings: ExperimentResult) -> list[Table]:
         id(judgement)
         for table in findings.spec.tables
         for run in findings.experiment.matching(table.runs)
-        for judgement in _said_of(findings, run, table)
+        for judgement in _claims_of(findings, run, table)
     }
     tables = []
     for title, judged in (
@@ -289,12 +296,16 @@ def claim_tables(findings: ExperimentResult) -> list[Table]:
         table = Table(
             title, ["claim", "measured", "verdict", *(CARRIES if findings.regions else CARRIES[:1])]
         )
-        for one in judged:
-            if id(one) not in beside:
-                says = f"{one.claim.says} ({one.claim.source})" if one.claim.source else one.claim.says
-                note = f"\n{one.claim.note}" if one.claim.note else ""
-                carries = _carries(one, len(table.headings) - 3)
-                table.rows.append([f"{says}{note}", "\n".join(one.measured), verdict(one), *carries])
+        for result in judged:
+            if id(result) not in beside:
+                says = (
+                    f"{result.claim.says} ({result.claim.source})"
+                    if result.claim.source
+                    else result.claim.says
+                )
+                note = f"\n{result.claim.note}" if result.claim.note else ""
+                carries = _carries(result, len(table.headings) - 3)
+                table.rows.append([f"{says}{note}", "\n".join(result.measured), verdict(result), *carries])
         if not findings.regions and judged is findings.claims and (only := reach(findings)):
             table.notes.append(f"verdicts: {only}")
         tables += [table] if table.rows else []
@@ -309,8 +320,10 @@ def _cell(quantity: TestQuantity | None) -> Cell:
 
 def run_table(judged: Evaluation, title: str) -> Table:
     """Return the table of a standard test's run: a row per quantity with its reading, verdicts as notes."""
-    rows: list[Sequence[Cell]] = [[one.name, _cell(one), one.reading] for one in judged.quantities.values()]
-    notes = [f"{name}: {one}" for name, one in judged.criteria.items()]
+    rows: list[Sequence[Cell]] = [
+        [quantity.name, _cell(quantity), quantity.reading] for quantity in judged.quantities.values()
+    ]
+    notes = [f"{name}: {result}" for name, result in judged.criteria.items()]
     return Table(f"{judged.label}: {title}", ["quantity", "value", "reading"], rows, notes + judged.notes)
 
 
@@ -325,7 +338,7 @@ def runs_table(runs: Sequence[Evaluation], test: StandardTest, series: TestSerie
         rows.append([run.label, *(_cell(run.quantities.get(key)) for key in keys), *words])
     notes = []
     if series:
-        notes += [f"{name}: {one}" for name, one in series.criteria.items()]
+        notes += [f"{name}: {result}" for name, result in series.criteria.items()]
         notes.append(series.summary)
     notes += [f"{run.label}: {'; '.join(run.notes)}" for run in runs if run.notes]
     return Table(test.says, ["run", *(names[key] for key in keys), *criteria], rows, notes)

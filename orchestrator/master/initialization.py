@@ -68,10 +68,10 @@ def initialize(memory: SignalPool, check: StatusCheck, log: Log) -> int:
     for station in memory.stations:
         tolerance = station.instance.tolerance or station.instance.fmu.tolerance
         experiment = ExperimentSetup(plan.time(0), plan.time(plan.n_steps), tolerance)
-        check(station.name, "initialization", station.running.setup(experiment))
+        check(station.name, "initialization", station.fmu_instance.setup(experiment))
         _put(station, station.instance.parameters, "setting parameters", check)
         _put(station, _known_inputs(memory, station), "setting inputs", check)
-        check(station.name, "initialization", station.running.enter())
+        check(station.name, "initialization", station.fmu_instance.enter())
         _check_parameters(station, check, log)
         _get(memory, station, check)
     for number in range(1, PASSES + 1):  # noqa: B007  the number is the result
@@ -83,7 +83,7 @@ def initialize(memory: SignalPool, check: StatusCheck, log: Log) -> int:
             _unsettled(moving), instance=None, time=plan.time(0), code="initialization-unsettled"
         )
     for station in memory.stations:
-        check(station.name, "initialization", station.running.exit())
+        check(station.name, "initialization", station.fmu_instance.exit())
         _get(memory, station, check)
         _check_constants(station, check, log)
     memory.start_history()
@@ -97,7 +97,7 @@ def _put(station: InstanceSlot, requested: Mapping[str, Value], what: str, check
     others = (v for v in variables.values() if v.reference in arrays) if arrays else ()
     values = {v.name: v.start for v in others if v.start is not None} | dict(requested)
     for chosen in by_type(variables[name] for name in values):
-        status = station.running.put([v.place for v in chosen], [values[v.name] for v in chosen])
+        status = station.fmu_instance.put([v.place for v in chosen], [values[v.name] for v in chosen])
         check(station.name, what, status)
 
 
@@ -147,7 +147,7 @@ def _read_back(
     """Yield variables of one type, the status of reading them, and those that differ: name, read, set."""
     for chosen in by_type(station.instance.fmu.variables[name] for name in requested):
         with log.muted():
-            raw, values = station.running.fetch([v.place for v in chosen])
+            raw, values = station.fmu_instance.fetch([v.place for v in chosen])
         status = known(raw)
         if status >= FATAL:
             check(station.name, "reading back what was set", status)

@@ -51,7 +51,7 @@ class Master:
     def __init__(
         self,
         plan: Plan,
-        running: Mapping[str, FmuInstance],
+        fmu_instances: Mapping[str, FmuInstance],
         log: Log,
         stop: StopFlag,
         reached: ctypes.c_int64 | None = None,
@@ -70,14 +70,14 @@ class Master:
         log.time.value = plan.time(0)
         self._reached = ctypes.c_int64(-1) if reached is None else reached
         self.passes = 0
-        self.memory = memory = SignalPool(plan, running)
+        self.memory = memory = SignalPool(plan, fmu_instances)
         slow = {s.instance.period for s in memory.stations} - {1}
         self.clocks = {1: log.time} | {period: ctypes.c_double(0.0) for period in slow}
         for s in memory.stations:
             period = s.instance.period
             size = ctypes.c_double(float(period * plan.step))
             into, of = [v.place for v in s.inputs], [v.place for v in s.outputs]
-            s.calls = s.running.connect(Buffers(s.u, into, s.y, of, self.clocks[period], size))
+            s.calls = s.fmu_instance.connect(Buffers(s.u, into, s.y, of, self.clocks[period], size))
         self.programs = StepProgram(memory)
         self._operations: dict[int, list[Operation]] = {}  # of the current `advance`, by phase
         q = math.lcm(plan.step.denominator, plan.start.denominator)
@@ -253,7 +253,7 @@ class Master:
         """Check a call made during initialization, where a logged error counts whatever the status is."""
         self._copies.end()
         self._surroundings.restore(unit, self.log)
-        status = self.memory.of[unit].running.note(status)
+        status = self.memory.of[unit].fmu_instance.note(status)
         if status > WARNING or self.log.errors(unit):
             start = self.plan.time(0)
             raise self._failure(describe(unit, what, start, status, self.log), unit, start)
@@ -265,14 +265,14 @@ class Master:
     def _answer(self, k: int, operation: Operation, status: Status) -> None:
         """Handle an operation of the step from `k` - 1 to `k` that did not return OK."""
         station = self.memory.of[operation.instance]
-        kind = station.running.part(operation.kind)
-        status = station.running.note(status)
+        kind = station.fmu_instance.part(operation.kind)
+        status = station.fmu_instance.note(status)
         if status == WARNING:
             self._note_warning(operation.instance, WORDS[kind])
             return
         self._check_finite(k)  # a non-finite value upstream is the better explanation
         time = self.plan.time(k - station.instance.period)
-        if status == DISCARD and kind == "step" and (reached := station.running.ended()) is not None:
+        if status == DISCARD and kind == "step" and (reached := station.fmu_instance.ended()) is not None:
             self._end(k, operation.instance, time if math.isnan(reached) else reached)
             return
         sentence = describe(operation.instance, WORDS[kind], time, status, self.log)

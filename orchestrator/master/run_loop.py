@@ -74,7 +74,7 @@ class RunLoop:
         self._progress = progress
         self._reached = reached
         self._master: Master | None = None
-        self._running: dict[str, FmuInstance] = {}
+        self._fmu_instances: dict[str, FmuInstance] = {}
         self._copies = Copies()
 
     def inputs_of(self, unit: str) -> dict[str, Value]:
@@ -87,9 +87,11 @@ class RunLoop:
         for unit in self.plan.instances:
             for violation in unit.fmu.violations():
                 self.log.add(unit.name, WARNING, MASTER, violation, self.plan.time(0))
-            self._running[unit.name] = opener(unit, self.log, corrupted)
+            self._fmu_instances[unit.name] = opener(unit, self.log, corrupted)
             self._copies.end()
-        self._master = Master(self.plan, self._running, self.log, self._stop, self._reached, self._copies)
+        self._master = Master(
+            self.plan, self._fmu_instances, self.log, self._stop, self._reached, self._copies
+        )
         self.loop = self._master.loop
         with np.errstate(all="ignore"):  # non-finite values are found by `Master`, not by NumPy warnings
             self._master.initialize(self._rows.rows[0], self._rows.others)
@@ -171,7 +173,7 @@ class RunLoop:
 
     def end(self) -> None:
         """Terminate and free the instances."""
-        for instance in reversed(self._running.values()):
+        for instance in reversed(self._fmu_instances.values()):
             instance.free()
             self._copies.end()
 
@@ -193,11 +195,11 @@ def timing(opener: OpenInstance, unit: str, clock: StepClock) -> OpenInstance:
     """Return an opener that times the instance named `unit`; the results of the run do not change."""
 
     def open_timed(planned: Instance, log: Log, corrupted: set[Path]) -> Any:
-        running: Any = opener(planned, log, corrupted)
+        fmu_instance: Any = opener(planned, log, corrupted)
         if planned.name == unit:
-            connect = running.connect
-            running.connect = lambda buffers: _timed(connect(buffers), clock)
-        return running
+            connect = fmu_instance.connect
+            fmu_instance.connect = lambda buffers: _timed(connect(buffers), clock)
+        return fmu_instance
 
     return open_timed
 

@@ -37,7 +37,7 @@ class InstanceSlot:
     """An instance with its variables, its views of the pool, its faults and its step calls."""
 
     instance: Instance
-    running: FmuInstance
+    fmu_instance: FmuInstance
     position: int  # in the evaluation order
     inputs: list[Variable]  # Real and driven, in declared order
     wires: list[Wire | None]  # that drive the inputs; None: a constant
@@ -92,9 +92,9 @@ class InstanceSlot:
 class SignalPool:
     """The arrays of a run and the slots of its instances, in evaluation order."""
 
-    def __init__(self, plan: Plan, running: Mapping[str, FmuInstance]) -> None:
+    def __init__(self, plan: Plan, fmu_instances: Mapping[str, FmuInstance]) -> None:
         self.plan = plan
-        self.stations = _make_slots(plan, running)
+        self.stations = _make_slots(plan, fmu_instances)
         self.of = {s.name: s for s in self.stations}
         self.placed = sorted(self.stations, key=lambda s: s.instance.period > 1)
         n_out = sum(len(s.outputs) for s in self.stations)
@@ -203,7 +203,7 @@ def by_type(variables: Iterable[Variable]) -> Iterable[list[Variable]]:
     return groups.values()
 
 
-def _make_slots(plan: Plan, running: Mapping[str, FmuInstance]) -> list[InstanceSlot]:
+def _make_slots(plan: Plan, fmu_instances: Mapping[str, FmuInstance]) -> list[InstanceSlot]:
     """Return the slots, in evaluation order, without their arrays."""
     driver = {(w.target, w.input): w for w in plan.wires}
     needed = {(w.source, w.output) for w in plan.wires} | set(plan.record)
@@ -218,7 +218,7 @@ def _make_slots(plan: Plan, running: Mapping[str, FmuInstance]) -> list[Instance
         slots.append(
             InstanceSlot(
                 unit,
-                running[unit.name],
+                fmu_instances[unit.name],
                 position,
                 [v for v, _ in driven if v.type == "Real"],
                 [wire for v, wire in driven if v.type == "Real"],

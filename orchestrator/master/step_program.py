@@ -294,7 +294,7 @@ def _setting(m: SignalPool, s: InstanceSlot) -> list[Operation]:
 
         def put(places: list[ValueRef] = places, ends: list[Any] = ends) -> Status:
             values = [m.others[key] if wire is None else m.other(wire) for key, wire in ends]
-            return s.running.put(places, values)
+            return s.fmu_instance.put(places, values)
 
         operations.append(Operation(s.name, "set", put))
     return operations
@@ -309,7 +309,7 @@ def getting(m: SignalPool, s: InstanceSlot) -> list[Operation]:
         places, keys = [v.place for v in chosen], [(s.name, v.name) for v in chosen]
 
         def fetch(places: list[ValueRef] = places, keys: list[tuple[str, str]] = keys) -> Status:
-            status, values = s.running.fetch(places)
+            status, values = s.fmu_instance.fetch(places)
             m.others.update(zip(keys, values, strict=True))
             return status
 

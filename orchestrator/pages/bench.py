@@ -182,11 +182,11 @@ class Bench:
     """Makes the runs of bench pages, one at a time; all its processes end with `close`.
 
     Args:
-        options: of the `Planner`.
+        build: as of the `Planner`.
     """
 
-    def __init__(self, **options: Any) -> None:
-        self._planner = Planner(**options)
+    def __init__(self, *, build: bool = False) -> None:
+        self._planner = Planner(build=build)
         self._planning = threading.Lock()
         self._turn = threading.Lock()
         self._pool = Pool(1, preload=NEEDED, lasting=LASTING)
