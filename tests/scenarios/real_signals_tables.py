@@ -57,28 +57,16 @@ def step_by_step(study: dict[str, Any]) -> list[str]:
     ]
 
 
-FAULTS = {
-    "none": "no fault",
-    "gyro_frozen": "gyro frozen",
-    "gyro_zero": "gyro at zero",
-    "gyro_bias": "gyro 10 °/s too high",
-    "gyro_drift": "gyro drifts by 3 °/s²",
-    "a_y_zero": "accelerometer at zero",
-    "hand_wheel": "hand wheel frozen",
-    "wheel": "a wheel speed at zero",
-    "brake": "one wheel not braked",
-}
-
-
 def faulty(study: dict[str, Any]) -> list[str]:
-    """Return a row per car and fault: share found, time, largest sideslip with the monitor and without."""
+    """Return a row per car and fault: share found, delay, blame, sideslip with and without monitor."""
     runs = study["runs"]
     rows = []
     for car, off in (("B", "lane_change_80kmh"), ("C", "double_lane_change")):
-        rows.append(f"| {car}, no control | - | - | - | {_of(runs[f'off/{off}'], 'sideslip', 'rad')} |")
-        for fault, says in FAULTS.items():
-            held, bare = runs[f"with/{car}/{fault}"], runs[f"without/{car}/{fault}"]
-            found = f"{_of(held, 'found', '%')} | {_of(held, 'after', 's')}"
+        rows.append(f"| {car}, no control | - | - | - | - | {_of(runs[f'off/{off}'], 'sideslip', 'rad')} |")
+        for name in (name for name in runs if name.startswith(f"with/{car}/")):
+            held, bare = runs[name], runs[name.replace("with/", "without/", 1)]
+            says = held["label"].rpartition("with the monitor, ")[2]
+            found = f"{_of(held, 'found', '%')} | {_of(held, 'after', 's')} | {_of(held, 'blamed', '')}"
             slides = f"{_of(held, 'sideslip', 'rad')} | {_of(bare, 'sideslip', 'rad')}"
             rows.append(f"| {car}, {says} | {found} | {slides} |")
     return rows
@@ -90,4 +78,4 @@ def _of(run: dict[str, Any], metric: str, unit: str) -> str:
 
 
 def _shown(found: dict[str, Any], unit: str) -> str:
-    return shown(found["value"], unit, half=found.get("half", 0.0))
+    return shown(found["value"], unit, half=found.get("half", 0.0), between=found.get("between"))

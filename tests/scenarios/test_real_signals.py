@@ -89,7 +89,7 @@ def test_the_documentation_has_what_the_studies_measure(name, rows, page, tmp_pa
     assert [row for row in rows(study) if row not in written] == []
 
 
-@pytest.mark.parametrize(("name", "noisy"), [("degradation", 6 * 4), ("faults", 2 * 9)])
+@pytest.mark.parametrize(("name", "noisy"), [("degradation", 6 * 4), ("faults", 104)])
 def test_every_run_with_noise_that_a_mean_is_made_of_has_ten_seeds(name, noisy):
     study = load_experiment(ROOT / f"scenarios/real_signals/{name}.yaml")
     seeds: dict[str, set[object]] = {}
