@@ -24,6 +24,23 @@ class SignalEntry(NamedTuple):
     """Largest plausible magnitude in a measurement: a larger value probably has another unit. Chosen."""
 
 
+SYMBOLS = {
+    "psi": "yaw",
+    "beta": "sideslip",
+    "delta": "steer",
+    "phi": "roll",
+    "theta": "pitch",
+    "mu": "friction",
+    "dot": "rate",
+    "mz": "yaw_moment",
+    "fz": "vertical_load",
+    "vx": "velocity",
+    "vy": "velocity",
+    "ax": "acceleration",
+    "ay": "acceleration",
+}
+"""Symbol in names of other tools' variables -> the words for it here."""
+
 SIGNALS: dict[str, SignalEntry] = {
     "velocity_x": SignalEntry(
         "m/s",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -136,7 +137,7 @@ def _values(name: str, items: Iterable[Any]) -> dict[str, Any]:
         raise ScenarioError(
             f"{name}: give all levels in the same unit, or all without", code="argument-invalid"
         )
-    return {"values": [float(pair[0]) for pair in split if pair], "unit": units.pop()}
+    return {"values": [float(Fraction(pair[0])) for pair in split if pair], "unit": units.pop()}
 
 
 @dataclass(frozen=True)

@@ -316,6 +316,12 @@ def _spaced(start: float, end: float, count: int, spacing: str) -> list[float]:
     return [float(first + (last - first) * i / (count - 1)) for i in range(count)]
 
 
+def names_of(axis: AxisSpec, level: Level) -> tuple[str, ...]:
+    """Return the texts that name a level in a file: its value, that with the unit of the axis, its label."""
+    value = text_of(level.value)
+    return (value, *([f"{value} {axis.unit}"] if axis.unit else []), level.words)
+
+
 def _level(number: float) -> Level:
     return Level(number, f"{number:.6g}")
 

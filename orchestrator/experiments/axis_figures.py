@@ -21,7 +21,7 @@ from ..figures.style import QUIET, line_style, literal, shown, shown_unit
 from ..metrics.measures import variable_of, words
 from ..metrics.run_metrics import MetricValue, metric
 from ..names import Target
-from .axes import RUN, Level
+from .axes import RUN, Level, names_of
 from .experiment import Case
 from .grids import cells
 from .judged_schema import si_number, text_of
@@ -65,7 +65,7 @@ class Drawing:
         self.runs = [
             run
             for run in findings.experiment.first_cases
-            if all(text_of(self.at(run, axis).value) in values for axis, values in only.items())
+            if all(self._is_of(run, axis, values) for axis, values in only.items())
         ]
 
     def fill(self, axes: Axes, runs: Sequence[Case]) -> None:
@@ -95,6 +95,11 @@ class Drawing:
             yield level, {**style_of(number), "label": self.name_of(self.spec.lines, level)}
         if not levels:
             yield None, style_of(0)
+
+    def _is_of(self, run: Case, axis: str, chosen: set[str]) -> bool:
+        level = self.at(run, axis)
+        names = names_of(self.axes[axis], level) if axis in self.axes else (text_of(level.value),)
+        return not chosen.isdisjoint(names)
 
     def at(self, run: Case, axis: str) -> Level:
         """Return the level of a run on an axis; the axis "run" has the run names as levels."""

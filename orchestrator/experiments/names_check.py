@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ..messages import hint
 from ..names import Target
 from ..scenario.yaml_lines import Document, KeyPath
-from .axes import RUN, levels_of
+from .axes import RUN, levels_of, names_of
 from .grids import cells
 from .judged_schema import MetricReference, text_of
 from .schema import ExperimentSpec, FigureSpec
@@ -184,7 +184,8 @@ def _check_levels(spec: ExperimentSpec, document: Document, i: int, figure: Figu
         if axis not in spec.axes or (spec.design == "latin_hypercube" and spec.axes[axis].numeric):
             continue
         known = [text_of(level.value) for level in levels_of(spec.axes[axis])]
-        for value in (value for value in chosen if text_of(value) not in known):
+        names = {name for level in levels_of(spec.axes[axis]) for name in names_of(spec.axes[axis], level)}
+        for value in (value for value in chosen if text_of(value) not in names):
             sentence = f"{axis} has no value {value!r}{hint(text_of(value), known, lead='it has')}"
             document.report(("figures", i, "only", axis), sentence, "figure-invalid")
 

@@ -254,6 +254,9 @@ FIGURE_KINDS = {
 """Name -> kind of figure."""
 
 
+Chosen = Annotated[list[Scalar], BeforeValidator(lambda value: value if isinstance(value, list) else [value])]
+
+
 class FigureSpec(StrictModel):
     """A figure: overlaid runs, a metric or a limit over one or two axes, or a grid."""
 
@@ -272,7 +275,7 @@ class FigureSpec(StrictModel):
     x: str = Field("", description="Horizontal axis")
     y: str = Field("", description="Vertical axis, of a map")
     lines: str = Field("", description="Axis with a line per value, of curves and limits")
-    only: dict[str, list[Scalar]] = Field({}, description="Axis -> those of its values that are drawn")
+    only: dict[str, Chosen] = Field({}, description="Axis -> that of its values, or those, which are drawn")
     scale: Literal["linear", "log"] = Field("linear", description="Of the metric")
     largest: QuantityText | None = Field(None, description="Upper end of the metric's scale")
     mark: QuantityText | None = Field(None, description="A value of the metric to draw a line at")

@@ -162,14 +162,25 @@ def _check_time_grid(document: Document) -> None:
         change = document.override(("step_size",))
         origin = f" ({change})" if change else ""
         allowed = [t + from_start for t in (below, below + step) if t > 0]
-        nearest = listed([f"{float(t):.12g} s" for t in allowed], last="or")
-        after = f" from {float(from_start):.12g} s on" if from_start else ""
+        exact = quantities.exact_text
+        nearest = listed([f"{exact(t)} s" for t in allowed], last="or")
+        after = f" from {exact(Fraction(from_start))} s on" if from_start else ""
+        meant = _unrounded(step)
+        fraction = f"; did you mean step_size: {meant} s?" if meant and time % meant == 0 else ""
         document.report(
             key,
-            f"{float(time):.12g} s{after} is not an integer multiple of the communication step "
-            f"{float(step):.12g} s{origin}; nearest allowed: {nearest}",
+            f"{exact(time)} s{after} is not an integer multiple of the communication step "
+            f"{exact(step)} s{origin}; nearest allowed: {nearest}{fraction}",
             "time-grid-invalid",
         )
+
+
+def _unrounded(step: Fraction) -> Fraction | None:
+    """Return the fraction 1/n that a step with at least three digits rounds: 1/30 for 0.0333."""
+    meant = Fraction(1, max(1, round(1 / step)))
+    digits = len(f"{float(step):.12e}".partition("e")[0].replace(".", "").rstrip("0"))
+    rounds = digits >= 3 and float(f"{float(meant):.{digits}g}") == float(f"{float(step):.{digits}g}")
+    return meant if rounds and meant != step else None
 
 
 def _seconds(value: object) -> Fraction | None:

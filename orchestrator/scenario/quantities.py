@@ -1,4 +1,4 @@
-"""Units of measurement, and quantities written with one: '90 km/h', '5 deg', '12 bar', '2 N.m/deg'.
+"""Units of measurement, and quantities written with one: '90 km/h', '5 deg', '2 N.m/deg', '1/30 s'.
 
 A unit is a product of powers: symbols of the tables below, many with a decimal prefix, joined by `.` (also
 `*`, a raised dot or a space), each with an exponent (`m2`, `m^2`, `s-1`), divided by `/`; a denominator of
@@ -218,6 +218,9 @@ WRITTEN = 200
 SHORTEST = Fraction(1, 10**9)
 """Shortest accepted time [s]; shorter steps are lost in the rounding of time."""
 
+LONGEST_DENOMINATOR = 10_000
+"""Denominators up to which a time is shown as a fraction. Chosen: beyond the rates of all hardware, in Hz."""
+
 _GRAVITY = replace(parse_unit("m/s2"), factor=Fraction("9.80665"))
 _COMMON = (  # noqa: SIM905 - units read better as one line of text
     "s ms min h m mm cm km m/s km/h m/s2 g m2 m3 rad deg mrad rad/s deg/s rpm rad/s2 deg/s2 Hz "
@@ -227,15 +230,19 @@ _COMMON = (  # noqa: SIM905 - units read better as one line of text
 """Units to suggest in messages."""
 
 _NUMBER = re.compile(
-    r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(?P<unit>[A-Za-zµμ°%1(].*?)?\s*",
+    r"\s*(?P<number>[+-]?(?:\d+/0*[1-9]\d*|(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?))\s*(?P<unit>[A-Za-zµμ°%1(].*?)?\s*",
     re.ASCII,
 )
+_FRACTION = re.compile(r"\s*[+-]?\d+/0*[1-9]\d*\s*", re.ASCII)
 _LARGEST = Fraction(sys.float_info.max)
 _COMMA = re.compile(r"\s*([+-]?\d+),(\d+\s*[^,]*?)\s*", re.ASCII)
 
 
 def number_and_unit(text: str) -> tuple[str, str] | None:
-    """Split a quantity into number and unit, ("80", "km/h"); None if `text` is not a number with a unit."""
+    """Split a quantity into number and unit, ("80", "km/h"); None if `text` is not a number with a unit.
+
+    The number may be a fraction, "1/30".
+    """
     match = _NUMBER.fullmatch(text) if len(text) <= WRITTEN else None
     return (match["number"], match["unit"]) if match and match["unit"] else None
 
@@ -355,7 +362,7 @@ def spellings(unit: str) -> list[str]:
 
 
 def instant(value: object) -> Fraction:
-    """Return a point of time in s as the exact fraction of its decimal text: 0.001 is 1/1000.
+    """Return a point of time in s as the exact fraction of its text: 0.001 is 1/1000, and so is '1/1000 s'.
 
     Raises:
         ValueError: not a time.
@@ -367,7 +374,7 @@ def instant(value: object) -> Fraction:
 
 
 def seconds(value: object) -> Fraction:
-    """Return a duration in s as the exact fraction of its decimal text.
+    """Return a duration in s as the exact fraction of its text.
 
     Raises:
         ValueError: not a positive time.
@@ -381,9 +388,18 @@ def seconds(value: object) -> Fraction:
     return time
 
 
+def exact_text(time: Fraction) -> str:
+    """Return a time in s as text that tells it from its neighbours: "0.001", "1/30", "9.99999999999"."""
+    decimal = f"{float(time):.12g}"
+    if Fraction(decimal) == time:
+        return decimal
+    return str(time) if time.denominator < LONGEST_DENOMINATOR else repr(float(time))
+
+
 def _time(value: object) -> Fraction:
     if isinstance(value, str):
-        return Fraction(convert(value, "s"))
+        plain = len(value) <= WRITTEN and _FRACTION.fullmatch(value)
+        return Fraction(value if plain else convert(value, "s"))
     if isinstance(value, Fraction):
         return value
     if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < math.inf:

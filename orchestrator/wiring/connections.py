@@ -10,10 +10,14 @@ where nothing is connected by equal names.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Set
 from dataclasses import replace
+from functools import cache
 from graphlib import CycleError
 from itertools import pairwise
+
+from vocabulary.signals import SYMBOLS
 
 from ..messages import fold, hint, listed
 from ..names import SignalName, matching
@@ -69,13 +73,24 @@ def difference(
     return None
 
 
-def alike(output: str, name: str) -> bool:
-    """Return whether an output is a plausible suggestion for an input: their names share a word.
+def alike(output: str, name: str) -> int:
+    """Return how many words the names of an output and of an input share: 0 if it should not be suggested.
 
-    Words of up to two letters do not count, and a reference value does not match an actual value.
+    A reference value does not match an actual value.
     """
-    words = [{word for word in name_part.split("_") if len(word) > 2} for name_part in (output, name)]
-    return bool(words[0] & words[1]) and ("ref" in words[0]) == ("ref" in words[1])
+    words = words_of(output), words_of(name)
+    return len(words[0] & words[1]) if ("ref" in words[0]) == ("ref" in words[1]) else 0
+
+
+@cache
+def words_of(name: str) -> frozenset[str]:
+    """Return the words of a signal's name, symbols translated: of `PsiDot` and `yaw_rate` yaw and rate.
+
+    Words of up to two letters do not count.
+    """
+    words = [name, *re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)]
+    translated = "_".join(SYMBOLS.get(word.lower(), word.lower()) for word in words)
+    return frozenset(word for word in translated.split("_") if len(word) > 2)
 
 
 def fits(source: Variable, target: Variable) -> bool:
@@ -339,13 +354,14 @@ class Connector:
 
     def _undriven(self, instance: str, variable: Variable) -> str:
         """Return the message for an input without a source."""
-        choices = [
-            f"{source}.{name}"
+        shared = {
+            f"{source}.{name}": alike(name, variable.name)
             for source, names in self._fitting_outputs(variable).items()
             if source != instance
             for name in names
-            if alike(name, variable.name)
-        ]
+        }
+        most = max(shared.values(), default=0)
+        choices = [output for output, words in shared.items() if words == most > 0]
         connect = f"connect {listed(choices, last='or')}, or give" if 0 < len(choices) <= 8 else "give"
         measure = f" [{variable.unit}]" if variable.unit else ""
         return (

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from fractions import Fraction
 from itertools import product
 from typing import NamedTuple
 
@@ -129,7 +130,9 @@ def _beyond(item: _Given) -> Diagnostic | None:
         return None
     written = number_and_unit(item.raw) if isinstance(item.raw, str) else None
     number, unit_written = written or (f"{item.value:.10g}", quantity.unit)
-    likely = meant_unit(float(number), unit_written, quantity.unit, lambda value: low <= value <= high)
+    likely = meant_unit(
+        float(Fraction(number)), unit_written, quantity.unit, lambda value: low <= value <= high
+    )
     unit = f" {quantity.unit}" if quantity.unit != "1" else ""
     says = (
         f"{item.place}: {item.value:.10g}{unit} is implausible for a car "
