@@ -63,7 +63,7 @@ def slip_for_force(
                 return sign * min(cap, share * optimum)
             low, at_low = before, at_before
             break
-        if high == end:
+        if not high < end:  # the end, or no number
             return sign * cap
         before, at_before = low, at_low
         low, at_low = high, at_high
