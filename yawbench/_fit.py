@@ -22,6 +22,8 @@ def fit(
 ) -> Fit:
     """Fit parameters of a scenario to a measurement, as `yawbench fit` does; nothing is written.
 
+        >>> fitted = yb.fit("fit.yaml")  # doctest: +SKIP
+
     Args:
         path: a fit file.
         workers: number of processes; default: one per core.
@@ -37,7 +39,10 @@ def fit(
 
 @dataclass(frozen=True)
 class Fit:
-    """Parameters fitted to a measurement; made by `fit`."""
+    """Parameters fitted to a measurement; made by `fit`.
+
+    >>> yb.fit("fit.yaml").parameters  # doctest: +SKIP
+    """
 
     __module__ = "yawbench"
 

@@ -14,6 +14,7 @@ import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 import components
@@ -128,5 +129,5 @@ def _functions(cls: type) -> list[Any]:
     functions = [member for member in vars(cls).values() if inspect.isfunction(member)]
     for function in functions:
         cells = (cell.cell_contents for cell in function.__closure__ or ())
-        functions += [held for held in cells if inspect.isfunction(held) and held not in functions]
+        functions += [held for held in cells if type(held) is FunctionType and held not in functions]
     return functions

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 def measured(file: str | Path, segment: int | None = None) -> Run:
     """Return a recording of a car as a run: `metric`, `plot`, `evaluate`, `view` take it like one.
 
-        >>> laps = yb.measured("measured.yaml", segment=2)
+        >>> laps = yb.measured("measured.yaml", segment=2)  # doctest: +SKIP
 
     Args:
         file: the measurement file.

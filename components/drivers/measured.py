@@ -50,7 +50,7 @@ class Measured(Component):
     )
     outputs = (
         output("steer_angle", "steering_wheel_angle_measured"),
-        "drive_force",
+        output("drive_force", "velocity_x_measured", "acceleration_x_measured", "velocity_x"),
         output("steering_wheel_angle", "steering_wheel_angle_measured"),
     )
 

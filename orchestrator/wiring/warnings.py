@@ -285,8 +285,8 @@ def _parameters(units: Iterable[Instance]) -> Iterator[GivenValue]:
     for unit in units:
         for variable in unit.fmu.of("parameter"):
             value = unit.parameter(variable.name)
-            if value is not None:
-                origin = unit.origins.get(variable.name, DEFAULT).kind
+            origin = unit.origins.get(variable.name, DEFAULT).kind
+            if value is not None and (value != 0 or origin != DEFAULT.kind):  # 0 by default: not given
                 yield GivenValue(unit.name, variable.name, value, origin, variable)
 
 

@@ -74,7 +74,7 @@ def in_one_sentence(said, arguments, words):
         ((*RUN, "--fmus", "nowhere"), ["--fmus nowhere: no such folder"]),
         ((*RUN, "--call-limit", "5"), ["--call-limit requires --isolate"]),
         (("plot", "nowhere"), ["nowhere: no results here", "make them with 'yawbench run SCENARIO"]),
-        (("list", "runs"), ["results: there is no such folder"]),
+        (("list", "runs"), ["results: no such folder"]),
         (("build", "controler_off"), [f"there is no component 'controler_off'; {KNOWN} 'controller_off'?"]),
         (("build", "nowhere.py"), ["nowhere.py: there is no such file; name a component or its Python file"]),
         (("new", "controller", "my controller"), ["cannot name a controller", "for example 'my_controller'"]),

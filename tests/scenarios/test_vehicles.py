@@ -134,8 +134,8 @@ def test_understeer_and_roll_are_those_of_closed_forms(fmus):
     p = YAML(typ="safe").load(file("four_wheel_drive_car").read_text())["parameters"]
     on_track = track(fmus, "four_wheel_drive_car", "plant_eight_dof", "tyre_linear")
     car = Handling("plant_eight_dof", wheelbase=p["cg_to_front_axle"] + p["cg_to_rear_axle"])
-    c = 2.0 * 50e3  # of the FMU
-    k = p["mass"] / car.wheelbase * (p["cg_to_rear_axle"] - p["cg_to_front_axle"]) / c
+    c_f, c_r = p["cornering_stiffness_front"], p["cornering_stiffness_rear"]
+    k = p["mass"] / car.wheelbase * (p["cg_to_rear_axle"] / c_f - p["cg_to_front_axle"] / c_r)
     v = TURN_SPEED
     car.gains[v] = v / (car.wheelbase + k * v * v)
     handling._turn(on_track, car)
