@@ -378,7 +378,7 @@ UNHASHABLE = {label for label, make in WRONG.items() if not _is_key(make())}
 NOT_CALLED = (
     yb.Controller, yb.Diagnostic, yb.Evaluation, yb.Location, yb.MetricValue, yb.Override, yb.Plan,
     yb.TestQuantity, yb.Verdict, yb.Fit, yb.LinearModel,
-    yb.RecordedRuns, yb.measured, yb.fit, yb.linearize,  # in tests of their own: calls need files or take seconds
+    yb.RecordedRuns, yb.measured, yb.fit, yb.linearize,  # calls need files or take seconds
 )  # fmt: skip
 """What users write, or only read."""
 
