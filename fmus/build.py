@@ -95,7 +95,7 @@ def build_all(
     if unknown:
         sentences = [f"there is no component {name!r}; there are: {', '.join(known)}" for name in unknown]
         raise BuildError(sentences, code="component-unknown")
-    errors: list[Diagnostic] = []
+    errors: dict[str, list[Diagnostic]] = {}
     report = Report()
     report_progress = progress or (lambda name, what: None)
     stale = []
@@ -107,12 +107,13 @@ def build_all(
         else:
             stale.append(name)
     for name, problems in _built(stale, known, out, root):
-        errors += problems
-        if not problems:
+        if problems:
+            errors[name] = problems
+        else:
             report.built.append(name)
         report_progress(name, "failed" if problems else "built")
     if errors:
-        raise BuildError(errors)
+        raise BuildError([error for name in chosen for error in errors.get(name, [])])
     report.built.sort(key=chosen.index)
     for name in report.built:
         how = runs_as(out / f"{name}.fmu")
