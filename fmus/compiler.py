@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
-from orchestrator.cache_and_checksums import cache_folder, keep, recall
+from orchestrator.cache import cache_folder, keep, recall
 from orchestrator.errors import BuildError, YawbenchError
 from orchestrator.messages import printable
 

@@ -17,7 +17,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from orchestrator.cache_and_checksums import cache_folder, keep, recall
+from orchestrator.cache import cache_folder, keep, recall
 from orchestrator.errors import BuildError
 from orchestrator.plan import BuildInfo
 

@@ -24,14 +24,14 @@ from .messages import cut, printable
 
 COMMANDS = {
     "new": "new",
-    "build": "build_and_list",
+    "build": "build",
     "check": "check",
-    "run": "run_and_compare",
-    "compare": "run_and_compare",
+    "run": "run",
+    "compare": "run",
     "plot": "results",
     "animate": "results",
     "serve": "results",
-    "converge": "run_and_compare",
+    "converge": "run",
     "study": "experiments",
     "report": "experiments",
     "sweep": "experiments",
@@ -40,15 +40,15 @@ COMMANDS = {
     "drive": "standard_tests",
     "tune": "experiments",
     "rank": "rank",
-    "list": "build_and_list",
-    "diff": "run_and_compare",
+    "list": "build",
+    "diff": "run",
     "salvage": "results",
     "export-ssp": "interop",
     "second-opinion": "interop",
     "tyre": "vehicle_and_tyre",
     "measured": "measured",
     "vehicle": "vehicle_and_tyre",
-    "cache": "build_and_list",
+    "cache": "build",
 }
 """Command -> its module in `orchestrator.commands`; the function has the same name, `_` for `-`."""
 

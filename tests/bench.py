@@ -29,8 +29,8 @@ from orchestrator.interop.second_opinion import MASTERS, installed, second_opini
 from orchestrator.interrupts import StopFlag
 from orchestrator.master.compiled_loop import WANTED as LOOP
 from orchestrator.master.fmi import open_instance
-from orchestrator.master.log_and_process_state import Log
 from orchestrator.master.master import Master
+from orchestrator.master.process_state import Log
 from orchestrator.master.step_program import Operation
 from orchestrator.plan import Plan
 from orchestrator.scenario.find_and_load import load_scenario

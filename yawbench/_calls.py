@@ -10,7 +10,7 @@ from orchestrator.errors import YawbenchError
 from orchestrator.experiments.jobs import Job, Outcome, execute
 from orchestrator.fmu.binary import NATIVE
 from orchestrator.master.fmi import open_instance
-from orchestrator.master.log_and_process_state import Log
+from orchestrator.master.process_state import Log
 from orchestrator.plan import Instance
 
 from ._controller import PythonComponent

@@ -29,7 +29,7 @@ from components.fmi.variables import VariableSpec, output, parameter, signal
 from orchestrator.errors import ScenarioError
 from orchestrator.fmu.description import describe
 from orchestrator.master.instance import Buffers, ExperimentSetup, Status, StepCalls, nothing_to_do
-from orchestrator.master.log_and_process_state import ERROR, OK, Log
+from orchestrator.master.process_state import ERROR, OK, Log
 from orchestrator.messages import counted, listed, short
 from orchestrator.plan import Fmu, Instance, Value, ValueRef
 from vocabulary.roles import ROLES

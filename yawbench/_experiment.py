@@ -28,7 +28,7 @@ from orchestrator.master.run_loop import OpenInstance
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.messages import hint, listed, printable, short
 from orchestrator.plan import Value
-from orchestrator.results.read_and_salvage import Results
+from orchestrator.results.reader import Results
 from orchestrator.scenario.quantities import number_and_unit
 from orchestrator.scenario.validation import Model, validate
 from orchestrator.scenario.yaml_lines import Document, scalar

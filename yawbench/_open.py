@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 from orchestrator.errors import ResultsError
 from orchestrator.messages import counted, listed
-from orchestrator.results.folder_and_lock import PART, RUN_FILE
-from orchestrator.results.formats_and_csv import RESULTS_FILE
-from orchestrator.results.read_and_salvage import found_runs, load_results
+from orchestrator.results.file_formats import RESULTS_FILE
+from orchestrator.results.reader import found_runs, load_results
+from orchestrator.results.run_folder import PART, RUN_FILE
 
 from . import arguments
 from ._run import Run

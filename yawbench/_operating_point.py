@@ -19,8 +19,8 @@ from fmus.build import find_components
 from fmus.build_stamp import read_stamp
 from orchestrator.errors import Diagnostic, Location, ScenarioError, SimulationError
 from orchestrator.interrupts import StopFlag
-from orchestrator.master.log_and_process_state import OK, WARNING, Log
 from orchestrator.master.master import Master
+from orchestrator.master.process_state import OK, WARNING, Log
 from orchestrator.master.step_program import SeriesFeed
 from orchestrator.messages import hint, short
 from orchestrator.names import SignalName

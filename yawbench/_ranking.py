@@ -25,7 +25,7 @@ from orchestrator.experiments.ranking_tables import (
 from orchestrator.experiments.tables import to_pandas
 from orchestrator.messages import hint
 from orchestrator.planner import Planner
-from orchestrator.results.folder_and_lock import writing
+from orchestrator.results.run_folder import writing
 from orchestrator.scenario import find_and_load
 
 from . import arguments

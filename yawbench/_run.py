@@ -19,7 +19,7 @@ from orchestrator.messages import hint, short
 from orchestrator.metrics.run_metrics import STANDARD, MetricValue, evaluate, evaluate_all, metric, why_none
 from orchestrator.plan import Override
 from orchestrator.results.measured import measured_results
-from orchestrator.results.read_and_salvage import Results
+from orchestrator.results.reader import Results
 
 from . import arguments
 

@@ -20,7 +20,7 @@ from orchestrator.errors import (
     warnings_in,
 )
 from orchestrator.fault_kinds import FaultList
-from orchestrator.master.log_and_process_state import Log
+from orchestrator.master.process_state import Log
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.messages import hint, short
 from orchestrator.names import Target

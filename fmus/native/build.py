@@ -20,7 +20,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from orchestrator.cache_and_checksums import keep, recall
+from orchestrator.cache import keep, recall
 from orchestrator.errors import BuildError
 
 from .. import usual_ranges

@@ -264,7 +264,7 @@ def _wire_rows(plan: Plan) -> Iterable[tuple[str, str, str, str]]:
 
 def _fault_rows(plan: Plan) -> Iterable[Sequence[str]]:
     from ..messages import fold
-    from ..results.plan_record_and_freshness import faults_of
+    from ..results.freshness import faults_of
 
     for fault in faults_of(plan):
         yield fault.on, fault.fault, ", ".join(fold(fault.at))

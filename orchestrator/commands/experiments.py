@@ -122,8 +122,8 @@ def chapter_of(
 ) -> dict[str, Any]:
     """Return the chapter of an experiment for a page in `shown_in`; `more`: further template data."""
     from ..pages.report import chapter
-    from ..results.folder_and_lock import RUN_FILE
-    from ..results.plan_record_and_freshness import staleness
+    from ..results.freshness import staleness
+    from ..results.run_folder import RUN_FILE
 
     jobs = findings.planned.jobs if findings.planned and not findings.spec.axes else []
     out_of_date = {
@@ -180,7 +180,7 @@ def of_files(context: typer.Context, files: Sequence[Path], options: RunOptions)
     from ..errors import ScenarioError
     from ..experiments.experiment import load_experiment
     from ..experiments.verdict_tables import all_tables, counts_of, reach, tally_words
-    from ..results.folder_and_lock import default_folder, names_of
+    from ..results.run_folder import default_folder, names_of
     from .progress import print_tables
 
     changes, out = options.changes, options.out
@@ -316,8 +316,8 @@ def tune(context: typer.Context, file: TuningFile, options: RunOptions, seed: Tu
     )
     from ..figures.style import save
     from ..files import write_whole
-    from ..pages.page_parts_and_provenance import image_of
-    from ..results.folder_and_lock import default_folder
+    from ..pages.page_parts import image_of
+    from ..results.run_folder import default_folder
 
     experiment = load_experiment(file, changes=options.changes)
     folder = options.out or default_folder(file, options.changes)

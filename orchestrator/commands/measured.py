@@ -64,7 +64,7 @@ def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
     from ..experiments.fit_result import make_fit
     from ..files import write_whole
     from ..planner import Planner
-    from ..results.folder_and_lock import default_folder
+    from ..results.run_folder import default_folder
 
     loaded = load_fit(file)
     for note in loaded.measurement.notes:

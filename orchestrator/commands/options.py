@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..fault_kinds import KINDS, NO_FAULTS
-from ..results.formats_and_csv import FORMATS
+from ..results.file_formats import FORMATS
 
 if TYPE_CHECKING:
     from ..plan import Override, Plan
@@ -165,7 +165,7 @@ class RunOptions:
         if self.fresh and self.no_run:
             raise ScenarioError("--fresh and --no-run are mutually exclusive", code="option-invalid")
         if self.format_ != "csv":  # importing the other formats takes time
-            from ..results.formats_and_csv import check_format
+            from ..results.file_formats import check_format
 
             check_format(self.format_)
         _ = self.limit, self.changes  # raises now if they are invalid

@@ -43,7 +43,7 @@ def hold(context: typer.Context, *folders: Path) -> None:
     Raises:
         ResultsError: another command is writing there, or a folder is not writable.
     """
-    from ..results.folder_and_lock import writing
+    from ..results.run_folder import writing
 
     context.with_resource(writing(*folders))
 

@@ -68,7 +68,7 @@ def rank(
     from ..experiments.ranking import load_ranking
     from ..experiments.ranking_scores import run_ranking
     from ..experiments.ranking_tables import table_of
-    from ..results.folder_and_lock import default_folder
+    from ..results.run_folder import default_folder
     from ..scenario import yaml_lines
 
     more = dict(map(_entry, controller or ()))
@@ -119,7 +119,7 @@ def _rank_by_threats(
     from ..files import write_whole
     from ..pages.report import PAGE
     from ..pages.threats_page import main_table, scored, threats_page
-    from ..results.folder_and_lock import default_folder
+    from ..results.run_folder import default_folder
 
     threats = load_threats(file, more=more, quick=quick)
     _check_only(only, threats.ranking.entries)

@@ -41,9 +41,9 @@ def recorded(sources: Sequence[Path], options: RunOptions) -> list[Path]:
     from ..experiments.jobs import Job, execute, ready
     from ..fmu.opener import stale_fmus
     from ..planner import Planner
-    from ..results.folder_and_lock import default_folder
+    from ..results.freshness import staleness
     from ..results.measured import is_measurement, segments_of
-    from ..results.plan_record_and_freshness import staleness
+    from ..results.run_folder import default_folder
     from ..scenario import find_and_load
     from ..scenario.find_and_load import MEASUREMENT
     from .progress import reported, say, stoppable
@@ -106,8 +106,8 @@ def labels_of(folders: Sequence[Path], labels: Sequence[str] | None) -> list[str
 
 def folder_of_all(folders: Sequence[Path]) -> Path:
     """Return the folder for figures of all runs: that of a single run, else their common parent."""
-    from ..results.folder_and_lock import below_results
     from ..results.measured import is_measurement
+    from ..results.run_folder import below_results
 
     if not (own := [folder for folder in folders if not is_measurement(folder)]):
         return below_results("measured", folders[0].stem)
@@ -328,7 +328,7 @@ def salvage(folders: Folders) -> None:
     instead. Incomplete Parquet and MDF files cannot be recovered.
     """
     from ..messages import counted
-    from ..results.read_and_salvage import lost_format, salvage
+    from ..results.reader import lost_format, salvage
     from .progress import say
 
     for folder in folders:

@@ -86,7 +86,7 @@ def drive(
     """
     from ..errors import ScenarioError
     from ..experiments.standard_test_runs import TestDriver
-    from ..results.folder_and_lock import default_folder
+    from ..results.run_folder import default_folder
     from ..scenario import find_and_load
 
     chosen = DRIVEN[test]
@@ -216,8 +216,8 @@ def evaluate(
     if nothing could be judged.
     """
     from ..evaluation.trace import trace_of
-    from ..results.folder_and_lock import below_results
     from ..results.measured import load_run
+    from ..results.run_folder import below_results
     from .progress import say
     from .results import distinct, folder_of_all
 
@@ -317,9 +317,9 @@ def _refuse_mapping(mapping: Path, sources: Sequence[Path], test: str) -> None:
 def _runs(source: Path) -> list[Path]:
     """Return the folders of the runs in and below a folder, or the segments of a measurement file."""
     from ..errors import ResultsError
-    from ..results.folder_and_lock import COMPLETED
     from ..results.measured import segments_of
-    from ..results.read_and_salvage import UNREADABLE, found_runs
+    from ..results.reader import UNREADABLE, found_runs
+    from ..results.run_folder import COMPLETED
     from .progress import say
 
     if not source.is_dir():

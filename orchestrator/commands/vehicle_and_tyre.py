@@ -61,7 +61,7 @@ def vehicle(
     """
     from ..errors import ScenarioError
     from ..planner import Planner
-    from ..results.folder_and_lock import below_results
+    from ..results.run_folder import below_results
     from ..scenario import find_and_load, yaml_lines
     from ..scenario.scenario_schema import Vehicle
     from ..scenario.validation import validate
@@ -171,7 +171,7 @@ def tyre(
     longitudinal force over slip at four loads, forces in combined slip at five slip angles, stiffnesses
     and relaxation lengths over load.
     """
-    from ..results.folder_and_lock import below_results
+    from ..results.run_folder import below_results
     from ..tyre_stand import draw_tyre, put_on_stand
     from .progress import save_figure, say
 

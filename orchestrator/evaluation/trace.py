@@ -31,7 +31,7 @@ from ..measured.segment import LowPass, even_grid, resample
 from ..messages import with_changes
 from ..metrics.measures import si_of
 from ..metrics.run_metrics import columns_of
-from ..results.read_and_salvage import Results
+from ..results.reader import Results
 from ..results.run_record import FmuRecord
 from .standard_tests import NotJudged
 

@@ -28,7 +28,7 @@ from typing import Any
 
 import distributed
 
-from ..cache_and_checksums import OF_METRICS, sources_hash
+from ..cache import OF_METRICS, sources_hash
 from ..errors import Diagnostic, ResultsError, ScenarioError
 from ..fmu.archive import open_fmu, read_archive
 from ..interrupts import terminable

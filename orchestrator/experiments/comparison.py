@@ -30,7 +30,7 @@ from ..metrics.run_metrics import MetricValue, metric
 from ..names import SignalName
 from ..plan import Override
 from ..plan import Value as Plain
-from ..results.read_and_salvage import Results
+from ..results.reader import Results
 from ..scenario.find_and_load import load_scenario
 from ..scenario.overrides import is_path, swap_of
 from .experiment import LoadedExperiment, NamedRun, experiment_of

@@ -17,13 +17,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
-from ..cache_and_checksums import warn_of_record
+from ..cache import warn_of_record
 from ..errors import ResultsError, ScenarioError
 from ..metrics.run_metrics import metric, results_to_be, unit_in
 from ..plan import Plan
 from ..planner import Planner
-from ..results.folder_and_lock import RUN_FILE
-from ..results.plan_record_and_freshness import altered, staleness
+from ..results.freshness import altered, staleness
+from ..results.run_folder import RUN_FILE
 from .experiment import Case, LoadedExperiment, NamedRun
 from .jobs import (
     Job,

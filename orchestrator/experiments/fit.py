@@ -45,7 +45,7 @@ from ..messages import hint
 from ..names import INPUTS, SignalName, Target, match
 from ..plan import InputSeries, Instance, Override, Value, Variable
 from ..planner import Planner
-from ..results.plan_record_and_freshness import key_of
+from ..results.freshness import key_of
 from ..scenario import yaml_lines
 from ..scenario.quantities import convert, gain_and_offset, measure_of
 from ..scenario.scenario_schema import Scalar, SeriesSpec

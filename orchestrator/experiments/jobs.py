@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..cache_and_checksums import OF_METRICS, OF_TESTS, sources_hash
+from ..cache import OF_METRICS, OF_TESTS, sources_hash
 from ..errors import (
     BuildError,
     Diagnostic,
@@ -30,8 +30,8 @@ from ..messages import printable
 from ..metrics.run_metrics import evaluate, metric
 from ..plan import Override, Plan
 from ..planner import Planner
-from ..results.plan_record_and_freshness import key_of
-from ..results.read_and_salvage import Results, load_results
+from ..results.freshness import key_of
+from ..results.reader import Results, load_results
 from ..workers import Finished, Pool, retire
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from typing import Annotated, Any, NoReturn
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from ..cache_and_checksums import KEY, changed_since, has_checksums, warn_of_record, with_checksums
+from ..cache import KEY, changed_since, has_checksums, warn_of_record, with_checksums
 from ..errors import Diagnostic, ResultsError
 from ..files import open_own, reason, write_whole
 from ..messages import counted

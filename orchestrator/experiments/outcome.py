@@ -16,8 +16,8 @@ from ..figures.style import digits_of
 from ..messages import counted
 from ..metrics.run_metrics import MetricValue
 from ..metrics.verdict import Status, Verdict, not_judged, worst
-from ..results.folder_and_lock import RUN_FILE
-from ..results.read_and_salvage import Results
+from ..results.reader import Results
+from ..results.run_folder import RUN_FILE
 from .axes import RUN, DesignPoint, Level
 from .claims import ClaimResult, Judgement, MetricTable, Region, judge
 from .confidence import interval, share_bounds

@@ -13,7 +13,7 @@ from ..names import OF_RUN, SignalName, Target
 from ..plan import DEFAULT, Fmu, Instance, Plan, Variable
 from ..plan import Value as Given
 from ..planner import Planner
-from ..results.read_and_salvage import Results
+from ..results.reader import Results
 from ..scenario import quantities
 from ..scenario.yaml_lines import dotted
 from ..wiring.context import FACTS

@@ -34,7 +34,7 @@ from typing import Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from ..cache_and_checksums import warn_of_record, what_changed
+from ..cache import warn_of_record, what_changed
 from ..errors import ResultsError, ScenarioError
 from ..evaluation.sine_with_dwell import AMPLITUDE, SIDES, amplitudes
 from ..evaluation.standard_tests import Evaluation, NotJudged

@@ -10,13 +10,13 @@ import math
 from pathlib import Path
 from typing import Any
 
-from ..cache_and_checksums import changed_since, warn_of_record, with_checksums
+from ..cache import changed_since, warn_of_record, with_checksums
 from ..errors import ResultsError
 from ..files import read_bytes, reason, write_whole
 from ..metrics.measures import si
 from ..metrics.run_metrics import MetricValue, metric
-from ..results.folder_and_lock import LARGEST
-from ..results.read_and_salvage import Results
+from ..results.reader import Results
+from ..results.run_folder import LARGEST
 from .claims import ClaimResult, Region
 from .judged_schema import si_number, text_of
 from .outcome import ExperimentResult, limits_of

@@ -13,7 +13,7 @@ from ..evaluation.standard_tests import Evaluation, SeriesRun, StandardTest
 from ..evaluation.trace import Trace, trace_of
 from ..names import Target
 from ..plan import Override, Plan
-from ..results.read_and_salvage import load_results
+from ..results.reader import load_results
 from ..scenario.find_and_load import LoadedScenario
 from ..scenario.quantities import convert
 from .execution import Executor, highest_passing, side_by_side

@@ -25,7 +25,7 @@ from ..metrics.measures import catalogue as measures
 from ..metrics.measures import si, symbol
 from ..metrics.run_metrics import STANDARD, MetricValue, columns_of, evaluate_all, metric
 from ..plan import Fmu, Plan
-from ..results.read_and_salvage import FoundRun, Results
+from ..results.reader import FoundRun, Results
 from ..results.run_record import RunRecord
 from ..scenario import find_and_load, yaml_lines
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import rich.console
 
-    from ..results.read_and_salvage import Results
+    from ..results.reader import Results
 
 
 MARK = "†"

@@ -19,7 +19,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from ..cache_and_checksums import checksums_of
+from ..cache import checksums_of
 from ..errors import ScenarioError
 from ..metrics.run_metrics import MetricValue
 from ..names import Target

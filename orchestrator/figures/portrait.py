@@ -16,7 +16,7 @@ import numpy as np
 from ..metrics.measures import variable_of, words
 from ..metrics.run_metrics import columns_of, reference_of
 from ..names import VARIABLE
-from ..results.read_and_salvage import Results
+from ..results.reader import Results
 from .style import REFERENCE, LabelledRun, digits_of, in_formula, line_style, literal, note_above, shown_unit
 
 if TYPE_CHECKING:

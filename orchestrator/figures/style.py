@@ -22,7 +22,7 @@ from ..errors import ResultsError
 from ..files import reason, write_whole
 from ..messages import cut, printable
 from ..metrics.measures import si_of, symbol, variable_of
-from ..results.read_and_salvage import Results
+from ..results.reader import Results
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -31,7 +31,7 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from ..cache_and_checksums import KEEP_DAYS, cache_folders, content_of, hold
+from ..cache import KEEP_DAYS, cache_folders, content_of, hold
 from ..errors import ModelDescriptionError
 from ..files import PACKED, TooLargeError, check_archive, read_bytes, reason
 from ..messages import closest, listed

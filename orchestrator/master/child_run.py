@@ -7,7 +7,7 @@ Ctrl-C always works, whatever the FMU does with signals.
 Chosen over isolating every third-party FMU by default, which costs 30 to 70 us per instance and step, and
 over a hook that the C library calls at exit(), which neither _exit() nor a signal runs. This costs a fork, a
 few milliseconds per run, and nothing per step. It does not protect instances from each other: see
-`log_and_process_state` for what they may change for each other, and `isolation` for protection. It needs
+`process_state` for what they may change for each other, and `isolation` for protection. It needs
 fork(), and is used on Linux only.
 
 Rows lie in memory shared by both processes: two blocks, one being filled by the child while the other is
@@ -41,10 +41,10 @@ from ..results.recorder import BLOCK, RowBlock
 from ..supervisor import LOG, REPLY, PipeChannel, ProcessLost, ProtocolError
 from .fmi import open_instance
 from .instance import CtypesInstance
-from .ipc_and_guardian import FmuProcess, LogRelay, error_record, rebuilt
+from .ipc import FmuProcess, LogRelay, error_record, rebuilt
 from .isolation import Isolation
-from .log_and_process_state import MASTER, WARNING, Log, flush_output
 from .master import WORDS, EndRequested, Master
+from .process_state import MASTER, WARNING, Log, flush_output
 from .run_loop import OpenInstance, RunLoop, RunProgress
 
 ROWS, PROGRESS, ENDED, WHERE = 0x90, 0x91, 0x92, 0x93

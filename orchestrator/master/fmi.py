@@ -28,7 +28,7 @@ from ..fmu.binary import INTEGERS, is_native
 from ..plan import Instance, Plan
 from .compiled_loop import Kind, OperationData
 from .instance import BoundCall, CtypesInstance, ExperimentSetup, PlainCall, Status
-from .log_and_process_state import DISCARD, OK, WARNING, Log, ProcessState, listen, receive
+from .process_state import DISCARD, OK, WARNING, Log, ProcessState, listen, receive
 
 
 class Fmi2Instance(CtypesInstance):

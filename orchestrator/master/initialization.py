@@ -20,8 +20,8 @@ from ..errors import SimulationError
 from ..messages import listed
 from ..plan import Value, Variable, Wire
 from .instance import ExperimentSetup, Status
-from .log_and_process_state import FATAL, OK, STATUS, WARNING, Log, known
-from .signal_pool_and_faults import InstanceSlot, SignalPool, by_type
+from .process_state import FATAL, OK, STATUS, WARNING, Log, known
+from .signal_pool import InstanceSlot, SignalPool, by_type
 from .step_program import getting
 
 PASSES = 100

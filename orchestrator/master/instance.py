@@ -27,7 +27,7 @@ from ..fmu.binary import CORE, INTEGERS, binary_of, binary_problem
 from ..messages import listed
 from ..plan import Instance, Value, ValueRef
 from .compiled_loop import Kind, OperationData
-from .log_and_process_state import ERROR, FATAL, OK, STATUS, WARNING, Log, known, relisten, unlisten
+from .process_state import ERROR, FATAL, OK, STATUS, WARNING, Log, known, relisten, unlisten
 
 Status = int
 

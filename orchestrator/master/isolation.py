@@ -6,7 +6,7 @@ same values. Setting inputs is deferred until the step, and outputs come back wi
 one exchange per step.
 
 `InstanceServer` is the other end: it does with the FMU what the master asks for, and nothing else. Its
-process ends when the master does, and with it everything that the FMU has started (see `ipc_and_guardian`).
+process ends when the master does, and with it everything that the FMU has started (see `ipc`).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from ..processes import start
 from ..supervisor import ANSWER, FAILED, LOG, REPLY, REQUEST, PipeChannel, ProcessLost
 from .fmi import INSTANCE_TYPES, open_instance
 from .instance import Buffers, CtypesInstance, ExperimentSetup, FmuInstance, Status, StepCalls
-from .ipc_and_guardian import (
+from .ipc import (
     GET,
     SET,
     STEP,
@@ -39,7 +39,7 @@ from .ipc_and_guardian import (
     shared_memory,
     stand_guard,
 )
-from .log_and_process_state import FATAL, OK, PROCESS, WARNING, Log, ProcessState, flush_output, known
+from .process_state import FATAL, OK, PROCESS, WARNING, Log, ProcessState, flush_output, known
 from .step_program import copying
 
 T = TypeVar("T")

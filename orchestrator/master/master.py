@@ -28,8 +28,8 @@ from ..plan import Plan, Value
 from .compiled_loop import Answer, CompiledLoop, missing_loop
 from .initialization import initialize
 from .instance import Buffers, FmuInstance, PlainCall, Status
-from .log_and_process_state import DISCARD, MASTER, OK, WARNING, Copies, Log, ProcessState, describe, suspects
-from .signal_pool_and_faults import SignalPool
+from .process_state import DISCARD, MASTER, OK, WARNING, Copies, Log, ProcessState, describe, suspects
+from .signal_pool import SignalPool
 from .step_program import Operation, StepProgram
 
 ALMOST = 1e-6

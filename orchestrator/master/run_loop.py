@@ -21,8 +21,8 @@ from ..messages import listed
 from ..plan import Instance, Plan, Value
 from ..results.recorder import BLOCK
 from .instance import FmuInstance, Status, StepCalls
-from .log_and_process_state import MASTER, WARNING, Copies, Log, suspects
 from .master import EndRequested, Master
+from .process_state import MASTER, WARNING, Copies, Log, suspects
 
 RunProgress = Callable[[int, int], None]
 """Called a few times a second with the number of communication points completed and their total."""

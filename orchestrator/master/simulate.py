@@ -23,15 +23,15 @@ from ..interrupts import StopFlag, interrupts
 from ..messages import printable
 from ..metrics.plausibility import PlausibilityWatch
 from ..plan import Plan
-from ..results.folder_and_lock import COMPLETED, RUNNING
-from ..results.formats_and_csv import recorder_of
-from ..results.plan_record_and_freshness import key_of, run_record
-from ..results.read_and_salvage import Results
+from ..results.file_formats import recorder_of
+from ..results.freshness import key_of, run_record
+from ..results.reader import Results
 from ..results.recorder import MemoryRecorder, Recorder
+from ..results.run_folder import COMPLETED, RUNNING
 from ..results.run_record import DiagnosticRecord, EndRecord, ErrorRecord, WarningRecord
 from .child_run import ChildRun, can_be_apart
 from .fmi import keeps, open_instance
-from .log_and_process_state import STATUS, Log, Message
+from .process_state import STATUS, Log, Message
 from .run_loop import OpenInstance, RunLoop, RunProgress
 
 WRITTEN = 100

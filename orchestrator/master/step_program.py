@@ -24,8 +24,8 @@ from ..coupling import ALGORITHMS, CouplingWeights
 from ..plan import InputSeries, Plan, ValueRef, Variable
 from .compiled_loop import Kind, OperationData
 from .instance import PlainCall, Status
-from .log_and_process_state import OK
-from .signal_pool_and_faults import FaultInjector, InstanceSlot, SignalPool, by_type
+from .process_state import OK
+from .signal_pool import FaultInjector, InstanceSlot, SignalPool, by_type
 
 BLOCK = 1024
 """Steps for which series are sampled at a time; chosen: some kilobytes per input."""

@@ -23,7 +23,7 @@ import numpy as np
 
 from vocabulary.signals import SignalEntry
 
-from ..cache_and_checksums import changed_since, has_checksums, warn_of_record
+from ..cache import changed_since, has_checksums, warn_of_record
 from ..errors import ScenarioError
 from ..files import read_bytes, reading, reason
 from ..messages import hint, listed

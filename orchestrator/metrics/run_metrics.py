@@ -36,7 +36,7 @@ from .measures import MEASURES, Measure, si_of, symbol, variable_of, words
 
 if TYPE_CHECKING:
     from ..plan import Plan
-    from ..results.read_and_salvage import Results
+    from ..results.reader import Results
 
 STANDARD = (
     "relative_peak_error(sideslip)",
@@ -288,8 +288,8 @@ def evaluate(results: Results, chosen: Metric, window: TimeWindow | None = None)
 
 def results_to_be(plan: Plan) -> Results:
     """Return results without rows that have the columns which a plan will record."""
-    from ..results.plan_record_and_freshness import connections_of
-    from ..results.read_and_salvage import Results
+    from ..results.freshness import connections_of
+    from ..results.reader import Results
     from ..results.run_record import FmuRecord, RunRecord
 
     units = {unit.name: unit for unit in plan.instances}

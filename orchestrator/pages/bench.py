@@ -28,13 +28,13 @@ from ..interrupts import StopFlag
 from ..messages import hint, short
 from ..plan import Instance, Plan, Variable
 from ..planner import Planner
-from ..results.read_and_salvage import Results
+from ..results.reader import Results
 from ..scenario import find_and_load
 from ..scenario.overrides import is_path, read_changes
 from ..scenario.scenario_schema import LoadedScenario
 from ..wiring.context import FACTS
 from ..workers import Pool, default_workers
-from .page_parts_and_provenance import made_by, render, style
+from .page_parts import made_by, render, style
 from .viewer import Settings, assets, viewer
 from .viewer_data import PackedRun, pack
 

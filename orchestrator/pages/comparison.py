@@ -22,7 +22,7 @@ from ..messages import changed, counted, star
 from ..metrics.measures import variable_of
 from ..metrics.run_metrics import MetricValue, metric
 from ..names import SignalName
-from ..results.read_and_salvage import Results
+from ..results.reader import Results
 from ..results.run_record import RunRecord
 from .viewer import View
 

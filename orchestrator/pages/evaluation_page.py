@@ -18,9 +18,9 @@ from ..figures.style import LabelledRun, digits_apart, shown
 from ..messages import counted
 from ..metrics.measures import words
 from ..metrics.verdict import SYMBOLS, Verdict, worst
-from ..results.read_and_salvage import Results, load_results
+from ..results.reader import Results, load_results
 from ..results.run_record import RunRecord
-from .page_parts_and_provenance import made_by, render, style
+from .page_parts import made_by, render, style
 from .viewer import MOST, Settings, View, assets, viewer
 
 LARGEST = 2_000_000

@@ -34,8 +34,8 @@ from ..experiments.tables import Table
 from ..figures.style import LabelledRun
 from ..files import write_whole
 from ..messages import changed, counted, listed
-from ..results.read_and_salvage import Results, load_results
-from .page_parts_and_provenance import FigureImage, anchor, image_of, made_by, option_of, render, style
+from ..results.reader import Results, load_results
+from .page_parts import FigureImage, anchor, image_of, made_by, option_of, render, style
 from .sweep_view import DATA, tidy_sides
 from .viewer import Settings, View, assets, side_file, viewer_frame
 

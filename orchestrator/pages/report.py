@@ -45,13 +45,13 @@ from ..messages import changed, counted, listed
 from ..metrics.run_metrics import evaluate, metric
 from ..plan import Plan
 from ..planner import Planner
-from ..results.plan_record_and_freshness import run_record
-from ..results.read_and_salvage import Results
+from ..results.freshness import run_record
+from ..results.reader import Results
 from ..results.run_record import RunRecord, load_record
 from ..scenario import find_and_load, yaml_lines
 from ..scenario.find_and_load import LoadedScenario
 from .diagram import diagrams, systems_of
-from .page_parts_and_provenance import (
+from .page_parts import (
     FigureImage,
     anchor,
     count_kinds,

@@ -18,7 +18,7 @@ from vocabulary.wheels import WHEELS
 
 from ..messages import listed
 from ..metrics.run_metrics import columns_of
-from ..results.read_and_salvage import Results
+from ..results.reader import Results
 
 OVERHANG_FRONT, OVERHANG_REAR = 0.85, 1.0
 """Overhangs beyond the axles [m], if the driver has no dimensions of the car; chosen: a saloon."""

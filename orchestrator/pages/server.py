@@ -33,12 +33,12 @@ from ..errors import ResultsError, YawbenchError
 from ..figures.style import LabelledRun
 from ..files import NO_FOLLOW
 from ..messages import changed_each, printable
-from ..results.folder_and_lock import RUN_FILE
-from ..results.formats_and_csv import FILES
-from ..results.read_and_salvage import FoundRun, found_runs, load_results
+from ..results.file_formats import FILES
+from ..results.reader import FoundRun, found_runs, load_results
+from ..results.run_folder import RUN_FILE
 from ..scenario import find_and_load
 from .bench import Bench, Superseded, wanted_of
-from .page_parts_and_provenance import made_by, render, style
+from .page_parts import made_by, render, style
 from .viewer import page
 
 LARGEST = 500_000_000

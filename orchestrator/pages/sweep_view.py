@@ -28,9 +28,9 @@ from ..messages import counted, listed
 from ..metrics.measures import variable_of
 from ..metrics.run_metrics import metric
 from ..plan import Override
-from ..results.folder_and_lock import RUN_FILE
-from ..results.read_and_salvage import load_results
-from .page_parts_and_provenance import option_of, render
+from ..results.reader import load_results
+from ..results.run_folder import RUN_FILE
+from .page_parts import option_of, render
 from .viewer import METRICS, PANELS, Settings, View, side_file, viewer_frame
 
 DATA = "data"

@@ -22,7 +22,7 @@ from ..experiments.threat_scores import (
     score_table,
 )
 from ..experiments.threats import LANE_CHANGE, REFERENCE, LoadedThreats, SearchPlace, ThreatSpec
-from .page_parts_and_provenance import made_by, render, style
+from .page_parts import made_by, render, style
 from .report import PAGE, RANKING
 
 RULE = (

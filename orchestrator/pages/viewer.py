@@ -25,8 +25,8 @@ from ..figures.panels import spans_of
 from ..figures.style import LINES, LabelledRun, line_style, shown, shown_unit
 from ..metrics.measures import words
 from ..metrics.run_metrics import columns_of, evaluate, metric, reference_of
-from ..results.read_and_salvage import Results
-from .page_parts_and_provenance import render
+from ..results.reader import Results
+from .page_parts import render
 from .road import legend_of, notes_of, road_of
 from .viewer_data import PackedRun, is_numeric, pack
 

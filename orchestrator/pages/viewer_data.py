@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from ..results.read_and_salvage import Results
+from ..results.reader import Results
 
 LEVELS = {2: 2**16 - 2, 3: 2**24 - 2}
 """Bytes of a code -> steps over a range. A sample is off by at most half a step: 1/131068 of the range, or

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from ..errors import ResultsError
 from ..measured.measurement import ENDINGS, MEASURABLE, load_measurement
-from .folder_and_lock import COMPLETED
-from .read_and_salvage import Results, load_results
+from .reader import Results, load_results
+from .run_folder import COMPLETED
 from .run_record import DiagnosticRecord, FmuRecord, RunRecord
 
 STEERING = ("steering_wheel_angle", "steer_angle", "drive_force")

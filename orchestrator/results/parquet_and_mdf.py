@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import ResultsError
 from ..messages import with_changes
-from .formats_and_csv import FILES, FORMATS, column_of, plain, values_of
+from .file_formats import FILES, FORMATS, column_of, plain, values_of
 from .recorder import ColumnRecorder
 from .run_record import RunRecord
 

@@ -20,13 +20,13 @@ from typing import Any
 
 import numpy as np
 
-from ..cache_and_checksums import checksum, shown
+from ..cache import checksum, shown
 from ..errors import ResultsError
 from ..files import reason, write_whole
 from ..plan import Value
-from .folder_and_lock import PART, RUN_FILE, FolderLock, put_in_place, tidy
-from .formats_and_csv import RESULTS_FILE, plain, recorder_of, rows_text
-from .read_and_salvage import Results
+from .file_formats import RESULTS_FILE, plain, recorder_of, rows_text
+from .reader import Results
+from .run_folder import PART, RUN_FILE, FolderLock, put_in_place, tidy
 from .run_record import RunRecord
 
 BLOCK = 512

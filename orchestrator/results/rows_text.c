@@ -1,5 +1,5 @@
 /* Rows of numbers as CSV text: each number as Python's `repr` writes it, the shortest decimal that reads back as
-   the same bits. `formats_and_csv.py` compiles this file and passes the powers of ten.
+   the same bits. `file_formats.py` compiles this file and passes the powers of ten.
 
    The digits are found as R. Giulietti describes in "The Schubfach way to render doubles" (2021): a number c 2^q
    and the two ends of the interval that is rounded to it are multiplied by a power of ten, to an integer part

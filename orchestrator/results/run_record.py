@@ -25,14 +25,14 @@ from pydantic_core import PydanticKnownError
 
 from vocabulary.roles import role_of
 
-from ..cache_and_checksums import KEY, changed_since, warn_of_record, with_checksums
+from ..cache import KEY, changed_since, warn_of_record, with_checksums
 from ..errors import Diagnostic, Location, ResultsError, Severity, warnings_in
 from ..files import read_bytes, reading, reason
 from ..messages import short
 from ..names import SignalName
 from ..plan import NEUTRAL, Override, ValueSource
-from .folder_and_lock import FAILED, LARGEST, RUN_FILE, refuse_dead
-from .formats_and_csv import FILES, RESULTS_FILE
+from .file_formats import FILES, RESULTS_FILE
+from .run_folder import FAILED, LARGEST, RUN_FILE, refuse_dead
 
 
 class _Part(BaseModel):
@@ -267,7 +267,7 @@ class RunRecord(_Part):
     checksum: str = ""  # of that file
     smallest: Mapping[str, float | NotFinite] = {}
     largest: Mapping[str, float | NotFinite] = {}
-    checksums: dict[str, str] = {}  # of the keys of the record itself; see `orchestrator.cache_and_checksums`
+    checksums: dict[str, str] = {}  # of the keys of the record itself; see `orchestrator.cache`
 
     @property
     def overrides(self) -> tuple[Override, ...]:

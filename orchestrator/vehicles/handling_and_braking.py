@@ -34,7 +34,7 @@ from ..fmu.opener import find_fmu, find_folder
 from ..master.simulate import simulate_in_memory
 from ..plan import Fmu, Plan
 from ..planner import Planner
-from ..results.read_and_salvage import Results
+from ..results.reader import Results
 from ..scenario import yaml_lines
 from ..scenario.overrides import is_path
 from ..tyre_stand import KNOWN_BY, open_role

@@ -26,7 +26,7 @@ from fmus.check import reference_files
 from fmus.compiler import compile_launcher
 from fmus.packing import to_bytes
 from fmus.reference_result import FOLDER
-from orchestrator.cache_and_checksums import content_of
+from orchestrator.cache import content_of
 from orchestrator.errors import BuildError
 from orchestrator.fmu.archive import open_fmu
 from orchestrator.plan import Instance
@@ -178,7 +178,7 @@ def test_the_launcher_compiles_to_the_same_bytes_again(tmp_path, monkeypatch):
     made = []
     for cache in ("a", "b"):
         monkeypatch.setattr(
-            "orchestrator.cache_and_checksums.cache_folders", lambda folder=tmp_path / cache: iter([folder])
+            "orchestrator.cache.cache_folders", lambda folder=tmp_path / cache: iter([folder])
         )
         compiler._launcher.cache_clear()
         made.append(compile_launcher()[0])
@@ -191,7 +191,7 @@ def test_the_launcher_compiles_to_the_same_bytes_again(tmp_path, monkeypatch):
 @pytest.mark.sampled(1)
 def test_a_damaged_launcher_in_the_cache_is_compiled_anew(harm, tmp_path, monkeypatch):
     """Believed, it would end the build with SIGBUS, or have every FMU fail."""
-    monkeypatch.setattr("orchestrator.cache_and_checksums.cache_folders", lambda: iter([tmp_path]))
+    monkeypatch.setattr("orchestrator.cache.cache_folders", lambda: iter([tmp_path]))
     compiler._launcher.cache_clear()
     good = compile_launcher()[0]
     (kept,) = tmp_path.glob("launcher/*")

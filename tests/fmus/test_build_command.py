@@ -11,7 +11,7 @@ import typer
 from typer.testing import CliRunner
 
 from fmus.build import find_recipes
-from orchestrator.commands.build_and_list import build
+from orchestrator.commands.build import build
 from orchestrator.errors import BuildError
 from orchestrator.files import claim
 from tests.sentences import golden, golden_in
@@ -86,7 +86,7 @@ def test_without_a_compiler_it_warns(tmp_path, monkeypatch):
     assert golden_in(done.stderr)
 
 
-@pytest.mark.parametrize("what", ["orchestrator.commands.build_and_list", "orchestrator.cli"])
+@pytest.mark.parametrize("what", ["orchestrator.commands.build", "orchestrator.cli"])
 def test_the_builder_is_loaded_only_when_it_is_needed(what):
     script = f"import sys, {what}; print('fmus.build' in sys.modules or 'pythonfmu' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)

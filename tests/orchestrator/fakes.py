@@ -9,7 +9,7 @@ from typing import Any
 
 from orchestrator.fault_kinds import FaultySignal
 from orchestrator.master.instance import ExperimentSetup, FmuInstance, StepCalls
-from orchestrator.master.log_and_process_state import ERROR, OK, Log
+from orchestrator.master.process_state import ERROR, OK, Log
 from orchestrator.names import SignalName
 from orchestrator.plan import Fmu, Instance, Plan, ValueRef, Variable, Wire
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cache_and_checksums import with_checksums
-from orchestrator.results.read_and_salvage import Results
+from orchestrator.cache import with_checksums
+from orchestrator.results.reader import Results
 from orchestrator.results.run_record import RunRecord
 
 UNITS = {

@@ -13,7 +13,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.files import LOCK_FILE
-from orchestrator.results.folder_and_lock import FolderLock, LockHolder
+from orchestrator.results.run_folder import FolderLock, LockHolder
 from tests.sentences import golden, golden_in
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")

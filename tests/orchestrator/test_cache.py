@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cache_and_checksums import cache_folder, keep, recall
+from orchestrator.cache import cache_folder, keep, recall
 from orchestrator.cli import main
 from orchestrator.files import write_whole
 from orchestrator.fmu.archive import open_fmu

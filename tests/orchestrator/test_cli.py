@@ -93,7 +93,7 @@ def test_a_command_imports_what_it_needs_itself():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = set(done.stderr.split())
-    assert "orchestrator.commands.build_and_list" in loaded
+    assert "orchestrator.commands.build" in loaded
     assert (
         not {f"orchestrator.commands.{name}" for name in COMMANDS.values() if name != COMMANDS["list"]}
         & loaded
@@ -145,7 +145,7 @@ def test_a_signal_while_a_class_is_being_made_is_no_error_of_the_program(monkeyp
     def ended() -> None:
         type("Made", (), {"attribute": Stopping()})
 
-    monkeypatch.setattr(importlib.import_module("orchestrator.commands.build_and_list"), "cache", ended)
+    monkeypatch.setattr(importlib.import_module("orchestrator.commands.build"), "cache", ended)
     with pytest.raises(SystemExit) as end:
         main(["cache"])
     assert end.value.code == 143

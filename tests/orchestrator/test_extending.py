@@ -26,7 +26,7 @@ from orchestrator.experiments.schema import FIGURE_KINDS, FigureKind
 from orchestrator.fault_kinds import KINDS, FaultKind
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.metrics.verdict import compare
-from orchestrator.results import formats_and_csv
+from orchestrator.results import file_formats
 from orchestrator.results.recorder import ColumnRecorder
 from orchestrator.scenario.overrides import read_changes
 from tests.commands import status_of
@@ -84,16 +84,16 @@ class NpzFile:
         self.names = list(self._columns)
 
     def blocks(self, columns):
-        yield [formats_and_csv.plain(self._columns[name]) for name in columns]
+        yield [file_formats.plain(self._columns[name]) for name in columns]
 
 
 def test_a_format_is_a_module_and_an_entry(steered, monkeypatch):
     module = ModuleType("orchestrator.results.npz")
     module.NpzRecorder, module.NpzFile = NpzRecorder, NpzFile
     monkeypatch.setitem(sys.modules, module.__name__, module)
-    entry = formats_and_csv.Format("results.npz", "NumPy's archive", "npz:NpzRecorder", "npz:NpzFile", 8)
-    monkeypatch.setitem(formats_and_csv.FORMATS, "npz", entry)
-    monkeypatch.setitem(formats_and_csv.FILES, "npz", entry.file)
+    entry = file_formats.Format("results.npz", "NumPy's archive", "npz:NpzRecorder", "npz:NpzFile", 8)
+    monkeypatch.setitem(file_formats.FORMATS, "npz", entry)
+    monkeypatch.setitem(file_formats.FILES, "npz", entry.file)
     for name in ("npz", "csv"):
         assert status_of("run", "steered.yaml", "--format", name, "--out", name) == 0
     assert sorted(path.name for path in Path("npz").iterdir()) == ["results.npz", "run.json"]

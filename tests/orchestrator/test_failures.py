@@ -6,9 +6,9 @@ import signal
 import pytest
 
 from orchestrator.errors import Interrupted, SimulationError
-from orchestrator.master.log_and_process_state import DISCARD, ERROR, FATAL, OK, PENDING, WARNING
+from orchestrator.master.process_state import DISCARD, ERROR, FATAL, OK, PENDING, WARNING
 from orchestrator.master.simulate import simulate
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.reader import load_results
 from tests.sentences import golden, golden_in
 
 from .fakes import Behaviour, Clock, Echo, FakeSlave, Function, Mixed, Stage, make_plan

@@ -20,12 +20,12 @@ from orchestrator.fault_kinds import KINDS, CountedNoise, Fault, FaultLocation, 
 from orchestrator.figures.panels import FAULTY, LabelledRun
 from orchestrator.figures.plots import draw
 from orchestrator.interrupts import StopFlag
-from orchestrator.master.log_and_process_state import Log
 from orchestrator.master.master import Master
+from orchestrator.master.process_state import Log
 from orchestrator.master.simulate import simulate, simulate_in_memory
 from orchestrator.plan import Override
-from orchestrator.results.plan_record_and_freshness import key_of, staleness
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.freshness import key_of, staleness
+from orchestrator.results.reader import load_results
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.scenario.overrides import read_changes
 from orchestrator.wiring.make_plan import make_plan as plan_of_scenario

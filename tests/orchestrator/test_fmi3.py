@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from orchestrator.cli import main
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.reader import load_results
 from tests.sentences import golden_in
 
 from . import models3

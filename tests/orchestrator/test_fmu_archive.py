@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from orchestrator import files
-from orchestrator.cache_and_checksums import KEEP_DAYS, cache_folder
+from orchestrator.cache import KEEP_DAYS, cache_folder
 from orchestrator.errors import ModelDescriptionError
 from orchestrator.fmu import archive as fmu_archive
 from orchestrator.fmu.archive import open_fmu

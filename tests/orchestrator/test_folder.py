@@ -12,10 +12,10 @@ from orchestrator.errors import ResultsError, SimulationError
 from orchestrator.experiments.tables import runs_table
 from orchestrator.files import LOCK_FILE
 from orchestrator.master.simulate import simulate
-from orchestrator.results import folder_and_lock as module
 from orchestrator.results import recorder
-from orchestrator.results.folder_and_lock import FolderLock, holder_of, writing
-from orchestrator.results.read_and_salvage import found_runs, load_results, lost_format, salvage
+from orchestrator.results import run_folder as module
+from orchestrator.results.reader import found_runs, load_results, lost_format, salvage
+from orchestrator.results.run_folder import FolderLock, holder_of, writing
 from tests.sentences import golden_in, refused
 from tests.trees import snapshot
 
@@ -212,7 +212,7 @@ def test_the_second_command_in_a_folder_is_told_who_is_first(tmp_path, monkeypat
 
 @needs_locks
 def test_a_folder_below_one_that_another_process_writes_is_refused(tmp_path):
-    holding = "import sys; from pathlib import Path; from orchestrator.results.folder_and_lock import *\n" + (
+    holding = "import sys; from pathlib import Path; from orchestrator.results.run_folder import *\n" + (
         "with writing(Path(sys.argv[1])): print('held', flush=True); input()"
     )
     command = [sys.executable, "-c", holding, str(tmp_path)]

@@ -11,8 +11,8 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.metrics.run_metrics import evaluate, metric
-from orchestrator.results.plan_record_and_freshness import staleness
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.freshness import staleness
+from orchestrator.results.reader import load_results
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.sentences import golden_in

@@ -14,8 +14,8 @@ from orchestrator.cli import main
 from orchestrator.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
 from orchestrator.master.simulate import simulate, simulate_in_memory
 from orchestrator.results import parquet_and_mdf
-from orchestrator.results.formats_and_csv import FILES, recorder_of
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.file_formats import FILES, recorder_of
+from orchestrator.results.reader import load_results
 from orchestrator.results.recorder import BLOCK, MemoryRecorder
 from orchestrator.results.run_record import RunRecord
 from tests.fmu_copies import put_fmus

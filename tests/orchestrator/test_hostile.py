@@ -16,9 +16,9 @@ import pytest
 from orchestrator import supervisor
 from orchestrator.master import isolation
 from orchestrator.master.isolation import InstanceProcess
-from orchestrator.master.log_and_process_state import Log
+from orchestrator.master.process_state import Log
 from orchestrator.processes import Child
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.reader import load_results
 from orchestrator.supervisor import FAILED, LOG, REPLY, PipeChannel, ProcessLost, ProtocolError
 from tests.sentences import golden_in
 

@@ -18,7 +18,7 @@ PRODUCT = ("components", "vocabulary", "fmus", "orchestrator", "yawbench")
 ROOT = Path(__file__).parents[2]
 ORCHESTRATOR = Path(__file__).parents[2] / "orchestrator"
 STAGES = (
-    {"errors", "messages", "names", "plan", "cache_and_checksums", "files"} | {"coupling", "fault_kinds"},
+    {"errors", "messages", "names", "plan", "cache", "files"} | {"coupling", "fault_kinds"},
     {"processes", "supervisor", "workers", "interrupts"},
     {"scenario"},
     {"measured"},

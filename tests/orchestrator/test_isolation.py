@@ -16,7 +16,7 @@ from orchestrator.commands.new import begin
 from orchestrator.errors import SimulationError
 from orchestrator.master.isolation import Isolation
 from orchestrator.master.simulate import simulate
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.reader import load_results
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
@@ -110,7 +110,7 @@ def test_units_end_when_the_master_is_killed(fmus, tmp_path):
         "isolation = Isolation(plan.instances)\n"
         f"simulate(plan, {str(tmp_path)!r}, opener=isolation)\n"
         "again = Isolation(plan.instances)\n"
-        "from orchestrator.master.log_and_process_state import Log\n"
+        "from orchestrator.master.process_state import Log\n"
         "[again(unit, Log(), set()) for unit in plan.instances]\n"
         "print(*(p.child.pid for p in again._processes.values()), flush=True)\n"
         "os.kill(os.getpid(), signal.SIGKILL)\n"

@@ -13,7 +13,7 @@ import pytest
 from orchestrator.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
 from orchestrator.experiments.jobs import Job, execute, read_back, ready
 from orchestrator.plan import Fmu, Variable
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.reader import load_results
 from orchestrator.supervisor import PipeChannel
 from orchestrator.workers import Pool
 from tests.sentences import golden, golden_in, refused, texts_of

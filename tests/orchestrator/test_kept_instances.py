@@ -19,8 +19,8 @@ from orchestrator.experiments import jobs as jobs_module
 from orchestrator.experiments.jobs import Job, execute, keyed, ready, run_job
 from orchestrator.fmu.binary import WANTED, is_native
 from orchestrator.master import fmi
-from orchestrator.master.log_and_process_state import Log
-from orchestrator.results.folder_and_lock import RUN_FILE
+from orchestrator.master.process_state import Log
+from orchestrator.results.run_folder import RUN_FILE
 from tests.changed import changed
 
 from .test_isolation import STEP

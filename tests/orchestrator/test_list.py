@@ -6,7 +6,7 @@ import pytest
 from orchestrator.experiments.tables import runs_table
 from orchestrator.metrics.run_metrics import columns_for, evaluate_all
 from orchestrator.pages.comparison import differences
-from orchestrator.results.read_and_salvage import UNREADABLE, found_runs, load_results
+from orchestrator.results.reader import UNREADABLE, found_runs, load_results
 from orchestrator.results.run_record import FmuRecord, RunRecord
 from tests.fmu_copies import put_fmus
 from tests.sentences import golden, golden_in

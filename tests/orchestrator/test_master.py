@@ -7,7 +7,7 @@ import pytest
 from orchestrator.errors import SimulationError
 from orchestrator.master import master, step_program
 from orchestrator.master.simulate import simulate
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.reader import load_results
 from tests.sentences import refused
 
 from .fakes import Behaviour, Clock, Echo, Function, Integrator, Mass, Mixed, Stage, Witness, make_plan

@@ -19,7 +19,7 @@ from orchestrator.figures.style import LabelledRun
 from orchestrator.metrics.run_metrics import evaluate, metric
 from orchestrator.names import SignalName, Target, match, matching
 from orchestrator.pages.comparison import divergence
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.reader import load_results
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed

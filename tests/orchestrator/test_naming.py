@@ -6,7 +6,7 @@ import pytest
 
 from orchestrator.errors import ScenarioError
 from orchestrator.plan import Override
-from orchestrator.results.folder_and_lock import LONGEST, default_folder
+from orchestrator.results.run_folder import LONGEST, default_folder
 from tests.sentences import refused
 
 FILE = Path("scenarios/paper/25mps.yaml")

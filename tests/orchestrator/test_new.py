@@ -11,7 +11,7 @@ import pytest
 
 from fmus.build import build_all
 from orchestrator.cli import main
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.reader import load_results
 from tests.checkout import copy_checkout, run_in
 from tests.sentences import golden, golden_in
 

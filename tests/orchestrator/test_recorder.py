@@ -13,9 +13,9 @@ from pydantic import BaseModel
 from orchestrator.errors import ResultsError, SimulationError
 from orchestrator.files import write_whole
 from orchestrator.master.simulate import simulate
-from orchestrator.results import formats_and_csv
+from orchestrator.results import file_formats
 from orchestrator.results import recorder as module
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.reader import load_results
 from orchestrator.results.recorder import BLOCK, Recorder
 from orchestrator.results.run_record import RunRecord
 from tests.sentences import golden, refused, texts_of
@@ -69,15 +69,15 @@ def hard_numbers():
 @pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 def test_numbers_are_written_as_python_writes_them():
     numbers = hard_numbers()
-    assert formats_and_csv._writer() is not None
-    text = formats_and_csv.rows_text(numbers[: len(numbers) // 3 * 3].reshape(-1, 3)).decode()
+    assert file_formats._writer() is not None
+    text = file_formats.rows_text(numbers[: len(numbers) // 3 * 3].reshape(-1, 3)).decode()
     rows = numbers[: len(numbers) // 3 * 3].reshape(-1, 3).tolist()
     assert text.splitlines() == [",".join(map(repr, row)) for row in rows]
 
 
 def test_without_a_compiler_the_bytes_are_the_same(tmp_path, monkeypatch):
     record(tmp_path / "c", table(100))
-    monkeypatch.setattr(formats_and_csv, "_writer", lambda: None)
+    monkeypatch.setattr(file_formats, "_writer", lambda: None)
     record(tmp_path / "python", table(100))
     assert (tmp_path / "c" / "results.csv").read_bytes() == (tmp_path / "python" / "results.csv").read_bytes()
 

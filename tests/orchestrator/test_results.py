@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import ResultsError
-from orchestrator.results import read_and_salvage
-from orchestrator.results.formats_and_csv import BLOCK, CsvFile
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results import reader
+from orchestrator.results.file_formats import BLOCK, CsvFile
+from orchestrator.results.reader import load_results
 from tests.sentences import golden, refused, texts_of
 
 RUN = {
@@ -203,9 +203,9 @@ def test_a_long_run_is_thinned_to_rows_that_hold_every_peak(folder, monkeypatch)
     np.savetxt(folder / "results.csv", table, "%.17g", ",", header="time,a.x,b.x_ref,a.gap", comments="")
     (folder / "run.json").write_text(json.dumps({"status": "completed", "rows": rows}))
     assert len(load_results(folder, thin=True).time) == rows  # a drawing of this is quick
-    monkeypatch.setattr(read_and_salvage, "LONG", 1000)
+    monkeypatch.setattr(reader, "LONG", 1000)
     thin = load_results(folder, thin=True)
-    assert len(thin.time) < 10 * read_and_salvage.STRETCHES < rows
+    assert len(thin.time) < 10 * reader.STRETCHES < rows
     assert {1.234, 30.001, 20.002, 0.777, 0.0, time[-1]} <= set(thin.time)
     kept = np.searchsorted(time, thin.time)
     for name, values in (("a.x", signal), ("b.x_ref", reference), ("a.gap", gap)):

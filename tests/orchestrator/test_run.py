@@ -13,10 +13,10 @@ import pytest
 
 from fmus.build import build_component
 from orchestrator.cli import main
-from orchestrator.master import log_and_process_state as log
+from orchestrator.master import process_state as log
 from orchestrator.master.fmi import open_instance
 from orchestrator.master.simulate import simulate
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.reader import load_results
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.fmu_copies import put_fmus

@@ -18,8 +18,8 @@ from orchestrator.interop.ssp_write import write_ssp
 from orchestrator.master.simulate import simulate
 from orchestrator.measured.columns import ColumnFile
 from orchestrator.plan import InputSeries, Plan
-from orchestrator.results.plan_record_and_freshness import staleness
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.freshness import staleness
+from orchestrator.results.reader import load_results
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.sentences import golden, golden_in, refused, texts_of

@@ -8,8 +8,8 @@ from collections import namedtuple
 import pytest
 
 from orchestrator.cli import main
-from orchestrator.results import formats_and_csv
-from orchestrator.results.formats_and_csv import expected_size, size_note
+from orchestrator.results import file_formats
+from orchestrator.results.file_formats import expected_size, size_note
 from tests.fmu_copies import put_fmus
 from tests.sentences import golden, golden_in
 
@@ -44,7 +44,7 @@ def test_results_that_do_not_fit_are_announced_whatever_their_size(plan_of, tmp_
 
 
 def test_run_tells_before_it_starts(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(formats_and_csv, "HUGE", 1000)
+    monkeypatch.setattr(file_formats, "HUGE", 1000)
     put_fmus(tmp_path, components=["driver_sine"])
     (tmp_path / "a.yaml").write_text("stop_time: 1\nstep_size: 0.01\nunits: {driver: {fmu: driver_sine}}\n")
     out = tmp_path / "out"

@@ -6,8 +6,8 @@ import shutil
 
 import pytest
 
-from orchestrator import cache_and_checksums as module
-from orchestrator.cache_and_checksums import OF_METRICS, OF_RESULTS, sources_hash
+from orchestrator import cache as module
+from orchestrator.cache import OF_METRICS, OF_RESULTS, sources_hash
 
 from .test_imports import ORCHESTRATOR, SOURCES, imported_by, stage_of
 
@@ -41,7 +41,7 @@ def test_code_that_has_a_say_in_the_numbers_changes_the_hash_and_no_other(copy):
 
 
 def test_all_that_these_parts_import_has_a_say_or_cannot_change_a_number():
-    harmless = {"cache_and_checksums", "errors", "files", "labels", "messages", "measured"}
+    harmless = {"cache", "errors", "files", "labels", "messages", "measured"}
     harmless |= {"interrupts", "processes", "supervisor", "workers"}
     own = {part.removesuffix(".py") for part in OF_RESULTS}
     for path in SOURCES:

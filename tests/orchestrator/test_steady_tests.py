@@ -18,7 +18,7 @@ from orchestrator.evaluation.standard_tests import Evaluation
 from orchestrator.evaluation.steering_tests import evaluate_step, evaluate_sweep, evaluate_understeer
 from orchestrator.evaluation.trace import Trace, trace_of
 from orchestrator.metrics.verdict import Status, Verdict
-from orchestrator.results.read_and_salvage import Results
+from orchestrator.results.reader import Results
 from orchestrator.results.run_record import RunRecord
 from orchestrator.scenario.find_and_load import SHIPPED, load_scenario
 from orchestrator.tyre_stand import cornering_stiffness

@@ -19,7 +19,7 @@ from orchestrator.cli import main
 from orchestrator.errors import Diagnostic, Location, RecordWarning, ResultsError
 from orchestrator.experiments.jobs import MeasuredRun
 from orchestrator.experiments.journal import Journal
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.reader import load_results
 from tests.sentences import golden, golden_in, refused
 
 UNIT = '''

@@ -15,7 +15,7 @@ from orchestrator.figures.plots import draw
 from orchestrator.figures.style import save
 from orchestrator.messages import changed, changed_each, with_changes
 from orchestrator.plan import Override
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.reader import load_results
 from tests.sentences import golden, golden_in
 
 from .recorded import car, noted

@@ -16,10 +16,10 @@ from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.planning import plan_experiment
 from orchestrator.interop.ssp_write import write_ssp
 from orchestrator.names import Target
-from orchestrator.pages.page_parts_and_provenance import groups_of
-from orchestrator.results.folder_and_lock import default_folder
-from orchestrator.results.plan_record_and_freshness import key_of, run_record
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.pages.page_parts import groups_of
+from orchestrator.results.freshness import key_of, run_record
+from orchestrator.results.reader import load_results
+from orchestrator.results.run_folder import default_folder
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.scenario.overrides import changes_of, read_changes
 from orchestrator.wiring.make_plan import make_plan

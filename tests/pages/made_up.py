@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.results.read_and_salvage import Results
+from orchestrator.results.reader import Results
 from tests.orchestrator.recorded import car, noted, results
 from vocabulary.wheels import WHEELS
 

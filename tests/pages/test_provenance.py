@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cache_and_checksums import checksum
-from orchestrator.pages.page_parts_and_provenance import groups_of
+from orchestrator.cache import checksum
+from orchestrator.pages.page_parts import groups_of
 from orchestrator.plan import CHOSEN, ERRATUM, LITERATURE, NEUTRAL, PAPER, ValueSource
-from orchestrator.results.plan_record_and_freshness import key_of, run_record, staleness
+from orchestrator.results.freshness import key_of, run_record, staleness
 from orchestrator.results.run_record import RunRecord
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.wiring.make_plan import make_plan

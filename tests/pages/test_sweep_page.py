@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from orchestrator.cli import main
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.reader import load_results
 
 from .browser import DESK, PHONE, Browser
 from .flaws import inaccessible

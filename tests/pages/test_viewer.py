@@ -16,7 +16,7 @@ from orchestrator.errors import ResultsError
 from orchestrator.figures.panels import LabelledRun
 from orchestrator.figures.style import LINES, digits_of, shown_unit
 from orchestrator.pages.viewer import MOST, PANELS, Settings, View, assets, page, still_of, viewer
-from orchestrator.results.read_and_salvage import Results
+from orchestrator.results.reader import Results
 from tests.orchestrator.recorded import car, noted, write
 from tests.sentences import golden, golden_in
 from vocabulary.lane_change import lanes_of

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from orchestrator.pages.viewer_data import CLOSE, LEVELS, PackedRun, pack
-from orchestrator.results.read_and_salvage import Results
+from orchestrator.results.reader import Results
 from tests.orchestrator.recorded import results
 
 from .made_up import whole_car

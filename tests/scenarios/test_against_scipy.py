@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from orchestrator.master.simulate import simulate
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.reader import load_results
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed

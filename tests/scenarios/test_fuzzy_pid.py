@@ -12,7 +12,7 @@ from orchestrator.experiments.jobs import Job, execute
 from orchestrator.experiments.outcome import derive
 from orchestrator.figures.style import shown
 from orchestrator.metrics.run_metrics import MetricValue
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.reader import load_results
 from tests.changed import changed
 from tests.commands import status_of
 from tests.studies import check_figures, judge_all, judge_some, verdicts

@@ -12,7 +12,7 @@ from components.control_laws.slip_control import SlipControlParameters
 from orchestrator.cli import main
 from orchestrator.experiments.jobs import Job, execute
 from orchestrator.figures.style import shown
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.reader import load_results
 from tests.changed import changed
 from tests.studies import check_figures, judge_all, judge_some, verdicts
 

@@ -9,7 +9,7 @@ import pytest
 
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.journal import FILE as JOURNAL
-from orchestrator.results.folder_and_lock import default_folder
+from orchestrator.results.run_folder import default_folder
 from tests.checkout import ROOT
 from tests.evidence import RECORD
 from tests.studies import judge_all

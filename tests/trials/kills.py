@@ -25,8 +25,8 @@ from pathlib import Path
 from fmus.build import build_all
 from orchestrator.errors import ResultsError
 from orchestrator.files import LOCK_FILE, NEW
-from orchestrator.results.folder_and_lock import PART, RUN_FILE
-from orchestrator.results.read_and_salvage import load_results
+from orchestrator.results.reader import load_results
+from orchestrator.results.run_folder import PART, RUN_FILE
 from tests.orchestrator.test_batch_commands import SCENARIO, STUDY, UNITS
 from tests.orchestrator.test_ranking import SMALL
 from tests.orchestrator.test_tuning import SCENARIO as WHEEL

@@ -137,7 +137,7 @@ def load(file: Path, kind: str, planner: Any) -> None:
     from orchestrator.experiments.experiment import load_experiment
     from orchestrator.metrics.run_metrics import evaluate_all
     from orchestrator.plan import Override
-    from orchestrator.results.read_and_salvage import load_results
+    from orchestrator.results.reader import load_results
     from orchestrator.scenario.find_and_load import load_scenario
     from orchestrator.wiring.make_plan import make_plan
 

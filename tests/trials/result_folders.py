@@ -35,7 +35,7 @@ from orchestrator.cli import main as yawbench
 from orchestrator.errors import YawbenchError
 from orchestrator.files import LOCK_FILE
 from orchestrator.messages import printable
-from orchestrator.results.formats_and_csv import FILES
+from orchestrator.results.file_formats import FILES
 from orchestrator.results.recorder import write_results
 from tests.orchestrator import recorded
 from tests.trees import snapshot

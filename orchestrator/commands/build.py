@@ -91,7 +91,7 @@ def cache(action: CacheAction = "show") -> None:
     written. Deleted entries are made again when needed.
     Nothing is deleted while another command uses the cache.
     """
-    from ..cache_and_checksums import alone_in, cache_folders
+    from ..cache import alone_in, cache_folders
     from ..fmu.archive import kept_in, remove
 
     damaged, in_use = 0, False
@@ -161,7 +161,7 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
         signals_table,
         units_table,
     )
-    from ..results.read_and_salvage import found_runs
+    from ..results.reader import found_runs
     from ..scenario import find_and_load
     from .progress import print_tables
 

@@ -56,11 +56,11 @@ def run(
     from ..errors import ScenarioError, SimulationError
     from ..master.compiled_loop import slower_because
     from ..master.isolation import opener_of
-    from ..master.log_and_process_state import STATUS, WARNING
+    from ..master.process_state import STATUS, WARNING
     from ..master.simulate import simulate
     from ..messages import changed, with_changes
-    from ..results.folder_and_lock import default_folder, refuse_below_others
-    from ..results.formats_and_csv import size_note
+    from ..results.file_formats import size_note
+    from ..results.run_folder import default_folder, refuse_below_others
 
     if options.out and name:
         raise ScenarioError("--out and --name are mutually exclusive", code="option-invalid")
@@ -101,7 +101,7 @@ def run(
     if metrics:
         from ..experiments.tables import metrics_of_run
         from ..metrics.run_metrics import columns_for
-        from ..results.read_and_salvage import load_results
+        from ..results.reader import load_results
         from .progress import print_tables
 
         needed = load_results(folder, only=lambda recorded: columns_for(recorded, metrics))
@@ -173,7 +173,7 @@ def compare(context: typer.Context, scenario: ScenarioFile, swap: Swaps, options
     """
     from ..experiments.comparison import comparison, comparison_table
     from ..pages.comparison import comparison_facts
-    from ..results.folder_and_lock import default_folder
+    from ..results.run_folder import default_folder
 
     folder = options.out or default_folder(scenario, options.changes, suffix="-compare")
     hold(context, folder)
@@ -233,8 +233,8 @@ def converge(
     from ..experiments.tables import to_csv
     from ..figures.style import save
     from ..files import write_whole
-    from ..pages.page_parts_and_provenance import image_of
-    from ..results.folder_and_lock import default_folder
+    from ..pages.page_parts import image_of
+    from ..results.run_folder import default_folder
 
     for name in algorithm or ():
         if name not in ALGORITHMS:

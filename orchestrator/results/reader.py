@@ -17,13 +17,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ..cache_and_checksums import KEY, checksum
+from ..cache import KEY, checksum
 from ..errors import ResultsError
 from ..files import check_regular, open_own, reads, reason, write_whole
 from ..messages import fold, listed, short
 from ..names import SignalName
 from ..scenario.quantities import conversion, measure_of
-from .folder_and_lock import (
+from .file_formats import FILES, RESULTS_FILE, CsvFile, source_of
+from .run_folder import (
     COMPLETED,
     DIED,
     PART,
@@ -37,7 +38,6 @@ from .folder_and_lock import (
     tidy,
     unfinished,
 )
-from .formats_and_csv import FILES, RESULTS_FILE, CsvFile, source_of
 from .run_record import (
     ConnectionRecord,
     RunRecord,

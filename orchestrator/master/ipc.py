@@ -37,7 +37,7 @@ import numpy as np
 from ..errors import Diagnostic, Interrupted, YawbenchError
 from ..processes import Child, die_with_parent, prctl
 from ..supervisor import LOG, PipeChannel, ProtocolError, SupervisedProcess
-from .log_and_process_state import KEPT, Log
+from .process_state import KEPT, Log
 
 SET, STEP, GET = 1, 2, 4
 """Parts of an exchange, in this order; a sum of them asks for several."""

@@ -53,7 +53,7 @@ from ..files import (
 )
 from ..messages import cut
 from ..plan import Override, Value
-from .formats_and_csv import FILES, RESULTS_FILE
+from .file_formats import FILES, RESULTS_FILE
 
 RUN_FILE = "run.json"
 

@@ -41,8 +41,8 @@ from ..plan import (
     ValueSource,
     Variable,
 )
-from ..results.plan_record_and_freshness import versions
-from ..results.read_and_salvage import Results
+from ..results.freshness import versions
+from ..results.reader import Results
 from ..results.run_record import NOT_RECORDED, RunRecord
 
 CURLY = str.maketrans("'\"", "’”")

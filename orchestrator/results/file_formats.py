@@ -70,7 +70,7 @@ class Format:
 FORMATS = {
     "csv": Format(
         RESULTS_FILE, "text that every program reads",
-        "recorder:Recorder", "formats_and_csv:CsvFile", bytes=17,
+        "recorder:Recorder", "file_formats:CsvFile", bytes=17,
     ),
     "parquet": Format(
         "results.parquet", "Apache Parquet",

@@ -18,13 +18,13 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from ..cache_and_checksums import OF_RESULTS, checksum, sources_hash
+from ..cache import OF_RESULTS, checksum, sources_hash
 from ..errors import ResultsError
 from ..fmu.binary import runs_as
 from ..names import SignalName
 from ..plan import DEFAULT, InputSeries, Instance, Plan, ValueSource, Wire
-from .folder_and_lock import COMPLETED, RUN_FILE, is_dead
-from .read_and_salvage import load_results
+from .reader import load_results
+from .run_folder import COMPLETED, RUN_FILE, is_dead
 from .run_record import (
     ConnectionRecord,
     DiagnosticRecord,

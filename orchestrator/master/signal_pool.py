@@ -29,7 +29,7 @@ from ..errors import SimulationError
 from ..fault_kinds import KINDS, Disturbance
 from ..plan import Instance, Plan, Value, Variable, Wire
 from .instance import FmuInstance, Status, StepCalls
-from .log_and_process_state import OK
+from .process_state import OK
 
 
 @dataclass
