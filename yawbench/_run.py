@@ -176,7 +176,7 @@ class Run:
     def evaluate(self, test: str, *, angle: float | None = None) -> Evaluation:
         """Evaluate the run by a standard test: quantities in SI, verdicts with their reasons.
 
-            >>> run.evaluate("step-steer").notes  # a sine ends where it began
+            >>> [str(why) for why in run.evaluate("step-steer").diagnostics]  # a sine ends where it began
             ['the hand wheel is not turned']
 
         Args:

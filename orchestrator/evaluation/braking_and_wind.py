@@ -91,7 +91,8 @@ def evaluate_braking(judged: Evaluation, trace: Trace) -> None:
     distance = None if stop is None else at(t, way, stop)
     judged.add("distance", "stopping distance", distance, "m", "distance travelled by the centre of mass")
     if stop is None:
-        judged.notes.append(f"the car has not stopped by {end:.2f} s: {3.6 * at(t, speed, end):.0f} km/h")
+        left = 3.6 * at(t, speed, end)  # km/h
+        judged.report("car-not-stopped", f"the car has not stopped by {end:.2f} s: {left:.0f} km/h")
     judged.add("deceleration", "mean deceleration", _mean_deceleration(t, speed, way, v_0, begin), "m/s2",
                "from 0.8 to 0.1 of the speed (UN R13-H)")  # fmt: skip
     during = (t >= begin) & (t <= end)
@@ -292,4 +293,4 @@ def evaluate_side_wind(judged: Evaluation, trace: Trace) -> None:
             judged.add(f"{name}_at", "its instant", float(t[k]) - begin, "s", "after the start of the wind")
     if "steering_wheel_angle" in trace and np.ptp(trace["steering_wheel_angle"][during]) > HELD:
         turned_by = math.degrees(float(np.ptp(trace["steering_wheel_angle"][during])))
-        judged.notes.append(f"the hand wheel is not held: it moves by {turned_by:.0f} degrees")
+        judged.report("steering-not-held", f"the hand wheel is not held: it moves by {turned_by:.0f} degrees")

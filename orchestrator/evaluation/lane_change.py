@@ -156,7 +156,7 @@ def draw_run(trace: Trace, judged: Evaluation) -> Figure:
         entry = judged["entry"]
         clean = judged.criteria[CLEAN]
         speed = "" if entry is None else f", {3.6 * entry:.1f} km/h at the first cones"
-        note = " · ".join([*filter(None, [trace.title, trace.name]), *judged.notes])
+        note = " · ".join([*filter(None, [trace.title, trace.name]), *map(str, judged.diagnostics)])
         title = f"Lane change{speed}: {clean.status.value}, {clean.why}"
         frame(figure, 1.45 * sum(heights), [], title, note)
     return figure

@@ -32,7 +32,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -95,7 +95,7 @@ class DwellCourse:
     end: float  # COS
     peak: float | None  # instant of the second peak
     side: float  # 1: left first
-    notes: list[str] = field(default_factory=list)
+    early: str = ""  # why the zeroing range may end too early
 
 
 def course_of(trace: Trace) -> DwellCourse:
@@ -107,8 +107,7 @@ def course_of(trace: Trace) -> DwellCourse:
     """
     signals = prepared(trace, ("steering_wheel_angle", "yaw_rate", "acceleration_y"))
     t, rate = signals["time"], trace.even.rate
-    notes: list[str] = []
-    start = _start(t, signals["steering_wheel_angle"], rate, notes)
+    start, early = _start(t, signals["steering_wheel_angle"], rate)
     if start - BEFORE < t[0] - 1e-9:
         raise NotJudged(
             f"the record begins {start - t[0]:.2f} s before the steering; {BEFORE:g} s are needed"
@@ -139,12 +138,12 @@ def course_of(trace: Trace) -> DwellCourse:
         end,
         _second_peak(t, r, begin, reversed_, end),
         side,
-        notes,
+        early,
     )
 
 
-def _start(t: np.ndarray, angle: np.ndarray, rate: float, notes: list[str]) -> float:
-    """Return the end of the zeroing range [s]."""
+def _start(t: np.ndarray, angle: np.ndarray, rate: float) -> tuple[float, str]:
+    """Return the end of the zeroing range [s], and why it may be too early."""
     turning = running_mean(np.gradient(angle, t), MEAN, rate)
     first = np.flatnonzero(np.abs(turning) > RATE)
     if not first.size:
@@ -154,12 +153,12 @@ def _start(t: np.ndarray, angle: np.ndarray, rate: float, notes: list[str]) -> f
     stays = np.convolve(side * turning > RATE, np.ones(lasting), "valid") >= lasting - 0.5
     starts = np.flatnonzero(stays)
     if starts.size:
-        return float(t[starts[0]])
-    notes.append(
+        return float(t[starts[0]]), ""
+    early = (
         f"zeroed before the first instant above {math.degrees(RATE):g} deg/s: the first half wave does not "
         f"stay above it for {1000 * LASTS:g} ms"
     )
-    return float(t[first[0]])
+    return float(t[first[0]]), early
 
 
 def _first_side(t: np.ndarray, angle: np.ndarray, start: float) -> float:
@@ -231,7 +230,8 @@ def evaluate_dwell(judged: Evaluation, trace: Trace, angle: float | None = None)
         for criterion in ("stability", "responsiveness"):
             judged.rule(criterion, not_judged(str(why)))
         return
-    judged.notes += course.notes
+    if course.early:
+        judged.report("steering-unusual", course.early)
     steered = np.abs(trace["steering_wheel_angle"] - _zero_of(trace, course))
     amplitude = float(steered.max())
     nominal = trace.facts.get("amplitude")
@@ -244,7 +244,7 @@ def evaluate_dwell(judged: Evaluation, trace: Trace, angle: float | None = None)
     judged.add("end", "completion of steer", course.end, "s", "zero, filtered and zeroed")
     _stability(judged, course)
     _responsiveness(judged, course, trace, angle, amplitude)
-    _add_notes(judged, course, trace)
+    _add_beyond(judged, course, trace)
 
 
 def marks_of(judged: Evaluation) -> tuple[list[Mark], list[Limit]]:
@@ -317,20 +317,21 @@ def _responsiveness(
         why = f"{displacement:.2f} m of at least {least:g} m"
         judged.rule(criterion, compare(displacement, "at_least", least, "m", why=why))
         if trace.mass is None:
-            judged.notes.append(f"mass unknown: assumed to be at most {HEAVY:g} kg")
+            judged.report("mass-unknown", f"mass unknown: assumed to be at most {HEAVY:g} kg", "info")
 
 
-def _add_notes(judged: Evaluation, course: DwellCourse, trace: Trace) -> None:
-    """Add quantities and notes beyond the regulation: sideslip and speeds."""
+def _add_beyond(judged: Evaluation, course: DwellCourse, trace: Trace) -> None:
+    """Add quantities and diagnostics beyond the regulation: sideslip and speeds."""
     after = trace.time >= course.begin
     if "sideslip" in trace:
         peak = float(np.abs(trace["sideslip"][after]).max())
         judged.add("sideslip", "peak sideslip", peak, "rad", "from BOS to the end of the record")
         if peak > SPUN:
             stable = judged.criteria["stability"].status.value
-            judged.notes.append(f"sideslip reaches {math.degrees(peak):.0f} degrees (stability: {stable})")
+            why = f"sideslip reaches {math.degrees(peak):.0f} degrees (stability: {stable})"
+            judged.report("sideslip-large", why)
     else:
-        judged.notes.append("sideslip was not recorded: a spin may pass the ratios undetected")
+        judged.report("sideslip-unknown", "sideslip was not recorded: a spin may pass the ratios undetected")
     if "velocity_x" in trace:
         speed = at(trace.time, trace["velocity_x"], course.begin)
         judged.add("speed", "speed at BOS", speed, "m/s")

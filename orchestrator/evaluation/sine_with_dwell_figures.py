@@ -55,7 +55,7 @@ def draw_run(trace: Trace, judged: Evaluation) -> Figure | None:
             [
                 *filter(None, [trace.title, trace.name]),
                 "first half wave positive, signals filtered and zeroed as in UN R140",
-                *judged.notes,
+                *map(str, judged.diagnostics),
             ]
         )
         frame(figure, 2.0 * sum(heights), [], heading, note)

@@ -12,6 +12,7 @@ from functools import wraps
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Protocol
 
+from ..errors import Diagnostic, Severity
 from ..metrics.verdict import Verdict, worst
 
 if TYPE_CHECKING:
@@ -63,17 +64,21 @@ class Evaluation:
         label: of the run.
         quantities: key -> quantity.
         criteria: name -> verdict.
-        notes: what else a reader should know.
+        diagnostics: what limits the evaluation, such as why a run is not judged.
     """
 
     label: str
     quantities: dict[str, TestQuantity] = field(default_factory=dict)  # key -> quantity
     criteria: dict[str, Verdict] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
+    diagnostics: list[Diagnostic] = field(default_factory=list)
 
     def add(self, key: str, name: str, value: float | None, unit: str, reading: str = "") -> None:
         """Add a quantity."""
         self.quantities[key] = TestQuantity(name, None if value is None else float(value), unit, reading)
+
+    def report(self, code: str, message: str, severity: Severity = "warning") -> None:
+        """Add a diagnostic."""
+        self.diagnostics.append(Diagnostic(code, message, severity))
 
     def rule(self, criterion: str, verdict: Verdict) -> None:
         """Add the verdict on a criterion, made by `metrics.verdict.compare` or `not_judged`."""
@@ -107,7 +112,7 @@ class Evaluation:
                 for key, quantity in self.quantities.items()
             },
             "criteria": {name: verdict.as_data() for name, verdict in self.criteria.items()},
-            "notes": self.notes,
+            "diagnostics": [diagnostic.record() for diagnostic in self.diagnostics],
         }
 
 
@@ -117,7 +122,7 @@ Evaluation.__module__ = "yawbench"  # where users import it from
 def evaluation(
     fill: Callable[Concatenate[Evaluation, Trace, P], None],
 ) -> Callable[Concatenate[Trace, P], Evaluation]:
-    """Decorate a function that fills in an `Evaluation` to return it; NotJudged becomes a note.
+    """Decorate a function that fills in an `Evaluation` to return it; NotJudged becomes a diagnostic.
 
     All such functions raise ResultsError if the trace lacks a signal that the test needs.
     """
@@ -128,7 +133,7 @@ def evaluation(
         try:
             fill(judged, trace, *args, **kwargs)
         except NotJudged as why:
-            judged.notes.append(str(why))
+            judged.report("test-not-judged", str(why))
         return judged
 
     return evaluate

@@ -57,6 +57,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..errors import text_of
 from .standard_tests import Evaluation, NotJudged, evaluation
 from .trace import SLOWEST, Trace, at, first_crossing, opposed, prepared, refuse_opposed
 
@@ -171,7 +172,7 @@ def characteristic_angle(judged: Sequence[Evaluation]) -> float:
     """
     without = next((run for run in judged if run["angle"] is None), None)
     if without or not judged:
-        why = "; ".join(without.notes) if without else "no runs"
+        why = text_of(without.diagnostics) if without else "no runs"
         raise NotJudged(f"slowly increasing steer{f', {without.label}' if without else ''}: {why}")
     mean = float(np.mean([abs(run["angle"] or 0.0) for run in judged]))
     return math.radians(round(math.degrees(mean), 1))
@@ -216,8 +217,9 @@ def evaluate_step(judged: Evaluation, trace: Trace) -> None:
             f"{key}_gain", f"gain of the {name}", steady / abs(step), _GAINS[key], "over the hand wheel"
         )
         if np.ptp(x[end]) > SETTLED * abs(steady):
-            judged.notes.append(
-                f"the {name} is not steady at the end: {100 * np.ptp(x[end]) / abs(steady):.1f} %"
+            judged.report(
+                "response-not-steady",
+                f"the {name} is not steady at the end: {100 * np.ptp(x[end]) / abs(steady):.1f} %",
             )
         answered = first_crossing(t, x, STEP_LEVEL * steady, float(t[0])) if steady > 0 else None
         judged.add(f"{key}_response", f"response time of the {name}", _since(answered, zero), "s", "to 90 %")

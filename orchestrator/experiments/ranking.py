@@ -329,7 +329,7 @@ def angles_of(
             if case.run.name == car:
                 measured = record.values.get("angle")
                 judged.append(Evaluation(car))
-                judged[-1].notes.append(record.reason or "0.375 g is not reached")
+                judged[-1].report("test-not-judged", record.reason or "0.375 g is not reached")
                 judged[-1].add("angle", "", measured[0] if measured else None, "rad")
         try:
             angles[car] = characteristic_angle(judged)

@@ -9,6 +9,7 @@ import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
+from ..errors import text_of
 from ..evaluation.standard_tests import Evaluation, StandardTest, TestQuantity, TestSeries
 from ..figures.style import digits_of, shown
 from ..messages import changed
@@ -324,7 +325,12 @@ def run_table(judged: Evaluation, title: str) -> Table:
         [quantity.name, _cell(quantity), quantity.reading] for quantity in judged.quantities.values()
     ]
     notes = [f"{name}: {result}" for name, result in judged.criteria.items()]
-    return Table(f"{judged.label}: {title}", ["quantity", "value", "reading"], rows, notes + judged.notes)
+    return Table(
+        f"{judged.label}: {title}",
+        ["quantity", "value", "reading"],
+        rows,
+        [*notes, *map(str, judged.diagnostics)],
+    )
 
 
 def runs_table(runs: Sequence[Evaluation], test: StandardTest, series: TestSeries | None) -> Table:
@@ -340,5 +346,5 @@ def runs_table(runs: Sequence[Evaluation], test: StandardTest, series: TestSerie
     if series:
         notes += [f"{name}: {result}" for name, result in series.criteria.items()]
         notes.append(series.summary)
-    notes += [f"{run.label}: {'; '.join(run.notes)}" for run in runs if run.notes]
+    notes += [f"{run.label}: {text_of(run.diagnostics)}" for run in runs if run.diagnostics]
     return Table(test.says, ["run", *(names[key] for key in keys), *criteria], rows, notes)

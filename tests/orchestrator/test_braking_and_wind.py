@@ -45,7 +45,7 @@ def braked(sampling, last=7.0, **other) -> Trace:
 @as_sampled
 def test_split_friction_gives_distance_deceleration_yaw_and_correction_of_its_closed_forms(sampling):
     judged = evaluate_braking(braked(sampling))
-    assert judged.notes == []
+    assert judged.diagnostics == []
     assert judged["speed"] == pytest.approx(V_0, rel=2e-3)
     assert judged["distance"] == pytest.approx(V_0**2 / (2 * SLOWING), rel=3e-3)  # a sample of 5 ms is 0.1 m
     assert judged["deceleration"] == pytest.approx(SLOWING, rel=1e-3)
@@ -69,11 +69,11 @@ def test_without_a_pedal_the_deceleration_tells_the_beginning_and_a_moving_car_h
     assert evaluate_braking(made)["begin"] == pytest.approx(BEGIN, abs=0.0011)
     early = evaluate_braking(braked(even, last=4.0))
     assert early["distance"] is None
-    assert golden(early.notes)
+    assert golden(list(map(str, early.diagnostics)))
     del made.signals["acceleration_x"]
-    assert golden_in(evaluate_braking(made).notes[0])
+    assert golden_in(str(evaluate_braking(made).diagnostics[0]))
     free = braked(even, drive_force=np.zeros(7000))
-    assert golden(evaluate_braking(free).notes)
+    assert golden(list(map(str, evaluate_braking(free).diagnostics)))
     del made.signals["yaw_rate"]
     with pytest.raises(ResultsError, match="yaw_rate"):
         evaluate_braking(made)
@@ -128,7 +128,7 @@ def test_a_gust_gives_deviation_and_peaks_of_its_closed_forms(sampling):
     }
     signals["wind_force_y"][t == begin] = -1e-9  # the sine begins with a zero
     judged = evaluate_side_wind(Trace("gust", t, signals))
-    assert judged.notes == []
+    assert judged.diagnostics == []
     assert judged["begin"] == pytest.approx(begin, abs=0.006)
     assert judged["force"] == pytest.approx(-1200.0, rel=1e-3)
     assert judged["deviation"] == pytest.approx(-0.4 * 4.0 * exp(-2.0 / 3.0), rel=0.01)
@@ -138,6 +138,6 @@ def test_a_gust_gives_deviation_and_peaks_of_its_closed_forms(sampling):
     assert judged["acceleration_y"] == pytest.approx(-1.5, rel=1e-3)
     assert judged["sideslip"] is None
     signals["steering_wheel_angle"] += 0.1 * s
-    assert golden_in(evaluate_side_wind(Trace("gust", t, signals)).notes[0])
+    assert golden_in(str(evaluate_side_wind(Trace("gust", t, signals)).diagnostics[0]))
     calm = Trace("calm", t, signals | {"wind_force_y": np.zeros_like(t)})
-    assert golden(evaluate_side_wind(calm).notes)
+    assert golden(list(map(str, evaluate_side_wind(calm).diagnostics)))

@@ -140,15 +140,15 @@ def test_a_ratio_is_signed_and_a_spin_that_passes_is_flagged():
     assert judged["ratio_1000"] < 0.0
     assert judged.criteria["stability"].status is Status.PASSED
     assert judged["sideslip"] == radians(60.0)
-    assert golden_in(judged.notes)
+    assert golden_in(judged.diagnostics)
 
 
 def test_below_26_8_degrees_the_zeroing_range_ends_at_the_first_instant_above_75_degrees_per_second():
     """A 2 pi 0.7 Hz cos(2 pi 0.7 Hz 0.2 s) = 75 deg/s at 26.8 degrees."""
     low = evaluate_dwell(trace(radians(26.0)), radians(17.0))
     high = evaluate_dwell(trace(radians(30.0)), radians(17.0))
-    assert golden_in(low.notes)
-    assert high.notes == []
+    assert golden_in(low.diagnostics)
+    assert high.diagnostics == []
     assert low["end"] == pytest.approx(END + 0.0143, abs=0.001)  # the zero holds the first degrees, too
 
 
@@ -228,7 +228,7 @@ def test_a_second_peak_that_comes_later_than_the_first_ratio_is_none():
 def test_a_slow_steer_whose_acceleration_opposes_it_has_no_angle():
     judged = evaluate_slow_steer(turned(slow_steer(), "acceleration_y"))
     assert judged["angle"] is None
-    assert golden(judged.notes[0])
+    assert golden(str(judged.diagnostics[0]))
 
 
 def test_responsiveness_is_asked_from_5_a_on_a_dry_road_at_80_km_h():
@@ -372,7 +372,7 @@ def test_measured_columns_under_other_names_units_and_signs_give_the_same(tmp_pa
     assert found["verdict"] == "passed"
     for key, one in found["quantities"].items():
         assert one["value"] == pytest.approx(exact[key], rel=1e-8), key
-    assert golden_in(found["notes"])
+    assert golden_in([why["message"] for why in found["diagnostics"]])
 
 
 UNITS_GIVEN = {

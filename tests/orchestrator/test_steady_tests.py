@@ -61,7 +61,7 @@ def step_trace(sampling) -> Trace:
 @as_sampled
 def test_a_step_steer_gives_gain_response_time_and_overshoot_of_its_closed_form(sampling):
     judged = evaluate_step(step_trace(sampling))
-    assert judged.notes == []
+    assert judged.diagnostics == []
     assert judged["step"] == pytest.approx(-STEP)
     assert judged["zero"] == pytest.approx(1.0, abs=1e-9)
     assert judged["yaw_rate_gain"] == pytest.approx(GAIN, rel=1e-5)
@@ -85,14 +85,14 @@ def test_a_step_whose_answer_opposes_it_gives_nothing(column, answer):
     made.signals[column] = -made.signals[column]
     judged = evaluate_step(made)
     assert judged.quantities == {}
-    assert golden(judged.notes[0])
+    assert golden(str(judged.diagnostics[0]))
 
 
 def test_a_wheel_that_is_not_held_is_no_step():
     made = step_trace(lambda last: np.arange(0.0, last, 0.001))
     made.signals["steering_wheel_angle"] = 0.1 * made.time
     judged = evaluate_step(made)
-    assert golden(judged.notes)
+    assert golden(list(map(str, judged.diagnostics)))
     assert judged.quantities == {}
 
 
@@ -111,14 +111,14 @@ def test_the_understeer_gradient_does_not_depend_on_what_is_held(sampling, held)
     for answer in ("yaw_rate", "acceleration_y"):
         turned = evaluate_understeer(Trace("slow", t, signals | {answer: -signals[answer]}, facts=facts))
         assert turned.quantities == {}
-        assert golden_in(turned.notes[0])
+        assert golden_in(str(turned.diagnostics[0]))
     assert judged["gradient"] == pytest.approx(0.004, rel=1e-9)
     assert judged["gradient_hand"] == pytest.approx(0.064, rel=1e-9)
     assert judged["gradient_4"] == pytest.approx(0.004 + 3e-4 * 16.0, rel=0.01)  # over 1 m/s2
     assert judged["characteristic_speed"] == pytest.approx(sqrt(2.7 / 0.004))
     assert judged["gradient_6"] is None  # 5.5 to 6.5 m/s2, the run ends at 6
     del facts["steering_ratio"]
-    assert golden(evaluate_understeer(Trace("slow", t, signals, facts=facts)).notes)
+    assert golden(list(map(str, evaluate_understeer(Trace("slow", t, signals, facts=facts)).diagnostics)))
 
 
 def theory() -> tuple[float, float, float, float]:
@@ -142,7 +142,7 @@ def test_the_yaw_gain_of_a_step_of_0_2_m_per_s2_is_that_of_the_single_track_theo
     judged = evaluate_step(trace_of(base.set({"driver.amplitude": 0.2 / (gain * v)}).run().results))
     assert judged["acceleration_y_steady"] == pytest.approx(0.2, rel=0.003)
     assert judged["yaw_rate_gain"] == pytest.approx(gain, rel=0.0005)  # 0.3 % was asked for
-    assert judged.notes == []
+    assert judged.diagnostics == []
 
 
 @pytest.mark.exhaustive
@@ -221,17 +221,18 @@ def test_a_braked_turn_gives_the_ratios_of_its_closed_form(sampling):
         "sideslip": np.radians(1.0 - late),
     }
     judged = evaluate_turn(Trace("turn", t, signals, facts={"action_time": 9.0}))
-    assert judged.notes == []
+    assert judged.diagnostics == []
     assert judged["radius"] == pytest.approx(-80.0)
     assert judged["deceleration"] == pytest.approx(4.0, rel=1e-3)
     assert judged["yaw_ratio"] == pytest.approx(1.0 + 0.6 * exp(-1.0), rel=1e-3)
     assert judged["yaw_ratio_peak"] == pytest.approx(1.3, rel=1e-3)
     assert judged["a_y_ratio"] == pytest.approx(1.0 + 0.6 * exp(-1.0), rel=1e-3)
     assert judged["sideslip"] == pytest.approx(-np.radians(1.0), rel=1e-3)
-    assert golden(evaluate_turn(Trace("turn", t, signals, facts={})).notes[0])
-    assert "not steady" in evaluate_turn(Trace("turn", t, signals), action=9.6).notes[0]
+    assert golden(str(evaluate_turn(Trace("turn", t, signals, facts={})).diagnostics[0]))
+    (unsteady,) = evaluate_turn(Trace("turn", t, signals), action=9.6).diagnostics
+    assert unsteady.code == "test-not-judged" and "not steady" in str(unsteady)
     steered = signals | {"steering_wheel_angle": np.full_like(t, 0.5)}
-    (why,) = evaluate_turn(Trace("turn", t, steered, facts={"action_time": 9.0})).notes
+    (why,) = map(str, evaluate_turn(Trace("turn", t, steered, facts={"action_time": 9.0})).diagnostics)
     assert golden(why)
 
 
@@ -248,7 +249,7 @@ def test_a_sweep_gives_the_frequency_response_of_an_oscillator(sampling):
     judged = evaluate_sweep(Trace("sweep", t, signals))
     turned = evaluate_sweep(Trace("sweep", t, signals | {"yaw_rate": -signals["yaw_rate"]}))
     assert turned.quantities == {}
-    assert golden(turned.notes[0])
+    assert golden(str(turned.diagnostics[0]))
     for f in (0.5, 1.0, 1.5, 2.0):
         exact = gain * omega**2 / (omega**2 - (2 * pi * f) ** 2 + 2j * damping * omega * 2 * pi * f)
         assert judged[f"yaw_rate_gain_{f:g}"] == pytest.approx(abs(exact), rel=0.01), f
