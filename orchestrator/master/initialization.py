@@ -86,6 +86,10 @@ def initialize(memory: SignalPool, check: StatusCheck, log: Log) -> int:
         check(station.name, "initialization", station.fmu_instance.exit())
         _get(memory, station, check)
         _check_constants(station, check, log)
+    for station in memory.stations:
+        for _, wire in station.other_inputs:
+            if wire is not None:
+                memory.other(wire)  # raises if the input cannot be this number
     memory.start_history()
     return number
 
@@ -210,8 +214,8 @@ def _renew_others(
     changed = set()
     values = memory.given_others(s)
     for variable, wire in s.other_inputs:
-        value, old = values[variable.name], memory.others.get((s.name, variable.name))
-        if value == old:
+        value, old = values.get(variable.name), memory.others.get((s.name, variable.name))
+        if value is None or value == old:
             continue
         memory.others[s.name, variable.name] = value
         changed.add(variable.place[:2])
@@ -219,7 +223,7 @@ def _renew_others(
             text = f"{wire.source}.{wire.output} -> {s.name}.{variable.name}"
             moving.append(UnsettledWire(text, "" if old is None else old, value))
     if changed:  # all elements of an array are set together
-        names = [v.name for v, _ in s.other_inputs if v.place[:2] in changed]
+        names = [v.name for v, _ in s.other_inputs if v.place[:2] in changed and v.name in values]
         _put(s, {name: values[name] for name in names}, "setting inputs", check)
     return bool(changed)
 

@@ -272,7 +272,7 @@ class CtypesInstance(FmuInstance, ABC):
         buffer = (self.c_types[kind] * count)()
         for i, value in zip(at, values, strict=False):  # empty when getting
             buffer[i] = value
-            if kind in INTEGERS and buffer[i] != value:
+            if kind in (*INTEGERS, "Integer") and buffer[i] != value:
                 sentence = f"{value} does not fit into a variable of type {kind}"
                 return self._impossible(sentence), list(values)
         return self._call(verb + kind, references, buffer)(), [buffer[i] for i in at]

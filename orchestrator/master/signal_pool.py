@@ -4,7 +4,9 @@ The pool stores, one after the other, the outputs of all instances at their last
 the step before (`before`), samples of fast sources kept for slow instances (`kept`), the constants of
 undriven inputs, and the time. So every value that an input needs, and every row of the results, is one
 indexed read of one array. Instances of period 1 come first: what they need at once is contiguous. Values
-that are not Real live in a separate dictionary, which costs nothing if there are no such wires.
+that are not Real live in a separate dictionary, which costs nothing if there are no such wires. If such an
+output feeds a Real input, its samples also stand in the array, behind those of its instance's Real outputs,
+and are coupled as these are.
 
 Faults disturb an instance's outputs after they are read, or its inputs before they are set. An output is
 disturbed as of the time of its sample, so all receivers and the results get the same faulty value. An input
@@ -19,7 +21,9 @@ from __future__ import annotations
 import ctypes
 import functools
 import math
+import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,9 +31,14 @@ import numpy as np
 from ..coupling import ALGORITHMS, WireTiming
 from ..errors import SimulationError
 from ..fault_kinds import KINDS, Disturbance
+from ..fmu.binary import integer_limits
+from ..messages import listed
 from ..plan import Instance, Plan, Value, Variable, Wire
 from .instance import FmuInstance, Status, StepCalls
 from .process_state import OK
+
+EXACT = 2.0**53
+"""Whole numbers up to this are exact in a Real."""
 
 
 @dataclass
@@ -44,12 +53,14 @@ class InstanceSlot:
     outputs: list[Variable]  # Real and needed, in declared order
     other_inputs: list[tuple[Variable, Wire | None]]  # not Real; None: a constant
     other_outputs: list[Variable]
+    converted: list[Variable]  # of `other_outputs`, those that feed a Real input
     sources: np.ndarray = field(default_factory=lambda: np.empty(0, np.intp))  # pool index per input
     kept: np.ndarray = field(default_factory=lambda: np.empty(0))  # pool view, one per input
     kept_at: int = 0  # pool index of kept[0]
     u: np.ndarray = field(default_factory=lambda: np.empty(0))  # view of the array of inputs
     y: np.ndarray = field(default_factory=lambda: np.empty(0))  # view of the outputs in the pool
-    y_before: np.ndarray = field(default_factory=lambda: np.empty(0))
+    samples: np.ndarray = field(default_factory=lambda: np.empty(0))  # `y`, then the converted outputs
+    samples_before: np.ndarray = field(default_factory=lambda: np.empty(0))
     output_faults: FaultInjector | None = None
     input_faults: FaultInjector | None = None
     calls: StepCalls = field(init=False)
@@ -97,14 +108,16 @@ class SignalPool:
         self.stations = _make_slots(plan, fmu_instances)
         self.of = {s.name: s for s in self.stations}
         self.placed = sorted(self.stations, key=lambda s: s.instance.period > 1)
-        n_out = sum(len(s.outputs) for s in self.stations)
+        n_out = sum(len(s.outputs) + len(s.converted) for s in self.stations)
         n_in = sum(len(s.inputs) for s in self.stations)
         self.n_outputs = n_out
         self.pool = np.zeros(2 * n_out + 2 * n_in + 1)
         self.now = self.pool[:n_out]
         self.inputs = np.full(n_in, np.nan)
-        self.index: dict[tuple[str, str], int] = {}  # (instance, output) -> index of its last sample
+        self.index: dict[tuple[str, str], int] = {}  # (instance, Real output) -> index of its last sample
+        self.converted: dict[tuple[str, str], int] = {}  # the same for outputs that are converted to Real
         self.others: dict[tuple[str, str], Value] = {}
+        self._allowed = _allowed_numbers(plan)
         self.time_at = len(self.pool) - 1
         self.time = ctypes.c_double.from_buffer(self.pool.data, 8 * self.time_at)
         self.time.value = plan.time(0)
@@ -119,8 +132,11 @@ class SignalPool:
         for s in self.placed:
             end = at + len(s.outputs)
             s.y = self.pool[at:end]
-            s.y_before = self.pool[self.n_outputs + at : self.n_outputs + end]
             self.index.update(((s.name, v.name), at + i) for i, v in enumerate(s.outputs))
+            self.converted.update(((s.name, v.name), end + i) for i, v in enumerate(s.converted))
+            end += len(s.converted)
+            s.samples = self.pool[at:end]
+            s.samples_before = self.pool[self.n_outputs + at : self.n_outputs + end]
             at = end
 
     def _place_inputs(self, kept_at: int, constants_at: int) -> None:
@@ -136,7 +152,8 @@ class SignalPool:
                     self.pool[constants_at + at + i] = float(s.instance.constants[variable.name])
                     sources.append(constants_at + at + i)
                 else:
-                    sources.append(self.index[wire.source, wire.output])
+                    key = wire.source, wire.output
+                    sources.append(self.index[key] if key in self.index else self.converted[key])
             s.sources = np.array(sources, np.intp)
             at = end
 
@@ -153,28 +170,59 @@ class SignalPool:
 
         Raises:
             KeyError: its source has not been read yet.
-            SimulationError: the converted number does not fit into an Integer.
+            SimulationError: the input cannot be this number.
         """
         value = self.others[wire.source, wire.output]
-        if not wire.converts:
+        if wire.converts:
+            value = int(wire.gain) * value + int(wire.offset)  # type: ignore[operator]
+        allowed = self._allowed.get((wire.target, wire.input))
+        if allowed is None or value in allowed:
             return value
-        number = int(wire.gain * value + wire.offset)  # type: ignore[operator]
-        if not -(2**31) <= number < 2**31:
-            sentence = f"{wire.target}: {wire.input} would be {number}, more than an Integer holds"
-            raise SimulationError(
-                sentence, instance=wire.target, time=self.time.value, code="value-too-large"
-            )
-        return number
+        raise self._unfit(wire, value)
+
+    def _unfit(self, wire: Wire, value: Value) -> SimulationError:
+        """Return the exception for a number that an input cannot be."""
+        items = self.of[wire.target].instance.fmu.variables[wire.input].items
+        sentence, now = f"{wire.target}: {wire.input} would be {value}", self.time.value
+        if items is None:
+            sentence += ", more than an Integer holds"
+            return SimulationError(sentence, instance=wire.target, time=now, code="value-too-large")
+        numbers = listed(f"{name} {number}" for name, number in items.items())
+        sentence += f", which is not the number of an item ({numbers})"
+        return SimulationError(sentence, instance=wire.target, time=now, code="value-not-an-item")
+
+    def store_converted(self, s: InstanceSlot) -> Callable[[], Status]:
+        """Return the call that stores an instance's outputs of other types as the Reals that they feed.
+
+        It raises SimulationError if a Real does not hold one of them exactly.
+        """
+        others, reals = self.others, s.samples[len(s.outputs) :]
+        keys = [(s.name, v.name) for v in s.converted]
+        pick = operator.itemgetter(*keys)
+
+        def store() -> Status:
+            reals[:] = pick(others)
+            if np.abs(reals).max() >= EXACT:
+                for (name, output), number in ((key, others[key]) for key in keys):
+                    if float(number) != number:
+                        sentence = f"{name}: {output} is {number}, which a Real does not hold exactly"
+                        raise SimulationError(
+                            sentence, instance=name, time=self.time.value, code="value-too-large"
+                        )
+            return OK
+
+        return store
 
     def given_others(self, s: InstanceSlot) -> dict[str, Value]:
-        """Return an instance's inputs that are not Real, as far as their sources have been read."""
+        """Return an instance's inputs that are not Real, as far as their sources have been read and fit."""
         values = {}
         for variable, wire in s.other_inputs:
             if wire is None:
                 constant = s.instance.constants[variable.name]
                 values[variable.name] = self.others.get((s.name, variable.name), constant)
             elif (wire.source, wire.output) in self.others:
-                values[variable.name] = self.other(wire)
+                with suppress(SimulationError):
+                    values[variable.name] = self.other(wire)
         return values
 
     def relation(self, target: InstanceSlot, variable: Variable, wire: Wire) -> WireTiming:
@@ -207,6 +255,8 @@ def _make_slots(plan: Plan, fmu_instances: Mapping[str, FmuInstance]) -> list[In
     """Return the slots, in evaluation order, without their arrays."""
     driver = {(w.target, w.input): w for w in plan.wires}
     needed = {(w.source, w.output) for w in plan.wires} | set(plan.record)
+    of = {unit.name: unit.fmu.variables for unit in plan.instances}
+    to_reals = {(w.source, w.output) for w in plan.wires if of[w.target][w.input].type == "Real"}
     slots = []
     for position, unit in enumerate(plan.instances):
         driven = [
@@ -225,9 +275,27 @@ def _make_slots(plan: Plan, fmu_instances: Mapping[str, FmuInstance]) -> list[In
                 [v for v in read if v.type == "Real"],
                 [(v, w) for v, w in driven if v.type != "Real"],
                 [v for v in read if v.type != "Real"],
+                [v for v in read if v.type != "Real" and (unit.name, v.name) in to_reals],
             )
         )
     return slots
+
+
+def _allowed_numbers(plan: Plan) -> dict[tuple[str, str], range | frozenset[int]]:
+    """Return the whole numbers that an input can be, by instance and input, where its wire may bring others.
+
+    Numbers that no wire has changed are checked when they are set.
+    """
+    of = {unit.name: unit.fmu.variables for unit in plan.instances}
+    allowed: dict[tuple[str, str], range | frozenset[int]] = {}
+    for wire in plan.wires:
+        source, target = of[wire.source][wire.output], of[wire.target][wire.input]
+        if target.type == "Enumeration" and source.type == "Integer":
+            allowed[wire.target, wire.input] = frozenset((target.items or {}).values())
+        elif target.type == "Integer" and wire.converts:
+            lowest, highest = integer_limits(target.encoding or "Int32")
+            allowed[wire.target, wire.input] = range(lowest, highest + 1)
+    return allowed
 
 
 class FaultInjector:

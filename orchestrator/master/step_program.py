@@ -159,7 +159,7 @@ class StepProgram:
                 operations += [*self._gathering(s, k), *self._of_inputs[s.name]]
                 operations += _setting(self._memory, s)
                 operations.append(_of_fmu(s, "step", s.calls.step))
-                if self._algorithm.needs_before and s.outputs:
+                if self._algorithm.needs_before and s.samples.size:
                     operations.append(_keeping_outputs(self._memory, s))
                 operations += [*getting(self._memory, s), *self._of_outputs[s.name]]
         return operations
@@ -271,9 +271,11 @@ def _acting(s: InstanceSlot, faults: FaultInjector | None, values: np.ndarray) -
 
 def _keeping_outputs(m: SignalPool, s: InstanceSlot) -> Operation:
     """Return the operation that keeps the outputs of an instance's last step."""
-    here = np.array([m.index[s.name, v.name] for v in s.outputs], np.intp)
-    data = OperationData(Kind.COPY, len(here), first=here, values=s.y_before)
-    return Operation(s.name, "keep", copying(s.y, s.y_before), data)
+    places = [m.index[s.name, v.name] for v in s.outputs]
+    places += [m.converted[s.name, v.name] for v in s.converted]
+    here = np.array(places, np.intp)
+    data = OperationData(Kind.COPY, len(here), first=here, values=s.samples_before)
+    return Operation(s.name, "keep", copying(s.samples, s.samples_before), data)
 
 
 def copying(source: np.ndarray, target: np.ndarray) -> Callable[[], None]:
@@ -314,4 +316,6 @@ def getting(m: SignalPool, s: InstanceSlot) -> list[Operation]:
             return status
 
         operations.append(Operation(s.name, "get", fetch))
+    if s.converted:
+        operations.append(Operation(s.name, "get", m.store_converted(s)))
     return operations

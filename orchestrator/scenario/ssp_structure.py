@@ -10,6 +10,7 @@ are ignored, as the standard requires, but with a note.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -369,7 +370,10 @@ def _value(parameter: _Element) -> SspValue:
         name, text = etree.QName(kind).localname, kind.get("value", "")
         try:
             if name == "Real":
-                return SspValue(float(text), kind.get("unit"), parameter)
+                unit = kind.get("unit")
+                if unit and (bare := re.fullmatch(r"\[(.+)\]", unit.strip())):
+                    unit = bare[1]  # as tools write units behind names
+                return SspValue(float(text), unit, parameter)
             if name == "Integer":
                 return SspValue(int(text), None, parameter)
             if name == "Boolean":

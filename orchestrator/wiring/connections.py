@@ -10,92 +10,20 @@ where nothing is connected by equal names.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Set
 from dataclasses import replace
-from functools import cache
 from graphlib import CycleError
 from itertools import pairwise
-
-from vocabulary.signals import SYMBOLS
 
 from ..messages import fold, hint, listed
 from ..names import SignalName, matching
 from ..plan import DEFAULT, InputSeries, Value, Variable, Wire
 from ..scenario.find_and_load import Connection
-from ..scenario.quantities import conversion, measure_of
 from ..scenario.yaml_lines import KeyPath, dotted
+from .compatibility import DIFFERENCES, alike, contradicts_its_name, conversion_between, difference, fits
 from .constants import Constant, Input, constants
 from .context import WiringContext
 from .order import in_order
-
-
-def conversion_between(source: Variable, target: Variable) -> tuple[float, float] | None:
-    """Return gain and offset between the units of two variables, None if the units are incompatible.
-
-    A variable without a unit is taken to have that of the other.
-    """
-    if source.unit is None or target.unit is None:
-        return 1.0, 0.0
-    if (source.unit, source.definition) == (target.unit, target.definition):
-        return 1.0, 0.0
-    measures = measure_of(source.unit, source.definition), measure_of(target.unit, target.definition)
-    if measures[0] is None or measures[1] is None:
-        return (1.0, 0.0) if source.unit == target.unit else None
-    return conversion(measures[0], measures[1])
-
-
-DIFFERENCES = {
-    "types": "wiring-type-mismatch",
-    "units": "wiring-unit-mismatch",
-    "enumerations": "wiring-enumeration-mismatch",
-}
-"""What differs at the ends of a wire -> code."""
-
-
-def contradicts_its_name(variable: Variable) -> bool:
-    usual, defined = measure_of(variable.unit), measure_of(variable.unit, variable.definition)
-    return usual is not None and usual != defined
-
-
-def difference(
-    source: Variable, target: Variable, scale: tuple[float, float] | None
-) -> tuple[str, str | None, str | None] | None:
-    """Return why two variables cannot be connected (what differs, the source's, the target's), else None."""
-    if source.type != target.type:
-        return "types", source.type, target.type
-    if scale is None:
-        return "units", source.unit, target.unit
-    items = source.items or {}, target.items or {}
-    if source.type == "Enumeration" and not items[0].items() <= items[1].items():
-        of, to = (listed(f"{name} {value}" for name, value in each.items()) for each in items)
-        return "enumerations", of, to
-    return None
-
-
-def alike(output: str, name: str) -> int:
-    """Return how many words the names of an output and of an input share: 0 if it should not be suggested.
-
-    A reference value does not match an actual value.
-    """
-    words = words_of(output), words_of(name)
-    return len(words[0] & words[1]) if ("ref" in words[0]) == ("ref" in words[1]) else 0
-
-
-@cache
-def words_of(name: str) -> frozenset[str]:
-    """Return the words of a signal's name, symbols translated: of `PsiDot` and `yaw_rate` yaw and rate.
-
-    Words of up to two letters do not count.
-    """
-    words = [name, *re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)]
-    translated = "_".join(SYMBOLS.get(word.lower(), word.lower()) for word in words)
-    return frozenset(word for word in translated.split("_") if len(word) > 2)
-
-
-def fits(source: Variable, target: Variable) -> bool:
-    alike = source.type == target.type and (source.unit is None) == (target.unit is None)
-    return alike and conversion_between(source, target) is not None
 
 
 class Connector:
@@ -397,7 +325,7 @@ class Connector:
             return wire
         assert scale is not None
         whole = source.type == "Integer" and all(x.is_integer() for x in scale)
-        if scaling and source.type != "Real" and not whole:
+        if scaling and target.type != "Real" and not whole:
             self._report(
                 key,
                 f"gain and offset are for Real, and whole ones for Integer, not for {source.type}",
@@ -420,8 +348,8 @@ class Connector:
                 (wire.source, self._outputs[wire.source][wire.output]),
                 (wire.target, self._inputs[wire.target][wire.input]),
             )
-            lacking = [(instance, v.name) for instance, v in ends if v.type == "Real" and v.unit is None]
-            if len(lacking) == 1:
+            lacking = [(instance, v.name) for instance, v in ends if v.unit is None]
+            if len(lacking) == 1 and all(v.type == "Real" for _, v in ends):
                 missing.setdefault(lacking[0][0], []).append(lacking[0][1])
             odd.update(
                 {(instance, v.unit): None for instance, v in ends if v.unit and contradicts_its_name(v)}

@@ -135,7 +135,7 @@ def _wheels(var: Var) -> list[Var]:
 
 def _scalar_variable(causality: str, var: Var, reference: int) -> str:
     variability = "fixed" if causality == "parameter" else var.variability
-    if var.type != "Real" and causality != "parameter":
+    if var.type != "Real" and causality != "parameter" and variability != "constant":
         variability = "discrete"
     text = var.description + (f" (one of: {', '.join(var.choices)})" if var.choices else "")
     attributes = {"declaredType": f"{var.name}_type"} if var.items else {}
@@ -145,7 +145,7 @@ def _scalar_variable(causality: str, var: Var, reference: int) -> str:
         attributes["min"] = str(var.minimum)
     if var.maximum is not None:
         attributes["max"] = str(var.maximum)
-    if causality != "output":
+    if causality != "output" or variability == "constant":
         attributes["start"] = str(var.start).lower() if var.type == "Boolean" else str(var.start)
     inner = " ".join(f"{k}={quoteattr(v)}" for k, v in attributes.items())
     said = ' optional="true"' * var.optional

@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.results.reader import load_results
-from tests.sentences import golden_in
+from tests.sentences import golden, golden_in
 
 from . import models3
 from .conftest import compiled
@@ -123,6 +123,85 @@ def test_a_value_on_a_wire_that_a_type_cannot_hold_ends_the_run(run, isolate):
     status, said, _ = run(units, *isolate, inputs=constants, connections=wires)
     assert status == 1
     assert golden_in(said)
+
+
+REST = EVERY | {"String": "", "mode": "dry"}
+
+
+def rest(*driven, units):
+    """Return constants for the inputs of instances of Every but those that are driven."""
+    given = {f"{unit}.{kind}_in": value for unit in units for kind, value in REST.items()}
+    return {name: value for name, value in given.items() if name not in driven}
+
+
+@together_and_apart
+def test_types_convert_on_a_wire_without_loss(run, library, tmp_path, isolate):
+    wires = [
+        {"from": "a.Int64_out", "to": "b.Float64_in"},
+        {"from": "a.Boolean_out", "to": "b.Float32_in", "gain": 0.25, "offset": -3},
+        {"from": "a.Int8_out", "to": "b.mode_in"},
+        {"from": "a.mode_out", "to": "b.UInt8_in"},
+        {"from": "a.Int16_out", "to": "old.Real_in"},
+    ]
+    constants = rest(*(wire["to"] for wire in wires), units="ab")
+    constants |= {"a.Int64_in": 2**53 - 1, "a.Int8_in": 4, "a.mode_in": "wet"}
+    old = write_fmu(tmp_path / "foreign.fmu", library, "Real")
+    units = {"a": ("Every", {}), "b": ("Every", {}), "old": (old, {})}
+    status, said, results = run(units, *isolate, inputs=constants, connections=wires)
+    assert status == 0, said
+    taken = {name: set(results[f"b.{name}_out"]) for name in ("Float64", "Float32", "mode", "UInt8")}
+    assert taken == {"Float64": {2.0**53 - 1}, "Float32": {-2.75}, "mode": {4}, "UInt8": {4}}
+    assert set(results["old.Real_out"]) == {-65536.0}
+
+
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
+def test_an_integer_that_feeds_a_real_is_coupled_alike_by_both_loops(run, tmp_path, monkeypatch, algorithm):
+    units = {"m": ("Matrix", {}), "a": ("Stair", {}), "n": ("Matrix", {"step_size": 0.4})}
+    wires = [
+        {"from": "a.counter", "to": "m.u[1]", "gain": 0.5, "offset": 1},
+        {"from": "m.y[1]", "to": "n.u[1]"},
+        {"from": "a.counter", "to": "n.u[2]"},
+    ]
+    files = []
+    for wanted in ("", "python"):
+        monkeypatch.setenv("YAWBENCH_LOOP", wanted)
+        constants = {"m.u[2]": 0.0}
+        status, said, results = run(
+            units, inputs=constants, connections=wires, algorithm=algorithm, stop_time=4, step_size=0.2
+        )
+        assert status == 0, said
+        files.append((tmp_path / "out" / "results.csv").read_bytes())
+        counts = results["a.counter"]
+        late = counts if algorithm == "gauss_seidel" else np.array([counts[0], *counts[:-1]])
+        if algorithm != "extrapolated":
+            assert results["m.y[1]"].tolist() == (0.5 * late + 1).tolist()
+        assert {*results["n.y[2]"]} <= {*counts.astype(float)}  # held, never interpolated
+        assert results["n.y[2]"][-1] >= 4.0
+    assert files[0] == files[1]
+
+
+@together_and_apart
+@pytest.mark.parametrize(
+    ("wire", "constants", "unit", "time"),
+    [
+        ({"from": "a.counter", "to": "b.mode_in"}, {}, "b", 1.0),
+        ({"from": "c.Int64_out", "to": "b.Float64_in"}, {"c.Int64_in": 2**53 + 1}, "c", 0.0),
+        ({"from": "c.UInt32_out", "to": "old.Integer_in"}, {}, "old", 0.0),
+    ],
+)
+def test_a_number_that_its_input_cannot_be_ends_the_run(
+    run, tmp_path, library, isolate, wire, constants, unit, time
+):
+    old = write_fmu(tmp_path / "foreign.fmu", library, "Integer")
+    units = {"a": ("Stair", {}), "b": ("Every", {}), "c": ("Every", {}), "old": (old, {})}
+    inputs = rest(wire["to"], units="bc") | constants
+    if wire["to"] != "old.Integer_in":
+        inputs["old.Integer_in"] = 0
+    status, _, results = run(units, *isolate, inputs=inputs, connections=[wire], stop_time=3)
+    assert status == 1
+    assert golden(results.record.error.message)
+    assert results.record.error.unit == unit
+    assert results.record.error.time == pytest.approx(time, abs=0.11)
 
 
 @together_and_apart

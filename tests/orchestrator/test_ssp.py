@@ -294,9 +294,10 @@ def test_names_that_cannot_name_a_unit_are_changed(feedback, fmus, tmp_path):
     )
 
 
-def test_a_parameter_in_another_unit_is_converted(feedback, fmus, tmp_path):
+@pytest.mark.parametrize("unit", ["km/h", "[km/h]"])
+def test_a_parameter_in_another_unit_is_converted(feedback, fmus, tmp_path, unit):
     before = '<ssv:Real value="25.0" unit="m/s"/>'
-    path = rewritten(feedback, tmp_path / "kmh.ssp", (before, '<ssv:Real value="90" unit="km/h"/>'))
+    path = rewritten(feedback, tmp_path / "kmh.ssp", (before, f'<ssv:Real value="90" unit="{unit}"/>'))
     assert unit_of(make_plan(load_scenario(path), fmus=fmus), "plant").parameters["initial_speed"] == 25.0
 
 

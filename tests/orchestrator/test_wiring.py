@@ -614,8 +614,27 @@ def test_an_fmu_without_units_is_connected_with_a_note(folder: Path) -> None:
 
 
 def test_types_that_differ_over_equal_names_are_said(folder: Path) -> None:
-    make_fmu(folder / "driver_int.fmu", outputs=[out("steer_angle", unit=None, type="Integer")])
-    assert golden(problems(scenario(), swaps=["driver=driver_int"])[1])
+    make_fmu(folder / "driver_text.fmu", outputs=[out("steer_angle", unit=None, type="String", start="")])
+    assert golden(problems(scenario(), swaps=["driver=driver_text"])[1])
+
+
+@pytest.mark.parametrize("kind", ["Integer", "Boolean"])
+def test_an_output_of_whole_numbers_feeds_a_real_of_the_same_name(folder: Path, kind: str) -> None:
+    make_fmu(folder / "driver_int.fmu", outputs=[out("steer_angle", unit=None, type=kind)])
+    wires = plan(scenario(), swaps=["driver=driver_int"]).wires
+    assert "plant" in [wire.target for wire in wires if wire.source == "driver"]
+
+
+def test_a_constant_integer_feeds_an_enumeration_that_has_its_number(folder: Path) -> None:
+    def feed(number: int) -> Path:
+        choice = Var("road", type="Integer", start=number, variability="constant")
+        make_fmu(folder / "sensor.fmu", outputs=[choice])
+        mode = Var("road", type="Enumeration", start=1, variability="discrete", items=("dry", "wet"))
+        make_fmu(folder / "taker.fmu", inputs=[mode], outputs=["y"])
+        return scenario("  sensor: {fmu: sensor}\n  taker: {fmu: taker}\n", "")
+
+    assert len(plan(feed(2)).wires) == 1
+    assert golden(problems(feed(3)))
 
 
 def test_enumerations_fit_if_the_input_knows_every_item_by_the_same_number(folder: Path) -> None:
