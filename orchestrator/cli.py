@@ -37,6 +37,7 @@ COMMANDS = {
     "sweep": "experiments",
     "evaluate": "standard_tests",
     "fit": "measured",
+    "validate": "measured",
     "drive": "standard_tests",
     "tune": "experiments",
     "rank": "rank",

@@ -52,6 +52,7 @@ if TYPE_CHECKING:
         YawbenchWarning,
     )
     from orchestrator.evaluation.standard_tests import Evaluation, TestQuantity
+    from orchestrator.evaluation.validation import Validation
     from orchestrator.metrics.run_metrics import MetricValue
     from orchestrator.metrics.verdict import Verdict
     from orchestrator.plan import Override, Plan
@@ -64,6 +65,7 @@ if TYPE_CHECKING:
     from ._ranking import Ranking, rank
     from ._run import Run, measured
     from ._scenario import Scenario, load
+    from ._validate import validate
     from ._view import View, view
 
 __all__ = [
@@ -89,6 +91,7 @@ __all__ = [
     "ScenarioError",
     "SimulationError",
     "TestQuantity",
+    "Validation",
     "Verdict",
     "View",
     "WiringError",
@@ -104,6 +107,7 @@ __all__ = [
     "parameter",
     "rank",
     "signal",
+    "validate",
     "view",
 ]
 
@@ -111,6 +115,7 @@ _PACKAGES = ("components", "fmus", "orchestrator", "scenarios", "vocabulary")
 _MODULES = {
     "components.fmi.variables": ("output", "parameter", "signal"),
     "orchestrator.evaluation.standard_tests": ("Evaluation", "TestQuantity"),
+    "orchestrator.evaluation.validation": ("Validation",),
     "orchestrator.metrics.run_metrics": ("MetricValue",),
     "orchestrator.metrics.verdict": ("Verdict",),
     "orchestrator.plan": ("Override", "Plan"),
@@ -122,6 +127,7 @@ _MODULES = {
     "yawbench._open": ("RecordedRuns", "open"),
     "yawbench._run": ("Run", "measured"),
     "yawbench._scenario": ("Scenario", "load"),
+    "yawbench._validate": ("validate",),
     "yawbench._view": ("View", "view"),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}

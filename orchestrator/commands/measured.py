@@ -1,4 +1,4 @@
-"""`yawbench measured` and `fit`: what is wrong with a recording; parameters fitted to it."""
+"""`yawbench measured`, `fit` and `validate`: flaws of recordings; runs fitted to and compared with them."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from .options import RunOptions, takes
+from .options import CHANGES, MAKING, RunOptions, takes
 from .progress import hold, print_tables, say, stoppable
 
 if TYPE_CHECKING:
+    from ..evaluation.validation import Validation
     from ..experiments.fit_result import FitResult, FittedModel
     from ..experiments.tables import Table
     from ..planner import Planner
@@ -19,6 +20,14 @@ if TYPE_CHECKING:
 MeasuredAction = Annotated[Literal["show"], typer.Argument(help="show: examine the recording.")]
 MeasurementFile = Annotated[Path, typer.Argument(metavar="FILE", help="Measurement file.")]
 FitFile = Annotated[Path, typer.Argument(metavar="FIT", help="Fit file: YAML.")]
+Validated = Annotated[
+    Path, typer.Argument(metavar="SCENARIO", help="Scenario, run first if needed, or results folder.")
+]
+MeasuredOption = Annotated[Path, typer.Option("--measured", metavar="FILE", help="Measurement file.")]
+BandsOption = Annotated[
+    str,
+    typer.Option("--bands", metavar="NAME", help="File of tolerances, or its name in scenarios/bands."),
+]
 SETS = "sets"
 """Subfolder of what sets of values gave, until the fit has ended."""
 
@@ -173,4 +182,53 @@ def score_table(result: FitResult) -> Table:
                 )
             table.rows.append(row)
     table.notes.append(result.verdict)
+    return table
+
+
+@takes(*CHANGES, *MAKING)
+def validate(
+    scenario: Validated, options: RunOptions, measured: MeasuredOption, bands: BandsOption = "steady_state"
+) -> None:
+    """Compare steady-state runs with measurements, by bands.
+
+    Prints a verdict per signal: the largest distance of a measured point from the cross plot, over the
+    tolerance. Draws the cross plots and writes validation.json. The measurement's low pass acts on the run,
+    too. Without --out, both go to the folder of the run. Exit status 1 if a signal lies outside its band, or
+    none could be judged.
+    """
+    import json
+
+    from ..evaluation.validation import compare_run, load_bands
+    from ..figures.style import save
+    from ..files import write_whole
+    from ..measured.measurement import load_measurement
+    from ..results.measured import load_run
+    from .results import recorded
+
+    tolerances = load_bands(bands)
+    measurement = load_measurement(measured)
+    (folder,) = recorded([scenario], options)
+    validation = compare_run(load_run(folder), measurement, tolerances)
+    place = options.out or folder
+    drawing = save(validation.plot(), place / "validation")
+    write_whole(
+        place / "validation.json", json.dumps(validation.as_data(), indent=1, ensure_ascii=False) + "\n"
+    )
+    print_tables([validation_table(validation)])
+    for diagnostic in (*measurement.notes, *validation.diagnostics):
+        say(f"{'note' if diagnostic.severity == 'info' else 'warning'}: {diagnostic}")
+    say(", ".join([str(place / "validation.json"), *(path.name for path in drawing)]))
+    if not validation.holds:
+        raise typer.Exit(1)
+
+
+def validation_table(validation: Validation) -> Table:
+    """Return the verdicts of a validation as a table."""
+    from ..experiments.tables import Table
+
+    title = f"{validation.title}, against {validation.measured}"
+    table = Table(title, ["signal", "verdict", "largest distance"])
+    for name, verdict in validation.verdicts.items():
+        table.rows.append([name, verdict.status.value, verdict.why])
+    table.notes.append(f"{validation.bands}: {validation.source}")
     return table

@@ -239,7 +239,7 @@ COMMANDS = {
     "a ranking file": "rank",
 }
 """Kind of file -> the command that takes it."""
-HOMES = {"a vehicle file": "vehicles"}
+HOMES = {"a vehicle file": "vehicles", "a file of bands": "bands"}
 """Kind of file -> its folder, which names may omit: `van` for `vehicles/van`."""
 MEASUREMENT = "a measurement file"
 _KEY = re.compile(rf"^[\"']?({'|'.join(KINDS)})[\"']?[ \t]*:", re.MULTILINE)

@@ -45,6 +45,7 @@ KINDS: dict[str, tuple[str, type, str]] = {
     "conditions": ("a ranking file", dict, "; it is for `yawbench rank`"),
     "threats": ("a threat file", dict, "; it is for `yawbench rank`"),
     "entries": ("a file of entries", dict, "; a ranking names it under 'more_entries'"),
+    "bands": ("a file of bands", dict, "; it is for `yawbench validate --bands`"),
     "signals": ("a measurement file", dict, "; it is for `yawbench measured show`"),
     "units": ("a scenario", dict, "; it is for `yawbench run`"),
     "parameters": ("a vehicle file", dict, "; a scenario names it under 'vehicle'"),

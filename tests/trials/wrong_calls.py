@@ -377,8 +377,8 @@ UNHASHABLE = {label for label, make in WRONG.items() if not _is_key(make())}
 
 NOT_CALLED = (
     yb.Controller, yb.Diagnostic, yb.Evaluation, yb.Location, yb.MetricValue, yb.Override, yb.Plan,
-    yb.TestQuantity, yb.Verdict, yb.Fit, yb.LinearModel,
-    yb.RecordedRuns, yb.measured, yb.fit, yb.linearize,  # calls need files or take seconds
+    yb.TestQuantity, yb.Validation, yb.Verdict, yb.Fit, yb.LinearModel,
+    yb.RecordedRuns, yb.measured, yb.fit, yb.linearize, yb.validate,  # calls need files or take seconds
 )  # fmt: skip
 """What users write, or only read."""
 

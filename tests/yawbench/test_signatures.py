@@ -14,6 +14,7 @@ ANYTHING = {
     "parameter.return": "a field of a dataclass of any type, as dataclasses.field returns it",
     "Evaluation.as_data.return": "JSON, as it is written to evaluation.json",
     "Fit.data.return": "JSON, as it is written to fit.json",
+    "Validation.as_data.return": "JSON, as it is written to validation.json",
     "Verdict.as_data.return": "the same JSON",
     "Plan.scenario": "the scenario file as it was run: JSON of any depth",
     "Plan.__init__.scenario": "the same JSON",
@@ -63,6 +64,7 @@ def test_no_public_signature_has_any_but_for_values_that_may_be_anything():
 
 INSIDE = {
     "ControllerLike",
+    "CrossPlot",
     "Design",
     "ExperimentResult",
     "FitResult",

@@ -1,0 +1,346 @@
+"""Validation: whether measurements of a car lie within a band around the cross plots of a simulated run.
+
+A cross plot shows a signal y over another x, the lateral acceleration in steady state. Both have a tolerance,
+eps = offset + gain |value|. The distance of a measured point from the simulated cross plot is the smallest
+factor of the tolerances with which the ellipse around one of its points, with the semi-axes eps_x and eps_y,
+holds it:
+
+    d = min over the cross plot of sqrt(((x_m - x) / eps_x)^2 + ((y_m - y) / eps_y)^2)
+
+The band of d <= 1 has the boundaries that the source gives; (dx, dy) is the direction of the cross plot:
+
+    (x - dy eps_x^2 / D, y + dx eps_y^2 / D)    and    (x + dy eps_x^2 / D, y - dx eps_y^2 / D)
+    D = sqrt((dx eps_y)^2 + (dy eps_x)^2)
+
+A signal passes if no measured point is further than 1 from its cross plot. A run that turns to one side is
+compared with tests to the other side by its mirror image.
+
+Source: the VVUQ framework of TUMFTM, which states these boundaries after ISO 19364; the standard itself was
+not read. Tolerances are data, in files with a source of their own (`load_bands`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from pydantic import AfterValidator, Field
+
+from vocabulary.signals import SIGNALS
+
+from ..errors import Diagnostic, ResultsError, ScenarioError, code_of, warnings_in
+from ..files import reads
+from ..measured.measurement import Measurement
+from ..messages import counted, hint
+from ..metrics.verdict import Verdict, compare, not_judged, worst
+from ..results.reader import Results
+from ..scenario import find_and_load, yaml_lines
+from ..scenario.quantities import convert
+from ..scenario.validation import StrictModel, validate
+from ..scenario.yaml_lines import Document
+from .trace import Trace, trace_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+BANDS = "steady_state"
+"""Name of the bands of steady-state tests."""
+LEAST_TESTS = 3
+"""Tests below which a warning is given: ISO 19364 has the car tested at least three times, as cited there."""
+SPACING = 0.05
+"""Distance of points on a cross plot over the tolerance; chosen: distances are exact to 0.1 %."""
+LONGEST = 20_000
+"""Most points of a cross plot; chosen: some seconds for an hour of measurement."""
+MIRRORED = ("steering_wheel_angle", "steer_angle", "yaw_rate", "acceleration_y", "velocity_y", "sideslip",
+            "roll_angle", "roll_rate")  # fmt: skip
+"""Signals that change their sign in a mirror; others are not compared with tests to the other side."""
+
+
+def _known(name: str) -> str:
+    if name not in SIGNALS:
+        raise ValueError(f"unknown signal {name!r}{hint(name, SIGNALS, lead='known')}")
+    return name
+
+
+SignalText = Annotated[str, AfterValidator(_known)]
+
+
+class ToleranceSpec(StrictModel):
+    """The tolerance of a signal."""
+
+    offset: float | str = Field(description="With a unit, such as 5 deg")
+    gain: float | str = Field(description="Part of the value, such as 3 %")
+
+
+class BandsSpec(StrictModel):
+    """A file of bands."""
+
+    title: str = Field(min_length=1)
+    source: str = Field(min_length=1, description="Where the tolerances come from; shown with every verdict")
+    over: SignalText = Field("acceleration_y", description="Signal over which the others are plotted")
+    bands: dict[SignalText, ToleranceSpec] = Field(min_length=2, description="Signal -> tolerance")
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """A tolerance, in SI: offset + gain |value|."""
+
+    offset: float
+    gain: float
+
+    def __call__(self, values: np.ndarray) -> np.ndarray:
+        """Return the tolerance at some values."""
+        tolerance: np.ndarray = self.offset + self.gain * np.abs(values)
+        return tolerance
+
+
+@dataclass(frozen=True)
+class Bands:
+    """Tolerances of signals that are plotted over one of them."""
+
+    title: str
+    source: str
+    over: str
+    tolerances: Mapping[str, Tolerance]
+
+    @property
+    def judged(self) -> list[str]:
+        """The signals that are plotted over `over`."""
+        return [name for name in self.tolerances if name != self.over]
+
+
+@reads("file of bands", ScenarioError)
+def load_bands(name: str | Path) -> Bands:
+    """Read bands by their name in `scenarios/bands`, or from a file.
+
+    Raises:
+        ScenarioError: there is no such file, or it is invalid; lists all errors.
+    """
+    path = find_and_load.find(name, "a file of bands")
+    document = yaml_lines.read(path, what="file of bands")
+    spec = validate(BandsSpec, document)
+    if spec is None or document.errors:
+        raise ScenarioError(document.sorted_errors())
+    tolerances = {name: _tolerance(document, name, given) for name, given in spec.bands.items()}
+    if spec.over not in tolerances:
+        document.report(("over",), f"{spec.over} has no tolerance; add it to 'bands'", "key-missing")
+    if document.errors:
+        raise ScenarioError(document.sorted_errors())
+    return Bands(spec.title, spec.source, spec.over, tolerances)
+
+
+def _tolerance(document: Document, signal: str, spec: ToleranceSpec) -> Tolerance:
+    """Return a tolerance in SI; report what is wrong with it."""
+
+    def si(key: str, value: float | str, unit: str) -> float:
+        try:
+            if not isinstance(value, str) and unit != "1":
+                raise ValueError(f"must be text with a unit, such as {unit} (got {value:g})")
+            number = float(convert(value, unit)) if isinstance(value, str) else value
+            if not (number > 0.0 if key == "offset" else number >= 0.0):
+                raise ValueError(f"must be {'above 0' if key == 'offset' else 'at least 0'} (got {value})")
+        except ValueError as error:
+            document.report(("bands", signal, key), str(error), code_of(error))
+            return math.nan
+        return number
+
+    return Tolerance(si("offset", spec.offset, SIGNALS[signal].unit), si("gain", spec.gain, "1"))
+
+
+@dataclass(frozen=True)
+class ComparedTest:
+    """A test of the car in a cross plot.
+
+    Attributes:
+        name: of the segment.
+        over, values: of the measured points, shape (points,), to the side of the run.
+        distance: of each of them, over the tolerance.
+    """
+
+    name: str
+    over: np.ndarray
+    values: np.ndarray
+    distance: np.ndarray
+
+
+@dataclass(frozen=True)
+class CrossPlot:
+    """The cross plot of a signal.
+
+    Attributes:
+        signal: its name.
+        over, values: of the run, shape (points,).
+        of_over, of_values: their tolerances, of the same shape.
+        tests: of the car.
+    """
+
+    signal: str
+    over: np.ndarray
+    values: np.ndarray
+    of_over: np.ndarray
+    of_values: np.ndarray
+    tests: Sequence[ComparedTest]
+
+
+@dataclass(frozen=True)
+class Validation:
+    """A run compared with measurements; made by `validate`.
+
+        >>> yb.validate(run, "measured.yaml").holds  # doctest: +SKIP
+        True
+
+    Attributes:
+        title: of the run.
+        measured: car and date of the measurement; `origin`: its source and licence.
+        bands: their title; `source`: where their tolerances come from.
+        verdicts: signal -> verdict; its number is the largest distance over the tolerance, its bound 1.
+        diagnostics: warnings if the conditions of such a comparison are not met.
+    """
+
+    __module__ = "yawbench"
+
+    title: str
+    measured: str
+    origin: str
+    bands: str
+    source: str
+    verdicts: Mapping[str, Verdict]
+    diagnostics: tuple[Diagnostic, ...]
+    plots: Sequence[CrossPlot]
+    horizontal: str
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """The worst verdict."""
+        return worst(self.verdicts.values())
+
+    @property
+    def holds(self) -> bool | None:
+        """Whether all signals that could be judged passed; None if there is none."""
+        judged = [verdict.holds for verdict in self.verdicts.values() if verdict.holds is not None]
+        return all(judged) if judged else None
+
+    def plot(self) -> Figure:
+        """Return the cross plots with their bands as a figure."""
+        from .validation_figure import draw
+
+        return draw(self)
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the comparison as plain data for files, in SI units."""
+        return {
+            "run": self.title, "measured": self.measured, "origin": self.origin, "bands": self.bands,
+            "source": self.source, "over": self.horizontal, "holds": self.holds,
+            "signals": {name: verdict.as_data() for name, verdict in self.verdicts.items()},
+            "warnings": [str(diagnostic) for diagnostic in self.diagnostics],
+        }  # fmt: skip
+
+    def __repr__(self) -> str:
+        words = "; ".join(f"{name} {verdict}" for name, verdict in self.verdicts.items())
+        noted = "".join(f"; {text}" for text in warnings_in(self.diagnostics))
+        return f"<Validation of {self.title!r}: {words}{noted}>"
+
+
+def compare_run(results: Results, measurement: Measurement, bands: Bands) -> Validation:
+    """Compare a run with all segments of a measurement.
+
+    The low pass of the measurement acts on the run, too.
+
+    Raises:
+        ResultsError: the signal over which the others are plotted was not recorded, or not measured.
+    """
+    trace = trace_of(results)
+    if measurement.filter:
+        low_pass, even = measurement.filter, trace.even
+        signals = {name: low_pass(even[name], even.rate) for name in bands.tolerances if name in even}
+        trace = Trace(trace.label, even.time, signals, title=trace.title)
+    over = trace[bands.over]
+    tests = [segment for segment in measurement.segments if bands.over in segment.signals]
+    if not tests:
+        raise ResultsError(f"{measurement.path}: {bands.over} is not measured", code="signal-unknown")
+    verdicts, plots = {}, []
+    for name in bands.judged:
+        own = [segment for segment in tests if name in segment.signals]
+        if name not in trace or not own:
+            verdicts[name] = not_judged("not measured" if name in trace else "not recorded in the run")
+            continue
+        band = _Band(over, trace[name], bands.tolerances[bands.over], bands.tolerances[name])
+        sides = [band.side_of(segment.signals[bands.over], (bands.over, name)) for segment in own]
+        compared = [
+            band.test(segment.name, side * segment.signals[bands.over], side * segment.signals[name])
+            for segment, side in zip(own, sides, strict=True)
+        ]
+        verdicts[name] = _verdict(bands.over, compared)
+        plots.append(CrossPlot(name, *band.points, *band.tolerances, compared))
+    notes = _conditions(bands, over, [segment.signals[bands.over] for segment in tests])
+    return Validation(
+        trace.title, measurement.title, measurement.origin, bands.title, bands.source, verdicts,
+        tuple(Diagnostic("validation-conditions", note, "warning") for note in notes), plots, bands.over,
+    )  # fmt: skip
+
+
+def _verdict(over: str, tests: Sequence[ComparedTest]) -> Verdict:
+    """Return the verdict on a signal: its measured point with the largest distance."""
+    furthest = max(tests, key=lambda test: float(test.distance.max()))
+    k = int(furthest.distance.argmax())
+    distance = float(furthest.distance[k])
+    where = f"at {furthest.over[k]:.3g} {SIGNALS[over].unit} of {over}, {furthest.name}"
+    return compare(distance, "at_most", 1.0, why=f"{distance:.2f} of the tolerance {where}")
+
+
+def _conditions(bands: Bands, over: np.ndarray, tests: Sequence[np.ndarray]) -> Iterator[str]:
+    """Yield what the comparison lacks."""
+    if len(tests) < LEAST_TESTS:
+        yield f"{counted(len(tests), 'test')} of the car; ISO 19364, as cited, asks for {LEAST_TESTS} or more"
+    wanted = float(np.abs(over).max())
+    reached = max(float(np.abs(test).max()) for test in tests)
+    tolerance = float(bands.tolerances[bands.over](np.array(wanted)))
+    if reached < wanted - tolerance:
+        unit = SIGNALS[bands.over].unit
+        yield (
+            f"the measurement ends at {reached:.3g} {unit} of {bands.over}, the run at {wanted:.3g} {unit}; "
+            "the rest is not judged"
+        )
+
+
+class _Band:
+    """The band around the cross plot of a run.
+
+    Args:
+        over, values: of the run, shape (rows,).
+        of_over, of_values: their tolerances.
+    """
+
+    def __init__(
+        self, over: np.ndarray, values: np.ndarray, of_over: Tolerance, of_values: Tolerance
+    ) -> None:
+        steps = np.hypot(np.diff(over) / of_over(over[1:]), np.diff(values) / of_values(values[1:]))
+        length = np.concatenate([[0.0], np.cumsum(steps)])
+        count = min(LONGEST, 2 + math.ceil(length[-1] / SPACING))
+        places = np.linspace(0.0, length[-1], count)
+        self.points = np.interp(places, length, over), np.interp(places, length, values)
+        self.tolerances = of_over(self.points[0]), of_values(self.points[1])
+
+    def side_of(self, over: np.ndarray, names: tuple[str, str]) -> float:
+        """Return -1 if a test goes to the side to which the run does not, else 1."""
+        low, high = float(self.points[0].min()), float(self.points[0].max())
+        eps = float(self.tolerances[0].min())
+        both = low < -eps and high > eps
+        against = float(over[np.abs(over).argmax()]) * (low + high) < 0.0
+        return -1.0 if against and not both and all(name in MIRRORED for name in names) else 1.0
+
+    def test(self, name: str, over: np.ndarray, values: np.ndarray) -> ComparedTest:
+        """Return a test with the distances of its points."""
+        (x, y), (eps_x, eps_y) = self.points, self.tolerances
+        distance = np.empty(over.size)
+        rows = max(1, 2_000_000 // x.size)
+        for first in range(0, over.size, rows):
+            some = slice(first, first + rows)
+            aside = (over[some, None] - x) / eps_x
+            up = (values[some, None] - y) / eps_y
+            distance[some] = np.sqrt((aside * aside + up * up).min(axis=1))
+        return ComparedTest(name, over, values, distance)

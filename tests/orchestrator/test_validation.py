@@ -1,0 +1,173 @@
+"""Validation by bands: which runs pass, how far measured points lie, which conditions are not met."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import yawbench as yb
+from orchestrator.errors import ScenarioError
+from orchestrator.evaluation.validation import BANDS, Tolerance, load_bands
+from tests.commands import status_of
+from tests.sentences import golden
+
+UNITS = (
+    "driver_ramp", "reference_steady_state", "controller_off", "allocator_single_wheel",
+    "wheel_control_hydraulic", "plant_fourteen_dof", "tyre_magic_formula",
+)  # fmt: skip
+MEASURED = """files: [{files}]
+signals: {{steering_wheel_angle: hand, acceleration_y: a_y}}
+{more}
+car: made up
+source: a run
+licence: none
+date: 2024-01-01
+"""
+
+
+def write(folder: Path, name: str, hand: np.ndarray, a_y: np.ndarray, more: str = "", tests: int = 3) -> Path:
+    """Write a measurement of some equal tests."""
+    table = np.column_stack([0.01 * np.arange(hand.size), hand, a_y])
+    header = "time [s],hand [rad],a_y [m/s2]"
+    np.savetxt(folder / f"{name}.csv", table, "%.9g", ",", header=header, comments="")
+    path = folder / f"{name}.yaml"
+    path.write_text(MEASURED.format(files=", ".join([f"{name}.csv"] * tests), more=more))
+    return path
+
+
+def line(folder: Path, name: str, along: float = 0.0, up: float = 0.0, **more: object) -> Path:
+    """Write a measurement along a = 0.1 delta, up to 5 m/s2, moved."""
+    a_y = np.linspace(1.0, 5.0, 200)
+    return write(folder, name, 0.1 * a_y + up, a_y + along, **more)
+
+
+def test_a_point_on_the_boundary_of_the_source_lies_at_one(tmp_path):
+    run = yb.measured(line(tmp_path, "run"), segment=1)
+    bands = tmp_path / "bands.yaml"
+    bands.write_text("""title: Bands
+source: chosen
+bands:
+  acceleration_y: {offset: 0.2 m/s2, gain: 0}
+  steering_wheel_angle: {offset: 2 deg, gain: 0}
+""")
+    eps_x, eps_y, dx, dy = 0.2, np.radians(2.0), 1.0, 0.1
+    length = np.hypot(dx * eps_y, dy * eps_x)
+    for side in (1.0, -1.0):
+        x, y = 3.0 - side * dy * eps_x**2 / length, 0.3 + side * dx * eps_y**2 / length
+        path = write(tmp_path, "point", np.repeat(y, 3), np.repeat(x, 3))
+        verdict = yb.validate(run, path, bands=bands).verdicts["steering_wheel_angle"]
+        assert verdict.value == pytest.approx(1.0, rel=1e-3)
+
+
+def test_the_tolerances_that_come_with_the_program_are_in_si():
+    bands = load_bands(BANDS)
+    assert bands.over == "acceleration_y" and "TUMFTM" in bands.source
+    assert bands.tolerances["acceleration_y"] == Tolerance(0.1, 0.06)
+    assert bands.tolerances["steering_wheel_angle"] == Tolerance(pytest.approx(np.radians(5.0)), 0.03)
+
+
+@pytest.fixture(scope="module")
+def ramps(tmp_path_factory):
+    """A slow ramp, and measurements of cars with other stiffnesses, with noise."""
+    place = tmp_path_factory.mktemp("ramps")
+    base = yb.load("proving_ground/slow_ramp").set({"step_size": 0.005})
+    run = base.run()
+    given = run.record["fmus"]["tyre"]["parameters"]
+    rng = np.random.default_rng(1)
+    paths = {}
+    for axle, factor in (("front", 1.1), ("front", 1.15), ("rear", 1.2)):
+        name = f"cornering_stiffness_scale_{axle}"
+        other = base.set({f"tyre.{name}": factor * given[name]}).run()
+        times = np.arange(1.0, other.time[-1] - 0.01, 0.01)
+        hand, a_y = (
+            np.interp(times, other.time, other[column]) + rng.normal(0.0, noise, times.size)
+            for column, noise in (("steering_wheel_angle", np.radians(0.1)), ("acceleration_y", 0.05))
+        )
+        label = f"{axle}_{factor:g}"
+        paths[axle, factor] = write(place, label, hand, a_y, "filter: {low_pass: 6 Hz}")
+    return run, paths
+
+
+@pytest.mark.parametrize(
+    ("axle", "factor", "passes"), [("front", 1.1, True), ("front", 1.15, False), ("rear", 1.2, True)]
+)
+def test_a_slow_ramp_tells_the_front_stiffness_and_hardly_the_rear(axle, factor, passes, ramps):
+    run, paths = ramps
+    validation = yb.validate(run, paths[axle, factor])
+    assert validation.holds is passes and not validation.diagnostics
+    verdict = validation.verdicts["steering_wheel_angle"]
+    assert verdict.bound == 1.0 and 0.5 < verdict.value < 1.6
+    assert "TUMFTM" in validation.source
+
+
+def test_one_side_is_compared_with_the_other_in_the_mirror(tmp_path):
+    run = yb.measured(line(tmp_path, "run"), segment=1)
+    a_y = -np.linspace(1.0, 5.0, 200)
+    verdict = yb.validate(run, write(tmp_path, "right", 0.1 * a_y, a_y)).verdicts["steering_wheel_angle"]
+    assert verdict.value < 0.05
+
+
+def test_conditions_that_are_not_met_are_warnings(tmp_path):
+    run = yb.measured(line(tmp_path, "run"), segment=1)
+    a_y = np.linspace(1.0, 3.0, 200)
+    few = yb.validate(run, write(tmp_path, "few", 0.1 * a_y, a_y, tests=2))
+    assert [one.code for one in few.diagnostics] == ["validation-conditions"] * 2
+    assert golden("\n".join(map(str, few.diagnostics)))
+    assert few.holds
+
+
+def test_the_command_draws_writes_and_ends_with_the_verdict(tmp_path, capsys):
+    run = yb.measured(line(tmp_path, "run"), segment=1).save(tmp_path / "results")
+    near, far = line(tmp_path, "near", up=0.05), line(tmp_path, "far", up=0.2)
+    assert status_of("validate", run, "--measured", near, "--out", tmp_path / "out") == 0
+    assert status_of("validate", run, "--measured", far, "--out", tmp_path / "out") == 1
+    assert (tmp_path / "out" / "validation.svg").is_file()
+    data = json.loads((tmp_path / "out" / "validation.json").read_text())
+    signal = data["signals"]["steering_wheel_angle"]
+    assert signal["verdict"] == "failed" and signal["value"] > 1.0 and not data["holds"]
+    assert "TUMFTM" in data["source"]
+    capsys.readouterr()
+
+
+def test_a_signal_that_is_not_recorded_is_not_judged(tmp_path):
+    bands = tmp_path / "bands.yaml"
+    tolerances = "{acceleration_y: {offset: 0.1 m/s2, gain: 0}, roll_angle: {offset: 1 deg, gain: 5 %}}"
+    bands.write_text(f"title: Roll\nsource: chosen\nbands: {tolerances}\n")
+    run = yb.measured(line(tmp_path, "run"), segment=1)
+    validation = yb.validate(run, line(tmp_path, "again"), bands=bands)
+    assert validation.holds is None and validation.verdicts["roll_angle"].holds is None
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code", "line_number"),
+    [
+        ("5 deg", "5 kg", "unit-mismatch", 5),
+        ("3 %", "-3 %", "value-invalid", 5),
+        ("5 deg", "5", "value-invalid", 5),
+        ("acceleration_y:", "roll_angle:", "key-missing", 1),
+        ("steering_wheel_angle:", "steering_angle:", "value-invalid", 5),
+        ("source: chosen", "sources: chosen", "key-unknown", 2),
+    ],
+)
+def test_mistakes_of_a_file_of_bands_have_a_line(old, new, code, line_number, tmp_path):
+    text = """title: Bands
+source: chosen
+bands:
+  acceleration_y: {offset: 0.1 m/s2, gain: 6 %}
+  steering_wheel_angle: {offset: 5 deg, gain: 3 %}
+"""
+    path = tmp_path / "bands.yaml"
+    path.write_text(text.replace(old, new))
+    with pytest.raises(ScenarioError) as refused:
+        load_bands(path)
+    assert (code, line_number) in {(one.code, one.location.line) for one in refused.value.diagnostics}
+    assert golden("\n".join(map(str, refused.value.diagnostics)))
+
+
+def test_unknown_bands_are_named_with_those_there_are():
+    with pytest.raises(ScenarioError) as refused:
+        load_bands("steady")
+    assert golden(str(refused.value))
