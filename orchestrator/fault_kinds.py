@@ -13,7 +13,7 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 if TYPE_CHECKING:
     import numpy as np
@@ -253,6 +253,12 @@ class CountedNoise:
         return self._numbers[place]
 
 
+FaultName = Literal[
+    "bias", "gain", "drift", "noise", "freeze", "value",
+    "dropout", "outlier", "delay", "saturation", "loss", "stuck",
+]  # fmt: skip
+"""Names of the kinds, for type checkers and editors."""
+
 KINDS: dict[str, FaultKind] = {
     "bias": FaultKind("x + value", _changing(lambda x, value: x + value), "{x}"),
     "gain": FaultKind("x * value", _changing(lambda x, value: x * value), "1"),
@@ -282,4 +288,4 @@ KINDS: dict[str, FaultKind] = {
         "of an actuator: value, by default the x at which the fault began", _stuck, "{x}", needs=False
     ),
 }  # fmt: skip
-"""Name -> kind. To add a kind, add it here."""
+"""Name -> kind. To add a kind, add it here and to `FaultName`."""

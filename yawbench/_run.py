@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from orchestrator.errors import Diagnostic, ResultsError, ScenarioError, warnings_in
-from orchestrator.evaluation.standard_tests import TESTS, Evaluation
+from orchestrator.evaluation.standard_tests import TESTS, Evaluation, TestName
 from orchestrator.evaluation.trace import trace_of
 from orchestrator.messages import hint, short
 from orchestrator.metrics.run_metrics import STANDARD, MetricValue, evaluate, evaluate_all, metric, why_none
@@ -173,7 +173,7 @@ class Run:
         """
         return evaluate_all(self.results, STANDARD)
 
-    def evaluate(self, test: str, *, angle: float | None = None) -> Evaluation:
+    def evaluate(self, test: TestName, *, angle: float | None = None) -> Evaluation:
         """Evaluate the run by a standard test: quantities in SI, verdicts with their reasons.
 
             >>> [str(why) for why in run.evaluate("step-steer").diagnostics]  # a sine ends where it began
@@ -187,13 +187,13 @@ class Run:
             ScenarioError: the test is unknown, or the angle invalid.
             ResultsError: a signal was not recorded.
         """
-        test = arguments.text(test, "test")
-        if test not in TESTS:
+        name = arguments.text(test, "test")
+        if name not in TESTS:
             raise ScenarioError(
-                f"there is no test {test!r}{hint(test, TESTS, lead='known')}", code="test-unknown"
+                f"there is no test {name!r}{hint(name, TESTS, lead='known')}", code="test-unknown"
             )
-        if angle is not None and not TESTS[test].needs_angle:
-            raise ScenarioError(f"{test} takes no angle: omit it", code="option-invalid")
+        if angle is not None and not TESTS[name].needs_angle:
+            raise ScenarioError(f"{name} takes no angle: omit it", code="option-invalid")
         if angle is not None:
             with arguments.as_scenario_errors():
                 amplitude = arguments.number(angle, "angle")
@@ -202,7 +202,7 @@ class Run:
                     f"angle: must be a number between 0 and 2 pi rad (got {short(angle)})",
                     code="argument-invalid",
                 )
-        return TESTS[test].evaluate(trace_of(self.results, self.title), angle)
+        return TESTS[name].evaluate(trace_of(self.results, self.title), angle)
 
     def plot(self, *panels: str, title: str | None = None) -> Figure:
         """Return a figure, as `yawbench plot` draws it.

@@ -19,7 +19,7 @@ from orchestrator.errors import (
     text_of,
     warnings_in,
 )
-from orchestrator.fault_kinds import FaultList
+from orchestrator.fault_kinds import FaultList, FaultName
 from orchestrator.master.process_state import Log
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.messages import hint, short
@@ -156,9 +156,9 @@ class Scenario:
 
     def fault(
         self,
-        place: str,
+        target: str,
         *,
-        kind: str,
+        kind: FaultName,
         value: float | str | None = None,
         start: float | str | None = None,
         until: float | str | None = None,
@@ -166,7 +166,7 @@ class Scenario:
         every: float | str | None = None,
         seed: int | None = None,
     ) -> Scenario:
-        """Return the scenario with a fault; several at the same place apply in order.
+        """Return the scenario with a fault; several at the same target apply in order.
 
             >>> blind = base.fault("plant.sideslip", kind="freeze", start=1.5)
             >>> blind = blind.fault("plant.sideslip -> controller", kind="bias", value="0.5 deg", until=3)
@@ -174,7 +174,7 @@ class Scenario:
             ['freeze from 1.5 s', 'bias 0.5 deg until 3 s']
 
         Args:
-            place: `unit.output` for all receivers and the results, `unit.output -> unit` for a single
+            target: `unit.output` for all receivers and the results, `unit.output -> unit` for a single
                 receiver, or `unit.input`; `*` matches several signals.
             kind: such as bias or freeze; the reference of scenario files lists all kinds.
             value: of the kind, in SI or with its unit.
@@ -184,14 +184,14 @@ class Scenario:
             seed: of the random numbers.
 
         Raises:
-            ScenarioError: the place or kind is unknown, or an argument does not fit the kind.
+            ScenarioError: the target or kind is unknown, or an argument does not fit the kind.
         """
-        place, kind = arguments.text(place, "place"), arguments.text(kind, "kind")
-        settings = {"kind": kind, "value": value, "share": share, "every": every, "seed": seed}
+        where, name = arguments.text(target, "target"), arguments.text(kind, "kind")
+        settings = {"kind": name, "value": value, "share": share, "every": every, "seed": seed}
         settings |= {"from": start, "until": until}
         with arguments.as_scenario_errors("fault"):
             item = {name: arguments.scalar(x, name) for name, x in settings.items() if x is not None}
-        new = faults_at(place, item, "fault")
+        new = faults_at(where, item, "fault")
         earlier = next((c for c in self.changes if (c.target, c.origin) == (new.target, "fault")), None)
         both = FaultList((*(earlier.faults if earlier else ()), *new.faults))
         others = [change for change in self.changes if change is not earlier]

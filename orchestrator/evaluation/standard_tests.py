@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import wraps
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Protocol
+from typing import TYPE_CHECKING, Any, Concatenate, Literal, ParamSpec, Protocol
 
 from ..errors import Diagnostic, Severity
 from ..metrics.verdict import Verdict, worst
@@ -240,6 +240,19 @@ class StandardTest:
 def _named(place: str) -> Any:
     return resolve_name(f"{__package__}.{place}")
 
+
+TestName = Literal[
+    "slowly-increasing-steer",
+    "sine-with-dwell",
+    "step-steer",
+    "frequency-response",
+    "understeer-gradient",
+    "turn-response",
+    "straight-braking",
+    "side-wind",
+    "lane-change",
+]
+"""Names of the tests, for type checkers and editors."""
 
 TESTS: dict[str, StandardTest] = {
     test.name: test

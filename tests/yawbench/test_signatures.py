@@ -5,8 +5,11 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Iterator
+from typing import get_args
 
 import yawbench as yb
+from orchestrator.evaluation.standard_tests import TESTS, TestName
+from orchestrator.fault_kinds import KINDS, FaultName
 
 ANYTHING = {
     "Controller.output.u": "a named tuple with the fields that the controller's inputs name",
@@ -69,6 +72,7 @@ INSIDE = {
     "ExperimentResult",
     "FitResult",
     "FaultList",
+    "FaultName",
     "FaultySignal",
     "Instance",
     "LoadedScenario",
@@ -82,11 +86,17 @@ INSIDE = {
     "SignalName",
     "Status",
     "Target",
+    "TestName",
     "Value",
     "VariableSpec",
     "Wire",
 }
 """Private types in public signatures: what public classes are made of, and names of unions."""
+
+
+def test_literals_name_all_kinds_of_faults_and_all_standard_tests():
+    assert get_args(FaultName) == (*KINDS,)
+    assert get_args(TestName) == (*TESTS,)
 
 
 def test_public_signatures_name_only_what_is_exported():
