@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from generate import (
@@ -30,12 +31,15 @@ PAGES = {
     "reference/vehicles.md": vehicles.page,
 }
 """Path in the docs -> what writes its text."""
+SCHEMAS = Path(__file__).resolve().parents[1] / "scenarios" / "schemas"
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the pages that are made from the program as it is."""
+    """Add the pages that are made from the program as it is, and the JSON Schemas."""
     for path, write in PAGES.items():
         files.append(File.generated(config, path, content=write()))
+    for schema in sorted(SCHEMAS.glob("*.json")):
+        files.append(File.generated(config, f"schemas/{schema.name}", content=schema.read_text("utf-8")))
     return files
 
 

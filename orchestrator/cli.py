@@ -50,6 +50,7 @@ COMMANDS = {
     "measured": "measured",
     "vehicle": "vehicle_and_tyre",
     "cache": "build",
+    "schema": "schema",
 }
 """Command -> its module in `orchestrator.commands`; the function has the same name, `_` for `-`."""
 

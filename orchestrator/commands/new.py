@@ -86,6 +86,7 @@ KINDS = (*ROLES, "vehicle", "scenario", "study", "sweep")
 LAW = {"gain": 20000.0, "integral_gain": 50000.0, "limit": 5000.0}
 """Gains and limit of the controller [N.m.s/rad, N.m/rad, N.m]; chosen: they hold paper A's car."""
 VEHICLES = PurePosixPath("scenarios/vehicles")
+SCHEMAS = PurePosixPath("scenarios/schemas")
 
 
 @dataclass(frozen=True)
@@ -167,7 +168,10 @@ def _rendered(templates: dict[PurePosixPath, str], facts: dict[str, Any]) -> dic
     environment = Environment(
         loader=loader, undefined=StrictUndefined, keep_trailing_newline=True, trim_blocks=True
     )
-    return {path: environment.get_template(name).render(facts) for path, name in sorted(templates.items())}
+    files = {path: environment.get_template(name).render(facts) for path, name in sorted(templates.items())}
+    for path in [path for path in files if path.suffix == ".yaml"]:
+        files[path] = f"# yaml-language-server: $schema=../schemas/{_schema_kind(path)}.json\n{files[path]}"
+    return files
 
 
 def write_new(files: dict[PurePosixPath, str], folder: Path, *, also: Iterable[PurePosixPath] = ()) -> None:
@@ -188,6 +192,24 @@ def write_new(files: dict[PurePosixPath, str], folder: Path, *, also: Iterable[P
         target.parent.mkdir(parents=True, exist_ok=True)
         with target.open("x", encoding="utf-8", newline="\n") as file:
             file.write(text)
+
+
+def write_schemas(files: Iterable[PurePosixPath], folder: Path) -> None:
+    """Write the JSON Schemas that YAML files below `folder` name in their first line."""
+    from ..files import write_whole
+    from .schema import schema_text
+
+    for path in files:
+        if path.suffix == ".yaml":
+            kind = _schema_kind(path)
+            write_whole(folder / SCHEMAS / f"{kind}.json", schema_text(kind))
+
+
+def _schema_kind(path: PurePosixPath) -> str:
+    """Return the kind of a new YAML file, in the words of `schema.MODELS`."""
+    return {"study": "experiment", "sweep": "experiment"}.get(
+        path.stem, "vehicle" if path.parent == VEHICLES else "scenario"
+    )
 
 
 NewKind = Literal[KINDS]  # type: ignore[valid-type]
@@ -229,6 +251,7 @@ def new(kind: NewKindArgument, name: NewName, language: Written = "python", out:
     beginning = begin(kind, name, language, in_checkout=in_checkout)
     also = [beginning.source] if beginning.source else []
     write_new(beginning.files, folder, also=also)
+    write_schemas(beginning.files, folder)
     for path in beginning.files:
         say(f"wrote {_shown(folder / path)}")
     say("Next:")

@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, WithJsonSchema
 
 from vocabulary.signals import SIGNALS
 
@@ -66,7 +66,9 @@ def _known(name: str) -> str:
     return name
 
 
-SignalText = Annotated[str, AfterValidator(_known)]
+SignalText = Annotated[
+    str, AfterValidator(_known), WithJsonSchema({"type": "string", "enum": sorted(SIGNALS)})
+]
 
 
 class ToleranceSpec(StrictModel):
@@ -201,8 +203,6 @@ class Validation:
         diagnostics: warnings if the conditions of such a comparison are not met.
     """
 
-    __module__ = "yawbench"
-
     title: str
     measured: str
     origin: str
@@ -243,6 +243,9 @@ class Validation:
         words = "; ".join(f"{name} {verdict}" for name, verdict in self.verdicts.items())
         noted = "".join(f"; {text}" for text in warnings_in(self.diagnostics))
         return f"<Validation of {self.title!r}: {words}{noted}>"
+
+
+Validation.__module__ = "yawbench"  # where users import it from
 
 
 def compare_run(results: Results, measurement: Measurement, bands: Bands) -> Validation:

@@ -15,15 +15,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, PlainSerializer, PlainValidator, model_validator
+from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, WithJsonSchema, model_validator
 
 from ..messages import short
 from ..names import INPUTS, OF_RUN, VEHICLE, Target
 from ..plan import Override, Value
 from ..scenario import overrides, yaml_lines
+from ..scenario.fault_schema import FaultSpec, by_location
 from ..scenario.quantities import parse_unit
-from ..scenario.scenario_schema import AlgorithmName, FaultSpec, Scalar, by_location
-from ..scenario.validation import StrictModel, Time
+from ..scenario.scenario_schema import AlgorithmName, Scalar
+from ..scenario.validation import StrictModel, Time, exactly_one
+from .judged_schema import LEVELS as VALUES
 from .judged_schema import Number, Patterns, is_finite, text_of
 
 if TYPE_CHECKING:
@@ -72,11 +74,17 @@ def _is_plain(value: object) -> bool:
     return isinstance(value, (str, bool)) or is_finite(value)
 
 
-TargetText = Annotated[Target, PlainValidator(_target), PlainSerializer(str)]
+_TARGET = {"type": "string", "pattern": r"^[^.]+(\..+)?$"}
+_TARGETS = {"anyOf": [_TARGET, {"type": "array", "items": _TARGET, "minItems": 1}]}
+
+TargetText = Annotated[Target, PlainValidator(_target), PlainSerializer(str), WithJsonSchema(_TARGET)]
 TargetList = Annotated[
-    list[Target], PlainValidator(_targets), PlainSerializer(lambda targets: [*map(str, targets)])
+    list[Target],
+    PlainValidator(_targets),
+    PlainSerializer(lambda targets: [*map(str, targets)]),
+    WithJsonSchema(_TARGETS),
 ]
-Levels = Annotated[dict[Any, str], PlainValidator(_levels)]
+Levels = Annotated[dict[Any, str], PlainValidator(_levels), WithJsonSchema(VALUES)]
 
 
 class OverrideSpec(StrictModel):
@@ -104,6 +112,8 @@ class VariantSpec(OverrideSpec):
 
 class AxisSpec(StrictModel):
     """An axis: targets with their values, listed or as a range; or variants that change several targets."""
+
+    model_config = ConfigDict(json_schema_extra=exactly_one("vary", "variants"))
 
     vary: TargetList = Field(
         [], description="unit.parameter, inputs.pattern, a unit (its FMU), vehicle or tyres (files)"

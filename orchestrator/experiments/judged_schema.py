@@ -18,14 +18,25 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
-from pydantic import AfterValidator, Discriminator, Field, PlainValidator, PrivateAttr, Tag, model_validator
+from pydantic import (
+    AfterValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    PlainValidator,
+    PrivateAttr,
+    Tag,
+    WithJsonSchema,
+    model_validator,
+)
 
 from ..errors import ScenarioError
 from ..messages import listed, short
+from ..metrics.measures import MEASURES
 from ..metrics.run_metrics import during, metric, window_of
 from ..metrics.verdict import SYMBOLS, Relation
 from ..scenario.quantities import convert
-from ..scenario.validation import StrictModel
+from ..scenario.validation import StrictModel, exactly_one
 
 
 def text_of(value: object) -> str:
@@ -66,8 +77,11 @@ def _quantity(value: object) -> float | str:
     return value  # type: ignore[return-value]
 
 
-Number = Annotated[float | int, PlainValidator(_number)]
-QuantityText = Annotated[float | int | str, PlainValidator(_quantity)]
+_NUMBER = {"type": "number"}
+_QUANTITY = {"anyOf": [_NUMBER, {"type": "string", "pattern": r"^\s*[+-]?\.?\d"}]}
+
+Number = Annotated[float | int, PlainValidator(_number), WithJsonSchema(_NUMBER)]
+QuantityText = Annotated[float | int | str, PlainValidator(_quantity), WithJsonSchema(_QUANTITY)]
 """A number in SI units, or text with a number and its unit."""
 
 
@@ -184,9 +198,21 @@ def _metric_name(name: str) -> str:
         raise ValueError(str(error)) from None
 
 
-Alternatives = Annotated[dict[str, str], PlainValidator(alternatives)]
-WindowField = Annotated[tuple[float, float], PlainValidator(_window)]
-MetricName = Annotated[str, AfterValidator(_metric_name)]
+LEVELS = {
+    "anyOf": [
+        {"type": "array", "items": {"type": ["string", "number", "boolean"]}, "minItems": 1},
+        {"type": "object", "additionalProperties": {"type": "string"}, "minProperties": 1},
+    ]
+}
+"""JSON Schema of values, or of values with words."""
+_WINDOWS = [{"type": "string"}, {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2}]
+_METRIC_PATTERN = rf"^\s*({'|'.join(MEASURES)})\s*\(.+\)"
+
+Alternatives = Annotated[dict[str, str], PlainValidator(alternatives), WithJsonSchema(LEVELS)]
+WindowField = Annotated[tuple[float, float], PlainValidator(_window), WithJsonSchema({"anyOf": _WINDOWS})]
+MetricName = Annotated[
+    str, AfterValidator(_metric_name), WithJsonSchema({"type": "string", "pattern": _METRIC_PATTERN})
+]
 Patterns = Annotated[list[str], Field(min_length=1)]
 """Names of runs; `*` and `?` are wildcards."""
 
@@ -214,7 +240,8 @@ def _single(value: dict[str, dict[str, str]]) -> dict[str, dict[str, str]]:
     return value
 
 
-GridAxis = Annotated[dict[str, Alternatives], AfterValidator(_single)]
+_AXIS = {"type": "object", "additionalProperties": LEVELS, "minProperties": 1, "maxProperties": 1}
+GridAxis = Annotated[dict[str, Alternatives], AfterValidator(_single), WithJsonSchema(_AXIS)]
 """Placeholder name of the rows or columns -> their values with labels."""
 
 
@@ -280,6 +307,8 @@ def _expression(text: str) -> str:
 class DerivedSpec(StrictModel):
     """A number derived from several runs: an expression of metrics, or a grid's rank correlation."""
 
+    model_config = ConfigDict(json_schema_extra=exactly_one("expression", "rank_correlation"))
+
     says: str = Field(description="Description of the number", min_length=1)
     for_each: dict[str, Alternatives] = Field(
         {}, alias="for", description="Key -> values; one number per combination, named in its key by {key}"
@@ -325,7 +354,7 @@ def _bound(value: object) -> Any:
 
 
 Bound = Annotated[
-    Annotated[float | int | str, PlainValidator(_bound), Tag("number")]
+    Annotated[float | int | str, PlainValidator(_bound), WithJsonSchema(_QUANTITY), Tag("number")]
     | Annotated[MetricReference, Tag("reference")],
     Discriminator(lambda value: "reference" if isinstance(value, (dict, MetricReference)) else "number"),
 ]
@@ -334,6 +363,8 @@ Bound = Annotated[
 
 class Condition(StrictModel):
     """A comparison of a run's metric, or of a derived number, with exactly one bound."""
+
+    model_config = ConfigDict(json_schema_extra=exactly_one(*SYMBOLS))
 
     run: str = Field("", description="Name of a run; with `*` every run that matches; default: every run")
     metric: str = ""

@@ -32,7 +32,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from ..cache import warn_of_record, what_changed
 from ..errors import ResultsError, ScenarioError
@@ -126,6 +126,10 @@ class EntriesSpec(StrictModel):
 
 class RankingSpec(StrictModel):
     """A ranking file."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"anyOf": [{"required": ["entries"]}, {"required": ["more_entries"]}]}
+    )
 
     title: str = Field(min_length=1)
     source: str = Field("", description="Of the test that everything is judged by")

@@ -135,15 +135,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from ..figures.plots import OVERVIEW
 from ..messages import listed
 from ..scenario.scenario_schema import Scalar
-from ..scenario.validation import StrictModel, one_of
+from ..scenario.validation import OneOf, StrictModel, exactly_one
 from ..scenario.yaml_lines import KeyPath
 from .axes import MOST, AxisSpec, DesignAxisSpec, OverrideSpec, RegionSpec
 from .judged_schema import (
+    Alternatives,
     Assertion,
     Claim,
     Condition,
@@ -170,7 +171,10 @@ def _choices(value: object) -> Any:
     return {k: {"says": words} for k, words in alternatives(value).items()}
 
 
-Choices = Annotated[dict[str, ChoiceSpec], BeforeValidator(_choices)]
+Choices = Annotated[
+    dict[str, ChoiceSpec],
+    BeforeValidator(_choices, json_schema_input_type=Alternatives | dict[str, str | ChoiceSpec]),
+]
 
 
 class RunSpec(OverrideSpec):
@@ -254,7 +258,13 @@ FIGURE_KINDS = {
 """Name -> kind of figure."""
 
 
-Chosen = Annotated[list[Scalar], BeforeValidator(lambda value: value if isinstance(value, list) else [value])]
+Chosen = Annotated[
+    list[Scalar],
+    BeforeValidator(
+        lambda value: value if isinstance(value, list) else [value],
+        json_schema_input_type=list[Scalar] | Scalar,
+    ),
+]
 
 
 class FigureSpec(StrictModel):
@@ -262,7 +272,7 @@ class FigureSpec(StrictModel):
 
     name: str = Field(description="Name of its files", pattern=r"^[\w.+-]+$")
     title: str = ""
-    kind: Annotated[str, one_of(FIGURE_KINDS)] = Field("overlay", description=listed(FIGURE_KINDS, last="or"))
+    kind: Annotated[str, OneOf(FIGURE_KINDS)] = Field("overlay", description=listed(FIGURE_KINDS, last="or"))
     runs: list[str] = Field([], description="Of an overlay: names of runs, with `*` and `?` for many")
     panels: list[str] | str = Field(
         list(OVERVIEW),
@@ -335,7 +345,9 @@ def _list_of_runs(value: object) -> Any:
 
 
 class ExperimentSpec(OverrideSpec):
-    """An experiment file."""
+    """An experiment file: a study, a sweep or a tuning."""
+
+    model_config = ConfigDict(json_schema_extra=exactly_one("scenario", "runs"))
 
     title: str = Field(min_length=1)
     source: str = Field(

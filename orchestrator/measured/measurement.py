@@ -39,7 +39,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
 from vocabulary.signals import SIGNALS, SignalEntry
 from vocabulary.vehicle import CAR
@@ -50,7 +50,7 @@ from ..files import reads
 from ..messages import hint, listed
 from ..scenario import yaml_lines
 from ..scenario.quantities import convert, measure_of, parse_unit
-from ..scenario.validation import StrictModel, validate
+from ..scenario.validation import StrictModel, quantities_in, text_in_unit, validate
 from ..scenario.yaml_lines import Document, KeyPath
 from .columns import (
     SECOND,
@@ -68,6 +68,8 @@ MEASURABLE: dict[str, SignalEntry] = {name: one for key, one in SIGNALS.items() 
 ENDINGS = (".yaml", ".yml")
 """Of measurement files."""
 BY_TIME = "time"
+OF_CAR = {name: one.unit for name, one in CAR.items()} | {"friction": "1"}
+"""Known quantities of a car and its road, with their units."""
 OF_TEST = {"action_time": "s"}
 """Values that tests need beside signals and vehicle, with their units."""
 
@@ -98,17 +100,23 @@ def _text(value: object) -> object:
     return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
+MeasurableName = Annotated[
+    str, AfterValidator(_signal), WithJsonSchema({"type": "string", "enum": sorted(MEASURABLE)})
+]
 UnitText = Annotated[str, AfterValidator(_unit)]
 Quantity = Annotated[str, BeforeValidator(_quantity)]
-Words = Annotated[str, BeforeValidator(_text)]
+Length = Annotated[Quantity, WithJsonSchema(text_in_unit("m"))]
+Frequency = Annotated[Quantity, WithJsonSchema(text_in_unit("Hz"))]
+Duration = Annotated[Quantity, WithJsonSchema(text_in_unit("s"))]
+Words = Annotated[str, BeforeValidator(_text, json_schema_input_type=str | int)]
 
 
 class PlaceSpec(StrictModel):
     """The place of a sensor relative to the centre of mass, vehicle axes of ISO 8855."""
 
-    x: Quantity = Field("0 m", description="m, forward")
-    y: Quantity = Field("0 m", description="m, to the left")
-    z: Quantity = Field("0 m", description="m, up; acts only with a recorded roll_rate")
+    x: Length = Field("0 m", description="m, forward")
+    y: Length = Field("0 m", description="m, to the left")
+    z: Length = Field("0 m", description="m, up; acts only with a recorded roll_rate")
 
 
 class SignalSpec(StrictModel):
@@ -119,7 +127,7 @@ class SignalSpec(StrictModel):
     sign: Literal[1, -1] = Field(1, description="-1: positive where ISO 8855 is negative")
     gain: float = Field(1.0, description="Factor of its numbers", gt=0)
     offset: Quantity | None = Field(None, description="What the column shows at zero")
-    delay: Quantity | None = Field(None, description="Time by which it lags")
+    delay: Duration | None = Field(None, description="Time by which it lags")
     spikes: Quantity | None = Field(None, description="Values this far from the running median are replaced")
     noise: Quantity | None = Field(None, description="Standard deviation of its noise")
     at: PlaceSpec | None = Field(None, description="Place of the sensor; default: the centre of mass")
@@ -144,13 +152,13 @@ class SegmentsSpec(StrictModel):
 class FilterSpec(StrictModel):
     """The Butterworth low pass of all signals, measured and simulated."""
 
-    low_pass: Quantity = Field(description="Hz, cut-off frequency")
+    low_pass: Frequency = Field(description="Hz, cut-off frequency")
     order: int = Field(POLES, description="Number of poles, even if phaseless", ge=1, le=24)
     phaseless: bool = Field(True, description="Half of the poles forward, half of them backward in time")
 
 
-AnySignal = Annotated[SignalSpec, BeforeValidator(_column)]
-AnyTime = Annotated[TimeSpec, BeforeValidator(_column)]
+AnySignal = Annotated[SignalSpec, BeforeValidator(_column, json_schema_input_type=str | SignalSpec)]
+AnyTime = Annotated[TimeSpec, BeforeValidator(_column, json_schema_input_type=str | TimeSpec)]
 
 
 class MeasurementSpec(StrictModel):
@@ -161,10 +169,14 @@ class MeasurementSpec(StrictModel):
     time: AnyTime = Field(
         TimeSpec(column="time", unit=None, repeated="refuse"), description="Column of times"
     )
-    signals: dict[Annotated[str, AfterValidator(_signal)], AnySignal] = Field(min_length=1)
+    signals: dict[MeasurableName, AnySignal] = Field(min_length=1)
     filter: FilterSpec | None = None
-    vehicle: dict[str, float | str] = Field({}, description="Known quantities of the car, and friction")
-    test: dict[str, float | str] = Field({}, description=f"What tests need: {listed(OF_TEST)}")
+    vehicle: Annotated[dict[str, float | str], WithJsonSchema(quantities_in(OF_CAR))] = Field(
+        {}, description="Known quantities of the car, and friction"
+    )
+    test: Annotated[dict[str, float | str], WithJsonSchema(quantities_in(OF_TEST))] = Field(
+        {}, description=f"What tests need: {listed(OF_TEST)}"
+    )
     car: Words = ""
     source: Words = ""
     licence: Words = ""
@@ -277,8 +289,7 @@ class _Reader:
             where = Location(document.path, 1)
             self.notes.append(Diagnostic("measurement-unattributed", words, "info", where))
         self.corrections = {name: self._correction(name, one) for name, one in spec.signals.items()}
-        known = {name: one.unit for name, one in CAR.items()} | {"friction": "1"}
-        self.vehicle = self._values("vehicle", spec.vehicle, known)
+        self.vehicle = self._values("vehicle", spec.vehicle, OF_CAR)
         self.test = self._values("test", spec.test, OF_TEST)
         self.filter = self._filter()
 

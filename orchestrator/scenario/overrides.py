@@ -32,7 +32,7 @@ from ..messages import hint, listed
 from ..names import FACTS, FAULTS, INPUTS, OF_RUN, TYRES, VEHICLE, Target
 from ..plan import Override, Value
 from . import yaml_lines
-from .scenario_schema import location_of, parse_faults, read_line
+from .fault_schema import location_of, parse_faults, read_line
 from .yaml_lines import Document, KeyPath
 
 

@@ -356,6 +356,20 @@ def meant_unit(number: float, assumed: str, unit: str, fits: Callable[[float], b
     return next((spelling for spelling, value in in_unit if fits(float(value))), "")
 
 
+def quantity_pattern(unit: str) -> str:
+    """Return a regular expression (ECMA 262) of numbers with a unit of the same dimension as `unit`.
+
+    It lists the units of one symbol; of products and quotients, which have countless spellings, it only asks
+    for a unit.
+    """
+    powers = parse_unit(unit).powers
+    symbols = [symbol for symbol, base in _PLAIN.items() if base.powers == powers]
+    for symbol in (symbol for symbol, base in _PREFIXED.items() if base.powers == powers):
+        symbols += [f"{prefix}{symbol}" for prefix in ("", *_PREFIXES)]
+    units = "|".join(map(re.escape, sorted(symbols))) if unit in symbols else "[A-Za-zµ°%1(].*"
+    return rf"^\s*[+-]?(\d+/0*[1-9]\d*|(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)\s*({units})\s*$"
+
+
 def spellings(unit: str) -> list[str]:
     """Return the common units of the same dimension as `unit`, itself first."""
     return _spellings(unit, parse_unit(unit))

@@ -4,32 +4,85 @@ from __future__ import annotations
 
 import types
 import typing
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated, Any, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, PlainSerializer, PlainValidator, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    PlainSerializer,
+    PlainValidator,
+    ValidationError,
+    WithJsonSchema,
+)
+from pydantic_core.core_schema import no_info_after_validator_function
 
 from ..errors import code_of
 from ..messages import closest, listed, short
-from .quantities import instant, seconds
+from .quantities import instant, quantity_pattern, seconds
 from .yaml_lines import Document, KeyPath
 
 Model = TypeVar("Model", bound=BaseModel)
-Instant = Annotated[Fraction, PlainValidator(instant), PlainSerializer(float)]
-Time = Annotated[Fraction, PlainValidator(seconds), PlainSerializer(float)]
+JsonSchema = dict[str, Any]
+
+
+def in_unit(unit: str, **number: float) -> JsonSchema:
+    """Return the JSON Schema of a number, or text with a unit of a dimension; `number`: limits of numbers."""
+    return {"anyOf": [{"type": "number", **number}, text_in_unit(unit)]}
+
+
+def text_in_unit(unit: str) -> JsonSchema:
+    """Return the JSON Schema of text with a unit of a dimension."""
+    return {"type": "string", "pattern": quantity_pattern(unit)}
+
+
+def quantities_in(units: Mapping[str, str]) -> JsonSchema:
+    """Return the JSON Schema of a mapping of quantities; `units`: name -> unit."""
+    properties = {name: in_unit(unit) for name, unit in units.items()}
+    return {"type": "object", "properties": properties, "additionalProperties": False}
+
+
+def _time(sign: str, **number: float) -> WithJsonSchema:
+    patterns = [quantity_pattern("s").replace("[+-]", sign), rf"^\s*{sign}?\d+/0*[1-9]\d*\s*$"]
+    texts = [{"type": "string", "pattern": pattern} for pattern in patterns]
+    return WithJsonSchema({"anyOf": [{"type": "number", **number}, *texts]})
+
+
+Instant = Annotated[Fraction, PlainValidator(instant), PlainSerializer(float), _time("[+-]")]
+Time = Annotated[Fraction, PlainValidator(seconds), PlainSerializer(float), _time("[+]", exclusiveMinimum=0)]
 """Above zero."""
 
 
-def one_of(names: Collection[str]) -> AfterValidator:
-    """Return the validator of a text that must be one of some names, which may become more."""
+@dataclass(frozen=True, eq=False)
+class OneOf:
+    """Validator of a text that must be one of some names, which may become more."""
 
-    def known(name: str) -> str:
-        if name not in names:
-            raise ValueError(f"must be {listed(map(repr, names), last='or')} (got {short(name)})")
+    names: Collection[str]
+
+    def __call__(self, name: str) -> str:
+        """Return the name.
+
+        Raises:
+            ValueError: it is not one of the names.
+        """
+        if name not in self.names:
+            raise ValueError(f"must be {listed(map(repr, self.names), last='or')} (got {short(name)})")
         return name
 
-    return AfterValidator(known)
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Validate with this after the type itself."""
+        return no_info_after_validator_function(self, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> JsonSchema:
+        """List the names."""
+        return {**handler(schema), "enum": sorted(self.names)}
+
+
+def exactly_one(*keys: str) -> JsonSchema:
+    """Return the JSON Schema of mappings with exactly one of some keys."""
+    return {"oneOf": [{"required": [key]} for key in keys]}
 
 
 class StrictModel(BaseModel):

@@ -130,13 +130,15 @@ def test_only_controllers_begin_in_c(new):
 
 def test_it_writes_a_source_a_test_and_a_scenario(tmp_path, new):
     new("idea")
-    assert files(tmp_path) == {"controllers/idea.py", "tests/test_idea.py", "scenarios/idea/25mps.yaml"}
+    written = {"controllers/idea.py", "tests/test_idea.py", "scenarios/idea/25mps.yaml"}
+    assert files(tmp_path) == written | {"scenarios/schemas/scenario.json"}
 
 
 def test_in_c_the_source_is_a_folder_with_the_model_description(tmp_path, new):
     new("idea", "--language", "c")
     expected = {"controllers/idea/idea.c", "controllers/idea/modelDescription.xml"}
-    assert files(tmp_path) == expected | {"tests/test_idea.py", "scenarios/idea/25mps.yaml"}
+    expected |= {"tests/test_idea.py", "scenarios/idea/25mps.yaml", "scenarios/schemas/scenario.json"}
+    assert files(tmp_path) == expected
 
 
 @pytest.mark.exhaustive
