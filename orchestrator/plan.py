@@ -66,6 +66,7 @@ class Variable:
     encoding: str | None = None  # FMI 3.0: the type in the FMU, such as "Float32"
     element: int = 0  # of an array, counted row by row
     elements: int = 1  # of the whole array
+    alias_of: str | None = None  # of an input: the input of which this is another name (FMI 3.0)
 
     @property
     def place(self) -> ValueRef:
@@ -136,8 +137,12 @@ class Fmu:
         return [f"the model description is not valid FMI {self.fmi}.0: {flaw}" for flaw in self.flaws]
 
     def of(self, causality: str) -> list[Variable]:
-        """Return the variables of a causality, in the order of the model description."""
-        return [v for v in self.variables.values() if v.causality == causality]
+        """Return the variables of a causality, in the order of the FMU, without aliases of inputs."""
+        return [v for v in self.variables.values() if v.causality == causality and v.alias_of is None]
+
+    def aliases(self) -> dict[str, str]:
+        """Return other name -> name of the inputs that have several."""
+        return {v.name: v.alias_of for v in self.variables.values() if v.alias_of is not None}
 
 
 @dataclass(frozen=True, eq=False)

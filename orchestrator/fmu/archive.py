@@ -39,7 +39,7 @@ from ..plan import Fmu
 from . import description as fmu_description
 from .binary import binary_problem
 
-FORMAT = 7
+FORMAT = 8
 """Format version of cache entries; part of their names, so versions of this program can share a cache."""
 
 _FILE_TIME = 946_684_800

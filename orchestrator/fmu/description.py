@@ -61,6 +61,8 @@ def scalars(description: Any, root: ElementTree.Element) -> tuple[dict[str, Vari
             {i.name: int(i.value) for i in declared.items} if v.type == "Enumeration" and declared else None
         )
         names = element_names(v.name, v.shape or ())
+        driven = v.causality == "input" and v.alias
+        aliases = element_names(v.alias.name, v.shape or ()) if driven else [None] * len(names)
         starts = _starts(v, kind, element, len(names))
         limits = element if modern else v  # fmpy does not read the limits of all FMI 3.0 types
         for i, name in enumerate(names):
@@ -86,6 +88,7 @@ def scalars(description: Any, root: ElementTree.Element) -> tuple[dict[str, Vari
                     encoding=("Int64" if kind == "Enumeration" else v.type) if modern else None,
                     element=i,
                     elements=len(names),
+                    alias_of=aliases[i],
                 ),
             )
     return variables, refused
@@ -107,8 +110,6 @@ def _reason(v: Any) -> str | None:
         return "belongs to a Clock, which is not supported"
     if math.prod(v.shape or ()) > MOST:
         return f"has {math.prod(v.shape)} elements; supported are {MOST}"
-    if v.alias and v.causality == "input":
-        return f"is an alias of {v.alias.name}: use that"
     return None
 
 

@@ -115,7 +115,7 @@ class Connector:
             self._prefer(ends[0], ends[1], key)
             return []
         (target, to_pattern) = ends[1]
-        inputs = matching(to_pattern, self._inputs[target])
+        inputs = self._system.matching_inputs(target, to_pattern)
         if not inputs:
             self._no_such((*key, "to"), target, to_pattern, "input")
         if ends[0] is None:
@@ -238,9 +238,11 @@ class Connector:
             for name in inputs:
                 if (instance, name) in wires or (instance, name) in taken:
                     continue
-                sources, key = self._sources(instance, name)
+                names = [name, *(a for a, of in self._system.aliases[instance].items() if of == name)]
+                output = next((known for known in names if self._sources(instance, known)[0]), name)
+                sources, key = self._sources(instance, output)
                 if len(sources) == 1:
-                    wires[(instance, name)] = (Wire(sources[0], name, instance, name), key)
+                    wires[(instance, name)] = (Wire(sources[0], output, instance, name), key)
                 elif sources:
                     ambiguous.add((instance, name))
                     choices = listed(f"{source}.{name}" for source in sources)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InvalidValueError, ScenarioError, code_of, text_of
 from ..messages import fold, hint
-from ..names import SignalName, matching
+from ..names import SignalName
 from ..plan import InputSeries, Value, ValueOrigin, Variable
 from ..scenario.find_and_load import LoadedScenario
 from ..scenario.quantities import measure_of
@@ -68,7 +68,9 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
         of_unit = prefix in fmus
         instances = [prefix] if of_unit else list(fmus)
         parts = {
-            (u, name): part for u in instances for part, name in matching(name_pattern, inputs[u]).items()
+            (u, name): part
+            for u in instances
+            for part, name in system.matching_inputs(u, name_pattern).items()
         }
         if not parts and system.had(instances, name_pattern, "input"):
             system.note(

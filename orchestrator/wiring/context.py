@@ -22,7 +22,7 @@ from vocabulary.wheels import WHEELS, wheels
 from ..errors import Diagnostic, Severity, WiringError
 from ..messages import fold_sentences
 from ..names import FACTS as NAMES
-from ..names import match
+from ..names import match, matching
 from ..plan import Fmu, Instance, Value, ValueOrigin, Variable
 from ..scenario.find_and_load import LoadedScenario
 from ..scenario.yaml_lines import MOST_ERRORS, Document, KeyPath
@@ -89,6 +89,19 @@ class WiringContext:
     def inputs(self) -> ByUnit:
         """All inputs by instance and name."""
         return {instance: {v.name: v for v in fmu.of("input")} for instance, fmu in self.fmus.items()}
+
+    @cached_property
+    def aliases(self) -> dict[str, dict[str, str]]:
+        """Other names of inputs by instance: alias -> name."""
+        return {instance: fmu.aliases() for instance, fmu in self.fmus.items()}
+
+    def matching_inputs(self, instance: str, pattern: str) -> dict[str, str]:
+        """Return the inputs of which a name matches a pattern, as part matched by `*` -> name."""
+        names = matching(pattern, self.inputs[instance])
+        for part, alias in matching(pattern, self.aliases[instance]).items():
+            if self.aliases[instance][alias] not in names.values():
+                names.setdefault(part, self.aliases[instance][alias])
+        return names
 
     @cached_property
     def outputs(self) -> ByUnit:

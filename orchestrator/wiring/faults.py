@@ -113,7 +113,7 @@ class _Finder:
         return [(unit, name, True) for name in names if (unit, name) in used or "*" not in pattern]
 
     def _on_inputs(self, unit: str, pattern: str) -> list[tuple[str, str, bool]]:
-        names = matching(pattern, self.system.inputs[unit]).values()
+        names = self.system.matching_inputs(unit, pattern).values()
         driven = {w.input for w in self.wires if w.target == unit}
         if names and not driven & set(names):
             self._report(

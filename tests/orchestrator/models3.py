@@ -39,7 +39,9 @@ def pair(kind: str, reference: int) -> list[str]:
     if kind == "String":
         given = variable(kind, f"{kind}_in", reference, "input", '<Start value="none"/>')
     else:
-        given = variable(kind, f"{kind}_in", reference, "input", start="false" if kind == "Boolean" else 0)
+        alias = '<Alias name="x"/>' if kind == "Float64" else ""
+        start = "false" if kind == "Boolean" else 0
+        given = variable(kind, f"{kind}_in", reference, "input", alias, start=start)
     return [given, variable(kind, f"{kind}_out", reference + 1, "output")]
 
 
@@ -76,7 +78,7 @@ MODELS: dict[str, list[str]] = {
     "Matrix": [
         variable("UInt64", "n", 40, "structuralParameter", start=2),
         variable("Float64", "A", 41, "parameter", _SIZED + _SIZED, start="1 0 0 1"),
-        variable("Float64", "u", 42, "input", _VECTOR, start="0 0"),
+        variable("Float64", "u", 42, "input", _VECTOR + '<Alias name="force"/>', start="0 0"),
         variable("Float64", "y", 43, "output", _SIZED + '<Alias name="result"/>'),
     ],
     "Early": [_state("x", 31, 1), _state("gone", 32, 0)],

@@ -226,6 +226,36 @@ def test_arrays_are_wired_set_and_recorded_element_by_element(run, library, tmp_
 
 
 @together_and_apart
+def test_an_alias_of_an_input_is_another_name_for_it(run, isolate):
+    units = {"d": ("Dahlquist", {}), "m": ("Matrix", {}), "n": ("Matrix", {})}
+    wires = [{"from": "d.x", "to": "m.force[2]"}, {"from": "m.y[*]", "to": "n.force[*]"}]
+    record = ["d.x", "m.force[*]", "m.u[*]", "n.force[1]", "n.y[*]"]
+    faults = ["--fault", "n.force[1]: gain 3"]
+    inputs = {"m.force[1]": 10.0}
+    status, said, results = run(units, *isolate, *faults, inputs=inputs, connections=wires, record=record)
+    assert status == 0, said
+    assert results["m.force[2]"].tolist() == results["m.u[2]"].tolist() == results["d.x"].tolist()
+    assert set(results["m.force[1]"]) == {10.0}
+    assert set(results["n.force[1]"]) == set(results["n.y[1]"]) == {30.0}
+    assert results["n.y[2]"].tolist() == results["d.x"].tolist()
+
+
+def test_an_output_feeds_the_input_that_has_its_name_as_an_alias(run):
+    inputs = rest("e.Float64_in", units="e")
+    status, said, results = run({"s": ("Dahlquist", {}), "e": ("Every", {})}, inputs=inputs)
+    assert status == 0, said
+    assert results["e.Float64_out"].tolist() == results["s.x"].tolist()
+
+
+def test_an_input_with_two_names_has_one_source(run):
+    units = {"s": ("Dahlquist", {}), "m": ("Matrix", {})}
+    wires = [{"from": "s.x", "to": "m.u[1]"}, {"from": "s.x", "to": "m.force[1]"}]
+    status, said, _ = run(units, inputs={"m.u[2]": 0.0}, connections=wires)
+    assert status == 2
+    assert golden_in(said)
+
+
+@together_and_apart
 def test_units_of_both_versions_share_a_scenario(run, tmp_path, library, isolate):
     old = write_fmu(tmp_path / "foreign.fmu", library, "Real")
     units = {"d": ("Dahlquist", {}), "old": (old, {}), "m": ("Matrix", {})}
