@@ -920,8 +920,9 @@ def test_a_scenario_is_wired_anew_when_its_fmu_has_been_mended(folder):
     loaded = load_scenario(scenario())
     good = (folder / "tyre_dugoff.fmu").read_bytes()
     make_fmu(folder / "tyre_dugoff.fmu", inputs=[Var("slip_angle_*", "rad")], outputs=[out("grip", unit="N")])
-    with pytest.raises(WiringError, match="no source"):
+    with pytest.raises(WiringError) as caught:
         make_plan(loaded)
+    assert caught.value.code == "input-undriven"
     (folder / "tyre_dugoff.fmu").write_bytes(good)
     assert make_plan(loaded).wires == make_plan(load_scenario(scenario())).wires
 
