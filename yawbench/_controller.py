@@ -30,13 +30,14 @@ from orchestrator.errors import ScenarioError
 from orchestrator.fmu.description import describe
 from orchestrator.master.instance import Buffers, ExperimentSetup, Status, StepCalls, nothing_to_do
 from orchestrator.master.process_state import ERROR, OK, Log
-from orchestrator.messages import counted, listed, short
+from orchestrator.messages import counted, listed
 from orchestrator.plan import Fmu, Instance, Value, ValueRef
 from vocabulary.roles import ROLES
 from vocabulary.wheels import wheels
 
-from . import arguments
+from . import _parameters, arguments
 from ._native import in_native_code, of_function, of_object, zipped
+from ._parameters import ProgramParameters
 
 __all__ = ["Controller", "ControllerLike", "PythonComponent", "output", "parameter", "signal"]
 
@@ -99,6 +100,7 @@ class PythonComponent:
 
     Attributes:
         step_size: sampling time [s]; None if the program declares none.
+        parameters: name -> value that a function or an object brings along.
 
     Raises:
         ScenarioError: the program is none of these, or its declarations are invalid.
@@ -110,6 +112,7 @@ class PythonComponent:
             self.component, self._translated = _component(program, role)
             self.step_size = _step_size(program)
             self._xml = _described(self._made(unit).to_xml())
+            self.parameters = _parameters.brought_along(program, self.component)
         except ScenarioError as error:
             raise ScenarioError(f"{unit}: {error}", code="controller-invalid") from None
         except (TypeError, ValueError) as error:
@@ -119,8 +122,8 @@ class PythonComponent:
                 f"{unit}: {_name(program)}: {arguments.error_text(error)}", code="controller-invalid"
             ) from error
         name = self.component.fmu_name
-        self.path = HOME / f"{quote(label, safe=' ') or name}.fmu"
-        digest = hashlib.sha256(self._xml + _source(program)).hexdigest()
+        self.path = HOME / unit / f"{quote(label, safe=' ') or name}.fmu"
+        digest = hashlib.sha256(self._xml + _parameters.text_of(program)).hexdigest()
         files = {"modelDescription.xml": self._xml}
         described = describe(files, zipped(files), self.path)
         self.fmu: Fmu = replace(described, sha256=digest, generation_tool="Python, no FMU", role=role)
@@ -264,14 +267,19 @@ def _of_function(function: Callable[..., Any], role: str) -> tuple[type[Componen
     names = [p.name for p in parameters if p.default is p.empty]
     inputs = [name for name in names if name != "t"]
     outputs = [item for pattern in known[role] for item in wheels(pattern)]
+    own = _parameters.of_function(function)
 
-    def compute(self: Component, t: float, u: Sequence[float]) -> Any:
-        values = dict(zip(inputs, u, strict=True))
+    def compute(self: Any, t: float, u: Sequence[float]) -> Any:
+        values = dict(zip(inputs, u, strict=True)) | self._chosen
         result = function(**values, t=t) if "t" in names else function(**values)
         return _numbers(result, outputs)
 
-    both = {"output": compute, "_fail": _fail}, of_function(function, inputs, "t" in names)
-    checked, bare = (_class(function, inputs, known[role], members) for members in both)
+    def configure(self: Any) -> None:
+        self._chosen = own.chosen(self.p)
+
+    checks = {"output": compute, "configure": configure, "_fail": _fail}
+    both = checks, of_function(function, inputs, "t" in names, list(own.values))
+    checked, bare = (_class(function, inputs, known[role], members, own) for members in both)
     return checked, bare
 
 
@@ -293,15 +301,21 @@ def _of_object(program: Any) -> tuple[type[Component], type[Component] | str]:
                 f"{_name(program)} cannot be copied for a run: {error}", code="controller-invalid"
             ) from error
 
-    members = {"__init__": __init__, "_fail": _fail}
+    def configure(self: Any) -> None:
+        values = own.chosen(self.p)
+        same = all(values[name] is value for name, value in own.values.items())
+        self._program = copy.deepcopy(program) if same else _parameters.made_anew(program, own, values)
+
+    own = _parameters.of_object(program, _names(program))
+    members = {"__init__": __init__, "configure": configure, "_fail": _fail}
     for method in ("output", "advance", "start"):
         if hasattr(program, method):
             if not callable(getattr(program, method)):
                 arguments.refuse(method, "a method", getattr(program, method))
             members[method] = _passing_on(method)
-    component = _class(program, program.inputs, program.outputs, members)
+    component = _class(program, program.inputs, program.outputs, members, own)
     try:
-        return component, _class(program, program.inputs, program.outputs, of_object(program))
+        return component, _class(program, program.inputs, program.outputs, of_object(program, own), own)
     except Exception as error:  # it is not made to be one
         return component, f"not translated: {_name(program)}: {arguments.error_text(error)}"
 
@@ -318,7 +332,11 @@ def _passing_on(method: str) -> Callable[..., Any]:
 
 
 def _class(
-    program: Any, inputs: Sequence[Any], outputs: Sequence[Any], members: dict[str, Any]
+    program: Any,
+    inputs: Sequence[Any],
+    outputs: Sequence[Any],
+    members: dict[str, Any],
+    own: ProgramParameters,
 ) -> type[Component]:
     """Return a component class; outputs without declared dependencies depend on all inputs."""
     inputs, outputs = _signals(inputs, "inputs"), _signals(outputs, "outputs")
@@ -333,7 +351,13 @@ def _class(
         "__doc__": inspect.getdoc(program) or f"{_name(program)}, plain Python.",
         "_named": staticmethod(namedtuple("Inputs", scalars)),
     }
-    return type(_name(program), (Component,), members)
+    return own.without_units(type(_name(program), (Component,), members | own.members(_name(program))))
+
+
+def _names(program: Any) -> list[str]:
+    """Return the names of an object's inputs and outputs."""
+    declared = (*_signals(program.inputs, "inputs"), *_signals(program.outputs, "outputs"))
+    return [name for item in declared for name in wheels(item if isinstance(item, str) else item.name)]
 
 
 def _reporting(component: type[Component]) -> type[Component]:
@@ -423,13 +447,3 @@ def _name(program: Any) -> str:
     if name == "<lambda>":
         return "function"
     return name if type(name) is str and name.isidentifier() else type(program).__name__
-
-
-def _source(program: Any) -> bytes:
-    """Return the program's source text if Python knows it, to tell different programs apart."""
-    try:
-        return inspect.getsource(
-            program if callable(program) and not hasattr(program, "output") else type(program)
-        ).encode()
-    except Exception:  # there is no source, or inspecting the user's object fails
-        return short(program).encode()

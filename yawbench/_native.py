@@ -25,27 +25,42 @@ from orchestrator.fmu.archive import open_fmu
 from orchestrator.fmu.binary import NATIVE, REASON, WANTED, binary_of, python_wanted
 from orchestrator.plan import Fmu
 
+from ._parameters import ProgramParameters
+
 PLAIN = (bool, int, float, str, type(None))
 """Types of what an object may hold before its first step."""
 
 
-def of_function(function: Callable[..., Any], inputs: Sequence[str], timed: bool) -> dict[str, Any]:
-    """Return the methods of a component that only calls a function of its inputs, and of `t` if `timed`."""
+def of_function(
+    function: Callable[..., Any], inputs: Sequence[str], timed: bool, parameters: Sequence[str]
+) -> dict[str, Any]:
+    """Return the methods of a component that only calls a function.
+
+    Args:
+        function: of its inputs and parameters, and of `t` if `timed`.
+        inputs, timed, parameters: what it is called with.
+    """
 
     def output(self: Component, t: float, u: Sequence[float]) -> Any:
-        values = dict(zip(inputs, u, strict=True))
+        values = dict(
+            zip([*inputs, *parameters], [*u, *[getattr(self.p, x) for x in parameters]], strict=True)
+        )
         result = function(**values, t=t) if timed else function(**values)
         return result if isinstance(result, (tuple, list)) else (result,)
 
     return {"output": output}
 
 
-def of_object(program: Any) -> dict[str, Any]:
-    """Return the members of a component that is the object itself: its attributes become the state.
+def of_object(program: Any, own: ProgramParameters) -> dict[str, Any]:
+    """Return the members of a component that makes an object with its parameters, or is the object itself.
+
+    Without parameters, the attributes of the object become the state.
 
     Raises:
         TypeError: the object holds something else than numbers and texts.
     """
+    if own.values:
+        return _with_parameters(program, own)
     members: dict[str, Any] = {}
     for cls in reversed(type(program).__mro__[:-1]):
         members |= {name: value for name, value in vars(cls).items() if not name.startswith("__")}
@@ -74,6 +89,36 @@ def of_object(program: Any) -> dict[str, Any]:
     return members | ({"advance": advance} if its_advance else {})
 
 
+def _with_parameters(program: Any, own: ProgramParameters) -> dict[str, Any]:
+    cls: Any = type(program)
+    for name, value in own.fixed.items():
+        if type(value) not in PLAIN:
+            raise TypeError(f"{name} is a {type(value).__name__}")
+    fixed, attributes = own.fixed, sorted(own.attributes)
+    arguments = [name for name in own.values if name not in own.attributes]
+
+    def configure(self: Any) -> None:
+        self._program = cls(
+            **fixed, **dict(zip(arguments, [getattr(self.p, x) for x in arguments], strict=True))
+        )
+        for name in attributes:
+            setattr(self._program, name, getattr(self.p, name))
+
+    def start(self: Any, t: float, u: Sequence[float]) -> None:
+        self._program.start(t, self._named(*u))
+
+    def advance(self: Any, t: float, h: float, u: Sequence[float]) -> None:
+        self._program.advance(t, h, self._named(*u))
+
+    def output(self: Any, t: float, u: Sequence[float]) -> Any:
+        result = self._program.output(t, self._named(*u))
+        return result if isinstance(result, (tuple, list)) else (result,)
+
+    members = {"configure": configure, "output": output}
+    members |= {"start": start} if hasattr(cls, "start") else {}
+    return members | ({"advance": advance} if hasattr(cls, "advance") else {})
+
+
 def in_native_code(component: type[Component], translated: type[Component], fmu: Fmu, xml: bytes) -> Fmu:
     """Return the FMU of a component with a native library, or with the reason why it runs in Python.
 
@@ -88,7 +133,10 @@ def in_native_code(component: type[Component], translated: type[Component], fmu:
     from fmus.native.build import NATIVE_LIBRARY, native  # here, because most scenarios need none of it
 
     functions = (function for cls in translated.__mro__ for function in _functions(cls))
-    folders = {Path(function.__code__.co_filename).parent for function in functions}
+    codes = [function.__code__ for function in functions]
+    # dataclasses write methods that have no file
+    generated = [code for code in codes if code.co_filename == "<string>" and code.co_name.startswith("__")]
+    folders = {Path(code.co_filename).parent for code in codes if code not in generated}
     with tempfile.TemporaryDirectory(prefix="yawbench_") as folder:
         made = native(
             component,
@@ -128,6 +176,8 @@ def _functions(cls: type) -> list[Any]:
     """Return the functions of a class, with those that they have from around them."""
     functions = [member for member in vars(cls).values() if inspect.isfunction(member)]
     for function in functions:
-        cells = (cell.cell_contents for cell in function.__closure__ or ())
-        functions += [held for held in cells if type(held) is FunctionType and held not in functions]
+        for held in (cell.cell_contents for cell in function.__closure__ or ()):
+            classes = held.__mro__ if isinstance(held, type) else ()
+            within = [x for base in classes for x in vars(base).values()] or [held]
+            functions += [x for x in within if type(x) is FunctionType and x not in functions]
     return functions

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -39,8 +39,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+Ranked = ControllerLike | type[Controller]
+"""What can be ranked: what can replace an FMU, or a class of such objects."""
+
+
 def rank(
-    controller: ControllerLike | type[Controller] | None = None,
+    controller: Ranked | Mapping[str, Ranked] | None = None,
     *,
     name: str = "",
     against: Iterable[str] | None = None,
@@ -64,8 +68,8 @@ def rank(
 
     Args:
         controller: name or path of an FMU, or plain Python as in `Scenario.swap`, or a class of such
-            objects; None: rank only the others.
-        name: of its entry; default: the name of the controller.
+            objects, or a mapping of names of entries to these; None: rank only the others.
+        name: of the entry of a single controller; default: the name of the controller.
         against: other entries to rank; default: all of the ranking.
         conditions: of the ranking; default: all.
         quick: run only the last amplitude of a few conditions.
@@ -82,7 +86,7 @@ def rank(
     workers = None if workers is None else arguments.count(workers, "workers")
     kept_in = None if out is None else arguments.path(out, "out")
     file = find_and_load.find(arguments.path(ranking, "ranking"), "a ranking file")
-    more, programs = _entry(controller, arguments.text(name, "name", empty=True))
+    more, programs = _entries(controller, arguments.text(name, "name", empty=True))
     loaded = load_ranking(file, more=more, quick=quick, chosen=chosen)
     wanted = set(loaded.entries if others is None else others)
     if unknown := sorted(wanted - set(loaded.entries)):
@@ -107,20 +111,38 @@ def rank(
         return Ranking(run_ranking(loaded, execute, keep=out is not None))
 
 
-def _entry(controller: Any, name: str) -> tuple[dict[str, EntrySpec], dict[Path, PythonComponent]]:
-    """Return the entry of a controller by its name, and its Python component, if any, by its path."""
+def _entries(controller: Any, name: str) -> tuple[dict[str, EntrySpec], dict[Path, PythonComponent]]:
+    """Return the entries of controllers by name, and the Python components among them by path."""
+    entries: dict[str, EntrySpec] = {}
+    programs: dict[Path, PythonComponent] = {}
     if controller is None:
-        return {}, {}
+        return entries, programs
+    named = {name: controller}
+    if arguments.is_a(controller, Mapping):
+        named = arguments.mapping(controller, "controller", "a mapping of names to controllers")
+        if name:
+            raise ScenarioError(
+                "name: must not be given for a mapping, which has the names", code="argument-invalid"
+            )
+    for label, wanted in named.items():
+        words, entry, program = _entry(wanted, label)
+        entries[words] = entry
+        programs |= {program.path: program} if program else {}
+    return entries, programs
+
+
+def _entry(controller: Any, name: str) -> tuple[str, EntrySpec, PythonComponent | None]:
+    """Return the name of a controller's entry, the entry, and the Python component if it is one."""
     if arguments.names_file(controller):
         fmu = fmu_of(controller, "controller")
         if not (name or Path(fmu).stem):
             raise ScenarioError(f"controller: {fmu!r} is not the name of an FMU", code="controller-invalid")
-        return {name or Path(fmu).stem: _spec(name or Path(fmu).stem, fmu)}, {}
+        return name or Path(fmu).stem, _spec(name or Path(fmu).stem, fmu), None
     if arguments.is_a(controller, type) and not issubclass(controller, Component):
         controller = _object_of(controller)
-    program = PythonComponent(controller, unit=CONTROLLER, role=CONTROLLER)
+    program = PythonComponent(controller, unit=CONTROLLER, role=CONTROLLER, label=name)
     words = name or program.path.stem
-    return {words: _spec(words, str(program.path))}, {program.path: program}
+    return words, _spec(words, str(program.path), program.parameters), program
 
 
 def _object_of(kind: type) -> object:
@@ -131,8 +153,9 @@ def _object_of(kind: type) -> object:
         raise ScenarioError(f"controller: {kind.__name__}: {reason}", code="controller-invalid") from error
 
 
-def _spec(name: str, fmu: str) -> EntrySpec:
-    return EntrySpec(title=name, fmu=fmu, parameters={}, source="given to rank", gains="authors")
+def _spec(name: str, fmu: str, parameters: Mapping[str, Any] | None = None) -> EntrySpec:
+    own = dict(parameters or {})
+    return EntrySpec(title=name, fmu=fmu, parameters=own, source="given to rank", gains="authors")
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
@@ -28,7 +28,9 @@ from orchestrator.plan import Instance, Override, Plan, Value
 from orchestrator.planner import Planner
 from orchestrator.scenario import find_and_load, scenario_schema
 from orchestrator.scenario.overrides import faults_at, setting
+from orchestrator.wiring.context import FACTS
 from vocabulary.roles import role_of
+from vocabulary.vehicle import CAR
 
 from . import arguments
 from ._calls import opener_of
@@ -95,9 +97,10 @@ class Scenario:
 
         Args:
             units: instance of the scenario -> name or path of an FMU, or plain Python: a function whose
-                parameters have the names of signals (`t` is the time in s); an object with `inputs`,
+                arguments have the names of signals (`t` is the time in s); an object with `inputs`,
                 `outputs` and `output(t, u)`, and optionally `advance(t, h, u)`, `start(t, u)` and
-                `step_size`; or a component class. Every run uses a copy of the object.
+                `step_size`; or a component class. Every run uses a copy of the object. Arguments with
+                a default value, and what the object was made with, are parameters for `set`.
 
         Raises:
             ScenarioError: the instance is unknown, or its replacement invalid.
@@ -122,12 +125,27 @@ class Scenario:
             if program.step_size is not None:
                 step_size = Target.of_instance(unit, "step_size")
                 changes.append(Override(step_size, program.step_size, "swap"))
+            changes += self._kept(unit, program)
         return replace(self, changes=tuple(changes), programs=programs)
 
+    def _kept(self, unit: str, program: PythonComponent) -> Iterator[Override]:
+        """Yield overrides with a program's own values for parameters that the scenario would set."""
+        loaded, facts = self.loaded, [name for fact in FACTS.values() for name in fact.parameters]
+        by_scenario = {*CAR, *facts, *loaded.vehicle_file.parameters, *loaded.units[unit].parameters}
+        requested = {change.target for change in self.changes if change.origin == "set"}
+        for name, value in program.parameters.items():
+            target = Target.of_instance(unit, name)
+            if name in by_scenario and target not in requested:
+                yield Override(target, value, "swap")
+
     def _unswapped(self, units: Iterable[str]) -> Scenario:
-        """Return the scenario without earlier swaps of instances and the step sizes set by them."""
-        targets = {Target.of_instance(unit, name) for unit in units for name in ("", "step_size")}
-        kept = (change for change in self.changes if change.origin != "swap" or change.target not in targets)
+        """Return the scenario without earlier swaps of instances and the values that came with them."""
+        swapped = set(units)
+        kept = (
+            change
+            for change in self.changes
+            if change.origin != "swap" or change.target.instance not in swapped
+        )
         return replace(self, changes=tuple(kept))
 
     def set(self, values: Mapping[str, Value]) -> Scenario:
@@ -136,6 +154,9 @@ class Scenario:
             >>> changes = {"vehicle.mass": 1200, "plant.initial_speed": "80 km/h", "inputs.friction*": 0.3}
             >>> print(base.set(changes).run()["plant.velocity_x"][0].round(2))
             22.22
+            >>> def follow(yaw_rate_ref, yaw_rate, gain=2e4):
+            ...     return gain * (yaw_rate_ref - yaw_rate)
+            >>> firm = base.swap(controller=follow).set({"controller.gain": 4e4})
 
         Args:
             values: target -> value, in SI or with its unit. Targets are those of `--set`:

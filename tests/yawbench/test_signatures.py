@@ -79,6 +79,7 @@ INSIDE = {
     "Messages",
     "Numbers",
     "PythonComponent",
+    "Ranked",
     "RankingResult",
     "Relation",
     "Results",
