@@ -206,7 +206,10 @@ def plot(
     folders = recorded(sources, options)
     labels = labels_of(folders, label)
     if page:
-        write_view(folders, labels, panel or (), options.out and options.out / "view.html")
+        out = options.out
+        write_view(
+            folders, labels, panel or (), out if out is None or out.suffix == ".html" else out / "view.html"
+        )
         return
     runs = [
         LabelledRun(name, load_run(folder, thin=True)) for name, folder in zip(labels, folders, strict=True)

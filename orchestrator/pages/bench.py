@@ -34,7 +34,7 @@ from ..scenario.overrides import is_path, read_changes
 from ..scenario.scenario_schema import LoadedScenario
 from ..wiring.context import FACTS
 from ..workers import Pool, default_workers
-from .page_parts import made_by, render, style
+from .page_parts import render
 from .viewer import Settings, assets, viewer
 from .viewer_data import PackedRun, pack
 
@@ -232,7 +232,7 @@ class Bench:
             "bench.html.j2", title=plan.title or scenario, scenario=scenario, data=data, knobs=knobs,
             swaps=swaps, others=others,
             wires=[f"{one.source}.{one.output} -> {one.target}" for one in plan.wires],
-            style=style(), assets=assets("bench.js"), **made_by(),
+            assets=assets("bench.js"),
         )  # fmt: skip
 
     @staticmethod

@@ -209,7 +209,7 @@ def _text(value: Any) -> str | None:
 
 def partings_table(comparison: RunComparison, first: Results, second: Results) -> Table:
     """Return the table of signals that differ between two runs, the earliest first."""
-    headings = ["signal", "differs from", "visibly from", "largest difference", "at"]
+    headings = ["signal", "differs from", "visible from", "largest difference", "at"]
     table = Table("What came out", headings, notes=list(comparison.notes))
     for parting in comparison.partings:
         table.rows.append([
@@ -392,7 +392,7 @@ def parting_summary(comparison: RunComparison) -> str:
 
 def parting_table(partings: Sequence[SignalDifference]) -> Table:
     """Return a table of signals that differ, the earliest first."""
-    headings = ["signal", "goes to", "differs from", "seen from", "largest difference", "at"]
+    headings = ["signal", "goes to", "differs from", "visible from", "largest difference", "at"]
     table = Table("", headings, numbers={2, 3, 4, 5} if partings else set())
     for parting in partings:
         table.rows.append([

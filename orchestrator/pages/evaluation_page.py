@@ -20,7 +20,7 @@ from ..metrics.measures import words
 from ..metrics.verdict import SYMBOLS, Verdict, worst
 from ..results.reader import Results, load_results
 from ..results.run_record import RunRecord
-from .page_parts import made_by, render, style
+from .page_parts import render
 from .viewer import MOST, Settings, View, assets, viewer
 
 LARGEST = 2_000_000
@@ -100,7 +100,7 @@ def evaluation_page(
     return render(
         "evaluation.html.j2",
         title=f"{test.name.replace('-', ' ').capitalize()}: {counted(len(judged), 'run')}",
-        below=test.says,
+        below=f"{test.says[:1].upper()}{test.says[1:]}.",
         sentence=series.summary if series else _sentence(rows, judged),
         rows=rows,
         marked=chosen.label,
@@ -108,9 +108,7 @@ def evaluation_page(
         viewer=viewer(runs, settings, name="test", alone=True),
         table=table,
         each=[run_table(one, test.says) for one in judged],
-        style=style(),
         assets=assets(),
-        **made_by(),
     )
 
 

@@ -118,12 +118,9 @@ def option_of(change: Override) -> list[str]:
     return ["--swap" if change.swaps else "--set", f"{change.target}={text}"]
 
 
-def made_by() -> dict[str, object]:
-    """Return the content of the footer of every page."""
-    return {
-        "versions": versions(),
-        "made": f"{datetime.now(timezone.utc):%Y-%m-%d %H:%M} UTC",
-    }
+def now() -> str:
+    """Return the time at which a page is made, as text."""
+    return f"{datetime.now(timezone.utc):%Y-%m-%d %H:%M} UTC"
 
 
 def anchor(text: str) -> str:
@@ -159,6 +156,7 @@ def _templates() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters["verdict"] = verdict_sign
+    environment.globals |= {"style": style(), "program": f"yawbench {versions()['yawbench']}", "now": now}
     return environment
 
 

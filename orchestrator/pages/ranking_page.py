@@ -35,7 +35,7 @@ from ..figures.style import LabelledRun
 from ..files import write_whole
 from ..messages import changed, counted, listed
 from ..results.reader import Results, load_results
-from .page_parts import FigureImage, anchor, image_of, made_by, option_of, render, style
+from .page_parts import FigureImage, anchor, image_of, option_of, render
 from .sweep_view import DATA, tidy_sides
 from .viewer import Settings, View, assets, side_file, viewer_frame
 
@@ -91,9 +91,7 @@ def ranking_page(ranked: RankingResult, folder: Path, command: str, each: Each =
         entries=_entries(ranked),
         command=command,
         folder=str(folder),
-        style=style(),
         assets=assets("ranking.js"),
-        **made_by(),
     )
 
 

@@ -58,13 +58,11 @@ from .page_parts import (
     fmus_of,
     groups_of,
     image_of,
-    made_by,
     programs_of,
     render,
-    style,
 )
 from .sweep_view import DATA, sweep_view, write_sides
-from .viewer import MOST, PANELS, Settings, View, assets, viewer
+from .viewer import MOST, PANELS, Settings, View, answer_of, assets, viewer
 
 
 def chapter(
@@ -200,10 +198,17 @@ def conclusions(findings: ExperimentResult) -> list[dict[str, Any]]:
 
 
 def answer(findings: ExperimentResult) -> str:
-    """Return the verdicts in one sentence: how many claims (or checks) hold, and where they were judged."""
+    """Return the result in one sentence: how many claims (or checks) hold, and where they were judged.
+
+    Without claims and checks, what the named runs came to.
+    """
     kind, results = ("claims", findings.claims) if findings.claims else ("checks", findings.checks)
     if not results:
-        return ""
+        runs = findings.experiment.runs
+        named = [
+            LabelledRun(runs[name].label, run) for name, run in findings.results.items() if run.time.size
+        ]
+        return answer_of(named) if named else ""
     counts = [
         f"{count} {word if count == 1 else SEVERAL.get(word, word)}"
         for word, count in counts_of(results).items()
@@ -406,6 +411,5 @@ def report_page(chapters: Sequence[dict[str, Any]], ranking: str = "") -> str:
     sweeps = ["sweep.js"] if any(chapter["sweep"] for chapter in chapters) else []
     scripts = assets(*sweeps) if sweeps or any(chapter["viewer"] for chapter in chapters) else ""
     return render(
-        "report.html.j2", title=title, chapters=chapters, ranking=ranking, style=style(), assets=scripts,
-        **made_by(),
+        "report.html.j2", title=title, chapters=chapters, ranking=ranking, assets=scripts,
     )  # fmt: skip

@@ -38,7 +38,7 @@ from ..results.reader import FoundRun, found_runs, load_results
 from ..results.run_folder import RUN_FILE
 from ..scenario import find_and_load
 from .bench import Bench, Superseded, wanted_of
-from .page_parts import made_by, render, style
+from .page_parts import render
 from .viewer import page
 
 LARGEST = 500_000_000
@@ -196,7 +196,7 @@ class Request(BaseHTTPRequestHandler):
         runs = list(runs_below(folder))
         text = render(
             "results.html.j2", title=f"Results in {folder}", pages=pages, runs=runs,
-            scenarios=find_and_load.names("a scenario"), style=style(), assets="", **made_by(),
+            scenarios=find_and_load.names("a scenario"),
         )  # fmt: skip
         self._send_own(text)
 

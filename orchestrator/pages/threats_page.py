@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 
 from ..experiments.confidence import Bounds
 from ..experiments.tables import Table
@@ -22,7 +21,8 @@ from ..experiments.threat_scores import (
     score_table,
 )
 from ..experiments.threats import LANE_CHANGE, REFERENCE, LoadedThreats, SearchPlace, ThreatSpec
-from .page_parts import made_by, render, style
+from ..messages import counted
+from .page_parts import render
 from .report import PAGE, RANKING
 
 RULE = (
@@ -51,20 +51,44 @@ def scored(result: ThreatResult, setting: str = "") -> ScoreTable:
 
 
 def main_table(result: ThreatResult, table: ScoreTable) -> Table:
-    """Return the table of scores, the best first."""
+    """Return the table of scores, the best first; published entries are marked where others are not."""
     titles = titles_of(result)
+    published = result.published if any(one.entry not in result.published for one in table.scores) else ()
     rows = [
         [
-            str(one.place), titles[one.entry] + (" (published)" if one.entry in result.published else ""),
+            str(one.place), titles[one.entry] + (" (published)" if one.entry in published else ""),
             f"{one.score:.1f}", interval_text(one.bounds), f"{one.mean_rank:.1f}", str(one.by_rank),
         ]
         for one in table.scores
     ]  # fmt: skip
     return Table(
-        result.threats.spec.title,
+        f"Scores: {result.threats.spec.settings[result.threats.main].title}",
         ["place", "controller", "score", "95 % interval", "mean rank", "order by rank"],
         [*rows], [RULE, told_apart(table)], {0, 2, 4, 5},
     )  # fmt: skip
+
+
+def answer(result: ThreatResult, table: ScoreTable) -> str:
+    """Return the result in a sentence: who shares the first place, and how many pairs are told apart."""
+    titles = titles_of(result)
+    first = [titles[score.entry] for score in table.scores if score.place == 1]
+    who = (
+        f"{first[0]} is first"
+        if len(first) == 1
+        else f"{len(first)} share the first place, as their intervals overlap; {first[0]} has the best score"
+    )
+    return (
+        f"Of {counted(len(table.scores), 'controller')}, {who}. Of {table.pairs} pairs, {table.told_apart} "
+        "can be told apart."
+    )
+
+
+def _published(result: ThreatResult, order: Sequence[str]) -> str:
+    """Return a sentence on the entries with published levels; "" without any."""
+    titles = [titles_of(result)[entry] for entry in order if entry in result.published]
+    if len(titles) == len(order):
+        return "All levels are the published ones; none was searched in these runs."
+    return f"Published levels, not searched in these runs: {'; '.join(titles)}." if titles else ""
 
 
 def told_apart(table: ScoreTable) -> str:
@@ -343,9 +367,9 @@ def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command:
         source=threats.spec.source,
         notes=[*threats.spec.notes, *threats.ranking.edited],
         matrix=Path(os.path.relpath(matrix, folder)).as_posix() if matrix.is_file() else "",
-        published=[titles_of(result)[entry] for entry in order if entry in result.published],
+        answer=answer(result, table),
+        published=_published(result, order),
         main=main_table(result, table),
-        setting=threats.spec.settings[threats.main].title,
         levels=levels_table(result, order),
         orders=orders_table(result, order),
         settings=[setting_table(result, name) for name in others],
@@ -356,8 +380,5 @@ def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command:
         described=threats_table(result),
         command=command,
         folder=str(folder),
-        style=style(),
-        assets=Markup(""),
-        **made_by(),
     )
     return page

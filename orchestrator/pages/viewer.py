@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import distribution
 from importlib.resources import files
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +23,10 @@ from markupsafe import Markup
 
 from ..errors import ResultsError
 from ..figures.panels import spans_of
-from ..figures.style import LINES, LabelledRun, line_style, shown, shown_unit
+from ..figures.style import LINES, LabelledRun, digits_apart, line_style, shown, shown_unit
+from ..messages import listed
 from ..metrics.measures import words
-from ..metrics.run_metrics import columns_of, evaluate, metric, reference_of
+from ..metrics.run_metrics import MetricValue, columns_of, evaluate, metric, reference_of
 from ..results.reader import Results
 from .page_parts import render
 from .road import legend_of, notes_of, road_of
@@ -40,6 +42,8 @@ PANELS = ("sideslip", "yaw_rate", "acceleration_y", "yaw_moment", "steer_angle")
 """Signals shown first, with their references; chosen: what all four papers draw."""
 METRICS = ("peak(sideslip)", "peak(yaw_rate)", "peak(acceleration_y)", "peak(yaw_moment)")
 """Metrics in the table of runs, by default."""
+FEW = 4
+"""Runs that a page's sentence names each. Chosen: more are read better in the table of runs."""
 STILL = ("sideslip", "yaw_rate")
 """Signals whose largest value sets the cursor at first."""
 
@@ -224,9 +228,46 @@ def page(
         title=title or " and ".join(run.label for run in runs),
         below=below,
         changed=changed,
+        answer=answer_of(runs),
         assets=assets(),
         viewer=viewer(runs, settings, name="run", alone=True),
     )
+
+
+def answer_of(runs: Sequence[LabelledRun]) -> str:
+    """Return how runs ended and their largest sideslip angle, or else the first metric that all have.
+
+    A sentence; "" if they completed and share no metric.
+    """
+    parts = [
+        f"{run.label} failed at {shown(float(run.results.time[-1]), 's')}"
+        for run in runs
+        if run.results.record.status not in ("", "completed")
+    ]
+    parts += [f"{run.label}: {run.results.ended.rstrip('.')}" for run in runs if run.results.ended]
+    for name in METRICS:
+        values = [value for run in runs if (value := evaluate(run.results, metric(name)))]
+        if len(values) == len(runs):
+            parts.append(f"largest {words(metric(name).signal).lower()}: {_compared(runs, values)}")
+            break
+    sentence = "; ".join(parts)
+    return f"{sentence[:1].upper()}{sentence[1:]}." if sentence else ""
+
+
+def _compared(runs: Sequence[LabelledRun], values: Sequence[MetricValue]) -> str:
+    """Return the values of a metric with their runs; of many runs, the smallest and the largest."""
+    unit, numbers = values[0].unit, [value.number for value in values]
+    digits = digits_apart(pairwise(sorted(numbers)), unit)
+    texts = [
+        f"{shown(number, unit, digits=digits)} ({run.label})"
+        for number, run in zip(numbers, runs, strict=True)
+    ]
+    if len(texts) == 1:
+        return shown(numbers[0], unit)
+    if len(texts) <= FEW:
+        return listed(texts)
+    ends = (texts[numbers.index(pick(numbers))] for pick in (min, max))
+    return f"{' to '.join(ends)}, of {len(texts)} runs"
 
 
 def _static(folder: Any, name: str) -> str:

@@ -256,7 +256,7 @@ def test_an_entry_joins_the_published_levels_with_its_own_runs(tmp_path, capsys)
     assert status_of("rank", tmp_path / "threats.yaml", *options) == 0, capsys.readouterr().err
     scores = rows(tmp_path / "out" / "scores.csv")
     assert [one["entry"] for one in scores] == ["fuzzy_pid", "none"]
-    assert "published before" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "Published levels" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
 def test_conditions_are_refused_for_a_threat_file(tmp_path, capsys):

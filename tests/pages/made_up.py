@@ -1,4 +1,4 @@
-"""A made-up run with all that an animation can show."""
+"""A made-up run with all that an animation can show, and a scenario that runs in a moment."""
 
 from __future__ import annotations
 
@@ -13,6 +13,15 @@ from orchestrator.results.reader import Results
 from tests.orchestrator.recorded import car, noted, results
 from vocabulary.wheels import WHEELS
 
+HALF_A_CAR = """
+title: Half a car
+stop_time: 1
+step_size: 0.01
+inputs: {velocity_x: 20, friction: 0.7}
+units:
+  driver: {fmu: driver_sine, parameters: {frequency: 1, start_time: 0}}
+  reference: {fmu: reference_single_track}
+"""
 SIZES = {"cg_to_front_axle": 1.2, "cg_to_rear_axle": 1.5, "track_width": 1.6}
 MU = 0.5
 

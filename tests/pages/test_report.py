@@ -22,7 +22,7 @@ from tests.sentences import golden, golden_in, refused
 
 from .browser import DESK, PHONE
 from .flaws import flaws, inaccessible, open_all
-from .made_up import data_in
+from .made_up import HALF_A_CAR, data_in
 
 ROOT = Path(__file__).parents[2]
 UNITS = (
@@ -50,15 +50,6 @@ FIGURES = """
 figures:
   - {name: angles, runs: ["*"], panels: [steer_angle, yaw_rate_ref]}
 """
-SCENARIO = """
-title: Half a car
-stop_time: 1
-step_size: 0.01
-inputs: {velocity_x: 20, friction: 0.7}
-units:
-  driver: {fmu: driver_sine, parameters: {frequency: 1, start_time: 0}}
-  reference: {fmu: reference_single_track}
-"""
 
 
 @pytest.fixture
@@ -79,7 +70,7 @@ def half(tmp_path, monkeypatch):
     folder = tmp_path / "scenarios" / "half"
     folder.mkdir(parents=True)
     (folder / "study.yaml").write_text(HALF)
-    (folder / "half.yaml").write_text(SCENARIO)
+    (folder / "half.yaml").write_text(HALF_A_CAR)
     monkeypatch.chdir(tmp_path)
     return folder
 
@@ -240,14 +231,14 @@ def test_only_missing_or_stale_runs_are_made(report, half):
     text = (half / "study.yaml").read_text()
     (half / "study.yaml").write_text(text.replace("amplitude: [0.02, 0.05]", "amplitude: [0.02, 0.05, 0.1]"))
     assert golden_in(report()[1])
-    (half / "half.yaml").write_text(SCENARIO.replace("velocity_x: 20", "velocity_x: 25"))
+    (half / "half.yaml").write_text(HALF_A_CAR.replace("velocity_x: 20", "velocity_x: 25"))
     assert ": 3 runs\n" in report()[1]
     assert ": 3 runs\n" in report("--again")[1]
 
 
 def test_stale_results_are_shown_as_such_where_nothing_may_run(report, half):
     report()
-    (half / "half.yaml").write_text(SCENARIO.replace("velocity_x: 20", "velocity_x: 25"))
+    (half / "half.yaml").write_text(HALF_A_CAR.replace("velocity_x: 20", "velocity_x: 25"))
     assert report("--no-run")[0] == 0
     tree = html.fromstring(Path("results/half/study/report.html").read_text(encoding="utf-8"))
     assert golden_in(texts(tree, ".verdict.bad"))
@@ -256,7 +247,7 @@ def test_stale_results_are_shown_as_such_where_nothing_may_run(report, half):
 
 def test_an_edit_after_the_run_does_not_change_where_the_page_says_that_values_come_from(report, half):
     file = half / "half.yaml"
-    file.write_text(SCENARIO.replace("friction: 0.7}", "friction: 0.7}  # paper A, table 1"))
+    file.write_text(HALF_A_CAR.replace("friction: 0.7}", "friction: 0.7}  # paper A, table 1"))
     report()
 
     def parameters():
@@ -265,10 +256,10 @@ def test_an_edit_after_the_run_does_not_change_where_the_page_says_that_values_c
 
     before = parameters()
     assert any("paper A, table 1" in row for row in before)
-    file.write_text(SCENARIO.replace("friction: 0.7}", "friction: 0.7}  # chosen: a guess"))
+    file.write_text(HALF_A_CAR.replace("friction: 0.7}", "friction: 0.7}  # chosen: a guess"))
     assert report()[0] == 0
     assert parameters() == before
-    file.write_text(SCENARIO.replace("velocity_x: 20, friction: 0.7", "velocity_x: 25, friction: 0.5"))
+    file.write_text(HALF_A_CAR.replace("velocity_x: 20, friction: 0.7", "velocity_x: 25, friction: 0.5"))
     assert report("--no-run")[0] == 0
     assert parameters() == before
 

@@ -15,18 +15,10 @@ from orchestrator.results.reader import load_results
 
 from .browser import DESK, PHONE, Browser
 from .flaws import inaccessible
+from .made_up import HALF_A_CAR
 
 UNITS = ("driver_sine", "reference_single_track")
 
-SCENARIO = """
-title: Half a car
-stop_time: 1
-step_size: 0.01
-inputs: {velocity_x: 20, friction: 0.7}
-units:
-  driver: {fmu: driver_sine, parameters: {frequency: 1, start_time: 0}}
-  reference: {fmu: reference_single_track}
-"""
 SWEEP = """
 title: How far may it be steered?
 scenario: half.yaml
@@ -48,7 +40,7 @@ MOST_ELEMENTS = 2000
 def sweep(tmp_path_factory, fmus):
     """The page of a sweep of 40 runs, its folder and the rows of its table."""
     folder = tmp_path_factory.mktemp("sweep")
-    (folder / "half.yaml").write_text(SCENARIO)
+    (folder / "half.yaml").write_text(HALF_A_CAR)
     (folder / "sweep.yaml").write_text(SWEEP)
     with pytest.raises(SystemExit) as ended:
         main(["sweep", str(folder / "sweep.yaml"), "--out", str(folder / "out"), "--fmus", str(fmus)])
@@ -101,7 +93,7 @@ def test_no_label_touches_another(chromium, sweep, width):
 
 @pytest.mark.exhaustive  # a minute
 def test_the_page_of_two_thousand_runs_keeps_its_budgets(chromium, tmp_path, fmus):
-    (tmp_path / "half.yaml").write_text(SCENARIO)
+    (tmp_path / "half.yaml").write_text(HALF_A_CAR)
     large = SWEEP.replace("count: 4", "count: 100").replace("count: 5", "count: 10")
     (tmp_path / "large.yaml").write_text(large)
     with pytest.raises(SystemExit) as ended:

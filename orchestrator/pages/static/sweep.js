@@ -416,6 +416,9 @@ class Sweep {
     addEventListener('hashchange', () => { if (this.restore()) { this.refresh(); this.show(); } });
     new ResizeObserver(() => { if (this.root.clientWidth !== this.wide) { this.wide = this.root.clientWidth; this.draw(); } }).observe(this.root);
     this.wide = this.root.clientWidth;
+    for (const [event, printing] of [['beforeprint', true], ['afterprint', false]]) {
+      addEventListener(event, () => { this.root.classList.toggle('ys-print', printing); this.draw(); });
+    }
   }
 
   soon() {

@@ -57,7 +57,7 @@ class Viewer {
     this.observer.observe(root);
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.refresh(), {signal});
     addEventListener('beforeprint', () => this.print(), {signal});
-    addEventListener('afterprint', () => this.refresh(), {signal});
+    addEventListener('afterprint', () => this.print(false), {signal});
     root.classList.add('yv-ready');
   }
 
@@ -114,13 +114,6 @@ class Viewer {
       view: 0, ...this.viewed(0), span: null, time: this.data.still,
       difference: false, tolerance: 0, camera: 'cars', offsets: {},
     };
-  }
-
-  // Level of the panels' headings: one below the last heading before the viewer.
-  get level() {
-    const before = [...document.querySelectorAll('h1, h2, h3, h4, h5')]
-      .filter((one) => !one.closest('.yv') && one.compareDocumentPosition(this.root) & Node.DOCUMENT_POSITION_FOLLOWING);
-    return before.length ? Number(before.at(-1).tagName[1]) + 1 : 2;
   }
 
   // Runs, baseline and panels of a view.
@@ -360,12 +353,14 @@ class Viewer {
   }
 
   resized() {
+    if (this.root.classList.contains('yv-print')) return;
     if (this.root.clientWidth !== this.wide) this.redraw(); else if (this.road) this.road.draw();
   }
 
-  print() {
-    this.refresh(PAPER);
-    if (this.road) this.road.draw(PAPER);
+  print(printing = true) {
+    this.root.classList.toggle('yv-print', printing);
+    this.refresh(printing ? PAPER : undefined);
+    if (this.road && printing) this.road.draw(PAPER);
   }
 
   drawTable() {
