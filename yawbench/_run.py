@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def measured(file: str | Path, segment: int | None = None) -> Run:
+def measured(file: str | Path, segment: int | None = None, *, start: float = 0.0) -> Run:
     """Return a recording of a car as a run: `metric`, `plot`, `evaluate`, `view` take it like one.
 
         >>> laps = yb.measured("measured.yaml", segment=2)  # doctest: +SKIP
@@ -37,6 +37,7 @@ def measured(file: str | Path, segment: int | None = None) -> Run:
     Args:
         file: the measurement file.
         segment: its number, counted from 1, if the file has several.
+        start: time of the recording [s] that becomes 0, to lie beside a run that begins there.
 
     Raises:
         ScenarioError: the file, or a recording that it names, cannot be used.
@@ -44,7 +45,8 @@ def measured(file: str | Path, segment: int | None = None) -> Run:
     """
     path = arguments.path(file, "file")
     number = None if segment is None else arguments.count(segment, "segment", least=1, most=10**6)
-    return Run(measured_results(path if number is None else Path(f"{path}#{number}")))
+    begin = arguments.number(start, "start")
+    return Run(measured_results(path if number is None else Path(f"{path}#{number}"), begin))
 
 
 class Run:

@@ -11,11 +11,14 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from .options import CHANGES, MAKING, RunOptions, takes
+
+if TYPE_CHECKING:
+    from ..results.reader import Results
 
 RunSources = Annotated[
     list[Path],
@@ -117,6 +120,63 @@ def folder_of_all(folders: Sequence[Path]) -> Path:
     return Path(os.path.commonpath([folder.absolute().parent for folder in folders]))
 
 
+MeasuredRuns = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--measured",
+        metavar="FILE",
+        help="Measurement file, FILE#2 for its second segment: overlaid, dashed; its filter acts on the runs "
+        "too. Repeatable.",
+    ),
+]
+MeasuredFrom = Annotated[
+    str,
+    typer.Option("--from", metavar="TIME", help="Time of the measurements at which the runs begin: '12 s'."),
+]
+
+
+def start_of(begin: str) -> float:
+    """Return the time [s] that `--from` gives.
+
+    Raises:
+        ScenarioError: it is malformed.
+    """
+    from ..errors import ScenarioError
+    from ..scenario.quantities import convert
+
+    try:
+        return float(convert(begin, "s"))
+    except ValueError as error:
+        raise ScenarioError(f"--from: {error}", code="option-invalid") from None
+
+
+def with_segments(folders: Sequence[Path], measured: Sequence[Path] | None) -> list[Path]:
+    """Return folders of runs, and the segments of measurement files.
+
+    Raises:
+        ResultsError: a file does not exist.
+    """
+    from ..results.measured import segments_of
+
+    return [*folders, *(segment for file in measured or () for segment in segments_of(file))]
+
+
+def read_runs(places: Sequence[Path], start: float, *, thin: bool = False) -> list[Results]:
+    """Return runs and measurements, the former filtered like the latter.
+
+    Args:
+        places: folders of runs, and measurement files, which begin at `start` [s].
+        thin: see `load_results`; not beside a measurement, whose filter needs all rows.
+
+    Raises:
+        ResultsError, ScenarioError: one of them cannot be read.
+    """
+    from ..results.measured import filtered_alike, is_measurement, load_run
+
+    thin = thin and not any(map(is_measurement, places))
+    return filtered_alike([load_run(place, thin=thin, start=start) for place in places])
+
+
 Panels = Annotated[
     list[str] | None,
     typer.Option(
@@ -179,6 +239,8 @@ def plot(
     options: RunOptions,
     label: Labels = None,
     panel: Panels = None,
+    measured: MeasuredRuns = None,
+    begin: MeasuredFrom = "0 s",
     page: AsPage = False,
     format: FileFormat = None,
     size: Size = None,
@@ -198,21 +260,21 @@ def plot(
     from ..figures.panels import check_panels, shown_by
     from ..figures.plots import OVERVIEW, draw
     from ..figures.style import KINDS, LabelledRun, save
-    from ..results.measured import load_run
     from .progress import say
 
     settings = _settings(style, size)
     file = options.out if options.out and options.out.suffix[1:] in KINDS and not page else None
-    folders = recorded(sources, options)
+    start = start_of(begin)
+    folders = with_segments(recorded(sources, options), measured)
     labels = labels_of(folders, label)
     if page:
         out = options.out
-        write_view(
-            folders, labels, panel or (), out if out is None or out.suffix == ".html" else out / "view.html"
-        )
+        page_file = out if out is None or out.suffix == ".html" else out / "view.html"
+        write_view(folders, labels, panel or (), page_file, start)
         return
     runs = [
-        LabelledRun(name, load_run(folder, thin=True)) for name, folder in zip(labels, folders, strict=True)
+        LabelledRun(name, results)
+        for name, results in zip(labels, read_runs(folders, start, thin=True), strict=True)
     ]
     check_panels(runs, panel or ())
     figures: dict[str, Sequence[str]] = {"overview": panel or OVERVIEW}
@@ -232,7 +294,14 @@ Page = Annotated[Path | None, typer.Option("--out", metavar="FILE.html", help="P
 
 
 @takes(*CHANGES, "fmus", "no_build")
-def animate(sources: RunSources, options: RunOptions, label: Labels = None, out: Page = None) -> None:
+def animate(
+    sources: RunSources,
+    options: RunOptions,
+    label: Labels = None,
+    measured: MeasuredRuns = None,
+    begin: MeasuredFrom = "0 s",
+    out: Page = None,
+) -> None:
     """Write an interactive page of runs, like `plot --page`.
 
     Shows all recorded signals with a common cursor, zoom and differences from a baseline, and animates
@@ -240,12 +309,17 @@ def animate(sources: RunSources, options: RunOptions, label: Labels = None, out:
     results are missing or out of date. Without --out, the page of one run is view.html in its folder,
     that of several goes to their common parent folder.
     """
-    folders = recorded(sources, options)
-    write_view(folders, labels_of(folders, label), (), out)
+    start = start_of(begin)
+    folders = with_segments(recorded(sources, options), measured)
+    write_view(folders, labels_of(folders, label), (), out, start)
 
 
 def write_view(
-    folders: Sequence[Path], labels: Sequence[str], panels: Sequence[str], out: Path | None
+    folders: Sequence[Path],
+    labels: Sequence[str],
+    panels: Sequence[str],
+    out: Path | None,
+    start: float = 0.0,
 ) -> None:
     """Write the page of a viewer.
 
@@ -254,6 +328,7 @@ def write_view(
         labels: of the runs.
         panels: signals shown at first; none: those that the papers draw.
         out: the page; default: view.html in the folder of the run, or in that of all runs.
+        start: time of measurements [s] at which the runs begin.
 
     Raises:
         ResultsError: a run cannot be read, or the page cannot be written.
@@ -263,10 +338,10 @@ def write_view(
     from ..files import write_whole
     from ..messages import changed_each
     from ..pages.viewer import SETTINGS, Settings, View, page
-    from ..results.measured import load_run
     from .progress import say
 
-    runs = [LabelledRun(name, load_run(folder)) for name, folder in zip(labels, folders, strict=True)]
+    read = read_runs(folders, start)
+    runs = [LabelledRun(name, results) for name, results in zip(labels, read, strict=True)]
     titles = [run.results.record.title or run.label for run in runs]
     changed = changed_each([(run.label, run.results.record.overrides) for run in runs])
     settings = Settings((View(panels=panels),)) if panels else SETTINGS

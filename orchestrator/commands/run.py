@@ -17,6 +17,7 @@ from ..messages import hint, listed, printable
 from .experiments import chapter_of, command_of, conduct, write_page
 from .options import CHANGES, MAKING, RunOptions, ScenarioFile, plan_of_scenario, takes
 from .progress import hold, pooled, print_tables, say
+from .results import MeasuredFrom
 
 if TYPE_CHECKING:
     from ..errors import Diagnostic
@@ -276,22 +277,21 @@ def converge(
         raise typer.Exit(1)
 
 
-One = Annotated[Path, typer.Argument(help="Results folder.", metavar="RUN")]
-Other = Annotated[Path, typer.Argument(help="Results folder to compare it with.", metavar="RUN")]
+One = Annotated[Path, typer.Argument(help="Results folder, or measurement file.", metavar="RUN")]
+Other = Annotated[Path, typer.Argument(help="What to compare it with, likewise.", metavar="RUN")]
 
 
-def diff(one: One, other: Other) -> None:
+def diff(one: One, other: Other, begin: MeasuredFrom = "0 s") -> None:
     """Show what differs between two runs.
 
     First the inputs: scenario, parameters, FMUs, connections, program versions. Then the results, signal
     by signal: when they start to differ, when the difference becomes visible (1 % of the signal's
-    largest value), and the largest difference.
+    largest value), and the largest difference. The filter of a measurement acts on the other run, too.
     """
     from ..pages.comparison import differences, differences_table, divergence, partings_table
-    from ..results.measured import load_run
-    from .results import distinct
+    from .results import distinct, read_runs, start_of
 
-    first, second = load_run(one), load_run(other)
+    first, second = read_runs([one, other], start_of(begin))
     inputs, parted = differences(first.record, second.record), divergence(first, second)
     if inputs:
         print_tables([differences_table(inputs, *distinct([one, other]))])

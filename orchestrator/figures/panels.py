@@ -34,6 +34,7 @@ from .style import (
     literal,
     note_above,
     shown_unit,
+    style_of_run,
 )
 
 if TYPE_CHECKING:
@@ -208,7 +209,7 @@ def _draw_signal(axes: Axes, runs: Sequence[LabelledRun], name: str, whole: bool
     unit = ""
     for number, run, column, _ in lines:
         unit = run.results.units[column]
-        _line(axes, run.results.time, run.results[column], unit, line_style(number))
+        _line(axes, run.results.time, run.results[column], unit, style_of_run(number, run.results))
     _finish(axes, name, unit)
     if references and not whole:
         peaks = [(run.label, _peak(run.results[column])) for _, run, column, _ in lines]
@@ -237,7 +238,7 @@ def _draw_error(axes: Axes, runs: Sequence[LabelledRun], signal: str, whole: boo
     for number, run in enumerate(runs):
         error = _error(run, signal)
         if error is not None:
-            _line(axes, run.results.time, error, "%", line_style(number))
+            _line(axes, run.results.time, error, "%", style_of_run(number, run.results))
             peaks.append((run.label, _peak(error)))
     _finish(axes, signal, "", f", error in % of max|{in_formula(signal + '_ref')}|")
     if not whole:
@@ -282,7 +283,7 @@ def draw_path(axes: Axes, runs: Sequence[LabelledRun], *, room: float = PATH_ROO
     drawn = [(k, run.results, c) for k, run in enumerate(runs) if (c := _path_columns(run))]
     for number, results, (x, y) in drawn:
         keep = spread_rows(results, POINTS)
-        axes.plot(results[x][keep], results[y][keep], **line_style(number))
+        axes.plot(results[x][keep], results[y][keep], **style_of_run(number, results))
         axes.plot(results[x][-1:], results[y][-1:], "o", ms=3.5, color=line_style(number)["color"])
     length = _span([results[x] for _, results, (x, _) in drawn])
     breadth = _span([results[y] for _, results, (_, y) in drawn])

@@ -20,10 +20,10 @@ from .style import (
     LabelledRun,
     digits_of,
     frame,
-    line_style,
     new_figure,
     own_size,
     reference_words,
+    style_of_run,
 )
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def _pair(left: Panel, right: Panel) -> bool:
 
 def legend_of(runs: Sequence[LabelledRun], drawn: Iterable[Axes]) -> list[tuple[str, dict[str, Any]]]:
     """Return labels and line styles of a legend: runs if there are several, reference lines, fault spans."""
-    styles = [(run.label, line_style(k)) for k, run in enumerate(runs) if len(runs) > 1]
+    styles = [(run.label, style_of_run(k, run.results)) for k, run in enumerate(runs) if len(runs) > 1]
     if label := reference_words(line for axes in drawn for line in axes.get_lines()):
         styles.append((label, REFERENCE))
     return styles + [(label, SPAN) for label in in_legend(spans_of(runs))]

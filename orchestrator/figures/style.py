@@ -22,6 +22,7 @@ from ..errors import ResultsError
 from ..files import reason, write_whole
 from ..messages import cut, printable
 from ..metrics.measures import si_of, symbol, variable_of
+from ..results.measured import MeasuredResults
 from ..results.reader import Results
 
 if TYPE_CHECKING:
@@ -42,6 +43,8 @@ LINES: tuple[dict[str, Any], ...] = (
 )
 """One style per run: Okabe and Ito's colours, and a dash pattern that survives grey print."""
 
+MEASURED_LINE = (0, (3.5, 1.5))
+"""Dash pattern of measured runs."""
 REFERENCE: dict[str, Any] = {"color": "#B8B8B8", "linestyle": "-", "linewidth": 5.0, "solid_capstyle": "butt"}
 """Line style of references: wide and pale, so that a run that follows its reference is visible on it."""
 
@@ -120,6 +123,12 @@ def line_style(number: int) -> dict[str, Any]:
             cycle = list(rcParams["axes.prop_cycle"])
             style |= cycle[number % len(cycle)]
     return style
+
+
+def style_of_run(number: int, results: Results) -> dict[str, Any]:
+    """Return the line style of a run by its number; that of a measurement is dashed."""
+    style = line_style(number)
+    return style | {"linestyle": MEASURED_LINE} if isinstance(results, MeasuredResults) else style
 
 
 def _own() -> Any:

@@ -23,10 +23,11 @@ from markupsafe import Markup
 
 from ..errors import ResultsError
 from ..figures.panels import spans_of
-from ..figures.style import LINES, LabelledRun, digits_apart, line_style, shown, shown_unit
+from ..figures.style import LINES, MEASURED_LINE, LabelledRun, digits_apart, line_style, shown, shown_unit
 from ..messages import listed
 from ..metrics.measures import words
 from ..metrics.run_metrics import MetricValue, columns_of, evaluate, metric, reference_of
+from ..results.measured import MeasuredResults
 from ..results.reader import Results
 from .page_parts import render
 from .road import legend_of, notes_of, road_of
@@ -184,6 +185,7 @@ def _carried(
                 "notes": notes_of(run.results, road),
                 "road": road,
                 "ghost": number in settings.ghosts,
+                **({"dash": MEASURED_LINE[1]} if isinstance(run.results, MeasuredResults) else {}),
                 **block.header,
             }
             for number, (run, road, block) in enumerate(zip(runs, roads, packed, strict=True))

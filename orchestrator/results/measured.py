@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from ..errors import ResultsError
 from ..measured.measurement import ENDINGS, MEASURABLE, load_measurement
+from ..measured.segment import LowPass, even_grid
 from .reader import Results, load_results
 from .run_folder import COMPLETED
 from .run_record import DiagnosticRecord, FmuRecord, RunRecord
@@ -17,18 +22,26 @@ MEASURED = "measured"
 """Name of the FMU in the record of a measurement."""
 
 
-def load_run(path: Path | str, *, thin: bool = False) -> Results:
+@dataclass(frozen=True)
+class MeasuredResults(Results):
+    """A segment of a measurement as the results of a run; `low_pass`: the filter it has passed."""
+
+    low_pass: LowPass | None = None
+
+
+def load_run(path: Path | str, *, thin: bool = False, start: float = 0.0) -> Results:
     """Read a recorded run: a results folder, a measurement file, or a segment of it, `measured.yaml#2`.
 
     Args:
         path: the folder or the file.
         thin: see `load_results`.
+        start: time of a measurement [s] that becomes 0.
 
     Raises:
         ResultsError, ScenarioError: it cannot be read.
     """
     path = Path(path)
-    return measured_results(path) if is_measurement(path) else load_results(path, thin=thin)
+    return measured_results(path, start) if is_measurement(path) else load_results(path, thin=thin)
 
 
 def is_measurement(path: Path) -> bool:
@@ -55,7 +68,34 @@ def segments_of(path: Path) -> list[Path]:
     return [Path(f"{path}#{k}") for k in range(1, count + 1)] if count > 1 else [path]
 
 
-def measured_results(path: Path) -> Results:
+def filtered_alike(runs: Sequence[Results]) -> list[Results]:
+    """Return runs, the simulated ones filtered by the low pass of the measured one among them.
+
+    Only signals that are measured are filtered. Without a measured run, all are returned unchanged.
+    """
+    measured = next((run for run in runs if isinstance(run, MeasuredResults) and run.low_pass), None)
+    if measured is None or measured.low_pass is None:
+        return list(runs)
+    wanted = {name.variable for name in measured.names.values()}
+    low_pass = measured.low_pass
+    return [run if isinstance(run, MeasuredResults) else _filtered(run, low_pass, wanted) for run in runs]
+
+
+def _filtered(run: Results, low_pass: LowPass, wanted: set[str]) -> Results:
+    """Return a run whose wanted variables have passed a low pass."""
+    grid = even_grid(run.time)
+    rate = 1.0 / float(grid[1] - grid[0]) if grid.size > 1 else 0.0
+    if grid.size < 2 or not rate > 2.0 * low_pass.cut_off:
+        return run
+    columns = dict(run.columns)
+    for column, name in run.names.items():
+        if name.variable in wanted and np.issubdtype(columns[column].dtype, np.floating):
+            smooth = low_pass(np.interp(grid, run.time, columns[column]), rate)
+            columns[column] = np.interp(run.time, grid, smooth)
+    return replace(run, columns=columns)
+
+
+def measured_results(path: Path, start: float = 0.0) -> MeasuredResults:
     """Return a segment of a measurement as the results of a run.
 
     Steering belongs to the instance `driver` there, all other signals to `plant`, so that they meet those of
@@ -63,6 +103,7 @@ def measured_results(path: Path) -> Results:
 
     Args:
         path: the measurement file, with `#` and the number of the segment if it has several.
+        start: its time [s] that becomes 0, as runs begin there.
 
     Raises:
         ScenarioError: it cannot be used.
@@ -83,8 +124,8 @@ def measured_results(path: Path) -> Results:
         status=COMPLETED,
         title=f"{measurement.title}, {segment.name}" if len(measurement.segments) > 1 else measurement.title,
         rows=segment.time.size,
-        start_time=float(segment.time[0]),
-        stop_time=float(segment.time[-1]),
+        start_time=float(segment.time[0]) - start,
+        stop_time=float(segment.time[-1]) - start,
         units=dict(units),
         fmus={
             role: FmuRecord(name=MEASURED, role=role, sha256=measurement.sha256, parameters=known)
@@ -94,4 +135,4 @@ def measured_results(path: Path) -> Results:
         diagnostics=[DiagnosticRecord.of(one) for one in measurement.notes],
         results="",
     )
-    return Results(path, segment.time, columns, units, record)
+    return MeasuredResults(path, segment.time - start, columns, units, record, measurement.filter)

@@ -192,7 +192,7 @@ class Viewer {
     return run.ghost ? colour + (colour.length === 4 ? '7' : '73') : colour; // a hexadecimal alpha
   }
 
-  dash(run) { return this.data.dashes[this.style(run)]; }
+  dash(run) { return run.dash || this.data.dashes[this.style(run)]; }
 
   meaning(name) {
     const [one, other] = name.split(' - ').map((part) => this.data.signals[part]);
