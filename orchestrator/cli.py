@@ -12,12 +12,13 @@ import sys
 import threading
 import traceback
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
+from .commands import output
 from .errors import Diagnostic, Interrupted, RecordWarning, YawbenchError
 from .interrupts import terminable
 from .messages import cut, printable
@@ -59,11 +60,11 @@ class _Commands(TyperGroup):
     """The command group. It reports interruptions itself, because typer treats SIGTERM like Ctrl-C."""
 
     def make_context(self, *args: Any, **options: Any) -> Any:
-        with _interruptible():
+        with _interruptible(), _usage_noted():
             return super().make_context(*args, **options)
 
     def invoke(self, context: Any) -> Any:
-        with _interruptible():
+        with _interruptible(), _usage_noted():
             return super().invoke(context)
 
 
@@ -80,6 +81,17 @@ def _interruptible() -> Iterator[None]:
         _print_traceback(error)
         _print_errors(interrupted.diagnostics)
         raise SystemExit(interrupted.exit_status) from None
+
+
+@contextlib.contextmanager
+def _usage_noted() -> Iterator[None]:
+    """Note errors of usage, which typer prints itself."""
+    try:
+        yield
+    except Exception as error:
+        if message := getattr(error, "format_message", None):
+            output.note([Diagnostic("option-invalid", message())])
+        raise
 
 
 def _interruption_in(error: BaseException | None) -> KeyboardInterrupt | None:
@@ -102,7 +114,8 @@ def _application(arguments: Sequence[str] = ()) -> typer.Typer:
     app.callback()(_options)
     for name in called:
         module = importlib.import_module(f".commands.{COMMANDS[name]}", __package__)
-        app.command(name)(getattr(module, name.replace("-", "_")))
+        command = getattr(module, name.replace("-", "_"))
+        app.command(name)(output.with_forms(command) if name in output.COMMANDS else command)
     return app
 
 
@@ -135,8 +148,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     _make_printable()
     if not os.environ.get(TRACEBACK):  # ignore errors raised in destructors of libraries
         sys.unraisablehook = lambda _: None
-    with terminable():
+    with terminable(), output.printing(sys.argv[1:] if arguments is None else arguments) as printed:
         status = _status(sys.argv[1:] if arguments is None else arguments)
+    status = _status_of_printing(printed, status)
     if arguments is None and threading.active_count() == 1:
         # Interpreter shutdown costs as much as a short command: skip it.
         atexit._run_exitfuncs()
@@ -169,13 +183,25 @@ def _status(arguments: Sequence[str]) -> int:
     except OSError as error:  # a figure or table that cannot be written, most likely
         _print_traceback(error)
         where = f"{error.filename}: " if error.filename else ""
-        print(printable(f"{where}{error.strerror or error}"), file=sys.stderr)
+        _print_errors([Diagnostic("results-unwritable", f"{where}{error.strerror or error}")])
     except Exception as error:
         shown = _print_traceback(error)
-        print(_own_error(error, shown), file=sys.stderr)
+        _print_errors([Diagnostic(YawbenchError.default_code, _own_error(error, shown))])
     else:
         return 0
     return 1
+
+
+def _status_of_printing(printed: output.Output, status: int) -> int:
+    """Print what a command has collected for standard output; return the exit status."""
+    try:
+        printed.print(status)
+    except BrokenPipeError:
+        return 1
+    except OSError as error:
+        _print_errors([Diagnostic("results-unwritable", error.strerror or str(error))])
+        return 1
+    return status
 
 
 @contextlib.contextmanager
@@ -201,7 +227,8 @@ TRACEBACK = "YAWBENCH_TRACEBACK"
 """Environment variable; if it is set, errors are printed with their tracebacks."""
 
 
-def _print_errors(diagnostics: Iterable[Diagnostic]) -> None:
+def _print_errors(diagnostics: Sequence[Diagnostic]) -> None:
+    output.note(diagnostics)
     for diagnostic in diagnostics:
         print(cut(str(diagnostic), LONGEST_MESSAGE), file=sys.stderr)
 

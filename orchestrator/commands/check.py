@@ -13,8 +13,9 @@ from vocabulary.wheels import WHEELS, wheels
 
 from ..messages import counted, cut, printable
 from ..plan import DEFAULT, ValueOrigin
+from . import output
 from .options import CHANGES, RunOptions, ScenarioFile, plan_of_scenario, takes
-from .progress import say
+from .progress import print_tables, say
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -39,11 +40,30 @@ def check(scenario: ScenarioFile, options: RunOptions, all_: All = False) -> Non
     """
     plan = plan_of_scenario(scenario, options)
     show(plan, scenario, defaults=all_)
+    output.note(plan.diagnostics)
+    output.answer(plan=_data_of(plan))
     for diagnostic in plan.diagnostics:
         say(f"note: {diagnostic}")
     for unit in plan.instances:
         for violation in unit.fmu.violations():
             say(f"warning: {unit.name}: {violation}")
+
+
+PLANNED = (
+    "title", "algorithm", "step_size", "start_time", "stop_time", "evaluation_order", "units", "fmus",
+    "connections", "faults", "changes", "scenario",
+)  # fmt: skip
+"""What run.json says of the plan, beside what came of it."""
+
+
+def _data_of(plan: Plan) -> dict[str, object]:
+    """Return a plan as run.json describes it."""
+    from datetime import datetime, timezone
+
+    from ..results.freshness import run_record
+
+    record = run_record(plan, status="planned", started=datetime.now(timezone.utc)).content()
+    return {key: record[key] for key in PLANNED if key in record}
 
 
 def show(plan: Plan, scenario: Path, *, defaults: bool = False) -> None:
@@ -54,7 +74,7 @@ def show(plan: Plan, scenario: Path, *, defaults: bool = False) -> None:
     console = Console(highlight=False, markup=False, emoji=False, width=width)
     with console.capture() as capture:
         _print(plan, scenario, console, defaults)
-    for line in capture.get().splitlines():
+    for line in capture.get().splitlines() if output.form() == "text" else ():
         print(line.rstrip())
 
 
@@ -106,10 +126,16 @@ def _print(plan: Plan, scenario: Path, console: Console, defaults: bool) -> None
 
 
 def _show(console: Console, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    from rich.padding import Padding
-    from rich.table import Table
+    if output.form() != "text":
+        from ..experiments.tables import Table
 
-    table = Table(*columns, box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
+        table_of_rows = Table(title, columns, map(tuple, rows))
+        print_tables([table_of_rows] if table_of_rows.rows else [])
+        return
+    from rich.padding import Padding
+    from rich.table import Table as Grid
+
+    table = Grid(*columns, box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
     for column in table.columns[:-1]:
         column.no_wrap = True
     table.columns[-1].overflow = "fold"  # names are never cut
@@ -252,10 +278,10 @@ def _wire_rows(plan: Plan) -> Iterable[tuple[str, str, str, str]]:
     for (source, target), wires in _grouped(((w.source, w.target), w) for w in plan.wires).items():
         shown = []
         examples = {name: w for w in reversed(wires) for name in (w.input, star(w.input))}
-        for output, name in fold_wires([(w.output, w.input) for w in wires]):
+        for given, name in fold_wires([(w.output, w.input) for w in wires]):
             example = examples[name]
             of, measure = units[source][example.output].unit, units[target][example.input].unit
-            ends = output if output == name else f"{output} → {name}"
+            ends = given if given == name else f"{given} → {name}"
             if example.converts:
                 measure = f"{of or '?'} → {measure or '?'}: {_scaled(example)}"
             shown.append(f"{ends} [{measure}]" if measure else ends)

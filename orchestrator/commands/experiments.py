@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..messages import counted, listed
+from . import output
 from .options import CHANGES, MAKING, RunOptions, named, takes
 from .progress import executor_of, hold, pooled, print_tables, say, say_failed, stoppable
 
@@ -70,6 +71,18 @@ def concluded(experiment: LoadedExperiment, execute: Executor, options: RunOptio
         say(problem)
     say_problems(findings)
     return findings
+
+
+def data_of(findings: ExperimentResult, folder: Path) -> dict[str, Any]:
+    """Return an experiment's result for programs: how many runs there are, which failed, and its record."""
+    from ..experiments.record import record_of
+
+    runs = {
+        "runs": len(findings.records),
+        "missing": findings.not_made,
+        "failed": {str(words): str(why) for words, why in findings.failed.items()},
+    }
+    return {"folder": folder, **runs, "record": record_of(findings)}
 
 
 def say_problems(findings: ExperimentResult) -> None:
@@ -165,6 +178,7 @@ def write_page(chapters: Sequence[dict[str, Any]], folder: Path) -> None:
     page = folder / PAGE
     ranking = Path(os.path.relpath(RANKING, folder)).as_posix() if RANKING.is_file() else ""
     write_whole(page, report_page(chapters, ranking))
+    output.answer(page=page)
     say(f"The page: {page} ({page.stat().st_size / 1e6:.1f} MB)")
 
 
@@ -205,7 +219,7 @@ def of_files(context: typer.Context, files: Sequence[Path], options: RunOptions)
             )
     hold(context, *folders)
     each = pooled(context, options)
-    chapters, failed = [], False
+    chapters, conducted, failed = [], [], False
     for experiment, folder in zip(experiments, folders, strict=True):
         findings = conduct(experiment, folder, options, each)
         command = command_of(
@@ -215,6 +229,7 @@ def of_files(context: typer.Context, files: Sequence[Path], options: RunOptions)
             **options.changing,
         )
         chapters.append(chapter_of(findings, folder, command, shown_in=page, each=each))
+        conducted.append(data_of(findings, folder))
         failed = failed or bool(findings.failed) or bool(findings.not_made)
         if len(files) == 1:
             print_tables(all_tables(findings))
@@ -222,6 +237,7 @@ def of_files(context: typer.Context, files: Sequence[Path], options: RunOptions)
             where = reach(findings)
             say(f"{experiment.spec.title}: {verdicts}" + f" ({where})" * bool(where))
     write_page(chapters, page)
+    output.answer(experiments=conducted)
     if failed:
         raise typer.Exit(1)
 
@@ -346,3 +362,4 @@ def tune(context: typer.Context, file: TuningFile, options: RunOptions, seed: Tu
     charts = [image_of(folder / "history.svg", experiment.spec.title)]
     facts: dict[str, Any] = {"results": [table], "charts": charts}
     write_page([chapter_of(findings, folder, command, shown_in=folder, **facts)], folder)
+    output.answer(experiments=[data_of(findings, folder)])

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from . import output
 from .options import CHANGES, MAKING, RunOptions, takes
 from .progress import hold, print_tables, say, stoppable
 
@@ -51,6 +52,12 @@ def measured(action: MeasuredAction, file: MeasurementFile) -> None:
             for one in measurement.segments
         ]
         print_tables([Table("Segments", ["segment", "from [s]", "to [s]", "rate [Hz]", "signals"], rows)])
+    output.answer(
+        flaws=[
+            {"kind": flaw.kind, "signal": flaw.signal, "value": flaw.value, "text": flaw.text}
+            for flaw in flaws
+        ]
+    )
     for flaw in flaws:
         say(f"{flaw.signal}: {flaw.text}" if flaw.signal else flaw.text)
     if flaws:
@@ -87,6 +94,7 @@ def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
         )
     write_whole(folder / "fit.json", json.dumps(result.data, indent=1, ensure_ascii=False) + "\n")
     write_whole(folder / "vehicle.yaml", vehicle_text(result, folder, planner))
+    output.answer(folder=folder, fit=result.data)
     print_tables([*map(parameter_table, result.models), score_table(result)])
     say(f"Written: {folder / 'fit.json'}, {folder / 'vehicle.yaml'}")
 
@@ -214,6 +222,8 @@ def validate(
     write_whole(
         place / "validation.json", json.dumps(validation.as_data(), indent=1, ensure_ascii=False) + "\n"
     )
+    output.answer(folder=place, validation=validation.as_data())
+    output.note((*measurement.notes, *validation.diagnostics))
     print_tables([validation_table(validation)])
     for diagnostic in (*measurement.notes, *validation.diagnostics):
         say(f"{'note' if diagnostic.severity == 'info' else 'warning'}: {diagnostic}")

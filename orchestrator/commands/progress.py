@@ -15,6 +15,7 @@ import typer
 
 from ..errors import Interrupted
 from ..messages import counted, printable
+from . import output
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -218,7 +219,10 @@ def save_figure(figure: Figure, wanted: Path | None, default: Path) -> None:
 
 
 def print_tables(tables: Iterable[Table]) -> None:
-    """Print tables to stdout, as wide as the terminal."""
+    """Print tables to stdout, as wide as the terminal, or in the form that is asked for."""
+    if output.form() != "text":
+        output.collect(tables)
+        return
     from rich.console import Console
 
     from ..experiments.tables import for_terminal

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from . import output
 from .experiments import command_of
 from .options import MAKING, RunOptions, named, takes
 from .progress import executor_of, hold, pooled, print_tables, say, stoppable
@@ -67,7 +68,9 @@ def rank(
     from ..errors import ScenarioError
     from ..experiments.ranking import load_ranking
     from ..experiments.ranking_scores import run_ranking
-    from ..experiments.ranking_tables import table_of
+    from ..experiments.ranking_tables import columns_of_entries, table_of
+    from ..experiments.tables import records_in
+    from ..pages.report import PAGE
     from ..results.run_folder import default_folder
     from ..scenario import yaml_lines
 
@@ -85,6 +88,7 @@ def rank(
         ranked = run_ranking(ranking, execute, only=only or ())
         command = command_of("rank", file, quick=quick, controller=controller, condition=condition)
         _write(ranked, folder, command, pooled(context, options))
+    output.answer(folder=folder, page=folder / PAGE, entries=records_in(columns_of_entries(ranked)))
     print_tables([table_of(ranked, "gains", "speed lost", "chatter")])
     if unranked := [score.entry for score in ranked.scores if score.missing]:
         say(f"not ranked (missing runs): {', '.join(unranked)}")
@@ -112,7 +116,7 @@ def _rank_by_threats(
     controller: list[str] | None,
 ) -> None:
     """Search the levels that entries survive; write tables and page."""
-    from ..experiments.tables import to_csv
+    from ..experiments.tables import records_in, to_csv
     from ..experiments.threat_runs import run_threats, table_of_levels, table_of_quantities
     from ..experiments.threat_scores import table_of_scores
     from ..experiments.threats import load_threats
@@ -135,6 +139,7 @@ def _rank_by_threats(
     command = command_of("rank", file, quick=quick, controller=controller)
     write_whole(page, threats_page(result, table, folder, command))
     say(f"The page: {page} ({page.stat().st_size / 1e6:.1f} MB)")
+    output.answer(folder=folder, page=page, entries=records_in(table_of_scores(table)))
     print_tables([main_table(result, table)])
 
 

@@ -14,7 +14,8 @@ import typer
 
 from ..coupling import ALGORITHMS
 from ..messages import hint, listed, printable
-from .experiments import chapter_of, command_of, conduct, write_page
+from . import output
+from .experiments import chapter_of, command_of, conduct, data_of, write_page
 from .options import CHANGES, MAKING, RunOptions, ScenarioFile, plan_of_scenario, takes
 from .progress import hold, pooled, print_tables, say
 from .results import MeasuredFrom
@@ -67,6 +68,7 @@ def run(
         raise ScenarioError("--out and --name are mutually exclusive", code="option-invalid")
     metrics = _metric_names(metric or ())
     plan = plan_of_scenario(scenario, options)
+    output.note(plan.diagnostics)
     if named := [name for name in metric or () if name != "standard"]:
         from ..metrics import run_metrics
 
@@ -99,19 +101,29 @@ def run(
         say(f"ended: {info.ended}")
     _say_warnings(info.diagnostics)
     say(f"{folder}: {info.rows} rows of {info.columns} variables in {info.wall_time:.2f} s")
+    output.answer(
+        folder=folder, rows=info.rows, columns=info.columns, wall_time=info.wall_time, ended=info.ended
+    )
     if metrics:
         from ..experiments.tables import metrics_of_run
-        from ..metrics.run_metrics import columns_for
+        from ..metrics.measures import si
+        from ..metrics.run_metrics import columns_for, evaluate_all
         from ..results.reader import load_results
         from .progress import print_tables
 
         needed = load_results(folder, only=lambda recorded: columns_for(recorded, metrics))
         print_tables([metrics_of_run(needed, metrics)])
+        numbers = evaluate_all(needed, metrics)
+        output.answer(
+            metrics={name: {"value": value.number, "unit": si(value.unit)} for name, value in numbers.items()}
+        )
 
 
 def _say_warnings(diagnostics: Iterable[Diagnostic]) -> None:
     from ..errors import warnings_in
 
+    diagnostics = [*diagnostics]
+    output.note(diagnostics)
     for warning in warnings_in(diagnostics):
         say(f"note: {warning}")
 
@@ -186,6 +198,7 @@ def compare(context: typer.Context, scenario: ScenarioFile, swap: Swaps, options
     views = facts["views"] if facts else []
     chapter = chapter_of(findings, folder, command, shown_in=folder, views=views, comparison=facts)
     write_page([chapter], folder)
+    output.answer(experiments=[data_of(findings, folder)])
     if findings.failed:
         raise typer.Exit(1)
 
@@ -293,6 +306,21 @@ def diff(one: One, other: Other, begin: MeasuredFrom = "0 s") -> None:
 
     first, second = read_runs([one, other], start_of(begin))
     inputs, parted = differences(first.record, second.record), divergence(first, second)
+    output.answer(
+        identical=not (inputs or parted.partings or parted.notes),
+        inputs=[{"name": name, "first": one, "second": other} for name, one, other in inputs],
+        signals=[
+            {
+                "signal": parting.signal,
+                "unit": parting.unit,
+                "from": parting.first,
+                "visibly_from": parting.seen,
+                "largest": parting.largest,
+                "largest_at": parting.largest_at,
+            }
+            for parting in parted.partings
+        ],
+    )
     if inputs:
         print_tables([differences_table(inputs, *distinct([one, other]))])
     if parted.partings or parted.notes:

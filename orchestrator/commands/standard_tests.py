@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from ..evaluation.standard_tests import DRIVEN, TESTS, Evaluation, NotJudged, StandardTest, TestSeries
+from . import output
 from .options import CHANGES, MAKING, RunOptions, takes
 from .progress import executor_of, hold, say, stoppable
 
@@ -272,6 +273,7 @@ class EvaluatedRuns:
             "series": self.series.data if self.series else None,
         }
         write_whole(self.folder / FILE, json.dumps(data, indent=1))
+        output.answer(folder=self.folder, page=self.folder / PAGE, evaluation=data)
         if len(self.judged) == 1:
             table = run_table(self.judged[0], self.test.says)
         else:

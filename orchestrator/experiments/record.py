@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from ..cache import changed_since, warn_of_record, with_checksums
@@ -141,6 +143,7 @@ def _description(findings: ExperimentResult) -> str:
 
 
 RECORD = "experiment.json"
+NO_FIGURES: Mapping[str, str] = MappingProxyType({})
 
 
 def write_findings(findings: ExperimentResult, drawn: dict[str, str], out: Path) -> None:
@@ -151,7 +154,7 @@ def write_findings(findings: ExperimentResult, drawn: dict[str, str], out: Path)
     """
     write_table(findings, out)
     _warn_if_edited(out / RECORD)
-    content = with_checksums(_record(findings, drawn))
+    content = with_checksums(record_of(findings, drawn))
     write_whole(out / RECORD, json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
 
 
@@ -168,7 +171,8 @@ def _warn_if_edited(file: Path) -> None:
         warn_of_record(f"{file}: {words} since it was written; it is written anew from the runs")
 
 
-def _record(findings: ExperimentResult, drawn: dict[str, str]) -> dict[str, Any]:
+def record_of(findings: ExperimentResult, drawn: Mapping[str, str] = NO_FIGURES) -> dict[str, Any]:
+    """Return the record of an experiment as JSON-ready data; `drawn`: name -> title of its figures."""
     spec, settings = findings.spec, findings.experiment.settings
     alone = not spec.axes or (len(settings) == 1 and bool(spec.runs))  # else see the table
     return {
@@ -226,7 +230,7 @@ def _record(findings: ExperimentResult, drawn: dict[str, str]) -> dict[str, Any]
             ]
             for key, limit in spec.limits.items()
         },
-        "figures": drawn,
+        "figures": dict(drawn),
     }
 
 

@@ -182,6 +182,12 @@ def to_pandas(table: Table) -> pd.DataFrame:
     return frame
 
 
+def records_in(table: Table) -> list[dict[str, str | float | None]]:
+    """Return the rows of a table as heading -> value, numbers in SI units."""
+    columns = [table.values(k) for k in range(len(table.columns))]
+    return [dict(zip(table.headings, row, strict=True)) for row in zip(*columns, strict=True)]
+
+
 def to_csv(table: Table) -> str:
     """Return a table as CSV, with units in the headings."""
     text = io.StringIO()

@@ -188,6 +188,12 @@ def test_a_small_matrix_is_driven_goes_on_where_it_was_and_shows_what_is_missing
     assert {"x", "y", "yaw"} <= set(run["road"])  # what the car on the road needs
     assert low["verdict"] in content["html"]
     assert golden_in(content["html"])
+    capsys.readouterr()
+    assert status_of("rank", file, "--out", out, "--no-run", "--json") == 0
+    answer = json.loads(capsys.readouterr().out)
+    places = {entry["entry"]: entry["place"] for entry in answer["entries"]}
+    assert places == {"fuzzy_pid": 1, "none": 2}
+    assert (answer["page"], answer["folder"]) == (str(out / "report.html"), str(out))
 
 
 @pytest.mark.exhaustive
