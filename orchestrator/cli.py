@@ -73,6 +73,9 @@ def _interruptible() -> Iterator[None]:
     """Turn Ctrl-C and SIGTERM into a message and an exit status of their own (130, 143)."""
     try:
         yield
+    except typer.BadParameter as error:
+        error.message = error.message.replace("Value error, ", "")  # as pydantic, in typer, begins it
+        raise
     except (Exception, KeyboardInterrupt) as error:
         cause = _interruption_in(error)
         if cause is None:

@@ -23,6 +23,8 @@ MODELS = {
     "fit": "experiments.fit:FitSpec",
 }
 """Kind of file -> module and class of the model that reads it."""
+ALSO = {"study": "experiment", "sweep": "experiment", "tuning": "experiment"}
+"""Names of commands and documents -> kind."""
 DIALECT = "http://json-schema.org/draft-07/schema#"
 """Chosen: the latest draft that editors implement in full."""
 FOLDER = Path(__file__).resolve().parents[2] / "scenarios" / "schemas"
@@ -60,7 +62,7 @@ def schema_text(kind: str) -> str:
     return json.dumps(schema_of(kind), indent=1, ensure_ascii=False) + "\n"
 
 
-KindName = Literal[tuple(MODELS)]  # type: ignore[valid-type]
+KindName = Literal[tuple(MODELS | ALSO)]  # type: ignore[valid-type]
 Kind = Annotated[
     KindName | None,  # type: ignore[valid-type]
     typer.Argument(help="Kind of file; without it, all kinds are listed.", metavar="KIND"),
@@ -71,10 +73,10 @@ def schema(kind: Kind = None) -> None:
     """Print the JSON Schema of a kind of YAML file.
 
     An editor with a YAML language server checks and completes files whose first line is
-    `# yaml-language-server: $schema=PATH`; `yawbench new` writes it. Studies, sweeps and tunings are of
-    the kind experiment.
+    `# yaml-language-server: $schema=PATH`; `yawbench new` writes it. Studies, sweeps and tunings are
+    experiments.
     """
-    print("\n".join(MODELS) if kind is None else schema_text(kind), end="\n" if kind is None else "")
+    print("\n".join(MODELS) if kind is None else schema_text(ALSO.get(kind, kind)), end="\n" * (kind is None))
 
 
 def main() -> None:

@@ -170,3 +170,10 @@ def test_nothing_that_turns_the_text_reaches_the_terminal_even_in_a_traceback(
     assert ("Traceback" in said) == bool(shown)
     assert r"\u202etxt.exe \x1b[31m \u2066 \x9b" in said
     assert not set(text) & set(said) - set(printable(text))
+
+
+def test_a_choice_that_does_not_exist_is_told_with_those_that_do(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["list", "foo"])
+    assert end.value.code == 2
+    assert golden(capsys.readouterr().err.splitlines()[-1])

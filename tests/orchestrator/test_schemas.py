@@ -100,9 +100,10 @@ def test_the_command_lists_the_kinds_and_prints_a_schema(capsys):
     with pytest.raises(SystemExit):
         main(["schema"])
     assert capsys.readouterr().out.split() == [*MODELS]
-    with pytest.raises(SystemExit):
-        main(["schema", "fit"])
-    assert capsys.readouterr().out == schema_text("fit")
+    for name, kind in {"fit": "fit", "sweep": "experiment"}.items():
+        with pytest.raises(SystemExit):
+            main(["schema", name])
+        assert capsys.readouterr().out == schema_text(kind)
 
 
 MISSING = object()
