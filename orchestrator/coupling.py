@@ -19,6 +19,9 @@ the step.
 A slow instance (M > N) integrates over many samples of its source; it takes the straight line through the
 newest sample and the one that was newest at its own last step, so that neither weight exceeds one. Before
 there are two samples, both are the initial value: held, for one step.
+
+A wire with a declared delay of one communication step brings y(k - 1), under every algorithm: the newest
+sample that is at least one communication step old at the end of the target's step.
 """
 
 from __future__ import annotations
@@ -49,6 +52,11 @@ class CouplingWeights:
 
 def _held(timing: WireTiming, k: int) -> CouplingWeights:
     return CouplingWeights()
+
+
+def delayed(timing: WireTiming, k: int) -> CouplingWeights:
+    """Return the weights of a wire with a declared delay."""
+    return CouplingWeights(0.0, 1.0) if _last_sample(timing, k) == k else CouplingWeights()
 
 
 def _extrapolated(timing: WireTiming, k: int) -> CouplingWeights:

@@ -266,6 +266,7 @@ class Wire:
     input: str  # variable
     gain: float = 1.0  # the input is gain * output + offset
     offset: float = 0.0
+    delayed: bool = False  # by one communication step
 
     @property
     def converts(self) -> bool:

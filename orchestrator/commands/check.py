@@ -111,6 +111,7 @@ def _print(plan: Plan, scenario: Path, console: Console, defaults: bool) -> None
             ("from", "to", "variables"),
             [(source, to, names) for source, to, _, names in wires],
         )
+    _show(console, "Delayed by one step", ("from", "to", "value at the start"), _delayed_rows(plan))
     _show(console, "Faults", ("target", "fault", "signals"), _fault_rows(plan))
     direct = evaluate({unit.name: unit.fmu for unit in plan.instances}, plan.wires).direct
     headings = ("instance", "after", "direct feedthrough of")
@@ -286,6 +287,15 @@ def _wire_rows(plan: Plan) -> Iterable[tuple[str, str, str, str]]:
                 measure = f"{of or '?'} → {measure or '?'}: {_scaled(example)}"
             shown.append(f"{ends} [{measure}]" if measure else ends)
         yield source, target, seen_as(wires[0], plan.instances), ", ".join(shown)
+
+
+def _delayed_rows(plan: Plan) -> Iterable[Sequence[str]]:
+    units = {unit.name: unit.fmu for unit in plan.instances}
+    for wire in plan.wires:
+        if wire.delayed:
+            variable = units[wire.target].variables[wire.input]
+            ends = f"{wire.source}.{wire.output}", f"{wire.target}.{wire.input}"
+            yield *ends, f"{variable.start:g} {variable.unit or ''}".rstrip()
 
 
 def _fault_rows(plan: Plan) -> Iterable[Sequence[str]]:

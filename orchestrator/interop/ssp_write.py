@@ -73,6 +73,11 @@ def write_ssp(plan: Plan, path: Path, standard: Version = "1.0", *, named: bool 
             f"{path}: an SSP archive cannot contain the time series of {listed(fold(series))}",
             code="ssp-unsupported",
         )
+    if delayed := [f"{wire.target}.{wire.input}" for wire in plan.wires if wire.delayed]:
+        raise ResultsError(
+            f"{path}: an SSP archive cannot contain the delay of {listed(fold(delayed))}",
+            code="ssp-unsupported",
+        )
     sources = _sources(plan)
     try:
         structure = system_structure(plan, standard)

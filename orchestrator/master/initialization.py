@@ -180,7 +180,7 @@ def _shown(variable: Variable, value: Value) -> str:
 
 def _comes_before(memory: SignalPool, wire: Wire | None, station: InstanceSlot) -> bool:
     """Return whether an input is known before the instance is evaluated: a constant or an earlier output."""
-    return wire is None or memory.of[wire.source].position < station.position
+    return wire is None or wire.delayed or memory.of[wire.source].position < station.position
 
 
 def _renew(memory: SignalPool, s: InstanceSlot, check: StatusCheck) -> list[UnsettledWire]:

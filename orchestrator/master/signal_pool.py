@@ -77,6 +77,14 @@ class InstanceSlot:
         gains, offsets = np.array(pairs).T.copy()
         return gains, offsets
 
+    @functools.cached_property
+    def starts(self) -> dict[int, float]:
+        """Start values of the inputs whose wires have a declared delay, by their index."""
+        delayed = [
+            (i, v) for i, (v, w) in enumerate(zip(self.inputs, self.wires, strict=True)) if w and w.delayed
+        ]
+        return {i: float(v.start) for i, v in delayed if v.start is not None}
+
     @property
     def name(self) -> str:
         return self.instance.name
@@ -158,9 +166,13 @@ class SignalPool:
             at = end
 
     def taken(self, s: InstanceSlot) -> np.ndarray:
-        """Return the Real inputs of an instance, computed from the current outputs, at initialization."""
+        """Return the Real inputs of an instance, computed from the current outputs, at initialization.
+
+        An input whose wire has a declared delay has its start value: there is nothing earlier.
+        """
         values: np.ndarray = self.pool[s.sources]
         values = values if s.scale is None else values * s.scale[0] + s.scale[1]
+        values[list(s.starts)] = list(s.starts.values())
         if s.input_faults is not None:
             s.input_faults.begin(values)
         return values
@@ -351,6 +363,7 @@ def faulting(memory: SignalPool, s: InstanceSlot, *, of_output: bool) -> FaultIn
             wire = s.wires[i]
             assert wire is not None
             ahead = ALGORITHMS[plan.algorithm].halves_ahead(period, s.direct(variable))
+            ahead = min(ahead, 2 * period - 2) if wire.delayed else ahead
             held = memory.of[wire.source].instance.fmu.variables[wire.output].discrete
         disturbances.append((i, ahead, KINDS[signal.fault.kind].disturbance(signal, held)))
     return FaultInjector(plan, period, disturbances) if disturbances else None

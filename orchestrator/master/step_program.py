@@ -20,7 +20,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from ..coupling import ALGORITHMS, CouplingWeights
+from ..coupling import ALGORITHMS, CouplingWeights, delayed
 from ..plan import InputSeries, Plan, ValueRef, Variable
 from .compiled_loop import Kind, OperationData
 from .instance import PlainCall, Status
@@ -118,6 +118,7 @@ class StepProgram:
         self._gathers: dict[tuple[Any, ...], list[Operation]] = {}
         feeds = {s.name: SeriesFeed(memory, s) for s in memory.stations if s.instance.series}
         self._feeds = {name: Operation(name, "gather", feed, feed.data) for name, feed in feeds.items()}
+        self._delayed = {wire.source for wire in memory.plan.wires if wire.delayed}  # instances
         self._of_outputs = {s.name: _acting(s, s.output_faults, s.y) for s in memory.stations}
         self._of_inputs = {s.name: _acting(s, s.input_faults, s.u) for s in memory.stations}
 
@@ -159,7 +160,7 @@ class StepProgram:
                 operations += [*self._gathering(s, k), *self._of_inputs[s.name]]
                 operations += _setting(self._memory, s)
                 operations.append(_of_fmu(s, "step", s.calls.step))
-                if self._algorithm.needs_before and s.samples.size:
+                if (self._algorithm.needs_before or s.name in self._delayed) and s.samples.size:
                     operations.append(_keeping_outputs(self._memory, s))
                 operations += [*getting(self._memory, s), *self._of_outputs[s.name]]
         return operations
@@ -173,9 +174,9 @@ class StepProgram:
             if wire is None:
                 per_input.append(CouplingWeights())
             else:
-                relation = m.relation(s, variable, wire)
+                weights = delayed if wire.delayed else self._algorithm.weights
                 # `k` is a phase; shifted so that no sample lies before the start
-                per_input.append(self._algorithm.weights(relation, k + 2 * self.cycle))
+                per_input.append(weights(m.relation(s, variable, wire), k + 2 * self.cycle))
         key = (s.name, *per_input)
         if key not in self._gathers:
             _make_room(self._gathers)

@@ -112,6 +112,8 @@ def _connection(wire: Wire, units: Mapping[str, Instance]) -> ConnectionRecord:
         ends.gain, ends.offset = wire.gain, wire.offset
         if unit := units[wire.target].fmu.variables[wire.input].unit:
             ends.unit = unit
+    if wire.delayed:
+        ends.delay = "1 step"
     return ends
 
 

@@ -118,13 +118,14 @@ RecordedName = Annotated[SignalName, PlainValidator(_signal), PlainSerializer(st
 
 
 class ConnectionRecord(_Part):
-    """A wire; `gain`, `offset` and the resulting unit only if it converts."""
+    """A wire; `gain`, `offset` and the resulting unit only if it converts, `delay` only if it has one."""
 
     source: RecordedName = Field(SignalName("", ""), validation_alias="from", serialization_alias="from")
     target: RecordedName = Field(SignalName("", ""), validation_alias="to", serialization_alias="to")
     gain: float | None = None
     offset: float = 0.0
     unit: str | None = None
+    delay: str | None = None
 
 
 NotFinite = Literal["nan", "inf", "-inf"]

@@ -216,6 +216,9 @@ class Connection(StrictModel):
     order. With a list of instances and a pattern, `{from: [plant, driver], to: sensor.*_true}`, each input
     takes the output matched by the `*` from the first instance that has it. `from: null` leaves inputs
     without a source, whatever outputs there are.
+
+    With `delay: 1 step`, which breaks an algebraic loop, an input takes the value of one communication step
+    earlier, at the start its start value.
     """
 
     source: SourceEndpoint = Field(
@@ -224,6 +227,7 @@ class Connection(StrictModel):
     target: TargetEndpoint = Field(alias="to", description="instance.input, or a list of instances")
     gain: float | None = Field(None, description="Factor in place of the conversion of units")
     offset: float | None = Field(None, description="Added after the factor")
+    delay: Literal["1 step"] | None = Field(None, description="Breaks an algebraic loop")
 
     @model_validator(mode="after")
     def _check_ends(self) -> Connection:
@@ -236,6 +240,8 @@ class Connection(StrictModel):
             raise ValueError("with 'from: null', 'to' must be unit.variable")
         if self.scale is not None and not isinstance(self.source, SignalName):
             raise ValueError("gain and offset are for a connection of unit.variable to unit.variable")
+        if self.delay is not None and not isinstance(self.source, SignalName):
+            raise ValueError("a delay is for a connection of unit.variable to unit.variable")
         return self
 
     @property

@@ -339,7 +339,16 @@ class Connector:
                 f"{dotted(key)}: its gain and offset replace the conversion "
                 f"from {source.unit} to {target.unit}",
             )
-        return replace(wire, gain=scale[0], offset=scale[1])
+        delayed = key[0] == "connections" and self._scenario.connections[key[1]].delay is not None  # type: ignore[index]
+        if delayed and target.type != "Real":
+            sentence = (
+                f"a delay is for inputs of type Real, not for {wire.target}.{wire.input} [{target.type}]"
+            )
+            self._report(key, sentence, "value-wrong-type")
+        if delayed and target.start is None:
+            sentence = f"{wire.target}.{wire.input} has no start value to begin with, which a delay needs"
+            self._report(key, sentence, "connection-invalid")
+        return replace(wire, gain=scale[0], offset=scale[1], delayed=delayed)
 
     def _note_units(self, wires: Iterable[Wire]) -> None:
         """Note variables without a unit, and units that an FMU defines otherwise than usual."""

@@ -162,7 +162,8 @@ def make_plan(
         Diagnostic(
             "algebraic-loop",
             f"algebraic loop: {loop}; these values would define each other at one instant, so "
-            "one of these units has to give an output that does not follow its input directly",
+            "one of these units has to give an output that does not follow its input directly, or one of the "
+            "connections needs 'delay: 1 step'",
         )
         for loop in evaluation.loops
     ]

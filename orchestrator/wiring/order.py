@@ -14,6 +14,8 @@ Apart from that, instances keep the order of the scenario.
 If an FMU does not declare the dependencies of an output, by FMI 2.0.4, section 2.2.8, the output must be
 assumed to depend on every input. A loop that exists only through such outputs is possible, not certain: it
 is noted, not refused.
+
+A wire with a declared delay is in neither graph: it passes on a value of another instant.
 """
 
 from __future__ import annotations
@@ -79,7 +81,7 @@ class _Feedthrough:
 def evaluate(fmus: Mapping[str, Fmu], wires: Sequence[Wire]) -> EvaluationOrder:
     """Find the evaluation order of the instances `fmus`, given in the order of the scenario."""
     following = {instance: _Feedthrough(fmu) for instance, fmu in fmus.items()}
-    direct = [wire for wire in wires if any(following[wire.target].outputs(wire.input))]
+    direct = [w for w in wires if not w.delayed and any(following[w.target].outputs(w.input))]
     weights = _weights(following, wires, direct)
     cycles = _cycles(list(fmus), weights)
     group = {name: i for i, cycle in enumerate(cycles) for name in cycle}

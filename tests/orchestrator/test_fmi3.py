@@ -353,3 +353,78 @@ def test_check_shows_arrays_and_their_constants(run):
     assert ["u[1]", "2.5", "scenario", "m"] in shown
     assert ["u[2]", "2.5", "scenario", "m"] in shown
     assert golden_in(said)
+
+
+LOOP = [{"from": "m.y[1]", "to": "n.u[1]"}, {"from": "n.y[1]", "to": "m.u[1]", "gain": 0.5}]
+FEEDBACK = {"m": ("Matrix", {"parameters": {"A[1,2]": 1.0}}), "n": ("Matrix", {})}
+
+
+def delayed(wire):
+    return wire | {"delay": "1 step"}
+
+
+@pytest.mark.parametrize("isolate", [[], ["--isolate"]], ids=["together", "apart"])
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
+@pytest.mark.sampled(3)
+def test_a_declared_delay_breaks_an_algebraic_loop(run, tmp_path, monkeypatch, algorithm, isolate):
+    inputs = {"m.u[2]": 1.0, "n.u[2]": 0.0}
+    status, said, _ = run(FEEDBACK, inputs=inputs, connections=LOOP)
+    assert status == 2
+    assert "delay: 1 step" in said
+    files = []
+    for wanted in ("", "python"):
+        monkeypatch.setenv("YAWBENCH_LOOP", wanted)
+        wires = [LOOP[0], delayed(LOOP[1])]
+        status, said, results = run(FEEDBACK, *isolate, inputs=inputs, connections=wires, algorithm=algorithm)
+        assert status == 0, said
+        files.append((tmp_path / "out" / "results.csv").read_bytes())
+        m, n = results["m.y[1]"], results["n.y[1]"]
+        assert m[0] == n[0] == 1.0  # from the start value, 0
+        assert m[1:].tolist() == (0.5 * n[:-1] + 1.0).tolist()
+        assert n[1:].tolist() == (m[:-1] if algorithm == "jacobi" else m[1:]).tolist()
+    assert files[0] == files[1]
+    assert [wire.delay for wire in results.record.connections] == ["1 step", None]
+
+
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
+@pytest.mark.parametrize(("n", "m"), [(1, 1), (2, 1), (1, 2), (3, 2)])
+def test_a_delayed_wire_brings_the_value_of_one_communication_step_before(run, algorithm, n, m):
+    units = {"d": ("Dahlquist", {"step_size": n / 10}), "m": ("Matrix", {"step_size": m / 10})}
+    wires = [delayed({"from": "d.x", "to": "m.u[1]"})]
+    status, said, results = run(
+        units, inputs={"m.u[2]": 0.0}, connections=wires, algorithm=algorithm, stop_time=1.2
+    )
+    assert status == 0, said
+    stepped = np.arange(m, 13, m)
+    assert results["m.y[1]"][0] == 0.0
+    earlier = stepped - (m if algorithm == "jacobi" else 1)
+    assert results["m.y[1]"][stepped].tolist() == results["d.x"][earlier].tolist()
+
+
+@pytest.mark.parametrize(
+    ("source", "target", "delay", "command"),
+    [
+        ("d.x", "m.u[1]", "2 steps", "check"),
+        ("e.Int8_out", "f.Int8_in", "1 step", "check"),
+        (["d", "e"], "m.u[*]", "1 step", "check"),
+        ("d.x", "m.u[1]", "1 step", "export-ssp"),
+    ],
+)
+def test_a_delay_that_cannot_be_is_refused(run, tmp_path, source, target, delay, command):
+    units = {"d": ("Dahlquist", {}), "m": ("Matrix", {}), "e": ("Every", {}), "f": ("Every", {})}
+    inputs = rest("f.Int8_in" if "f" in target else "", "e.Float64_in", "f.Float64_in", units="ef")
+    inputs |= {name: 0.0 for name in ("m.u[1]", "m.u[2]") if name != target}
+    wires = [{"from": source, "to": target, "delay": delay}]
+    where = ["--out", str(tmp_path / "s.ssp")] if command == "export-ssp" else []
+    status, said, _ = run(units, *where, command=command, inputs=inputs, connections=wires)
+    assert status == 2
+    assert golden_in(said.splitlines()[-1])
+
+
+def test_check_lists_delays(run):
+    inputs = {"m.u[2]": 1.0, "n.u[2]": 0.0}
+    wires = [LOOP[0], delayed(LOOP[1])]
+    status, said, _ = run(FEEDBACK, command="check", inputs=inputs, connections=wires)
+    assert status == 0, said
+    rows = [line.split() for line in said.splitlines()]
+    assert golden_in(said.splitlines()[rows.index(["n.y[1]", "m.u[1]", "0"]) - 2])
