@@ -20,12 +20,14 @@ import contextlib
 import ctypes
 import itertools
 import json
+import math
 import mmap
 import os
 import sys
 import threading
 import time
 import traceback
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -46,26 +48,35 @@ from .isolation import Isolation
 from .master import WORDS, EndRequested, Master
 from .process_state import MASTER, WARNING, Log, flush_output
 from .run_loop import OpenInstance, RunLoop, RunProgress
+from .signal_pool import InstanceSlot
 
 ROWS, PROGRESS, ENDED, WHERE = 0x90, 0x91, 0x92, 0x93
 """First bytes of records from the child: a block of rows, progress, end of the run, current instance."""
 TAKEN, FREE = b"\x01", b"\x02"
 """Bytes from the parent: the rows have been written; terminate and free the instances."""
+ONLY_ASKING = b"\0"
+"""Byte in place of the number of a signal: no stop is requested."""
 
 _SLOT = 256
 """Bytes of shared memory per row for values that are not Real, so that they survive a crash of the child."""
 
 
 class SharedProgress:
-    """Memory shared by both processes: the last communication point reached, and two blocks of rows."""
+    """Memory shared by both processes: how far the run is, and two blocks of rows.
+
+    `completed` is the last communication point reached, `returned` the time [s], by `time.monotonic`, at
+    which a call of initialization last returned.
+    """
 
     def __init__(self, width: int) -> None:
         """Allocate it for rows of `width` numbers."""
-        self._map = mmap.mmap(-1, 8 + 16 * BLOCK * width)
+        self._map = mmap.mmap(-1, 16 + 16 * BLOCK * width)
         self._slots = mmap.mmap(-1, BLOCK * _SLOT)
         self.completed = ctypes.c_int64.from_buffer(self._map)
         self.completed.value = -1
-        self.blocks = np.frombuffer(self._map, float, offset=8).reshape(2, BLOCK, width)
+        self.returned = ctypes.c_double.from_buffer(self._map, 8)
+        self.returned.value = time.monotonic()
+        self.blocks = np.frombuffer(self._map, float, offset=16).reshape(2, BLOCK, width)
 
     def keep(self, at: int, others: list[Value]) -> None:
         """Store the non-Real values of row `at` of the block being filled, unless they are too long."""
@@ -157,7 +168,7 @@ def _make(
     def progress(done: int, total: int) -> None:
         channel.send(PROGRESS, (done, total))
 
-    course = RunLoop(plan, rows, log, stop, progress, shared.completed)
+    course = RunLoop(plan, rows, log, stop, progress, shared.completed, shared.returned)
     _tell_where(channel, asking, stop)
     error = _go(course, opener)
     log.finish()
@@ -193,7 +204,8 @@ def _tell_where(channel: PipeChannel, asking: int, stop: StopFlag) -> None:
     def answer() -> None:
         with contextlib.suppress(OSError):  # the parent is gone
             while number := os.read(asking, 1):
-                stop.request(number[0])
+                if number != ONLY_ASKING:
+                    stop.request(number[0])
                 channel.send(WHERE, _whereabouts(stepping))
 
     threading.Thread(target=answer, daemon=True).start()
@@ -214,7 +226,7 @@ _kept: list[Any] = []
 
 def _whereabouts(thread: int) -> tuple[str, str] | None:
     """Return the instance whose code a thread is executing, and the operation; None outside all instances."""
-    frame, position = sys._current_frames().get(thread), None
+    frame, position, function = sys._current_frames().get(thread), None, ""
     here = str(Path(__file__).parent)
     while frame is not None:
         if frame.f_code.co_filename.startswith(here):
@@ -227,11 +239,35 @@ def _whereabouts(thread: int) -> tuple[str, str] | None:
                 return operation and (operation.instance, WORDS.get(operation.kind, operation.kind))
             if isinstance(local.get("self"), CtypesInstance):
                 ending = frame.f_code.co_name == CtypesInstance.free.__name__
-                position = local["self"].name, "its end" if ending else "initialization"
+                function = function or _function_called(frame.f_code.co_name, local)
+                position = local["self"].name, "its end" if ending else f"initialization{function}"
+            elif position is None and isinstance(local.get("s"), InstanceSlot):
+                position = local["s"].name, "initialization (setting inputs or reading outputs)"
         frame = frame.f_back
     return position
 
 
+def _function_called(caller: str, local: Mapping[str, Any]) -> str:
+    """Return the FMI function that a method of `CtypesInstance` is calling, in parentheses; "" if unknown."""
+    match caller:
+        case "_load":
+            return " (loading its library)"
+        case "_instantiate":
+            name = "Instantiate"
+        case "_do":
+            name = local["name"]
+        case "_access":
+            name = local["verb"] + local["kind"]
+        case _:
+            return ""
+    return f" ({local['self'].prefix}{name})"
+
+
+INITIALIZATION_LIMIT = 60.0
+"""Time that a call of an FMU may take during initialization [s]; chosen: enough to load Python and large
+tables from a slow disk, as `isolation.START_LIMIT`. --isolate --call-limit allows more."""
+ASKED = 1.0
+"""Time for an answer to the question where the child is [s]; chosen: far longer than an answer takes."""
 KILL_AFTER = 3.0
 """Time from a stop request until the child is killed [s]; chosen: far longer than a step."""
 END_LIMIT = 10.0
@@ -261,6 +297,8 @@ class ChildRun(RunLoop, FmuProcess):
         self._suspects: list[str] = []  # instances that may have ended the process
         self._told_end = False
         self._sealed = False  # no more rows are written
+        self._limit = INITIALIZATION_LIMIT
+        self._asked_at: float | None = None  # when a call of initialization exceeded its limit
 
     def inputs_of(self, unit: str) -> dict[str, Value]:
         """Return the inputs with which the failed instance was last stepped."""
@@ -269,6 +307,8 @@ class ChildRun(RunLoop, FmuProcess):
     def go(self, opener: OpenInstance) -> None:
         if opener is open_instance:
             self._suspects = [u.name for u in self.plan.instances if u.fmu.compiled]
+        if isinstance(opener, Isolation):  # which has limits of its own
+            self._limit = math.inf
         stop_pipe, self._asking = os.pipe()
         try:
             FmuProcess.__init__(self, partial(self._forked, opener, stop_pipe), self.log)
@@ -337,15 +377,27 @@ class ChildRun(RunLoop, FmuProcess):
         """Pass a stop request on to the child; kill it if it does not stop, or takes too long to end."""
         now, requested = time.monotonic(), stop_requested_at()
         if requested is not None:
-            self._ask()
+            self._ask(bytes([self._stop.number]))
+        if self._shared.completed.value < 0 and now - self._shared.returned.value > self._limit:
+            self._end_hanging(now)
         if now > self._deadline or (requested is not None and now - requested > KILL_AFTER):
             self.close()
             raise ProcessLost("did not respond")
 
-    def _ask(self) -> None:
-        """Ask the child to stop and to report its current instance."""
+    def _end_hanging(self, now: float) -> None:
+        """Ask where the child is hanging; kill it once it has answered, or has had the time to."""
+        if self._asked_at is None:
+            self._asked_at = now
+            self._ask(ONLY_ASKING)
+        elif self._where is not None or now - self._asked_at > ASKED:
+            self.close()
+            limit = f"{self._limit:g} s, the limit of a call during initialization"
+            raise ProcessLost(f"did not return within {limit} (--isolate --call-limit allows more)")
+
+    def _ask(self, what: bytes) -> None:
+        """Ask the child to report its current instance, and to stop if a signal has requested it."""
         with contextlib.suppress(OSError):
-            os.write(self._asking, bytes([self._stop.number]))
+            os.write(self._asking, what)
 
     def close(self, *, kill: bool = True) -> int:
         """Kill the process and those that FMUs have started; return its return code."""
@@ -381,7 +433,7 @@ class ChildRun(RunLoop, FmuProcess):
         self._deadline = time.monotonic() + END_LIMIT
         try:
             if not self._told_end:
-                self._ask()
+                self._ask(bytes([self._stop.number]))
                 self.hear(ENDED)
             self._where = None  # an answer from before the end of the run
             self._channel.say(FREE)

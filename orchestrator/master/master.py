@@ -15,6 +15,7 @@ from __future__ import annotations
 import ctypes
 import math
 import os
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import cast
@@ -56,12 +57,15 @@ class Master:
         stop: StopFlag,
         reached: ctypes.c_int64 | None = None,
         copies: Copies | None = None,
+        returned: ctypes.c_double | None = None,
     ) -> None:
         """Connect the instances.
 
         Args:
             reached: kept equal to `completed`, possibly in memory shared with another process.
             copies: detects forks of this process; created before the FMUs were opened.
+            returned: kept equal to the time of the last call of initialization [s], by `time.monotonic`,
+                possibly in memory shared with another process.
         """
         self.plan = plan
         self.log = log
@@ -69,6 +73,7 @@ class Master:
         self.completed = -1
         log.time.value = plan.time(0)
         self._reached = ctypes.c_int64(-1) if reached is None else reached
+        self._returned = ctypes.c_double() if returned is None else returned
         self.passes = 0
         self.memory = memory = SignalPool(plan, fmu_instances)
         slow = {s.instance.period for s in memory.stations} - {1}
@@ -251,6 +256,7 @@ class Master:
 
     def _check_initialization(self, unit: str, what: str, status: Status) -> None:
         """Check a call made during initialization, where a logged error counts whatever the status is."""
+        self._returned.value = time.monotonic()
         self._copies.end()
         self._surroundings.restore(unit, self.log)
         status = self.memory.of[unit].fmu_instance.note(status)

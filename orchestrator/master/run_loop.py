@@ -51,6 +51,7 @@ class RunLoop:
     Args:
         rows: buffer for the recorded values, usually the recorder itself.
         reached: kept equal to the last complete communication point, possibly in shared memory.
+        returned: kept equal to the time of the last call of initialization, likewise (see `Master`).
     """
 
     def __init__(
@@ -61,6 +62,7 @@ class RunLoop:
         stop: StopFlag,
         progress: RunProgress | None = None,
         reached: ctypes.c_int64 | None = None,
+        returned: ctypes.c_double | None = None,
     ) -> None:
         self.plan = plan
         self.passes = 0  # of initialization
@@ -73,6 +75,7 @@ class RunLoop:
         self._stop = stop
         self._progress = progress
         self._reached = reached
+        self._returned = ctypes.c_double() if returned is None else returned
         self._master: Master | None = None
         self._fmu_instances: dict[str, FmuInstance] = {}
         self._copies = Copies()
@@ -89,9 +92,9 @@ class RunLoop:
                 self.log.add(unit.name, WARNING, MASTER, violation, self.plan.time(0))
             self._fmu_instances[unit.name] = opener(unit, self.log, corrupted)
             self._copies.end()
-        self._master = Master(
-            self.plan, self._fmu_instances, self.log, self._stop, self._reached, self._copies
-        )
+            self._returned.value = time.monotonic()
+        observed = self._reached, self._copies, self._returned
+        self._master = Master(self.plan, self._fmu_instances, self.log, self._stop, *observed)
         self.loop = self._master.loop
         with np.errstate(all="ignore"):  # non-finite values are found by `Master`, not by NumPy warnings
             self._master.initialize(self._rows.rows[0], self._rows.others)

@@ -2,10 +2,12 @@
  *
  * Its GUID says how it treats the parameter: {reset} forgets it when the experiment is set up, {deaf} takes
  * nothing, {mute} does not tell it; {whole} and {half} want to end the run in the step at 0.25 s, having done
- * all or half of it; {solver} gives start time and tolerance as its Real output. */
+ * all or half of it; {solver} gives start time and tolerance as its Real output; {hang NAME} never returns from
+ * the first call of fmi2NAME. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "fmi2.h"
 
@@ -21,8 +23,17 @@ typedef struct {
     double real, reached, solver;
     int done;
     int integer, boolean, answer;
-    char given[64], made[80], guid[16];
+    char given[64], made[80], guid[48];
 } Instance;
+
+static void perhaps_hang(const char *guid, const char *function)
+{
+    char wanted[48];
+    snprintf(wanted, sizeof wanted, "{hang %s}", function);
+    while (!strcmp(guid, wanted)) {
+        pause();
+    }
+}
 
 EXPORT int counters[3]; /* instantiated, terminated, freed */
 
@@ -34,6 +45,7 @@ EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String 
         host->logger(host->componentEnvironment, name, fmi2Error, "logStatusError", "no licence in %s", "the shop");
         return NULL;
     }
+    perhaps_hang(guid, "Instantiate");
     if (strncmp(resources, "file:///", 8) != 0) {
         return NULL;
     }
@@ -80,6 +92,7 @@ EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolea
     EXPORT fmi2Status fmi2Set##Type(fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2##Type v[]) \
     {                                                                                                       \
         Instance *in = c;                                                                                   \
+        perhaps_hang(in->guid, "Set" #Type);                                                                \
         for (size_t i = 0; i < n; i++) {                                                                    \
             if (r[i] == INPUT) {                                                                            \
                 set;                                                                                        \
@@ -122,6 +135,7 @@ EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[], siz
     if (n != 1 || r[0] != INPUT) {
         return fmi2Error;
     }
+    perhaps_hang(((Instance *)c)->guid, "SetReal");
     ((Instance *)c)->real = v[0];
     return fmi2OK;
 }
@@ -146,6 +160,7 @@ EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerant, fmi
 {
     (void)stops, (void)stop;
     Instance *in = c;
+    perhaps_hang(in->guid, "SetupExperiment");
     in->solver = tolerant ? start + tolerance : start;
     if (strcmp(in->guid, "{reset}") == 0) {
         in->answer = 0;
@@ -165,8 +180,18 @@ EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, fmi2StatusKind kind, fmi2Re
     return fmi2OK;
 }
 
-EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return fmi2OK; }
-EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return fmi2OK; }
+EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c)
+{
+    perhaps_hang(((Instance *)c)->guid, "EnterInitializationMode");
+    return fmi2OK;
+}
+
+EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c)
+{
+    perhaps_hang(((Instance *)c)->guid, "ExitInitializationMode");
+    return fmi2OK;
+}
+
 #ifndef BARE /* without what many leave out */
 #include "idle.h"
 #endif

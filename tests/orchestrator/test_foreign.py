@@ -10,6 +10,7 @@ import fmpy
 import pytest
 
 from orchestrator.cli import main
+from orchestrator.master import child_run
 from orchestrator.metrics.run_metrics import evaluate, metric
 from orchestrator.results.freshness import staleness
 from orchestrator.results.reader import load_results
@@ -373,3 +374,28 @@ def test_a_foreign_unit_takes_time_series_of_every_type(run, isolate, tmp_path):
     assert results["a.Boolean_out"].tolist() == [1] * 5 + [0] * 5 + [1]
     assert results["a.String_out"].tolist() == ["<x>"] * 5 + ["<y>"] * 5 + ["<z>"]
     assert set(results.record.fmus["a"].series) == {f"{kind}_in" for kind in given}
+
+
+HANGING = (
+    "Instantiate",
+    "SetupExperiment",
+    "SetInteger",
+    "SetReal",
+    "EnterInitializationMode",
+    "ExitInitializationMode",
+)
+
+
+@together_and_apart
+@pytest.mark.parametrize("function", HANGING)
+@pytest.mark.sampled(6)
+def test_an_fmu_that_hangs_in_initialization_is_ended_at_the_limit_of_a_call(
+    run, monkeypatch, function, isolate
+):
+    monkeypatch.setattr(child_run, "INITIALIZATION_LIMIT", 1.0)
+    limit = ["--call-limit", "1 s"] if isolate else []
+    guid = f"{{hang {function}}}"
+    status, said, _ = run(*isolate, *limit, given={"Real": 0.75, "Integer": 5}, guid=guid)
+    assert status == 1
+    assert f"fmi2{function}" in said
+    assert golden_in(said.splitlines()[0])
