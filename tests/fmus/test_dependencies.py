@@ -27,6 +27,7 @@ FORCES = {"steer_angle", "yaw_moment", "slope", "bank", "wind_force_y", "wind_mo
 SLOW = {
     "estimator_kinematic",
     "estimator_observer",
+    "monitor_parity",
     "monitor_redundancy",
     "sensor_poor",
     "sensor_production",
