@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,6 +16,7 @@ from .options import CHANGES, MAKING, RunOptions, named, takes
 from .progress import executor_of, hold, pooled, print_tables, say, say_failed, stoppable
 
 if TYPE_CHECKING:
+    from ..experiments.dry_run import Forecast, Pace
     from ..experiments.execution import Executor
     from ..experiments.experiment import LoadedExperiment
     from ..experiments.outcome import Each, ExperimentResult
@@ -71,6 +72,18 @@ def concluded(experiment: LoadedExperiment, execute: Executor, options: RunOptio
         say(problem)
     say_problems(findings)
     return findings
+
+
+def print_forecasts(options: RunOptions, forecasts: Callable[[Pace], Sequence[Forecast]]) -> None:
+    """Print what experiments would take, which `forecasts` returns."""
+    import os
+    from dataclasses import asdict
+
+    from ..experiments.dry_run import Pace, forecast_table
+
+    made = forecasts(Pace())
+    output.answer(forecasts=[asdict(forecast) for forecast in made])
+    print_tables([forecast_table(made, options.jobs or os.cpu_count() or 1)])
 
 
 def data_of(findings: ExperimentResult, folder: Path) -> dict[str, Any]:
@@ -217,6 +230,21 @@ def of_files(context: typer.Context, files: Sequence[Path], options: RunOptions)
                 "report on them one by one, with --out",
                 code="name-duplicate",
             )
+    if options.dry_run:
+        from ..experiments.dry_run import of_experiment
+
+        executors = [
+            executor_of(folder, experiment.identity, options)
+            for experiment, folder in zip(experiments, folders, strict=True)
+        ]
+        print_forecasts(
+            options,
+            lambda pace: [
+                of_experiment(experiment, execute, pace, quick=options.quick, keep=options.keep)
+                for experiment, execute in zip(experiments, executors, strict=True)
+            ],
+        )
+        return
     hold(context, *folders)
     each = pooled(context, options)
     chapters, conducted, failed = [], [], False
@@ -247,7 +275,7 @@ StudyFile = Annotated[
 ]
 
 
-@takes(*CHANGES, *MAKING, "jobs", "scheduler", "format_", "quick", "fresh", "no_run")
+@takes(*CHANGES, *MAKING, "jobs", "scheduler", "format_", "quick", "fresh", "no_run", "dry_run")
 def study(context: typer.Context, file: StudyFile, options: RunOptions) -> None:
     """Run a study: tables, figures, a verdict per claim.
 
@@ -264,7 +292,7 @@ SweepFile = Annotated[
 ]
 
 
-@takes(*CHANGES, *MAKING, "jobs", "scheduler", "keep", "format_", "fresh", "no_run")
+@takes(*CHANGES, *MAKING, "jobs", "scheduler", "keep", "format_", "fresh", "no_run", "dry_run")
 def sweep(context: typer.Context, file: SweepFile, options: RunOptions) -> None:
     """Run a scenario over a grid, list or Latin hypercube.
 
@@ -281,7 +309,7 @@ Studies = Annotated[
 ]
 
 
-@takes(*MAKING, "jobs", "format_", "quick", "fresh", "no_run")
+@takes(*MAKING, "jobs", "format_", "quick", "fresh", "no_run", "dry_run")
 def report(context: typer.Context, options: RunOptions, studies: Studies = None) -> None:
     """Write one page that reproduces the papers.
 
@@ -306,7 +334,7 @@ TuningSeed = Annotated[
 ]
 
 
-@takes(*CHANGES, *MAKING, "jobs", "scheduler", "fresh")
+@takes(*CHANGES, *MAKING, "jobs", "scheduler", "fresh", "dry_run")
 def tune(context: typer.Context, file: TuningFile, options: RunOptions, seed: TuningSeed = None) -> None:
     """Find the parameters that minimize an objective.
 
@@ -340,6 +368,12 @@ def tune(context: typer.Context, file: TuningFile, options: RunOptions, seed: Tu
     if seed is not None:
         experiment = with_seed(experiment, seed)
         folder = options.out or folder / f"seed_{seed}"
+    if options.dry_run:
+        from ..experiments.dry_run import of_tuning
+
+        execute = executor_of(folder, experiment.identity, options)
+        print_forecasts(options, lambda pace: [of_tuning(experiment, execute, pace)])
+        return
     hold(context, folder)
     each = pooled(context, options)
 

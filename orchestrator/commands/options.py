@@ -135,6 +135,14 @@ class RunOptions:
             "--no-run", help="Only judge and draw what is in the results folder; build and run nothing."
         ),
     ] = False
+    dry_run: Annotated[
+        bool,
+        typer.Option(
+            "--dry-run",
+            help="Only tell how many runs would be made, how long they would take and how much disk space; "
+            "build, run and write nothing.",
+        ),
+    ] = False
     isolate: Annotated[
         bool,
         typer.Option(
@@ -164,6 +172,8 @@ class RunOptions:
 
         if self.fresh and self.no_run:
             raise ScenarioError("--fresh and --no-run are mutually exclusive", code="option-invalid")
+        if self.dry_run and self.no_run:
+            raise ScenarioError("--dry-run and --no-run are mutually exclusive", code="option-invalid")
         if self.format_ != "csv":  # importing the other formats takes time
             from ..results.file_formats import check_format
 
@@ -173,7 +183,7 @@ class RunOptions:
     @property
     def build(self) -> bool:
         """Whether FMUs that are out of date are built."""
-        return not (self.no_build or self.no_run)
+        return not (self.no_build or self.no_run or self.dry_run)
 
     @functools.cached_property
     def changes(self) -> tuple[Override, ...]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from . import output
-from .experiments import command_of
+from .experiments import command_of, print_forecasts
 from .options import MAKING, RunOptions, named, takes
 from .progress import executor_of, hold, pooled, print_tables, say, stoppable
 
@@ -45,7 +45,7 @@ Quick = Annotated[
 ]
 
 
-@takes(*MAKING, "jobs", "scheduler", "fresh", "no_run")
+@takes(*MAKING, "jobs", "scheduler", "fresh", "no_run", "dry_run")
 def rank(
     context: typer.Context,
     options: RunOptions,
@@ -83,6 +83,12 @@ def rank(
     ranking = load_ranking(file, more=more, quick=quick, chosen=condition or ())
     _check_only(only or (), ranking.entries)
     folder = options.out or default_folder(file)
+    if options.dry_run:
+        from ..experiments.dry_run import of_ranking
+
+        execute = executor_of(folder, ranking.identity, options, format="parquet")
+        print_forecasts(options, lambda pace: [of_ranking(ranking, execute, pace, only=only or ())])
+        return
     hold(context, folder)
     with stoppable(folder), executor_of(folder, ranking.identity, options, format="parquet") as execute:
         ranked = run_ranking(ranking, execute, only=only or ())
@@ -128,6 +134,12 @@ def _rank_by_threats(
     threats = load_threats(file, more=more, quick=quick)
     _check_only(only, threats.ranking.entries)
     folder = options.out or default_folder(file)
+    if options.dry_run:
+        from ..experiments.dry_run import of_threats
+
+        execute = executor_of(folder, threats.identity, options)
+        print_forecasts(options, lambda pace: [of_threats(threats, execute, pace, only=only)])
+        return
     hold(context, folder)
     with stoppable(folder), executor_of(folder, threats.identity, options) as execute:
         result = run_threats(threats, execute, only=only)

@@ -116,7 +116,7 @@ def search(experiment: LoadedExperiment, judged: JudgeExperiment) -> list[TunedL
             values = [_values(law, column) for column in np.asarray(places).T]
             tried = [_changes(law, place) for place in values]
             findings = judged(
-                _trials(experiment, {f"{name}, {k + 1}": changes for k, changes in enumerate(tried)})
+                trials_of(experiment, {f"{name}, {k + 1}": changes for k, changes in enumerate(tried)})
             )
             objectives = [_objective(experiment, {**fixed, **at}) for at in findings.at.values()]
             number = len(trials) // tuning.population + 1
@@ -137,18 +137,18 @@ def search(experiment: LoadedExperiment, judged: JudgeExperiment) -> list[TunedL
 def best_of(experiment: LoadedExperiment, tuned_laws: Sequence[TunedLaw]) -> LoadedExperiment:
     """Return the experiment with the best trial of every law."""
     laws = tuning_of(experiment).laws
-    return _trials(
+    return trials_of(
         experiment, {tuned.law: _changes(laws[tuned.law], tuned.best.values) for tuned in tuned_laws}
     )
 
 
 def _fixed(experiment: LoadedExperiment, judged: JudgeExperiment) -> MetricTable:
     """Return the metrics of the runs without a tuned law."""
-    left = _trials(experiment, {"as they stand": VariantSpec.model_validate({})}, driven=False)
+    left = trials_of(experiment, {"as they stand": VariantSpec.model_validate({})}, driven=False)
     return judged(left).values if left.runs else {}
 
 
-def _trials(
+def trials_of(
     experiment: LoadedExperiment, tried: dict[str, VariantSpec], *, driven: bool = True
 ) -> LoadedExperiment:
     """Return an experiment of the runs with laws, or of the others, whose only axis are the trials."""
@@ -174,6 +174,11 @@ def _changes(law: LawSpec, values: dict[Target, float]) -> VariantSpec:
     tried = {target: f"{x!r} {unit}" if (unit := units[target]) else x for target, x in values.items()}
     own = {name: getattr(law, name) for name in OverrideSpec.model_fields}
     return VariantSpec.model_construct(**{**own, "set": {**law.set, **tried}})
+
+
+def middle_of(law: LawSpec) -> VariantSpec:
+    """Return a law's overrides with the values in the middle of its ranges."""
+    return _changes(law, _values(law, [0.5] * len(law.axes)))
 
 
 def _objective(experiment: LoadedExperiment, values: MetricTable) -> float | None:

@@ -159,14 +159,14 @@ def size_note(plan: Plan, folder: Path, format: str) -> str | None:
     if size < HUGE and size <= free:
         return None
     note = (
-        f"{folder / FORMATS[format].file} will take about {_shown(size)} "
+        f"{folder / FORMATS[format].file} will take about {in_bytes(size)} "
         f"({plan.n_steps + 1} rows of {len(plan.record)} variables)"
     )
     if size > free:
-        note += f", and {_shown(free)} are free there"
+        note += f", and {in_bytes(free)} are free there"
     shorter = "name the variables that you need under 'record:' in the scenario"
     if format == "csv":
-        return f"{note}; {shorter}, or take --format parquet ({_shown(expected_size(plan, 'parquet'))})"
+        return f"{note}; {shorter}, or take --format parquet ({in_bytes(expected_size(plan, 'parquet'))})"
     return f"{note}; {shorter}"
 
 
@@ -181,8 +181,11 @@ def _free(folder: Path) -> float:
         return math.inf
 
 
-def _shown(size: float) -> str:
-    return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.0f} MB"
+def in_bytes(size: float) -> str:
+    """Return a number of bytes in words: "1.5 GB", "20 MB", "3 kB"."""
+    if size >= 1e9:
+        return f"{size / 1e9:.1f} GB"
+    return f"{size / 1e6:.0f} MB" if size >= 1e6 else f"{size / 1e3:.0f} kB"
 
 
 REAL = np.dtype(float)

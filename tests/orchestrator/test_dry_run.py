@@ -1,0 +1,163 @@
+"""`--dry-run`: how many runs an experiment would take, how long and how much space, and nothing written."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from orchestrator.experiments import dry_run
+from orchestrator.experiments.dry_run import Forecast, Pace, Span, forecast_table
+from orchestrator.experiments.journal import records_in
+
+from .test_batch_commands import SCENARIO, STUDY
+from .test_output import SWEEP
+from .test_ranking import SMALL
+
+UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
+OPEN = """
+region:
+  points: 10
+  most: 20
+  open_values:
+    friction: {vary: inputs.friction, from: 0.5, to: 0.9, because: chosen}
+"""
+TUNING = """
+title: One law
+runs:
+  - {name: held, scenario: half.yaml}
+  - {name: free, scenario: half.yaml, swap: {controller: controller_off}}
+metrics:
+  moment: {metric: peak(yaw_moment)}
+derived:
+  cost: {says: moment, expression: a, of: {a: {run: held, metric: moment}}}
+tuning:
+  objective: cost
+  population: 5
+  generations: 3
+  seed: 1
+  runs: [held]
+  laws:
+    fuzzy: {axes: {range: {vary: controller.error_range, from: 0.01, to: 0.1}}}
+"""
+
+
+@pytest.fixture
+def forecast(yawbench, fmus, tmp_path, monkeypatch):
+    """Call a command with `--dry-run` and return its forecast; nothing may be written."""
+    texts = {"half": SCENARIO, "study": STUDY, "sweep": SWEEP, "region": STUDY + OPEN, "tuning": TUNING}
+    for name, text in texts.items():
+        (tmp_path / f"{name}.yaml").write_text(text)
+    monkeypatch.chdir(tmp_path)
+
+    def state() -> dict[Path, int]:
+        return {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")}
+
+    def call(*arguments: str) -> dict[str, object]:
+        before = state()
+        status, out, _ = yawbench(*arguments, "--fmus", fmus, "--dry-run", "--json")
+        assert status == 0
+        assert state() == before
+        (made,) = json.loads(out)["forecasts"]
+        return made
+
+    return call
+
+
+def made_by(yawbench, fmus, *arguments: str) -> None:
+    status, _, said = yawbench(*arguments, "--fmus", fmus)
+    assert status == 0, said
+
+
+@pytest.mark.parametrize(("command", "runs"), [("study", 2), ("sweep", 2)])
+def test_runs_are_to_be_made_until_they_are_made(command, runs, forecast, yawbench, fmus):
+    before = forecast(command, f"{command}.yaml")
+    assert (before["finished"], before["left"]) == (0, [runs, runs])
+    assert min(before["seconds"]) > 0
+    assert min(before["size"]) > 0
+    made_by(yawbench, fmus, command, f"{command}.yaml")
+    after = forecast(command, f"{command}.yaml")
+    assert (after["finished"], after["left"], after["seconds"], after["size"]) == (
+        runs, [0, 0], [0, 0], [0, 0],
+    )  # fmt: skip
+    again = forecast(command, f"{command}.yaml", "--fresh")
+    assert (again["finished"], again["left"]) == (0, [runs, runs])
+
+
+@pytest.mark.exhaustive
+def test_a_region_is_bounded_by_its_first_and_its_last_look(forecast, yawbench, fmus):
+    made = forecast("study", "region.yaml")
+    least, most = made["left"]
+    assert forecast("study", "region.yaml", "--quick")["left"] == [2, 2]
+    assert 2 + 10 <= least < most
+    made_by(yawbench, fmus, "study", "region.yaml")
+    recorded = len(records_in(Path("results") / Path.cwd().name / "region"))
+    assert least - 2 <= recorded <= most - 2
+    after = forecast("study", "region.yaml")
+    assert after["finished"] == recorded + 2
+    assert after["left"] == [0, most - 2 - recorded]
+
+
+def test_a_tuning_takes_its_budget_and_the_runs_beside_it(forecast, yawbench, fmus):
+    assert forecast("tune", "tuning.yaml")["left"] == [5 * 3 + 1, 5 * 3 + 1]
+    made_by(yawbench, fmus, "tune", "tuning.yaml")
+    after = forecast("tune", "tuning.yaml")
+    assert after["left"] == [0, 0]
+
+
+def test_the_journal_that_is_only_read_has_the_runs_of_the_journal(yawbench, fmus, forecast, tmp_path):
+    made_by(yawbench, fmus, "sweep", "sweep.yaml")
+    folder = Path("results") / Path.cwd().name / "sweep"
+    assert len(records_in(folder)) == 2
+    lines = (folder / "runs.jsonl").read_text().splitlines()
+    (folder / "runs.jsonl").write_text("\n".join([lines[0], lines[1].replace("1", "2"), lines[2], "{"]))
+    assert len(records_in(folder)) == 1  # neither the edited line nor the broken one
+    assert records_in(tmp_path / "nothing") == {}
+
+
+def test_time_is_that_of_the_processors_and_bounds_are_in_words():
+    forecast = Forecast("many")
+    forecast.add(Span(10, 20), 30.0, 5e5)
+    table = forecast_table([forecast], workers=4)
+    ((title, finished, left, time, size),) = table.text()
+    assert (title, finished, left) == ("many", "0", "10 to 20")
+    assert time == "75 s to 2.5 min"
+    assert size == "5 MB to 10 MB"
+
+
+def test_further_sets_of_fmus_are_not_measured(monkeypatch, fmus, tmp_path):
+    from orchestrator.planner import Planner
+
+    (tmp_path / "half.yaml").write_text(SCENARIO)
+    planner = Planner(build=False)
+    plan = planner.plan(planner.load(tmp_path / "half.yaml", ()), fmus=fmus, isolated=False)
+    monkeypatch.setattr(dry_run, "MEASURED", 1)
+    pace = Pace({("others",): (2.0, 0.5)})
+    assert pace.of_plan(plan) == pytest.approx(2.0 + 0.5 * plan.n_steps)
+    begin, step = dry_run._measured(plan)
+    assert begin >= 0.0
+    assert step >= 0.0
+
+
+def test_a_ranking_is_counted_with_an_assumed_angle_until_it_is_measured(yawbench, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("small.yaml").write_text(SMALL)
+
+    def counted() -> tuple[int, list[float], list[str]]:
+        status, out, _ = yawbench("rank", "small.yaml", "--dry-run", "--json")
+        assert status == 0
+        answer = json.loads(out)
+        (made,) = answer["forecasts"]
+        return made["finished"], made["left"], made["notes"]
+
+    finished, left, (note,) = counted()
+    assert (finished, left) == (0, [2 + 2 * 2, 2 + 2 * 2])  # both sides of A, two entries in two conditions
+    assert "40.0 °" in note
+    assert [path.name for path in tmp_path.iterdir()] == ["small.yaml"]
+
+
+def test_no_run_and_dry_run_exclude_each_other(yawbench, forecast):
+    status, _, said = yawbench("study", "study.yaml", "--no-run", "--dry-run")
+    assert status == 2
+    assert "--dry-run and --no-run" in said
