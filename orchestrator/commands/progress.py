@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -33,13 +34,59 @@ SHOWN = 10
 """Failed runs named on the terminal; all are in the table."""
 
 
+SILENCE = 30.0
+"""Longest time [s] without a line where stderr is not a terminal. Chosen: readers of a log take a minute for
+a hang, and a night of lines is a page."""
+
+
+class _Log:
+    """Lines on stderr, and one on how far the command is whenever there was none for `SILENCE`."""
+
+    def __init__(self) -> None:
+        self.last = time.monotonic()
+        self.progress: Callable[[], str] | None = None  # how far the current work is
+
+    def say(self, text: str) -> None:
+        """Print a line."""
+        self.last = time.monotonic()
+        print(printable(text), file=sys.stderr, flush=True)
+
+    @contextlib.contextmanager
+    def watched(self) -> Iterator[None]:
+        """Break the silence while the block runs."""
+        began, over = time.monotonic(), threading.Event()
+        self.last = began
+
+        def watch() -> None:
+            while not over.wait(max(0.0, self.last + SILENCE - time.monotonic())):
+                if time.monotonic() >= self.last + SILENCE:
+                    so_far = f"{time.monotonic() - began:.0f} s so far"
+                    self.say(f"{self.progress()}, {so_far}" if self.progress else f"still running, {so_far}")
+
+        thread = threading.Thread(target=watch, daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
+
+
+_LOG = _Log()
+
+
 def say(text: str) -> None:
     """Print a message for the user on stderr, apart from the command's output."""
-    print(printable(text), file=sys.stderr, flush=True)
+    _LOG.say(text)
+
+
+def shows_bars() -> bool:
+    """Return whether stderr is a terminal that can show bars."""
+    return sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
 
 
 def hold(context: typer.Context, *folders: Path) -> None:
-    """Lock folders for this command until it ends.
+    """Lock folders for this command until it ends; in a log, it is never silent for long.
 
     Raises:
         ResultsError: another command is writing there, or a folder is not writable.
@@ -47,6 +94,8 @@ def hold(context: typer.Context, *folders: Path) -> None:
     from ..results.run_folder import writing
 
     context.with_resource(writing(*folders))
+    if not shows_bars():
+        context.with_resource(_LOG.watched())
 
 
 def pooled(context: typer.Context, options: RunOptions) -> Each:
@@ -169,8 +218,9 @@ def reported(
 @contextlib.contextmanager
 def bar(title: str, total: int, done: int = 0, *, quiet: bool = False) -> Iterator[Callable[[int], None]]:
     """Show progress and the time left: a bar on a terminal, elsewhere lines or nothing."""
-    if not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
-        yield (lambda count: None) if quiet else _lines(total, done)
+    if not shows_bars():
+        with _lines(title, total, done, quiet=quiet) as report:
+            yield report
         return
     from rich.console import Console
     from rich.progress import (
@@ -192,19 +242,29 @@ def bar(title: str, total: int, done: int = 0, *, quiet: bool = False) -> Iterat
         yield lambda count: shown.update(task, completed=count)
 
 
-def _lines(total: int, done: int) -> Callable[[int], None]:
-    """Return a function that prints a line for every tenth of the remaining runs."""
-    began, last = time.monotonic(), done
+@contextlib.contextmanager
+def _lines(title: str, total: int, done: int, *, quiet: bool) -> Iterator[Callable[[int], None]]:
+    """Print a line for every tenth of the remaining runs unless `quiet`, and while they take long."""
+    began, last, count = time.monotonic(), done, done
 
-    def report(count: int) -> None:
-        nonlocal last
-        if count < total and 10 * (count - last) < total - done:
+    def progress() -> str:
+        left = (time.monotonic() - began) / (count - done) * (total - count) if count > done else None
+        number = f"{title}: [{count:{len(str(total))}}/{total}]" if total else title
+        return number + (f" {left:.0f} s left" if left else "")
+
+    def report(finished: int) -> None:
+        nonlocal last, count
+        count = finished
+        if quiet or (count < total and 10 * (count - last) < total - done):
             return
         last = count
-        left = (time.monotonic() - began) / (count - done) * (total - count)
-        say(f"[{count:{len(str(total))}}/{total}]" + (f" {left:.0f} s left" if count < total else ""))
+        say(progress().removeprefix(f"{title}: "))
 
-    return report
+    before, _LOG.progress = _LOG.progress, progress
+    try:
+        yield report
+    finally:
+        _LOG.progress = before
 
 
 def save_figure(figure: Figure, wanted: Path | None, default: Path) -> None:
