@@ -7,8 +7,8 @@
     run.metric("peak(sideslip)")         # 0.0548 rad
     run.plot("sideslip", "yaw_rate")     # a matplotlib figure
 
-A controller may be plain Python, run in this process; `yawbench build` makes an FMU of one that has
-proved itself:
+A controller may be plain Python, run in this process; `export_fmu` makes an FMU of one that has proved
+itself:
 
     def proportional(yaw_rate_ref, yaw_rate):
         return 20000 * (yaw_rate_ref - yaw_rate)
@@ -59,6 +59,7 @@ if TYPE_CHECKING:
 
     from ._controller import Controller
     from ._experiment import Experiment, Runs, experiment
+    from ._export import export_fmu
     from ._fit import Fit, fit
     from ._linear import LinearModel, linearize
     from ._open import RecordedRuns, open
@@ -98,6 +99,7 @@ __all__ = [
     "YawbenchError",
     "YawbenchWarning",
     "experiment",
+    "export_fmu",
     "fit",
     "linearize",
     "load",
@@ -121,6 +123,7 @@ _MODULES = {
     "orchestrator.plan": ("Override", "Plan"),
     "yawbench._controller": ("Controller",),
     "yawbench._experiment": ("Experiment", "Runs", "experiment"),
+    "yawbench._export": ("export_fmu",),
     "yawbench._fit": ("Fit", "fit"),
     "yawbench._linear": ("LinearModel", "linearize"),
     "yawbench._ranking": ("Ranking", "rank"),

@@ -291,6 +291,11 @@ def _parameters() -> Iterator[Parameter]:
     yield of("Ranking.ranked", lambda x: yb.Ranking(x))
     yield of("Ranking.place.name", lambda x: b.places.place(x), "entry")
     yield of("Ranking.plot.kind", lambda x: b.places.plot(x), "kind", "picture")
+    # FMUs of plain Python.
+    yield of("export_fmu.controller", lambda x: yb.export_fmu(x, "made.fmu"), "controller", "made",
+             may={"lambda", "builtin"})  # fmt: skip
+    yield of("export_fmu.file", lambda x: yb.export_fmu(Law(), x, role=SENTINEL))
+    yield of("export_fmu.role", lambda x: yb.export_fmu(SENTINEL, "made.fmu", role=x))
     # Declarations.
     yield of("signal.name", lambda x: yb.signal(x), "signal")
     for name, right in (("unit", {"None"}), ("description", {"None"})):

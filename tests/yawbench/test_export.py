@@ -1,0 +1,274 @@
+"""FMUs of plain Python: they give what the program gives, here and in other tools."""
+
+from __future__ import annotations
+
+import functools
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Literal
+
+import fmpy
+import numpy as np
+import pytest
+
+import yawbench as yb
+from components.controllers.fnn import Fnn
+from tests.sentences import refused
+
+GAIN = 3e4
+LOG = open(os.devnull)  # noqa: SIM115 - a value that no FMU can take along
+MODULES = {
+    "__init__": "import numpy\n",
+    "laws": """
+import sys
+from dataclasses import dataclass
+
+import ourlab.limits as within
+from ourlab.limits import (
+    cut,
+)
+from .deep import SHARE
+
+assert "ourlab_was_imported_twice" not in sys.modules
+sys.modules["ourlab_was_imported_twice"] = sys
+
+
+def law(yaw_rate_ref, yaw_rate, gain=20000):
+    return SHARE * cut(gain * (yaw_rate_ref - yaw_rate)) + within.zero()
+""",
+    "limits": """
+import math
+
+import ourlab.deep
+
+
+def cut(x):
+    from . import deep
+    return math.copysign(min(abs(x), deep.LIMIT), x)
+
+
+def zero():
+    return ourlab.deep.LIMIT - ourlab.deep.LIMIT
+""",
+    "deep": "LIMIT, SHARE = 900.0, 0.5\n",
+    "foreign": "import numpy as np\n\n\ndef law(yaw_rate):\n    return np.tanh(yaw_rate)\n",
+    "deeply_foreign": "from . import foreign\n\n\ndef law(yaw_rate):\n    return foreign.law(yaw_rate)\n",
+}
+
+
+@pytest.fixture(scope="module")
+def base():
+    return yb.load("fnn_sideslip/25mps").set({"stop_time": 1.4})
+
+
+@pytest.fixture(scope="module")
+def ourlab(tmp_path_factory) -> Iterator[Any]:
+    """A package of a user, with a function that returns its modules."""
+    folder = tmp_path_factory.mktemp("project") / "ourlab"
+    folder.mkdir()
+    for name, text in MODULES.items():
+        (folder / f"{name}.py").write_text(text)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(folder.parent)
+        yield lambda name: import_module(f"ourlab.{name}")
+    for name in [name for name in sys.modules if name.startswith("ourlab")]:
+        del sys.modules[name]
+
+
+def half(x):
+    return 0.5 * x
+
+
+def law(yaw_rate_ref, yaw_rate, t, gain=20000, share=0.5):
+    return half(GAIN + gain) * share * (yaw_rate_ref - yaw_rate) if t > 0.1 else 0
+
+
+def powers(yaw_rate, count=3):
+    return sum(10.0**k for k in range(count))
+
+
+def times(factor):
+    def made(yaw_rate):
+        return factor * half(yaw_rate)
+
+    return made
+
+
+@dataclass
+class Data:
+    """A law of the yaw rate."""
+
+    inputs = ("yaw_rate_ref", "yaw_rate")
+    outputs = ("yaw_moment",)
+    gain: float = yb.parameter(2e4, "N.m.s/rad", "Moment per yaw-rate error", minimum=0.0)
+    kind: Literal["whole", "half"] = "whole"
+
+    def __post_init__(self):
+        self.half = half(self.gain)
+
+    def start(self, t, u):
+        self.integral = 0.0
+
+    def advance(self, t, h, u):
+        self.integral += h * (u.yaw_rate_ref - u.yaw_rate)
+
+    def output(self, t, u):
+        gain = 2 * self.half if self.kind == "whole" else self.half
+        return gain * (u.yaw_rate_ref - u.yaw_rate) + 1e3 * self.integral
+
+
+class Derived:
+    """What its constructor derives follows from an attribute of the class."""
+
+    inputs, outputs = ("yaw_rate",), ("yaw_moment",)
+    gain = 1e4
+
+    def __init__(self):
+        self.twice = 2 * self.gain
+
+    def output(self, t, u):
+        return -self.twice * u.yaw_rate
+
+
+class Changed(Derived):
+    """An object that is not as its constructor has made it."""
+
+    def __init__(self):
+        super().__init__()
+        self.table = [1.0, 2.0]
+
+    def output(self, t, u):
+        return self.table[-1] * super().output(t, u)
+
+
+def changed():
+    made = Changed()
+    made.table = [3.0, float("inf"), 4.0]
+    return made
+
+
+LAWS: dict[str, Any] = {
+    "a function": law,
+    "a dataclass": Data(3e4),
+    "whole numbers": powers,
+    "a partial function": functools.partial(law, gain=1e4),
+    "a lambda": lambda yaw_rate, gain=1e3: gain * yaw_rate + GAIN,
+    "a closure": times(3.0),
+    "an attribute of the class": Derived(),
+    "a changed object": changed(),
+    "a component": Fnn,
+}
+FIRST = ("a function", "a dataclass")
+
+
+@pytest.mark.parametrize(
+    "what", [pytest.param(w, marks=[pytest.mark.exhaustive] * (w not in FIRST)) for w in LAWS]
+)
+def test_the_fmu_gives_the_bits_of_the_program_here_and_in_fmpy(what, base, tmp_path):
+    fmu = yb.export_fmu(LAWS[what], tmp_path / "my.fmu")
+    by_fmu, by_program = (base.swap(controller=one).run() for one in (fmu, LAWS[what]))
+    assert list(by_fmu) == list(by_program)
+    assert all(np.array_equal(by_fmu[name], by_program[name]) for name in by_fmu)
+    translated = by_program.record["fmus"]["controller"]["runs_as"] == "native"
+    assert (by_fmu.record["fmus"]["controller"]["runs_as"] == "native") >= translated
+    driven = {name: by_program[f"plant.{name}"] for name in ("yaw_rate", "sideslip")}
+    columns = [("time", float), *((name, float) for name in driven)]
+    table = np.array(list(zip(by_program.time, *driven.values(), strict=True)), dtype=columns)
+    result = fmpy.simulate_fmu(
+        str(fmu), input=table, output=["yaw_moment"], stop_time=0.5, output_interval=0.01
+    )
+    assert np.all(np.isfinite(result["yaw_moment"]))
+    assert fmpy.read_model_description(str(fmu)).modelName == "my"
+
+
+def test_modules_of_the_own_package_are_packed_with_it(ourlab, base, tmp_path):
+    program = ourlab("laws").law
+    fmu = yb.export_fmu(program, tmp_path / "packed.fmu")
+    changed = {"controller.gain": 2.5e4}
+    by_fmu, by_program = (base.swap(controller=one).set(changed).run() for one in (fmu, program))
+    assert np.array_equal(by_fmu["controller.yaw_moment"], by_program["controller.yaw_moment"])
+    assert np.ptp(by_fmu["controller.yaw_moment"]) > 0
+    alone = "; ".join([
+        "import fmpy, sys",
+        "result = fmpy.simulate_fmu(sys.argv[1], start_values={'yaw_rate': 1.0})",
+        "print(result[-1][1])",
+    ])  # fmt: skip
+    for units in ("python", ""):  # in another process, which has no such package
+        done = subprocess.run(
+            [sys.executable, "-c", alone, fmu],
+            env=os.environ | {"YAWBENCH_UNITS": units},
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.stdout.split()[-1:] == ["-450.0"], done.stderr
+
+
+@pytest.mark.exhaustive
+def test_an_exported_law_is_tuned_by_a_file(tmp_path, base):
+    fmu = yb.export_fmu(law, tmp_path / "mine.fmu")
+    (tmp_path / "tuning.yaml").write_text(
+        f"""
+title: Mine
+metrics: {{error: {{metric: rms_error(yaw_rate)}}}}
+derived: {{cost: {{says: Error, expression: e, unit: rad/s, of: {{e: {{run: mine, metric: error}}}}}}}}
+runs: [{{name: mine, scenario: {base.path}, set: {{stop_time: 1.4}}}}]
+tuning:
+  objective: cost
+  population: 5
+  generations: 1
+  seed: 1
+  laws:
+    mine: {{swap: {{controller: {fmu}}}, axes: {{gain: {{vary: controller.gain, from: 1000, to: 40000}}}}}}
+"""
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "yawbench", "tune", "tuning.yaml", "--out", "tuned"],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(Path(yb.__file__).parents[1])},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert yb.open(tmp_path / "tuned").tables["trials"]["objective"].nunique() == 5
+
+
+def reads_a_file(yaw_rate):
+    return LOG.tell()
+
+
+def uses_numpy(yaw_rate):
+    return np.tanh(yaw_rate)
+
+
+REFUSED: dict[str, Any] = {
+    "a file": lambda get: reads_a_file,
+    "numpy": lambda get: uses_numpy,
+    "an array": lambda get: times(np.ones(3)),
+    "no source": lambda get: eval("lambda yaw_rate: 1.0"),
+    "a method": lambda get: Data().output,
+    "a foreign import": lambda get: get("foreign").law,
+    "a foreign import of a module": lambda get: get("deeply_foreign").law,
+    "the name of an FMU": lambda get: "controller_off",
+    "a class": lambda get: Data,
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_an_fmu_cannot_take_along_is_refused_in_a_sentence(what, ourlab, tmp_path):
+    with refused(yb.YawbenchError):
+        yb.export_fmu(REFUSED[what](ourlab), tmp_path / "my.fmu")
+    assert not list(tmp_path.iterdir())
+
+
+def test_names_and_roles_that_no_fmu_can_have_are_refused(tmp_path):
+    for wrong in ({"file": "my controller.fmu"}, {"file": "my.zip"}, {"file": "my.fmu", "role": "pilot"}):
+        with refused(yb.ScenarioError, "argument-invalid"):
+            yb.export_fmu(law, **wrong)

@@ -1,0 +1,350 @@
+"""FMUs of controllers in plain Python, for this bench and for every other tool."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import inspect
+import struct
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from components.fmi.component import Component
+from fmus.build import COMPONENTS, put
+from fmus.build_stamp import BuildStamp
+from fmus.closure import Parts, Sources
+from fmus.native.gate import Twin, random_inputs
+from fmus.packing import to_bytes
+from fmus.presentation import presented
+from fmus.recipe import TOOL, PythonRecipe
+from fmus.staging import staged
+from orchestrator.errors import BuildError, ScenarioError
+from orchestrator.messages import listed, short
+from vocabulary.roles import ROLES
+
+from . import _parameters, arguments
+from ._controller import ControllerLike, PythonComponent
+from ._export_source import Cut, Own, literal, refuse
+from ._parameters import ProgramParameters
+
+STEPS, FEW, STEP = 400, 60, 0.001
+"""Steps in which an FMU is compared with its program, those with other parameters, and their length [s]."""
+NOWHERE = "/"
+"""No folder has this name, so an FMU is never taken for outdated: its program may be gone."""
+
+
+def export_fmu(controller: ControllerLike, file: str | Path, *, role: str = "controller") -> Path:
+    """Write a controller in plain Python as an FMU, and return its path.
+
+        >>> def follow(yaw_rate_ref, yaw_rate, gain=2e4):
+        ...     return gain * (yaw_rate_ref - yaw_rate)
+        >>> fmu = yb.export_fmu(follow, "follow.fmu")
+        >>> by_fmu, by_python = base.swap(controller=fmu).run(), base.swap(controller=follow).run()
+        >>> bool((by_fmu["controller.yaw_moment"] == by_python["controller.yaw_moment"]).all())
+        True
+
+    The FMU is FMI 2.0 for co-simulation, with a native library where the program can be translated. It has
+    the program's parameters, and contains the modules of the user's own package that it imports. Before it
+    is written, its outputs are compared with those of the program, bit by bit.
+
+    Args:
+        controller: plain Python as in `Scenario.swap`.
+        file: the FMU; its name without `.fmu` is the name of the model.
+        role: of the instances that it can be, such as "driver"; it determines the outputs of a function.
+
+    Raises:
+        ScenarioError: the controller or the role is invalid.
+        BuildError: the program needs what an FMU cannot take along.
+    """
+    path = arguments.path(file, "file").absolute()
+    role = arguments.text(role, "role")
+    folders = {item.name: folder for folder, item in ROLES.items()}
+    if path.suffix != ".fmu" or not (path.stem.isidentifier() and path.stem.isascii()):
+        raise ScenarioError(
+            f"file: must be a name of letters, digits and _ that ends with .fmu (got {path.name!r})",
+            code="argument-invalid",
+        )
+    if role not in folders:
+        raise ScenarioError(
+            f"role: must be one of {listed(folders, last='or')} (got {short(role)})", code="argument-invalid"
+        )
+    if arguments.names_file(controller):
+        raise ScenarioError(f"controller: {short(controller)} is an FMU already", code="controller-invalid")
+    program = PythonComponent(controller, unit=role, role=role)
+    try:
+        recipe = _recipe(controller, program, path.stem, folders[role])
+        files, modules = recipe.make()
+        files = presented(files, recipe.listing(), role=role, credits={})
+        key = hashlib.sha256(b"".join(files[name] for name in sorted(files))).hexdigest()[:32]
+        stamp = BuildStamp(path.stem, key, source="Python", tool=TOOL, home=NOWHERE)
+        put(path, to_bytes(files, stamp), *modules)
+    except BuildError as error:
+        sentences = [diagnostic.message for diagnostic in error.diagnostics]
+        raise BuildError([f"{path.stem}: {text}" for text in sentences], code=error.code) from None
+    except OSError as error:
+        raise BuildError(f"{path}: cannot be written: {error}", code="component-unreadable") from None
+    return path
+
+
+@dataclass(frozen=True)
+class _ProgramRecipe(PythonRecipe):
+    """Builds an FMU from sources that are not in files."""
+
+    texts: dict[str, str] = field(default_factory=dict)
+
+    @cached_property
+    def _files(self) -> dict[str, str]:
+        return self.texts
+
+    def listing(self) -> dict[str, str]:
+        """Return the component and the program, as path -> text."""
+        folder, name = self.module
+        return {path: self.texts[path] for path in (f"{folder}/{name}.py", f"{folder}/{name}_program.py")}
+
+
+def _recipe(program: Any, known: PythonComponent, name: str, folder: str) -> PythonRecipe:
+    """Return the recipe of the first form of a program that gives the same values."""
+    target = program.func if arguments.is_a(program, functools.partial) else program
+    is_class = arguments.is_a(program, type)
+    code = target if is_class or inspect.isfunction(target) else type(target)
+    if not (is_class or inspect.isfunction(target) or hasattr(target, "output")):
+        raise refuse(f"{type(target).__name__}: give a function, or an object with a method output(t, u)")
+    own = Own(code.__module__, inspect.getsourcefile(code) if _has_file(code) else None)
+    cut = Cut(own, (folder,))
+    cut.module = code.__module__
+    called = code.__name__ if code.__name__.isidentifier() else "law"
+    cut.add(called, code, called)
+    sources = Sources(COMPONENTS)
+    base = dict(sources.closure(("fmi", "component")))
+    for place in own.ours:
+        base |= sources.closure(place)
+    texts = {**base, **own.files, f"{folder}/{name}_program.py": cut.text()}
+    texts.setdefault(f"{folder}/__init__.py", "")
+    difference = ""
+    for exact in (False, True):
+        form = _Form(name, called, known.component, exact)
+        if is_class:
+            text = form.of_class()
+        else:
+            text = form.of_function(program) if code is target else form.of_object(target)
+        texts[f"{folder}/{name}.py"] = text
+        difference = _difference(known, texts, (folder, name))
+        if not difference:
+            return _ProgramRecipe(name, (folder, name), sources, texts=dict(sorted(texts.items())))
+    raise refuse(f"its values would differ from those of {called} in Python: {difference}")
+
+
+def _has_file(code: Any) -> bool:
+    try:
+        return bool(inspect.getsourcefile(code))
+    except (TypeError, OSError):
+        return False
+
+
+HEAD = '''"""{doc}"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from dataclasses import dataclass, field, replace
+
+from ..fmi.component import Component
+from ..fmi.variables import VariableSpec
+from .{module} import {called} as program
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Its parameters."""
+
+{fields}
+
+
+Inputs = namedtuple("Inputs", {scalars!r})
+
+
+def whole(x):
+    return int(x) if x == int(x) else x
+
+
+class Exported(Component):
+    """{doc}"""
+
+    fmu_name = {name!r}
+    Parameters = Parameters
+    inputs = {inputs}
+    outputs = {outputs}
+    sampled = {sampled}
+'''
+RESULT = "        return result if isinstance(result, (tuple, list)) else (result,)\n"
+UNITLESS = '''
+
+Exported.variables = tuple(replace(v, unit=None) if v.name in {names!r} else v for v in Exported.variables)
+"""Python does not know the units of these."""
+'''
+CLASS = '''"""{doc}"""
+
+from .{module} import {called} as program
+
+
+class Exported(program):
+    fmu_name = {name!r}
+
+
+Exported.__doc__ = program.__doc__
+'''
+
+
+@dataclass(frozen=True)
+class _Form:
+    """The component of an FMU, as text.
+
+    Attributes:
+        name: of the FMU.
+        called: the function or class in the module beside it.
+        known: the component that runs in this process.
+        exact: keep whole numbers whole, and set attributes of a class before the constructor is called, as
+            Python does; the translator follows neither.
+    """
+
+    name: str
+    called: str
+    known: type[Component]
+    exact: bool
+
+    def of_class(self) -> str:
+        """Return a component class with another name."""
+        return CLASS.format(**self._names())
+
+    def of_function(self, program: Any) -> str:
+        """Return a component that calls a function, or what `functools.partial` has made of it."""
+        own = _parameters.of_function(program)
+        first, named = getattr(program, "args", ()), getattr(program, "keywords", {})
+        inputs = [v.name for v in self.known.variables if v.causality == "input"]
+        given = [literal(value, f"argument {k + 1} of {self.called}") for k, value in enumerate(first)]
+        given += [f"{name}=u[{k}]" for k, name in enumerate(inputs)]
+        given += ["t=t"] if "t" in inspect.signature(program).parameters else []
+        given += [f"{x}={literal(value, x)}" for x, value in named.items() if x not in own.values]
+        given += [f"{x}={self._value(x, value)}" for x, value in own.values.items()]
+        call = f"\n    def output(self, t, u):\n        result = program({', '.join(given)})\n"
+        return self._head(own) + call + RESULT + self._unitless(own)
+
+    def of_object(self, program: Any) -> str:
+        """Return a component that makes an object and calls its methods."""
+        names = [v.name for v in self.known.variables if v.causality != "parameter"]
+        own = _parameters.of_object(program, names)
+        given = [f"{x}={literal(value, x)}" for x, value in own.fixed.items()]
+        given += [f"{x}={self._value(x, v)}" for x, v in own.values.items() if x not in own.attributes]
+        attributes = [f"        made.{x} = {self._value(x, own.values[x])}\n" for x in sorted(own.attributes)]
+        made = f"        made = program({', '.join(given)})\n"
+        if not own.values:  # as it is, however it came to be
+            held = [(x, literal(value, f"{self.called}.{x}")) for x, value in vars(program).items()]
+            made = "        made = program.__new__(program)\n"
+            attributes = [f"        made.{x} = {text}\n" for x, text in held]
+        elif self.exact:
+            made = "        made = program.__new__(program)\n"
+            attributes += [f"        made.__init__({', '.join(given)})\n"]
+        parts = ["\n    def configure(self):\n", made, *attributes, "        self.program = made\n"]
+        if hasattr(program, "start"):
+            parts.append("\n    def start(self, t, u):\n        self.program.start(t, Inputs(*u))\n")
+        if hasattr(program, "advance"):
+            parts.append(
+                "\n    def advance(self, t, h, u):\n        self.program.advance(t, h, Inputs(*u))\n"
+            )
+        parts.append("\n    def output(self, t, u):\n        result = self.program.output(t, Inputs(*u))\n")
+        return "".join([self._head(own), *parts, RESULT, self._unitless(own)])
+
+    def _value(self, name: str, written: Any) -> str:
+        is_whole = self.exact and type(arguments.plain(written)) is int
+        return f"whole(self.p.{name})" if is_whole else f"self.p.{name}"
+
+    def _head(self, own: ProgramParameters) -> str:
+        specs = {name: made.metadata["declared"] for name, made in own.declared.items()}
+        kinds = {"Real": "float", "Integer": "int", "Boolean": "bool", "String": "str"}
+        fields = [
+            f"    {x}: {kinds[spec.type]} = field(default={spec.start!r}, metadata={{'declared': {spec!r}}})"
+            for x, spec in specs.items()
+        ]
+        return HEAD.format(
+            fields="\n".join(fields),
+            scalars=tuple(v.name for v in self.known.variables if v.causality == "input"),
+            inputs=repr(self.known.inputs),
+            outputs=repr(self.known.outputs),
+            sampled=self.known.sampled,
+            **self._names(),
+        )
+
+    def _names(self) -> dict[str, str]:
+        doc = (self.known.__doc__ or self.called).strip().splitlines()[0].replace("\\", " ").replace('"', "'")
+        return {"name": self.name, "module": f"{self.name}_program", "called": self.called, "doc": doc}
+
+    @staticmethod
+    def _unitless(own: ProgramParameters) -> str:
+        return UNITLESS.format(names=tuple(sorted(own.unitless))) if own.unitless else ""
+
+
+def _difference(known: PythonComponent, texts: dict[str, str], module: Parts) -> str:
+    """Return how the values of a component in `texts` differ from those of a program, "" if they do not."""
+    package = "yawbench_" + hashlib.sha256(repr(sorted(texts.items())).encode()).hexdigest()[:12]
+    with staged(texts, package) as stage:
+        made = stage.component(module)
+        variables = made.variables
+        inputs = [i for i, v in enumerate(variables) if v.causality == "input"]
+        outputs = [i for i, v in enumerate(variables) if v.causality == "output"]
+        walk = random_inputs(variables, made.fmu_name)
+        rows = [next(walk) for _ in range(STEPS)]
+        for told, kind, refs, values, steps in _settings(variables):
+            answers = []
+            for component in (type("Known", (known.component,), {}), made):
+                unit = Twin(component, Path(stage.folder))
+                if refs:
+                    unit.set(kind, refs, values)
+                answers.append(list(_outputs(unit, inputs, outputs, rows[:steps])))
+            for k, (one, other) in enumerate(zip(*answers, strict=False)):
+                if one != other:
+                    return f"{told} at t = {k * STEP:.3f} s, {_shown(one)} and {_shown(other)}"
+            if len(answers[0]) != len(answers[1]):
+                return f"{told}, only one of them ends early"
+    return ""
+
+
+def _settings(variables: Sequence[Any]) -> Iterator[tuple[str, str, list[int], list[Any], int]]:
+    """Yield what a program is compared with: text, and type, reference and value of a parameter; steps."""
+    other: dict[str, Callable[[Any], Any]] = {
+        "Real": lambda x: 1.25 * x + 0.01,
+        "Integer": lambda x: x + 1,
+        "Boolean": lambda x: not x,
+    }
+    yield "as it is", "Real", [], [], STEPS
+    for i, v in enumerate(variables):
+        if v.causality != "parameter":
+            continue
+        values = (v.choices or ()) if v.type == "String" else (other[v.type](v.start),)
+        for value in values:
+            if v.maximum is None or v.type != "Real" or value <= v.maximum:
+                yield f"with {v.name} = {value!r}", v.type, [i], [value], FEW
+
+
+def _outputs(
+    unit: Twin, inputs: list[int], outputs: list[int], rows: list[list[float]]
+) -> Iterator[bytes | str]:
+    """Yield the outputs of a component in every step, until it fails."""
+    if inputs:
+        unit.set("Real", inputs, rows[0])
+    if not (unit.begin(0.0)[0] and unit.end_initialization()[0]):
+        yield "it fails"
+        return
+    for k, row in enumerate(rows):
+        if inputs:
+            unit.set("Real", inputs, row)
+        yield unit.get(outputs)[2]
+        if not unit.step(k * STEP, STEP)[0]:
+            yield "it fails"
+            return
+
+
+def _shown(values: bytes | str) -> str:
+    return values if isinstance(values, str) else f"{struct.unpack(f'{len(values) // 8}d', values)}"
