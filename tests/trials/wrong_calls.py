@@ -179,7 +179,7 @@ def _parameters() -> Iterator[Parameter]:
         may = TRUTHS if place == "plant.validate" else set()
         yield of(f"Scenario.set.values [{place}]", lambda x, place=place: plan(b.base.set({place: x})), place,
                  "sideslip", "fmu", may=may)  # fmt: skip
-    yield of("Scenario.fault.place", lambda x: plan(b.base.fault(x, kind="freeze")), "place", "fault",
+    yield of("Scenario.fault.target", lambda x: plan(b.base.fault(x, kind="freeze")), "target", "fault",
              "on")  # fmt: skip
     yield of(
         "Scenario.fault.kind",
