@@ -241,12 +241,13 @@ class Cut:
     def _add_code(self, name: str, value: Any, user: str) -> None:
         module = value.__module__ or ""
         home = sys.modules.get(module)
-        elsewhere = module.partition(".")[0] in (*sys.stdlib_module_names, *OURS) and module != "__main__"
-        if elsewhere or (module != self.module and getattr(home, value.__name__, None) is value):
+        if module != self.module and getattr(home, value.__name__, None) is value:
             node = ast.parse(f"from {module} import {value.__name__} as {name}").body[0]
             self._import(node, user)
             return
         where = f"{user} uses {name}" if user != name else name
+        if isinstance(value, BuiltinFunctionType):
+            raise refuse(f"{where}, which has no source")
         block = self._class(value, where) if isinstance(value, type) else self._function(value, where)
         self._blocks.append(
             block if value.__name__ in (name, "<lambda>") else f"{block}\n\n{name} = {value.__name__}"
