@@ -239,10 +239,10 @@ class Cut:
         self._blocks.append(self.own.import_of(node, self.package, user) or ast.unparse(node))
 
     def _add_code(self, name: str, value: Any, user: str) -> None:
-        module = value.__module__ or ""
+        module, called = value.__module__ or "", value.__name__
         home = sys.modules.get(module)
-        if module != self.module and getattr(home, value.__name__, None) is value:
-            node = ast.parse(f"from {module} import {value.__name__} as {name}").body[0]
+        if module != self.module and getattr(home, called, None) is value:
+            node = ast.parse(f"from {module} import {called} as {name}").body[0]
             self._import(node, user)
             return
         where = f"{user} uses {name}" if user != name else name
