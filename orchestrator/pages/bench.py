@@ -84,7 +84,7 @@ class Knob:
 
 def knobs_of(scenario: LoadedScenario, plan: Plan) -> list[Knob]:
     """Return what sliders can change: facts, quantities of the vehicle file, parameters of instances."""
-    found = {knob.target: knob for knob in _facts(scenario, plan)}
+    knobs = {knob.target: knob for knob in _facts(scenario, plan)}
     for instance in plan.instances:
         for variable in instance.fmu.of("parameter"):
             value = instance.parameter(variable.name)
@@ -94,11 +94,11 @@ def knobs_of(scenario: LoadedScenario, plan: Plan) -> list[Knob]:
             target = f"vehicle.{variable.name}" if of_car else f"{instance.name}.{variable.name}"
             if any(
                 knob.target in FACTS and variable.name in FACTS[knob.target].parameters
-                for knob in found.values()
+                for knob in knobs.values()
             ):
                 continue  # the fact sets it
-            found.setdefault(target, _knob(target, variable, float(value)))
-    return list(found.values())
+            knobs.setdefault(target, _knob(target, variable, float(value)))
+    return list(knobs.values())
 
 
 def _facts(scenario: LoadedScenario, plan: Plan) -> Iterator[Knob]:
@@ -106,8 +106,8 @@ def _facts(scenario: LoadedScenario, plan: Plan) -> Iterator[Knob]:
         values = [
             value
             for instance in plan.instances
-            for one in (*fact.parameters, *fact.inputs)
-            if isinstance(value := instance.constants.get(one, instance.parameter(one)), float)
+            for quantity in (*fact.parameters, *fact.inputs)
+            if isinstance(value := instance.constants.get(quantity, instance.parameter(quantity)), float)
         ]
         if getattr(scenario, name) is not None and values:
             low, high = FACT_RANGES[name]
@@ -174,8 +174,8 @@ class Wanted:
     def command(self) -> str:
         """The command that makes the run."""
         options = (("--set", self.settings), ("--swap", self.swaps), ("--fault", self.faults))
-        given = [part for option, values in options for value in values for part in (option, value)]
-        return shlex.join(["yawbench", "run", self.scenario, *given])
+        options_given = [part for option, values in options for value in values for part in (option, value)]
+        return shlex.join(["yawbench", "run", self.scenario, *options_given])
 
 
 class Bench:
@@ -192,6 +192,7 @@ class Bench:
         self._pool = Pool(1, preload=NEEDED, lasting=LASTING)
         self._closing = StopFlag()
         self._latest: dict[str, StopFlag] = {}
+        self._paths: dict[str, Path] = {}  # of scenarios, by name: finding one reads all
         self._kept: OrderedDict[str, tuple[Results, PackedRun]] = OrderedDict()
         threading.Thread(target=self._warm, daemon=True).start()
 
@@ -216,33 +217,38 @@ class Bench:
             loaded, plan = planned(Job(scenario, path, Path()), self._planner)
             archives = self._planner.opener.names(find_folder(path, opener=self._planner.opener))
         knobs = knobs_of(loaded, plan)
-        swaps = [(one, choices) for one in plan.instances if len(choices := _alternatives(one, archives)) > 1]
+        swaps = [
+            (instance, choices)
+            for instance in plan.instances
+            if len(choices := _alternatives(instance, archives)) > 1
+        ]
         data = {
             "scenario": scenario,
             "shown": shown_first(knobs, plan),
             "knobs": {
-                one.target: {
-                    "unit": one.unit, "value": one.value, "low": one.low, "high": one.high, "step": one.step,
-                    "says": one.says, "usual": one.usual,
+                knob.target: {
+                    "unit": knob.unit, "value": knob.value, "low": knob.low, "high": knob.high,
+                    "step": knob.step, "says": knob.says, "usual": knob.usual,
                 }
-                for one in knobs
+                for knob in knobs
             },
         }  # fmt: skip
         return render(
             "bench.html.j2", title=plan.title or scenario, scenario=scenario, data=data, knobs=knobs,
             swaps=swaps, others=others,
-            wires=[f"{one.source}.{one.output} -> {one.target}" for one in plan.wires],
+            wires=[f"{wire.source}.{wire.output} -> {wire.target}" for wire in plan.wires],
             assets=assets("bench.js"),
         )  # fmt: skip
 
-    @staticmethod
-    def _scenario(name: str) -> Path:
+    def _scenario(self, name: str) -> Path:
         """Return the scenario of a name; a path is refused."""
-        known = find_and_load.names("a scenario")
-        if name not in known:
-            others = hint(name, known, lead="by name there are")
-            raise ScenarioError(f"there is no scenario {short(name)}{others}", code="scenario-unknown")
-        return find_and_load.find(name, "a scenario")
+        if name not in self._paths:
+            known = find_and_load.names("a scenario")
+            if name not in known:
+                others = hint(name, known, lead="by name there are")
+                raise ScenarioError(f"there is no scenario {short(name)}{others}", code="scenario-unknown")
+            self._paths[name] = find_and_load.find(name, "a scenario")
+        return self._paths[name]
 
     def run(self, wanted: Wanted) -> tuple[str, list[str]]:
         """Make a run unless it is kept; return its key and the warnings about its course.
@@ -255,9 +261,9 @@ class Bench:
         self._latest[wanted.page] = stop
         changes = read_changes(wanted.swaps, wanted.settings, wanted.faults)
         if files := [
-            str(one)
-            for one in changes
-            if one.target.names_file and (not one.swaps or is_path(str(one.value)))
+            str(change)
+            for change in changes
+            if change.target.names_file and (not change.swaps or is_path(str(change.value)))
         ]:
             raise ScenarioError(f"{files[0]}: the bench takes names, no files", code="option-invalid")
         path = self._scenario(wanted.scenario)
@@ -267,7 +273,7 @@ class Bench:
         if job.key not in self._kept:
             self._make(job, wanted.page, stop, earlier)
         self._kept.move_to_end(job.key)
-        return job.key, [str(one) for one in self._kept[job.key][0].record.course_warnings]
+        return job.key, [str(warning) for warning in self._kept[job.key][0].record.course_warnings]
 
     def _make(self, job: Job, page: str, stop: StopFlag, earlier: StopFlag | None) -> None:
         """Make a run when it is its turn, and keep it."""
@@ -286,7 +292,7 @@ class Bench:
             self._turn.release()
         if not outcome.ok:
             raise YawbenchError(list(outcome.diagnostics))
-        (packed,) = pack([outcome.value], exact=True)
+        (packed,) = pack([outcome.value], raw=True)
         self._kept[job.key] = outcome.value, replace(packed, address=f"block/{job.key}")
         while len(self._kept) > KEPT:
             self._kept.popitem(last=False)
@@ -343,5 +349,5 @@ class _Request(BaseModel, extra="forbid", strict=True):
     @property
     def wanted(self) -> tuple[Wanted, list[tuple[str, str]]]:
         changes = map(tuple, (self.settings, self.swaps, self.faults))
-        earlier = [(one[0], one[1]) for one in self.earlier if len(one) == 2]
+        earlier = [(pair[0], pair[1]) for pair in self.earlier if len(pair) == 2]
         return Wanted(self.page, self.label, self.scenario, *changes), earlier

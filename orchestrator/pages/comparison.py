@@ -154,8 +154,8 @@ class RecordDifference(NamedTuple):
     """An entry that differs between two records; None where a record does not have it."""
 
     place: str
-    one: Any
-    other: Any
+    first: Any
+    second: Any
 
 
 def differences(a: RunRecord, b: RunRecord) -> list[RecordDifference]:

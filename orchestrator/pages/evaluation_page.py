@@ -54,7 +54,7 @@ class CriterionRow:
 
 def criteria_of(judged: Sequence[Evaluation], series: TestSeries | None) -> list[CriterionRow]:
     """Return a row per criterion, with the verdict of the series, or that of the run that decides."""
-    found = []
+    rows = []
     for name in dict.fromkeys(name for run in judged for name in run.criteria):
         own = {run.label: run.criteria[name] for run in judged if name in run.criteria}
         deciding = worst(own.values())
@@ -63,8 +63,8 @@ def criteria_of(judged: Sequence[Evaluation], series: TestSeries | None) -> list
         verdict = series.criteria.get(name, deciding) if series else deciding
         number = verdict if verdict.beyond is not None else replace(deciding, status=verdict.status)
         row = CriterionRow(name, number, label if len(judged) > 1 else "", verdict.why, *_numbers(number))
-        found.append(row)
-    return found
+        rows.append(row)
+    return rows
 
 
 def _numbers(verdict: Verdict) -> tuple[str, str]:
@@ -73,7 +73,7 @@ def _numbers(verdict: Verdict) -> tuple[str, str]:
         return "", ""
     digits = digits_apart([(verdict.value, verdict.bound)], verdict.unit)
     symbol = SYMBOLS[verdict.relation] if verdict.relation else ""
-    value, bound = (shown(one, verdict.unit, digits=digits) for one in (verdict.value, verdict.bound))
+    value, bound = (shown(number, verdict.unit, digits=digits) for number in (verdict.value, verdict.bound))
     return value, f"{symbol} {bound}".strip()
 
 
@@ -107,7 +107,7 @@ def evaluation_page(
         dashed=[*(f"{instant:.3f} s: {text}" for instant, text in marks), *map(_limit_words, limits)],
         viewer=viewer(runs, settings, name="test", alone=True),
         table=table,
-        each=[run_table(one, test.says) for one in judged],
+        each=[run_table(run, test.says) for run in judged],
         assets=assets(),
     )
 

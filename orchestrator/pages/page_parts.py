@@ -181,14 +181,14 @@ class PageParameter:
     meaning: str
     unit: str
     default: ValueSource  # of the FMU's default
-    given: ValueSource | None = None  # of the value in the scenario or vehicle file
+    stated: ValueSource | None = None  # of the value in the scenario or vehicle file
     set_by_study: bool = False
     values: dict[str, None] = field(default_factory=dict)  # as text, each once
 
     @property
     def origin(self) -> ValueSource:
         """The provenance of the value that applies where the study does not override it."""
-        return self.given or self.default
+        return self.stated or self.default
 
 
 @dataclass
@@ -214,7 +214,7 @@ class ParameterGroup:
         if origin is not None and origin.kind == VARIED:
             row.set_by_study = True
         else:
-            row.given = row.given or origin
+            row.stated = row.stated or origin
 
 
 def groups_of(runs: Sequence[tuple[RunRecord, Plan]]) -> list[ParameterGroup]:

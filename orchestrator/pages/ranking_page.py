@@ -64,8 +64,8 @@ def ranking_page(ranked: RankingResult, folder: Path, command: str, each: Each =
     """
     ranking = ranked.ranking
     digits = deciding_digits(ranked.scores)
-    cells = [(one, cell) for one in ranked.scores for cell in one.cells.values()]
-    wanted = [_side(ranked, one, cell, folder) for one, cell in cells]
+    cells = [(score, cell) for score in ranked.scores for cell in score.cells.values()]
+    wanted = [_side(ranked, score, cell, folder) for score, cell in cells]
     list(each(_write_side, *zip(*wanted, strict=True)))
     tidy_sides(folder, [_id(cell) for _, cell in cells])
     lost = next((cell for _, cell in cells if cell.state in ("failed", "spun")), cells[0][1])
@@ -78,9 +78,12 @@ def ranking_page(ranked: RankingResult, folder: Path, command: str, each: Each =
         rule=RULE,
         notes=[*ranking.spec.notes, *ranking.edited],
         quick=ranking.quick,
-        missing=[one.spec.title for one in ranked.scores if one.missing],
+        missing=[score.spec.title for score in ranked.scores if score.missing],
         first=["place", "controller", "passed", "runs"],
-        conditions=[{"short": one.heading, "title": one.title} for one in ranking.conditions.values()],
+        conditions=[
+            {"short": condition.heading, "title": condition.title}
+            for condition in ranking.conditions.values()
+        ],
         rows=_rows(ranked, digits),
         first_cell=_id(lost),
         sides=DATA,
@@ -98,14 +101,14 @@ def ranking_page(ranked: RankingResult, folder: Path, command: str, each: Each =
 def answer(ranked: RankingResult) -> str:
     """Return the result in one sentence: what the first places and the car without control pass."""
     number = len(ranked.ranking.conditions)
-    placed = [one for one in ranked.scores if one.place]
+    placed = [score for score in ranked.scores if score.place]
     if not placed:
         return f"No controller has all of its runs under {counted(number, 'condition')}."
-    first = [one for one in placed if one.place == 1]
-    others = [one for one in placed if one.place != 1][:1]
-    others += [one for one in placed if one.spec.fmu == IDLE and one not in (*first, *others)]
-    names = listed(one.spec.title for one in first)
-    rest = "".join(f"; {one.spec.title} (place {one.place}) {one.count('passed')}" for one in others)
+    first = [score for score in placed if score.place == 1]
+    others = [score for score in placed if score.place != 1][:1]
+    others += [score for score in placed if score.spec.fmu == IDLE and score not in (*first, *others)]
+    names = listed(score.spec.title for score in first)
+    rest = "".join(f"; {score.spec.title} (place {score.place}) {score.count('passed')}" for score in others)
     return (
         f"Of {counted(len(placed), 'controller')}, the first is {names}: "
         f"{first[0].count('passed')} of {counted(number, 'condition')} passed{rest}."
@@ -118,23 +121,25 @@ def _image(file: Path, title: str) -> FigureImage | None:
 
 def _rows(ranked: RankingResult, digits: Digits) -> list[dict[str, Any]]:
     """Return the rows of the matrix; `together`: rows that share a place, 0 below the first of them."""
-    sharing = Counter(one.place for one in ranked.scores)
+    sharing = Counter(score.place for score in ranked.scores)
     rows = []
-    for number, one in enumerate(ranked.scores):
-        first = number == 0 or not one.place or ranked.scores[number - 1].place != one.place
+    for number, score in enumerate(ranked.scores):
+        first = number == 0 or not score.place or ranked.scores[number - 1].place != score.place
         rows.append({
-            "place": place_words(one),
-            "together": (sharing[one.place] if one.place else 1) if first else 0,
-            "title": one.spec.title,
-            "passed": f"{one.count('passed')}/{len(one.cells)}" if one.place else f"{one.missing} missing",
-            "share": row_of(one, digits)["runs"] if one.place else "–",
+            "place": place_words(score),
+            "together": (sharing[score.place] if score.place else 1) if first else 0,
+            "title": score.spec.title,
+            "passed": f"{score.count('passed')}/{len(score.cells)}"
+            if score.place
+            else f"{score.missing} missing",
+            "share": row_of(score, digits)["runs"] if score.place else "–",
             "cells": [
                 {
                     "id": _id(cell),
                     "state": cell.state,
                     "words": sign_of(cell),
                 }
-                for cell in one.cells.values()
+                for cell in score.cells.values()
             ],
         })  # fmt: skip
     return rows
@@ -145,7 +150,7 @@ def _id(cell: RankingCell) -> str:
 
 
 def _side(
-    ranked: RankingResult, one: EntryScore, cell: RankingCell, folder: Path
+    ranked: RankingResult, score: EntryScore, cell: RankingCell, folder: Path
 ) -> tuple[str, str, Path | None, str, Path]:
     """Return the arguments of `_write_side` for a cell."""
     condition, worst = ranked.ranking.conditions[cell.condition], cell.worst
@@ -158,11 +163,11 @@ def _side(
         "time per step": _text(cell.number(STEP_TIME), "s"),
     }
     label = (
-        f"{one.spec.title}, {'right' if worst.amplitude < 0 else 'left'} first, {degrees(worst.amplitude)}"
+        f"{score.spec.title}, {'right' if worst.amplitude < 0 else 'left'} first, {degrees(worst.amplitude)}"
     )
     shows = worst.results is not None and worst.results.is_dir()
     details = {
-        "title": f"{one.spec.title}: {condition.title}",
+        "title": f"{score.spec.title}: {condition.title}",
         "state": cell.state,
         "says": STATES[cell.state],
         "sums": [(name, text) for name, text in sums.items() if text is not None],
@@ -216,11 +221,11 @@ def series_command(ranked: RankingResult, cell: RankingCell) -> str:
     words += ["--scenario", str(ranking.path.parent / condition.scenario)]
     words += ["--angle", f"{math.degrees(ranked.angles[condition.car]):.1f} deg"]
     changes = {
-        one.target: one
-        for one in (*ranking.changes_of_condition(cell.condition), *ranking.changes_of_entry(cell.entry))
+        change.target: change
+        for change in (*ranking.changes_of_condition(cell.condition), *ranking.changes_of_entry(cell.entry))
     }
-    for one in changes.values():
-        words += option_of(one)
+    for change in changes.values():
+        words += option_of(change)
     return shlex.join(words)
 
 
@@ -229,13 +234,16 @@ def _conditions(ranked: RankingResult) -> Table:
     ranking = ranked.ranking
     headings = ["condition", "car", "A", "scenario", "changed", "runs of a controller", "responsiveness"]
     table = Table("", headings)
-    for name, one in ranking.conditions.items():
+    for name, condition in ranking.conditions.items():
         runs = sum(run.condition == name for run in ranked.runs) // max(1, len(ranking.entries))
         own = ranking.changes_of_condition(name)
-        told = [change for change in own if str(change.target) not in ("vehicle", "step_size", "stop_time")]
+        changes = [
+            change for change in own if str(change.target) not in ("vehicle", "step_size", "stop_time")
+        ]
         table.rows.append([
-            one.title, ranking.spec.cars[one.car].title, degrees(ranked.angles[one.car]), one.scenario,
-            changed(told) or None, str(runs), "asked" if one.dry else "no dry road: not asked",
+            condition.title, ranking.spec.cars[condition.car].title, degrees(ranked.angles[condition.car]),
+            condition.scenario, changed(changes) or None, str(runs),
+            "judged" if condition.dry else "not judged: the road is not dry",
         ])  # fmt: skip
     return table
 
@@ -243,8 +251,8 @@ def _conditions(ranked: RankingResult) -> Table:
 def _entries(ranked: RankingResult) -> Table:
     """Return the table of controllers."""
     table = Table("", ["controller", "name", "FMU", "parameters", "gains", "source"])
-    for one in ranked.scores:
-        spec: EntrySpec = one.spec
-        given = ", ".join(f"{name} {number}" for name, number in spec.parameters.items())
-        table.rows.append([spec.title, one.entry, spec.fmu, given or None, spec.gains, spec.source])
+    for score in ranked.scores:
+        spec: EntrySpec = score.spec
+        parameters = ", ".join(f"{name} {number}" for name, number in spec.parameters.items())
+        table.rows.append([spec.title, score.entry, spec.fmu, parameters or None, spec.gains, spec.source])
     return table

@@ -75,8 +75,8 @@ def road_of(run: Results, grounds: list[Any]) -> dict[str, Any] | None:
     car, known = _car(run)
     lanes = next(filter(None, map(lanes_of, _parameters(run, "driver"))), [])
     x, y = (run.columns[road[key]] for key in ("x", "y"))
-    ends = [(float(np.nanmin(one)), float(np.nanmax(one))) for one in (x, y)]
-    pieces = next(filter(None, (ground_of(one, *ends) for one in _parameters(run, "road"))), [])
+    ends = [(float(np.nanmin(values)), float(np.nanmax(values))) for values in (x, y)]
+    pieces = next(filter(None, (ground_of(parameters, *ends) for parameters in _parameters(run, "road"))), [])
     ground = [[piece.friction, piece.corners] for piece in pieces]
     if ground and ground not in grounds:
         grounds.append(ground)
@@ -222,9 +222,9 @@ def _around(places: Sequence[float], within: Bounds) -> list[tuple[int, Bounds]]
 
 def _of_patches(patches: Iterable[Patch], otherwise: float, box: Sequence[Bounds]) -> Iterator[FrictionPatch]:
     """Yield the parts of patches within a box; `otherwise`: friction of patches that state none."""
-    for one in patches:
-        for corners in _polygons(one, box):
-            yield FrictionPatch(otherwise if one.friction is None else one.friction, corners)
+    for patch in patches:
+        for corners in _polygons(patch, box):
+            yield FrictionPatch(otherwise if patch.friction is None else patch.friction, corners)
 
 
 def _polygons(patch: Patch, box: Sequence[Bounds]) -> Iterable[tuple[Point, ...]]:
@@ -238,19 +238,19 @@ def _polygons(patch: Patch, box: Sequence[Bounds]) -> Iterable[tuple[Point, ...]
 
 def _intervals(spans: Iterable[Span], within: Bounds) -> list[Bounds]:
     """Return the intervals within `within` in which all spans of an axis hold."""
-    found = [within]
+    intervals = [within]
     for _, low, high, period in spans:
         if period:
-            if (within[1] - within[0]) / period * len(found) > POLYGONS:
+            if (within[1] - within[0]) / period * len(intervals) > POLYGONS:
                 raise _TooFineError
             first, last = (floor(end / period) for end in within)
             low, high = max(low, 0.0), min(high, period)
             held = [(k * period + low, k * period + high) for k in range(first, last + 1)]
         else:
             held = [(low, high)]
-        pairs = [(max(a, c), min(b, d)) for (a, b), (c, d) in product(found, held)]
-        found = [(a, b) for a, b in pairs if a < b]
-    return found
+        pairs = [(max(a, c), min(b, d)) for (a, b), (c, d) in product(intervals, held)]
+        intervals = [(a, b) for a, b in pairs if a < b]
+    return intervals
 
 
 def _rectangle(x: Bounds, y: Bounds) -> tuple[Point, ...]:

@@ -61,7 +61,7 @@ def open_below(folder: Path, path: str) -> int:
     """
     parts = path.split("/")
     if not all(part and part not in (".", "..") and "\0" not in part and "\\" not in part for part in parts):
-        raise OSError(errno.ENOENT, "leaves the folder", path)
+        raise OSError(errno.ENOENT, "not below the folder", path)
     with ExitStack() as opened:
         place = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
         for part in parts[:-1]:
@@ -72,7 +72,7 @@ def open_below(folder: Path, path: str) -> int:
     status = os.fstat(file)
     if not stat.S_ISREG(status.st_mode) or status.st_size > LARGEST:
         os.close(file)
-        raise OSError(errno.EINVAL, "is no file that is served", path)
+        raise OSError(errno.EINVAL, "not a regular file, or too large to serve", path)
     return file
 
 
@@ -219,7 +219,7 @@ class Request(BaseHTTPRequestHandler):
             results.record.title or path for path, results in zip(paths, loaded, strict=True)
         )
         changed = changed_each(
-            [(path, one.record.overrides) for path, one in zip(paths, loaded, strict=True)]
+            [(path, results.record.overrides) for path, results in zip(paths, loaded, strict=True)]
         )
         runs = [LabelledRun(path, results) for path, results in zip(paths, loaded, strict=True)]
         self._send_own(page(runs, title="; ".join(titles), below=", ".join(paths), changed=changed))
@@ -245,10 +245,10 @@ class Request(BaseHTTPRequestHandler):
             self.close_connection = True
             raise Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "the request is too large")
         try:
-            asked = json.loads(self.rfile.read(int(length)))
+            request = json.loads(self.rfile.read(int(length)))
         except ValueError:
-            asked = None
-        wanted, earlier = wanted_of(asked)
+            request = None
+        wanted, earlier = wanted_of(request)
         key, made = self.server.bench.run(wanted)
         html = self.server.bench.viewer([(key, wanted.label), *earlier])
         answer = {
@@ -285,22 +285,22 @@ class Request(BaseHTTPRequestHandler):
 
 def pages_below(folder: Path) -> Iterator[str]:
     """Yield the paths of the HTML pages below a folder that are no links, in alphabetical order."""
-    found = [
+    pages = [
         path.relative_to(folder).as_posix()
         for place, _, files in os.walk(folder)
         for path in (Path(place, name) for name in files if name.endswith(".html"))
         if not path.is_symlink()
     ]
-    yield from sorted(found)
+    yield from sorted(pages)
 
 
 def runs_below(folder: Path) -> Iterator[tuple[str, FoundRun]]:
     """Yield path and run of the results below a folder, the latest first; none whose files are links."""
     try:
-        found = found_runs(folder)
+        runs = found_runs(folder)
     except ResultsError:
         return
-    for run in reversed(found):
+    for run in reversed(runs):
         path = run.folder.relative_to(folder).as_posix()
         with suppress(ResultsError):
             run_folder(folder, path)

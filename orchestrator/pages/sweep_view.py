@@ -70,7 +70,7 @@ def status_counts(findings: ExperimentResult) -> str:
 
 def limit_sentences(findings: ExperimentResult) -> list[str]:
     """Return a sentence per limit: its smallest and largest value for each run and value of named axes."""
-    planned, found = findings.planned, []
+    planned, sentences = findings.planned, []
     assert planned is not None
     for spec in findings.spec.limits.values():
         unit = planned.axis_unit(spec.of).strip(" []")
@@ -88,8 +88,8 @@ def limit_sentences(findings: ExperimentResult) -> list[str]:
             for k, levels in ranges.items()
         ]
         where = f", over {listed(over)}" if over else ""
-        found.append(f"{spec.says.rstrip('.')}: {'; '.join(parts)}{where}.")
-    return found
+        sentences.append(f"{spec.says.rstrip('.')}: {'; '.join(parts)}{where}.")
+    return sentences
 
 
 def _number(level: Level) -> float:
@@ -98,12 +98,12 @@ def _number(level: Level) -> float:
 
 def _reach(limits: Sequence[Any], unit: str) -> str:
     """Return the values of limits as a range; `at least` where no tried value fails."""
-    known = sorted((one for one in limits if one.largest is not None), key=lambda one: one.largest)
+    known = sorted((limit for limit in limits if limit.largest is not None), key=lambda limit: limit.largest)
     if not known:
         return "at no value tried"
     least, most = known[0], known[-1]
     ends = [most] if least.largest == most.largest else [least, most]
-    texts = [("at least " if one.beyond is None else "") + digits_of(one.largest) for one in ends]
+    texts = [("at least " if limit.beyond is None else "") + digits_of(limit.largest) for limit in ends]
     if len(known) < len(limits):
         texts = ["none", texts[-1]]
     return f"{' to '.join(texts)} {unit}".rstrip()
@@ -137,12 +137,12 @@ def _data(findings: ExperimentResult, sides: Mapping[int, str]) -> dict[str, Any
     statuses = list(dict.fromkeys(record.status for record in records))
     jobs = findings.planned.jobs if findings.planned else []
     return {
-        "axes": [one for one, _ in axes],
+        "axes": [axis for axis, _ in axes],
         "metrics": [_metric(findings, key) for key in findings.spec.metrics],
         "levels": [places for _, places in axes],
         "statuses": statuses,
         "status": [statuses.index(record.status) for record in records],
-        "told": {case.number: why for case in cases if (why := _told(findings, case))},
+        "told": {case.number: why for case in cases if (why := _remark(findings, case))},
         "keys": [job.key[:KEY] for job in jobs],
         "sides": [number in sides for number in range(len(cases))],
         "base": [
@@ -207,9 +207,10 @@ def _words(changes: Sequence[Override]) -> list[str]:
 def _metric(findings: ExperimentResult, key: str) -> dict[str, Any]:
     spec = findings.spec.metrics[key]
     unit, factor = shown_unit(findings.unit(key))
-    found = [findings.value(case, key) for case in findings.experiment.cases]
+    measured = [findings.value(case, key) for case in findings.experiment.cases]
     values = [
-        _rounded(value.number * factor) if value and math.isfinite(value.number) else None for value in found
+        _rounded(value.number * factor) if value and math.isfinite(value.number) else None
+        for value in measured
     ]
     return {"name": key, "label": spec.heading or metric(spec.metric).title, "unit": unit, "values": values}
 
@@ -218,7 +219,7 @@ def _rounded(number: float) -> float:
     return float(f"{number:.{DIGITS}g}")
 
 
-def _told(findings: ExperimentResult, case: Case) -> str:
+def _remark(findings: ExperimentResult, case: Case) -> str:
     """Return why a run failed or ended early, and its warnings."""
     record = findings.record(case)
     return "; ".join(filter(None, [record.reason if record.made else "", ", ".join(record.warning_codes)]))
@@ -228,13 +229,17 @@ def _chosen(findings: ExperimentResult) -> dict[str, Any]:
     """Return what the view shows at first: axes of the map, its metric, and the limits of metrics."""
     spec = findings.spec
     limits: dict[str, dict[str, Any]] = {}
-    asked = [
-        (c.metric, c.bound, c.relation in ("below", "at_most"))
-        for one in spec.limits.values()
-        for c in one.holds_if
+    bounds = [
+        (condition.metric, condition.bound, condition.relation in ("below", "at_most"))
+        for limit in spec.limits.values()
+        for condition in limit.holds_if
     ]
-    asked += [(one.metric, one.mark, True) for one in spec.figures if one.metric and one.mark is not None]
-    for key, bound, at_most in asked:
+    bounds += [
+        (figure.metric, figure.mark, True)
+        for figure in spec.figures
+        if figure.metric and figure.mark is not None
+    ]
+    for key, bound, at_most in bounds:
         if key in spec.metrics and key not in limits and not isinstance(bound, MetricReference):
             unit = findings.unit(key)
             factor = shown_unit(unit)[1]
@@ -242,13 +247,13 @@ def _chosen(findings: ExperimentResult) -> dict[str, Any]:
                 "bound": float(f"{si_number(bound, unit) * factor:.{DIGITS}g}"),
                 "at_most": at_most,
             }
-    drawn = next((one for one in spec.figures if one.kind == "map"), None)
+    drawn = next((figure for figure in spec.figures if figure.kind == "map"), None)
     named = [RUN] * (len(findings.experiment.runs) > 1) + [*spec.axes]
     names = sorted(named, key=lambda k: k == RUN or not spec.axes[k].numeric or spec.axes[k].repeats)
     if drawn:
         first = [drawn.x, drawn.y, drawn.panel_axis]
     else:
-        of = next((one.of for one in spec.limits.values()), "")
+        of = next((limit.of for limit in spec.limits.values()), "")
         others = [k for k in names if k != of]
         first = [*others[:1], of, *others[1:2]] if of else names[:3]
     first = [k for k in dict.fromkeys(first) if k]
@@ -294,16 +299,16 @@ def tidy_sides(folder: Path, keys: Any) -> None:
 
 def side_settings(findings: ExperimentResult) -> Settings:
     """Return what the viewer of a run shows: the signals of its metrics first, their limits, its metrics."""
-    asked = [metric(one.metric) for one in findings.spec.metrics.values()]
-    signals = dict.fromkeys(variable_of(one.signal) for one in asked if "*" not in one.signal)
+    metrics = {key: metric(spec.metric) for key, spec in findings.spec.metrics.items()}
+    signals = dict.fromkeys(variable_of(each.signal) for each in metrics.values() if "*" not in each.signal)
     panels = tuple(dict.fromkeys([*PANELS, *signals]))
     limits = []
     for key, limit in _chosen(findings)["limits"].items():
-        one = metric(findings.spec.metrics[key].metric)
-        if one.name.startswith("peak(") and not one.other:
+        bounded = metrics[key]
+        if bounded.name.startswith("peak(") and not bounded.other:
             level = limit["bound"] / shown_unit(findings.unit(key))[1]
-            limits += [(one.signal, side * level, "limit") for side in (1.0, -1.0)]
-    names = [one.metric for one in findings.spec.metrics.values()][:MOST_METRICS] or METRICS
+            limits += [(bounded.signal, side * level, "limit") for side in (1.0, -1.0)]
+    names = [spec.metric for spec in findings.spec.metrics.values()][:MOST_METRICS] or METRICS
     return Settings([View(panels=panels)], names, limits=limits, largest=1)
 
 

@@ -53,13 +53,13 @@ def scored(result: ThreatResult, setting: str = "") -> ScoreTable:
 def main_table(result: ThreatResult, table: ScoreTable) -> Table:
     """Return the table of scores, the best first; published entries are marked where others are not."""
     titles = titles_of(result)
-    published = result.published if any(one.entry not in result.published for one in table.scores) else ()
+    published = result.published if any(score.entry not in result.published for score in table.scores) else ()
     rows = [
         [
-            str(one.place), titles[one.entry] + (" (published)" if one.entry in published else ""),
-            f"{one.score:.1f}", interval_text(one.bounds), f"{one.mean_rank:.1f}", str(one.by_rank),
+            str(score.place), titles[score.entry] + (" (published)" if score.entry in published else ""),
+            f"{score.score:.1f}", interval_text(score.bounds), f"{score.mean_rank:.1f}", str(score.by_rank),
         ]
-        for one in table.scores
+        for score in table.scores
     ]  # fmt: skip
     return Table(
         f"Scores: {result.threats.spec.settings[result.threats.main].title}",
@@ -116,9 +116,9 @@ def levels_table(result: ThreatResult, entries: Sequence[str]) -> Table:
     for entry in entries:
         row = [titles[entry]]
         for name, spec in specs.items():
-            found = _of_threat(result, threats.main, name, entry)
-            ends = {one.end for one in found}
-            mean = sum(one.position for one in found) / len(found)
+            levels = _of_threat(result, threats.main, name, entry)
+            ends = {level.end for level in levels}
+            mean = sum(level.position for level in levels) / len(levels)
             row.append(level_text(spec, mean, ends.pop() if len(ends) == 1 else ""))
         table.rows.append(row)
     table.notes.append(
@@ -147,8 +147,10 @@ def car_tables(result: ThreatResult, entries: Sequence[str]) -> list[Table]:
         heading = f"{spec.title}{f' [{spec.unit}]' if spec.unit else ''}"
         table = Table(heading, ["controller", *cars], numbers=range(1, len(cars) + 1))
         for entry in entries:
-            found = (result.survived[SearchPlace(threats.main, name, car, entry)] for car in cars)
-            table.rows.append([titles[entry], *(level_text(spec, one.position, one.end) for one in found)])
+            levels = (result.survived[SearchPlace(threats.main, name, car, entry)] for car in cars)
+            table.rows.append(
+                [titles[entry], *(level_text(spec, level.position, level.end) for level in levels)]
+            )
         tables.append(table)
     return tables
 
@@ -174,8 +176,10 @@ def orders_table(result: ThreatResult, entries: Sequence[str]) -> Table:
     names = {"threat": threats.threats_in(threats.main), "car": threats.cars_in(threats.main)}
     table = Table("", ["without", "first", "entries that move", "farthest move", "order"], numbers={2})
     whole = [*entries]
-    given = result.complete[threats.main]
-    for (word, k), order in orders_without(given, result.positions(threats.main, given), REFERENCE).items():
+    entries_of_main = result.complete[threats.main]
+    for (word, k), order in orders_without(
+        entries_of_main, result.positions(threats.main, entries_of_main), REFERENCE
+    ).items():
         moves = {entry: order.index(entry) - whole.index(entry) for entry in whole}
         far = max(moves, key=lambda entry: abs(moves[entry]))
         moved = f"{titles[far]}, {whole.index(far) + 1} to {order.index(far) + 1}" if moves[far] else "none"
@@ -198,16 +202,16 @@ def setting_table(result: ThreatResult, setting: str) -> Table:
     if both:
         mains = result.positions(threats.main, both, like=setting)
         main = score_table(both, mains, REFERENCE)
-        of_main, order = {one.entry: one for one in main.scores}, main.order()
+        of_main, order = {score.entry: score for score in main.scores}, main.order()
         gain = np.nanmean(result.positions(setting, both) - mains)
         moved = f"Levels lie {100 * gain:+.1f} % of a range from those of the main setting, on average. "
     rows = [
         [
-            str(one.place), titles[one.entry], f"{one.score:.1f}", interval_text(one.bounds),
-            f"{of_main[one.entry].score:.1f}" if one.entry in of_main else None,
-            str(order.index(one.entry) + 1) if one.entry in of_main else None,
+            str(score.place), titles[score.entry], f"{score.score:.1f}", interval_text(score.bounds),
+            f"{of_main[score.entry].score:.1f}" if score.entry in of_main else None,
+            str(order.index(score.entry) + 1) if score.entry in of_main else None,
         ]
-        for one in table.scores
+        for score in table.scores
     ]  # fmt: skip
     about = (
         f"Threats: {', '.join(threats.threats_in(setting))}; cars: {', '.join(threats.cars_in(setting))}. "
@@ -220,7 +224,7 @@ def setting_table(result: ThreatResult, setting: str) -> Table:
 def compared_gains(result: ThreatResult) -> GainsAndLaws | None:
     """Compare gains and laws by the setting with seeds; None if there is none with all levels."""
     threats = result.threats
-    setting = next((name for name, one in threats.spec.settings.items() if one.seeds), None)
+    setting = next((name for name, described in threats.spec.settings.items() if described.seeds), None)
     if setting is None:
         return None
     entries, complete = threats.ranking.entries, result.complete[setting]
@@ -238,28 +242,28 @@ def compared_gains(result: ThreatResult) -> GainsAndLaws | None:
     return gains_and_laws(tuned, own)
 
 
-def gains_table(found: GainsAndLaws) -> Table:
+def gains_table(gains: GainsAndLaws) -> Table:
     """Return the table of spreads, in per cent of a threat's range."""
 
-    def row(words: str, one: Spread) -> list[str]:
-        low, high = (100 * x for x in one.bounds)
-        return [words, f"{100 * one.value:.1f}", f"{low:.1f} to {high:.1f}"]
+    def row(words: str, spread: Spread) -> list[str]:
+        low, high = (100 * x for x in spread.bounds)
+        return [words, f"{100 * spread.value:.1f}", f"{low:.1f} to {high:.1f}"]
 
     rows = [
-        row("between laws, tuned", found.laws),
-        row("between seeds of the search, within a law", found.seeds),
-        row("between authors' and tuned gains, within a law", found.gains),
-        row("between laws, means of both gains", found.between),
-        row("the third less the fourth", found.difference),
+        row("between laws, tuned", gains.laws),
+        row("between seeds of the search, within a law", gains.seeds),
+        row("between authors' and tuned gains, within a law", gains.gains),
+        row("between laws, means of both gains", gains.between),
+        row("the third less the fourth", gains.difference),
     ]
     return Table(
         "", ["standard deviation of the mean level, % of a range", "", "95 % interval"], [*rows], [], {1}
     )
 
 
-def gains_sentence(found: GainsAndLaws) -> str:
+def gains_sentence(gains: GainsAndLaws) -> str:
     """Return whether gains matter more than laws."""
-    low, high = found.difference.bounds
+    low, high = gains.difference.bounds
     if low > 0.0:
         return "Gains matter more than laws: the interval of the difference is above zero."
     if high < 0.0:
@@ -284,14 +288,14 @@ def discipline_tables(result: ThreatResult) -> list[Table]:
             for entry in entries
         ], dtype=float)  # fmt: skip
         lost = np.isnan(magnitudes)
-        offsets = np.array([one.offset for one in spec.quantities.values()])[None, :, None]
+        offsets = np.array([quantity.offset for quantity in spec.quantities.values()])[None, :, None]
         logs = -np.log(np.where(lost, np.nan, magnitudes + offsets))
         worst = np.nanmin(np.where(lost, np.inf, logs), axis=0)
         logs = np.where(lost, np.where(np.isfinite(worst), worst, 0.0), logs)
         table = score_table(entries, logs, REFERENCE)
         rows = []
-        for one in table.scores:
-            i = entries.index(one.entry)
+        for score in table.scores:
+            i = entries.index(score.entry)
             means = [
                 f"{np.nanmean(magnitudes[i, k]):.3g}"
                 + (f", lost on {n}" if (n := int(lost[i, k].sum())) else "")
@@ -300,11 +304,17 @@ def discipline_tables(result: ThreatResult) -> list[Table]:
                 for k in range(len(spec.quantities))
             ]
             rows.append(
-                [str(one.place), titles[one.entry], f"{one.score:.0f}", interval_text(one.bounds), *means]
+                [
+                    str(score.place),
+                    titles[score.entry],
+                    f"{score.score:.0f}",
+                    interval_text(score.bounds),
+                    *means,
+                ]
             )
         headings = ["place", "controller", "score", "95 % interval"]
-        headings += [f"{one.title}{f' [{u}]' if (u := result.units.get((name, key))) else ''}"
-                     for key, one in spec.quantities.items()]  # fmt: skip
+        headings += [f"{quantity.title}{f' [{u}]' if (u := result.units.get((name, key))) else ''}"
+                     for key, quantity in spec.quantities.items()]  # fmt: skip
         notes = [f"{spec.source}. Means over {', '.join(cars)}; less is better. {told_apart(table)}"]
         tables.append(Table(spec.title, headings, [*rows], notes, {0, 2, *range(4, len(headings))}))
     return tables
@@ -334,11 +344,17 @@ def _lane_change_table(result: ThreatResult, setting: str) -> Table:
     name, cars = threats.threats_in(setting)[0], threats.cars_in(setting)
     spec, table = threats.spec.threats[name], scored(result, setting)
     rows = []
-    for one in table.scores:
-        found = [result.survived[SearchPlace(setting, name, car, one.entry)] for car in cars]
-        levels = [level_text(spec, each.position, each.end) for each in found]
+    for score in table.scores:
+        levels_found = [result.survived[SearchPlace(setting, name, car, score.entry)] for car in cars]
+        levels = [level_text(spec, level.position, level.end) for level in levels_found]
         rows.append(
-            [str(one.place), titles[one.entry], f"{one.score:.0f}", interval_text(one.bounds), *levels]
+            [
+                str(score.place),
+                titles[score.entry],
+                f"{score.score:.0f}",
+                interval_text(score.bounds),
+                *levels,
+            ]
         )
     headings = ["place", "controller", "score", "95 % interval", *(f"{car} [{spec.unit}]" for car in cars)]
     notes = [f"More is better. {told_apart(table)}"]

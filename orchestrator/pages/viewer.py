@@ -76,7 +76,6 @@ class Settings:
         metrics: those in the table of runs.
         marks: instants [s] with a text, as vertical lines.
         limits: signal, level in SI units and a text, as horizontal lines.
-        exact: keep all samples as 32-bit floats.
         largest: size of the samples [bytes]; beyond it, the page carries the signals of the views and of the
             road alone. 0: no limit.
         ghosts: numbers of runs that are drawn faintly behind the others.
@@ -86,7 +85,6 @@ class Settings:
     metrics: Sequence[str] = METRICS
     marks: Sequence[tuple[float, str]] = ()
     limits: Sequence[tuple[str, float, str]] = ()
-    exact: bool = False
     largest: int = 0
     ghosts: Sequence[int] = ()
 
@@ -138,7 +136,7 @@ def side_file(key: str, runs: Sequence[LabelledRun], settings: Settings = SETTIN
         ResultsError: see `viewer`.
     """
     data, packed = _carried(runs, settings) if runs else (None, [])
-    blocks = [one.block for one in packed]
+    blocks = [run.block for run in packed]
     content = json.dumps({"data": data, "blocks": blocks, "html": html}, ensure_ascii=False)
     return f"yawbenchSide({json.dumps(key)}, {content});\n"
 
@@ -156,11 +154,11 @@ def _carried(
     roads = [road_of(run.results, grounds) for run in runs]
     drawn = [_drawn(view, results) for view in settings.views]
     views = [view for view in drawn if view["panels"]] or drawn[:1]
-    packed = packed or pack(results, exact=settings.exact)
-    if partial := 0 < settings.largest < sum(len(one.block) for one in packed):
+    packed = packed or pack(results)
+    if partial := 0 < settings.largest < sum(len(run.block) for run in packed):
         needed = _needed(views, roads)
-        packed = [one.only(needed) for one in packed]
-    carried = {name for one in packed for name in one.columns}
+        packed = [run.only(needed) for run in packed]
+    carried = {name for run in packed for name in run.columns}
     data = {
         "views": views,
         "grounds": grounds,
@@ -170,11 +168,11 @@ def _carried(
             for signal, level, text in settings.limits
             for column in _columns(results, signal)
         ],
-        "marks": [list(one) for one in settings.marks],
-        "signals": {name: one for name, one in _signals(results).items() if name in carried},
+        "marks": [list(mark) for mark in settings.marks],
+        "signals": {name: signal for name, signal in _signals(results).items() if name in carried},
         "dashes": [_dash(number) for number in range(len(LINES))],
         "metrics": [
-            [metric(one).title, values] for one in settings.metrics if any(values := _values(runs, one))
+            [metric(name).title, values] for name in settings.metrics if any(values := _values(runs, name))
         ],
         "key": legend_of(roads, grounds),
         "partial": partial,
@@ -301,8 +299,8 @@ def _panels(results: Sequence[Results], spec: str) -> Iterator[str]:
     minuend, _, subtrahend = first.partition(" - ")
     error = minuend.removesuffix("_error")
     for column in _columns(results, minuend) or _columns(results, error):
-        found = (reference_of(run, column) for run in results if column in run.columns)
-        references = [name for name in dict.fromkeys(found) if name]
+        names = (reference_of(run, column) for run in results if column in run.columns)
+        references = [name for name in dict.fromkeys(names) if name]
         if subtrahend or (error != minuend and not _columns(results, minuend)):
             taken = _columns(results, subtrahend) if subtrahend else references
             yield from (f"{column} - {name}" for name in taken[:1])
@@ -320,21 +318,21 @@ def _needed(views: Sequence[Mapping[str, Any]], roads: Sequence[Mapping[str, Any
 
 def _signals(results: Sequence[Results]) -> dict[str, dict[str, Any]]:
     """Return label, displayed unit, factor to it and unit of every numeric column."""
-    found = {}
+    signals = {}
     for run in results:
         for name, values in run.columns.items():
-            if name not in found and is_numeric(values):
+            if name not in signals and is_numeric(values):
                 unit = run.units.get(name, "")
                 text, factor = shown_unit(unit)
                 label = words(run.names[name].variable)
-                found[name] = {"label": label, "unit": text, "factor": factor, "si": unit}
-    return found
+                signals[name] = {"label": label, "unit": text, "factor": factor, "si": unit}
+    return signals
 
 
 def _values(runs: Sequence[LabelledRun], name: str) -> list[str]:
     """Return a metric of every run as text, "" where a run has none."""
     values = [evaluate(run.results, metric(name)) for run in runs]
-    return [shown(one.number, one.unit) if one is not None else "" for one in values]
+    return [shown(value.number, value.unit) if value is not None else "" for value in values]
 
 
 def still_of(results: Sequence[Results]) -> float:

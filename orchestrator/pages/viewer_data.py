@@ -36,8 +36,8 @@ class PackedColumn:
     """A column: its form, what decodes it, and its byte planes (none for a constant).
 
     The forms are ("q", first, step, order, bytes): codes as differences of that order, a sample is
-    (first + code) step; ("f",): 32-bit floats; ("c", value): a constant; of times also ("d",): 64-bit
-    floats, and ("u", begin, end): evenly spaced.
+    (first + code) step; ("f",): differences of the bits of 32-bit floats; ("r",): 32-bit floats as they are;
+    ("c", value): a constant; of times also ("d",): 64-bit floats, and ("u", begin, end): evenly spaced.
     """
 
     form: str
@@ -57,18 +57,18 @@ class PackedRun:
 
     def only(self, names: Collection[str]) -> PackedRun:
         """Return the run with some of its columns."""
-        return replace(self, columns={k: one for k, one in self.columns.items() if k in names})
+        return replace(self, columns={name: column for name, column in self.columns.items() if name in names})
 
     @cached_property
     def _offsets(self) -> dict[bytes, int]:
         """Byte planes -> their offset in the block; equal ones are stored once."""
-        found: dict[bytes, int] = {b"": 0}
+        offsets: dict[bytes, int] = {b"": 0}
         size = 0
-        for one in (self.time, *self.columns.values()):
-            if one.planes not in found:
-                found[one.planes] = size
-                size += len(one.planes)
-        return found
+        for column in (self.time, *self.columns.values()):
+            if column.planes not in offsets:
+                offsets[column.planes] = size
+                size += len(column.planes)
+        return offsets
 
     @property
     def data(self) -> bytes:
@@ -84,23 +84,24 @@ class PackedRun:
     def header(self) -> dict[str, Any]:
         """What the script needs to decode the block: of times and each column [form, offset, ...]."""
 
-        def place(one: PackedColumn) -> list[Any]:
-            return [one.form, self._offsets[one.planes], *one.numbers]
+        def place(column: PackedColumn) -> list[Any]:
+            return [column.form, self._offsets[column.planes], *column.numbers]
 
-        columns = {name: place(one) for name, one in self.columns.items()}
+        columns = {name: place(column) for name, column in self.columns.items()}
         return {"rows": self.rows, "time": place(self.time), "columns": columns}
 
 
-def pack(runs: Sequence[Results], *, exact: bool = False) -> list[PackedRun]:
+def pack(runs: Sequence[Results], *, raw: bool = False) -> list[PackedRun]:
     """Pack all numeric columns of runs.
 
     Args:
         runs: those of one page.
-        exact: keep all columns as 32-bit floats.
+        raw: leave all columns 32-bit floats, for a page that gets the bytes from a server: nothing to
+            compress, and the page reads them at once.
     """
     ranges = _ranges(runs)
-    close = [_close(run, [one for one in runs if one is not run], ranges) for run in runs]
-    return [_packed(run, ranges, fine, exact) for run, fine in zip(runs, close, strict=True)]
+    close = [_close(run, [other for other in runs if other is not run], ranges) for run in runs]
+    return [_packed(run, ranges, fine, raw) for run, fine in zip(runs, close, strict=True)]
 
 
 def is_numeric(values: np.ndarray) -> bool:
@@ -125,20 +126,20 @@ def _ranges(runs: Sequence[Results]) -> dict[str, tuple[float, float]]:
 
 def _close(run: Results, others: Sequence[Results], ranges: dict[str, tuple[float, float]]) -> set[str]:
     """Return the columns in which another run differs from a run, but by less than `CLOSE` of the range."""
-    found: set[str] = set()
+    close: set[str] = set()
     for other in others:
         if other.time.size != run.time.size:
             continue
-        for name in run.columns.keys() & other.columns.keys() & ranges.keys() - found:
+        for name in run.columns.keys() & other.columns.keys() & ranges.keys() - close:
             low, high = ranges[name]
             with np.errstate(invalid="ignore"):
                 apart = np.abs(np.asarray(other.columns[name], float) - np.asarray(run.columns[name], float))
             if 0.0 < np.max(apart, initial=0.0, where=np.isfinite(apart)) < CLOSE * (high - low):
-                found.add(name)
-    return found
+                close.add(name)
+    return close
 
 
-def _packed(run: Results, ranges: dict[str, tuple[float, float]], fine: set[str], exact: bool) -> PackedRun:
+def _packed(run: Results, ranges: dict[str, tuple[float, float]], fine: set[str], raw: bool) -> PackedRun:
     columns: dict[str, PackedColumn] = {}
     for name, values in run.columns.items():
         if not is_numeric(values):
@@ -149,7 +150,9 @@ def _packed(run: Results, ranges: dict[str, tuple[float, float]], fine: set[str]
         step = (high - low) / LEVELS[size]
         if np.isfinite(values[:1]).all() and (values == values[:1]).all():
             columns[name] = PackedColumn("c", (float(values[0]),))
-        elif exact or not (0.0 < step < np.inf and np.isfinite(values).all()):
+        elif raw:
+            columns[name] = PackedColumn("r", (), values.astype("<f4").tobytes())
+        elif not (0.0 < step < np.inf and np.isfinite(values).all()):
             columns[name] = PackedColumn("f", (), _float_planes(values))
         else:
             first = math.floor(low / step)

@@ -256,6 +256,6 @@ def test_the_origin_of_a_coefficient_on_a_page_is_its_file(folder, fmus):
     groups = groups_of([(run_record(plan, status="", started=datetime.now()), plan)])
     (of_tyre,) = (group for group in groups if group.title.startswith("tyre:"))
     row = of_tyre.parameters["pky1_front"]
-    assert row.given is not None
-    assert golden(row.given.says)
+    assert row.stated is not None
+    assert golden(row.stated.says)
     assert not row.set_by_study

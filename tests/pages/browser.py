@@ -1,4 +1,4 @@
-"""A real browser for tests of pages: Chromium without a window, on files, with no request to anywhere."""
+"""Real browsers for tests of pages, without windows, on files: Chromium, and Firefox for what may differ."""
 
 from __future__ import annotations
 
@@ -22,6 +22,13 @@ FLAGS = (
     "--hide-scrollbars",
 )
 PHONE, DESK = 400, 1400
+SECONDS = 20
+"""Longest wait for a page. Chosen: far more than any page takes, also on a busy computer."""
+WAIT = (
+    "const done = arguments[arguments.length - 1];"
+    "const look = () => ({}) ? done() : requestAnimationFrame(look); look();"
+)
+"""Script that ends when an expression is true at the drawing of a frame."""
 
 
 class Browser:
@@ -43,12 +50,9 @@ class Browser:
         return self.driver.execute_script(script, *arguments)
 
     def wait_for(self, condition: str) -> None:
-        """Wait until an expression is true at the drawing of a frame, at most 20 s."""
-        self.driver.set_script_timeout(20)
-        self.driver.execute_async_script(
-            f"const done = arguments[0];"
-            f"const look = () => ({condition}) ? done() : requestAnimationFrame(look); look();"
-        )
+        """Wait until an expression is true at the drawing of a frame."""
+        self.driver.set_script_timeout(SECONDS)
+        self.driver.execute_async_script(WAIT.replace("{}", condition))
 
     def press(self, *keys: str) -> None:
         """Press keys where the focus is."""
@@ -67,6 +71,41 @@ class Browser:
     def overflow(self) -> float:
         """Return by how many pixels the page is wider than the window."""
         return self.run("return document.documentElement.scrollWidth - window.innerWidth")
+
+
+class Firefox:
+    """One window of Firefox, driven by Mozilla's own client: Debian has no geckodriver."""
+
+    def __init__(self, client: Any) -> None:
+        self.client = client
+
+    def open(self, file: Path, *, width: int = DESK, height: int = 900) -> None:
+        """Open a page in a window of that size."""
+        self.client.set_window_rect(width=width, height=height)
+        self.client.navigate(file.resolve().as_uri())
+
+    def run(self, script: str, *arguments: Any) -> Any:
+        """Return what a script in the page returns."""
+        return self.client.execute_script(script, script_args=list(arguments), sandbox=None)
+
+    def wait_for(self, condition: str) -> None:
+        """Wait until an expression is true at the drawing of a frame."""
+        self.client.execute_async_script(
+            WAIT.replace("{}", condition), script_timeout=1000 * SECONDS, sandbox=None
+        )
+
+
+def start_firefox() -> Firefox:
+    """Return a window of Firefox; skip the test where there is none."""
+    found = (shutil.which(name) for name in ("firefox", "firefox-esr"))
+    programs = [str(Path(path).resolve()) for path in found if path]
+    program = next((path for path in programs if Path(path).with_name("application.ini").is_file()), None)
+    if not program:  # a script that starts another program tells its client nothing about it
+        pytest.skip("firefox is not installed: pages are tested in Chromium alone")
+    marionette = pytest.importorskip("marionette_driver.marionette", reason="needs marionette-driver")
+    client = marionette.Marionette(bin=program, headless=True, gecko_log=os.devnull)
+    client.start_session()
+    return Firefox(client)
 
 
 def start() -> Browser:

@@ -25,6 +25,8 @@ def unpacked(packed: PackedRun, name: str) -> np.ndarray:
     n = packed.rows
     if form == "c":
         return np.full(n, more[0])
+    if form == "r":
+        return np.frombuffer(raw[offset : offset + 4 * n], "<f4").astype(float)
     size = more[3] if form == "q" else 4
     planes = np.frombuffer(raw[offset : offset + size * n], np.uint8).reshape(size, n).astype(np.int64)
     words = sum(planes[k] << (8 * k) for k in range(size))
@@ -89,15 +91,17 @@ def test_a_difference_of_close_runs_is_no_rounding():
     np.testing.assert_allclose(difference, apart, atol=2e-3 * 1e-4 + 10 / LEVELS[3])
 
 
-def test_values_that_are_not_finite_and_exact_ones_are_single_precision():
+@pytest.mark.parametrize("raw", [False, True])
+def test_values_that_are_not_finite_and_raw_ones_are_single_precision(raw):
     values = RNG.normal(size=500)
     values[7] = np.nan
     values[9] = np.inf
-    (packed,) = pack([made(x=values)])
-    np.testing.assert_array_equal(unpacked(packed, "plant.x"), values.astype("f4"))
     smooth = RNG.normal(size=500)
-    (packed,) = pack([made(x=smooth)], exact=True)
-    np.testing.assert_array_equal(unpacked(packed, "plant.x"), smooth.astype("f4"))
+    (packed,) = pack([made(x=values, y=smooth, still=np.ones(500))], raw=raw)
+    np.testing.assert_array_equal(unpacked(packed, "plant.x"), values.astype("f4"))
+    assert packed.columns["plant.still"].form == "c"
+    if raw:
+        np.testing.assert_array_equal(unpacked(packed, "plant.y"), smooth.astype("f4"))
 
 
 def test_constants_and_both_ends_of_a_wire_cost_nothing():

@@ -45,8 +45,9 @@ class Viewer {
     this.panels = [];
     this.removal = new AbortController();
     this.listen();
-    this.road = runs.some((run) => run.road) ? new Road(this) : null;
+    this.road = null;
     this.refresh();
+    setTimeout(() => this.openRoad()); // the curves first
     const {signal} = this.removal;
     window.addEventListener('hashchange', () => {
       if (!this.restore()) return;
@@ -58,7 +59,16 @@ class Viewer {
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.refresh(), {signal});
     addEventListener('beforeprint', () => this.print(), {signal});
     addEventListener('afterprint', () => this.print(false), {signal});
-    root.classList.add('yv-ready');
+  }
+
+  openRoad() {
+    if (this.removal.signal.aborted) return;
+    if (this.runs.some((run) => run.road)) {
+      this.road = new Road(this);
+      this.road.arrange();
+      this.road.draw();
+    }
+    this.root.classList.add('yv-ready');
   }
 
   // Stop listening, before another viewer takes its place.
@@ -347,8 +357,8 @@ class Viewer {
   }
 
   redraw() {
+    this.wide = this.root.clientWidth; // before: drawn panels may bring a scroll bar, and then another width
     this.panels.forEach((panel, k) => panel.draw(k === this.panels.length - 1));
-    this.wide = this.root.clientWidth;
     this.moveCursor();
   }
 

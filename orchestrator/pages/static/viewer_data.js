@@ -32,9 +32,10 @@ function decodeColumn([form, offset, first, step, order, size], rows, bytes) {
     }
     return values;
   }
-  const bits = new Uint32Array(rows);
+  if (form === 'r') return Float64Array.from(new Float32Array(bytes.slice(offset, offset + 4 * rows).buffer));
+  const bits = new Int32Array(rows);
   for (let i = 0, sum = 0; i < rows; i++) {
-    for (let k = 0; k < 4; k++) sum = (sum + bytes[offset + k * rows + i] * 256 ** k) % 2 ** 32;
+    for (let k = 0; k < 4; k++) sum = (sum + (bytes[offset + k * rows + i] << (8 * k))) | 0;
     bits[i] = sum;
   }
   return Float64Array.from(new Float32Array(bits.buffer));
