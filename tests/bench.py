@@ -257,6 +257,22 @@ def beyond_stepping(path: Path) -> float:
     return (many - few) / (RUNS[1] - RUNS[0]) - stepping(path) * round(0.05 / float(plan.step))
 
 
+def episode_steps() -> float:
+    """Return the steps per second of an environment for training, over an episode, in this process."""
+    import yawbench.gym
+
+    env = yawbench.gym.SineWithDwell()
+    rates = []
+    for _ in range(REPEATS):
+        env.reset(options={"amplitude": yawbench.gym.ANGLE})
+        began, steps, over = perf_counter(), 0, False
+        while not over:
+            over = env.step(np.zeros(1))[2]
+            steps += 1
+        rates.append(steps / (perf_counter() - began))
+    return max(rates)
+
+
 def against(path: Path) -> dict[str, float]:
     """Return the time of our step over that of other masters, with the same FMUs on one core."""
     plan = make_plan(load_scenario(path))
@@ -302,6 +318,7 @@ def ratios(path: Path, *, long: bool) -> None:
         run = ratio(lambda: spent("-m", "orchestrator.cli", "run", path, "--out", folder), bare)
     line("`yawbench run` over a bare loop of 1e7 additions", run, "1.2")
     line("processor time of a run in a sweep beyond stepping [s]", beyond_stepping(path), "0.03")
+    line("steps per second of the environment yawbench/sine-with-dwell-v0", episode_steps(), "")
     if long:
         command = "-m", "orchestrator.cli"
         with tempfile.TemporaryDirectory() as folder:
