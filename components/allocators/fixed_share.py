@@ -35,6 +35,7 @@ class FixedShareParameters:
         0.5, "1", "Share n_r of the right side's moment in front", "paper A: half", minimum=0.0, maximum=1.0
     )
     drive_front_share: float = like(DriveParameters, "drive_front_share")
+    brake_front_share: float = like(DriveParameters, "brake_front_share")
 
 
 class FixedShare(Allocator):

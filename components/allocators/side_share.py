@@ -45,6 +45,7 @@ class SideShareParameters:
         choices=SIDE_FORCES,
     )
     drive_front_share: float = like(DriveParameters, "drive_front_share")
+    brake_front_share: float = like(DriveParameters, "brake_front_share")
 
 
 class SideShare(Allocator):

@@ -63,6 +63,7 @@ class SingleWheelParameters:
         0.5, "1", "Part of a threshold below which braking ends", "chosen: half", minimum=0.0, maximum=1.0
     )
     drive_front_share: float = like(DriveParameters, "drive_front_share", 0.0, "chosen: rear drive")
+    brake_front_share: float = like(DriveParameters, "brake_front_share")
 
 
 def chosen_wheel(delta: float, dr: float, *, printed: bool = False) -> int:

@@ -11,7 +11,7 @@ from vocabulary.wheels import Four
 
 from ..cars.wheel_kinematics import lever_arms
 from ..fmi.component import Component
-from ..fmi.variables import of_car, output, signal
+from ..fmi.variables import of_car, output, parameter, signal
 from .moment_sharing import add_drive_force
 
 BASIC = ("yaw_moment", "drive_force", "steer_angle")
@@ -24,6 +24,14 @@ class DriveParameters:
 
     drive_front_share: float = of_car(
         0.5, "chosen: equal motors", text="Share of the driver's force in front", maximum=1.0
+    )
+    brake_front_share: float = parameter(
+        -1.0,
+        "1",
+        "Share of the driver's braking force in front; below 0: as of the driving force",
+        "chosen: one share for both",
+        minimum=-1.0,
+        maximum=1.0,
     )
 
 
@@ -48,4 +56,7 @@ class Allocator(Component):
     def output(self, t: float, u: list[float]) -> Four:
         p, drive = self.p, u[1]
         forces = self.share(u, lever_arms(u[2], p.cg_to_front_axle, self.half_track))
-        return forces if drive == 0.0 else add_drive_force(forces, drive, p.drive_front_share)
+        if drive == 0.0:
+            return forces
+        braking = drive < 0.0 and p.brake_front_share >= 0.0
+        return add_drive_force(forces, drive, p.brake_front_share if braking else p.drive_front_share)

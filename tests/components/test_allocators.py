@@ -127,6 +127,11 @@ def test_the_drive_force_is_shared_between_the_axles_like_their_loads_or_as_told
     assert (fl, fr, rl, rr) == pytest.approx((375.0, 375.0, 125.0, 125.0))
     found = forces(FixedShare, 0.0, drive=1000.0, drive_front_share=0.8)
     assert found == pytest.approx([400.0, 400.0, 100.0, 100.0])
+    rear_drive = {"drive_front_share": 0.0, "brake_front_share": 0.6}
+    found = forces(FixedShare, 0.0, drive=1000.0, **rear_drive)
+    assert found == pytest.approx([0.0, 0.0, 500.0, 500.0])
+    found = forces(FixedShare, 0.0, drive=-1000.0, **rear_drive)
+    assert found == pytest.approx([-300.0, -300.0, -200.0, -200.0])
 
 
 def test_weights_may_be_given_in_any_unit():

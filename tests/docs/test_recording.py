@@ -1,0 +1,55 @@
+"""The program that converts a public recording: its files can be fitted, validated and estimated from."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import yawbench as yb
+from orchestrator.evaluation.validation import load_bands
+from orchestrator.experiments.fit import load_fit
+from tests.checkout import ROOT
+
+PLACE = ROOT / "notebooks" / "ferrari_250_lm"
+FILES = ("delta", "vx", "yawRate", "axCG", "ayCG", "beta_true")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What the program makes of a made-up recording in the form of the public one."""
+    place = tmp_path_factory.mktemp("recording")
+    recording = place / "clone" / "datasets" / "20140222_01_01_03_250lm"
+    recording.mkdir(parents=True)
+    times = 0.01 * np.arange(40_101)
+    turning = 0.3 * np.sin(times)
+    signals = (0.03 * np.sin(times), 30.0 + 0.0 * times, turning, 0.0 * times, 30.0 * turning, 0.02 * turning)
+    for name, values in zip(FILES, signals, strict=True):
+        np.savetxt(recording / f"{name}.txt", values, "%.6e")
+    command = [sys.executable, PLACE / "convert.py", place / "clone", place / "ferrari"]
+    ended = subprocess.run(command, check=True, capture_output=True, text=True)
+    assert "MIT" in ended.stdout and "github.com/MBDS" in ended.stdout
+    return place / "ferrari"
+
+
+def test_the_fits_of_the_recording_load(folder):
+    for name in ("fit_dugoff", "fit_magic_formula"):
+        fit = load_fit(folder / f"{name}.yaml")
+        assert len(fit.training) == 8 and len(fit.held_out) == 10
+        assert fit.measurement.filter is not None and "MIT" in fit.measurement.licence
+
+
+def test_its_scenarios_follow_the_recording(folder):
+    assert yb.load(folder / "dugoff.yaml").plan().instances
+    estimate = yb.load(folder / "kinematic.yaml").set({"stop_time": 5.0}).run()
+    assert estimate["velocity_x"][-1] == pytest.approx(30.0, abs=0.5)
+    assert load_bands(folder / "bands.yaml").judged == ["steer_angle"]
+
+
+def test_a_folder_without_the_recording_is_refused(tmp_path):
+    command = [sys.executable, PLACE / "convert.py", tmp_path, tmp_path / "ferrari"]
+    ended = subprocess.run(command, check=False, capture_output=True, text=True)
+    assert ended.returncode == 1 and "no such folder; clone" in ended.stderr
