@@ -5,11 +5,13 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
+from ..fmu.places import PackagedComponent
 from .options import RunOptions, plan_of_scenario, takes
 from .progress import say
 
@@ -41,10 +43,15 @@ def build(components: Components = None, out: BuildFolder = None, force: Force =
 
     from orchestrator.messages import hint
 
+    from ..fmu.places import hidden, packaged, packaged_components
+
     known = find_recipes()
     named = [*(components or ())]
     for name in named:
         if name in known:
+            continue
+        if component := packaged(name):
+            _build_packaged(component, force=force)
             continue
         if not name.endswith(".py") and not Path(name).is_dir():
             raise typer.BadParameter(
@@ -54,6 +61,8 @@ def build(components: Components = None, out: BuildFolder = None, force: Force =
             raise typer.BadParameter(f"{name}: there is no such file; name a component or its Python file")
         fmu = build_component(Path(name), target, force=force)
         say(f"{fmu.stem}: built from {name}")
+    for warning in hidden(packaged_components(), target, packages=True):
+        say(f"warning: {warning}")
     names = [name for name in named if name in known]
     if named and not names:
         return
@@ -63,9 +72,19 @@ def build(components: Components = None, out: BuildFolder = None, force: Force =
         say(f"warning: {why}")
     for name, why in report.in_python.items():
         say(f"{name} runs in Python: {why}")
+    for component in map(packaged, [] if named else packaged_components()):
+        if component:
+            _build_packaged(component, force=force)
     if report.current:
         total = len(report.built) + len(report.current)
         say(f"{len(report.current)} of {total} FMUs up to date")
+
+
+def _build_packaged(component: PackagedComponent, *, force: bool) -> None:
+    from fmus.build import build_component
+
+    fmu = build_component(component.source, component.archive.parent, force=force)
+    say(f"{fmu.stem} of {component}: {fmu}")
 
 
 def report_build(name: str, what: str) -> None:
@@ -165,8 +184,9 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
     from ..scenario import find_and_load
     from .progress import print_tables
 
+    further = [] if place or options.fmus else _further_folders(build=options.build)
     if units:
-        fmus, errors = fmus_in(_folder_of_fmus(place or options.fmus))
+        fmus, errors = fmus_in(_folder_of_fmus(place or options.fmus), *further)
         table = units_table(fmus)
         table.notes += map(str, errors)
         print_tables([table])
@@ -188,11 +208,22 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
         scenario = find_and_load.find(place, "a scenario")
         table = recorded_table(plan_of_scenario(scenario, options))
     else:
-        fmus, errors = fmus_in(_folder_of_fmus(place or options.fmus))
+        fmus, errors = fmus_in(_folder_of_fmus(place or options.fmus), *further)
         table = fmus_table(fmus, errors)
         if what == "signals":
             table = signals_table(fmus)
     print_tables([table])
+
+
+def _further_folders(*, build: bool) -> Sequence[Path]:
+    """Return the folders of FMUs that the environment names, and those of packages, whose FMUs are built."""
+    from ..fmu.opener import Opener
+    from ..fmu.places import further_folders, packaged, packaged_components
+
+    opener = Opener(build=build)
+    components = [component for name in packaged_components() if (component := packaged(name))]
+    archives = [opener.bring_packaged(component) for component in components]
+    return [*dict.fromkeys([*further_folders(), *(archive.parent for archive in archives)])]
 
 
 def _folder_of_fmus(folder: Path | None) -> Path:

@@ -20,6 +20,7 @@ from .progress import print_tables, say
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from ..errors import Diagnostic
     from ..plan import Instance, Plan, Value, Wire
 
 All = Annotated[bool, typer.Option("--all", help="Show every value, including the FMUs' defaults.")]
@@ -40,13 +41,26 @@ def check(scenario: ScenarioFile, options: RunOptions, all_: All = False) -> Non
     """
     plan = plan_of_scenario(scenario, options)
     show(plan, scenario, defaults=all_)
-    output.note(plan.diagnostics)
+    notes = [*plan.diagnostics, *_hidden(plan)]
+    output.note(notes)
     output.answer(plan=_data_of(plan))
-    for diagnostic in plan.diagnostics:
+    for diagnostic in notes:
         say(f"note: {diagnostic}")
     for unit in plan.instances:
         for violation in unit.fmu.violations():
             say(f"warning: {unit.name}: {violation}")
+
+
+def _hidden(plan: Plan) -> list[Diagnostic]:
+    """Return warnings of FMUs of packages that others hide, which a run does not look for."""
+    from ..fmu.places import hidden
+
+    found = [
+        warning
+        for unit in plan.instances
+        for warning in hidden([unit.fmu.path.stem], unit.fmu.path.parent, packages=True)
+    ]
+    return [warning for warning in dict.fromkeys(found) if warning not in plan.diagnostics]
 
 
 PLANNED = (

@@ -340,11 +340,12 @@ def files_table(folder: Path | None, kinds: Sequence[str]) -> Table:
     return table
 
 
-def fmus_in(folder: Path) -> tuple[list[Fmu], list[Diagnostic]]:
-    """Return the FMUs in a folder, and the errors of those that cannot be used."""
+def fmus_in(*folders: Path) -> tuple[list[Fmu], list[Diagnostic]]:
+    """Return the FMUs in folders, and the errors of those that cannot be used; of a name, the first."""
     opened: list[Fmu] = []
     errors: list[Diagnostic] = []
-    for path in sorted(folder.glob("*.fmu")):
+    archives = {path.name: path for folder in reversed(folders) for path in sorted(folder.glob("*.fmu"))}
+    for _, path in sorted(archives.items()):
         try:
             opened.append(open_fmu(path))
         except ModelDescriptionError as error:  # noqa: PERF203 - the others are listed all the same

@@ -19,6 +19,7 @@ from ..messages import closest, listed, printable, short
 from ..plan import BuildInfo, Fmu
 from ..scenario.overrides import is_path
 from .archive import open_fmu
+from .places import PackagedComponent, further_folders, packaged, packaged_components
 
 if TYPE_CHECKING:
     from fmus.upkeep import FmuUpdater
@@ -91,9 +92,30 @@ class Opener:
             self._opened[key] = replace(fmu, built=built)
         return self._opened[key]
 
+    def bring_packaged(self, component: PackagedComponent) -> Path:
+        """Return the archive of a component of an installed package, building it if necessary.
+
+        Raises:
+            BuildError: building fails.
+            ModelDescriptionError: it is not built, and building is not allowed.
+        """
+        archive = component.archive
+        if archive.is_file() or archive in self._preopened:
+            return self.bring(archive)
+        if not self.build:
+            raise ModelDescriptionError(
+                f"{component.fmu} of {component} is not built; 'yawbench build {component.fmu}' builds it",
+                code="fmu-missing",
+            )
+        from fmus.build import build_component
+
+        self._report(f"{component.fmu}: built from {component}")
+        return build_component(component.source, archive.parent)
+
     def names(self, folder: Path) -> list[str]:
-        """Return the names of the FMUs in a folder, including those that can be built into it."""
-        names = {path.stem for path in folder.glob("*.fmu")}
+        """Return the names of the FMUs that can be used beside a folder, with those that can be built."""
+        names = {path.stem for place in (folder, *further_folders()) for path in place.glob("*.fmu")}
+        names |= packaged_components().keys()
         if self.build and folder.resolve() == HOME:
             from fmus.build import find_recipes
 
@@ -140,6 +162,11 @@ def find_fmu(fmu: str, *, scenario: Path, fmus: Path, opener: Opener, build: boo
     archive = opener.bring(fmus.absolute() / f"{fmu}.fmu", build=build)
     if os.path.isfile(archive):
         return archive
+    for place in further_folders():
+        if (place / archive.name).is_file():
+            return opener.bring(place.absolute() / archive.name, build=build)
+    if component := packaged(fmu):
+        return opener.bring_packaged(component)
     names = opener.names(fmus)
     if not names:
         raise ModelDescriptionError(

@@ -26,6 +26,7 @@ from ..errors import BuildError, Diagnostic, Location, ModelDescriptionError, Wi
 from ..fmu.binary import CORE
 from ..fmu.description import shadowed_modules
 from ..fmu.opener import Opener, find_fmu, find_folder, host_needs, stale_fmus
+from ..fmu.places import hidden
 from ..messages import closest, fold, hint, listed
 from ..names import SignalName, match
 from ..plan import Fmu, InputSeries, Instance, Plan, Value, ValueOrigin, Variable, Wire
@@ -309,7 +310,8 @@ def _open_all(scenario: LoadedScenario, fmus: Path | None, opener: Opener) -> Wi
         raise BuildError(not_built)
     if errors:
         raise ModelDescriptionError(errors)
-    return WiringContext(scenario, fmus_by_name, replaced)
+    names = [spec.fmu for spec in scenario.units.values() if not is_path(spec.fmu)]
+    return WiringContext(scenario, fmus_by_name, replaced, hidden(names, folder, packages=False))
 
 
 def _check_instances(system: WiringContext) -> None:

@@ -1,0 +1,185 @@
+"""Components of installed packages, and FMUs in folders that the environment names."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from orchestrator.fmu import places
+from orchestrator.results.reader import Results, load_results
+from tests.sentences import golden
+
+from .test_batch_commands import SCENARIO
+
+UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
+LAW = '''
+"""A proportional law, with a gain from a file beside it."""
+
+from components.fmi.component import Component
+
+from ._gains import GAIN
+
+
+class Follow(Component):
+    """Holds the yaw rate."""
+
+    inputs = ("yaw_rate_ref",)
+    outputs = ("yaw_moment",)
+
+    def output(self, t, u):
+        return (GAIN * u[0],)
+'''
+Install = Callable[..., Path]
+
+
+@pytest.fixture
+def install(tmp_path, monkeypatch, cache) -> Iterator[Install]:
+    """Install a sample package, as an installer would leave it on Python's path."""
+    site = tmp_path / "site"
+    site.mkdir()
+    monkeypatch.syspath_prepend(site)
+
+    def make(distribution: str = "my-laws", *, name: str = "follow", gain: float = 3.0, of: str = "") -> Path:
+        package = distribution.replace("-", "_")
+        controllers = site / package / "components" / "controllers"
+        controllers.mkdir(parents=True)
+        (controllers / f"{name}.py").write_text(LAW)
+        (controllers / "_gains.py").write_text(f"GAIN = {gain}\n")
+        info = site / f"{package}-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {distribution}\nVersion: 1.0\n")
+        (info / "entry_points.txt").write_text(f"[{places.GROUP}]\nlaws = {of or f'{package}.components'}\n")
+        places.packaged_components.cache_clear()
+        return controllers
+
+    yield make
+    places.packaged_components.cache_clear()
+    for module in [name for name in sys.modules if name.partition(".")[0] in ("my_laws", "your_laws")]:
+        del sys.modules[module]
+
+
+@pytest.fixture
+def yawbench(yawbench, fmus, tmp_path, monkeypatch):
+    """Run the command line in a folder with a scenario and its folder of FMUs."""
+    work = tmp_path / "work"
+    work.mkdir()
+    shutil.copytree(fmus, work / "fmus")
+    (work / "half.yaml").write_text(SCENARIO)
+    monkeypatch.chdir(work)
+    return yawbench
+
+
+def gain_in(run: Results) -> float:
+    """Return the ratio of the peaks of output and input."""
+    return float(abs(run.find("yaw_moment")).max() / abs(run.find("yaw_rate_ref")).max())
+
+
+def test_a_component_of_a_package_is_found_built_and_run(install, yawbench, cache):
+    install()
+    status, _, said = yawbench(
+        "run", "half.yaml", "--swap", "controller=controller_follow", "--out", "results/one"
+    )
+    assert status == 0, said
+    assert golden(said.splitlines()[0])
+    run = load_results(Path("results/one"))
+    assert gain_in(run) == pytest.approx(3.0, rel=0.01)
+    assert (cache / "fmus").is_dir()
+    assert sorted(path.name for path in Path("fmus").iterdir()) == sorted(f"{name}.fmu" for name in UNITS)
+
+
+def test_it_is_built_again_when_a_file_beside_it_has_changed(install, yawbench):
+    controllers = install()
+    swap = ("--swap", "controller=controller_follow")
+    assert yawbench("run", "half.yaml", *swap)[0] == 0
+    _, _, said = yawbench("run", "half.yaml", *swap)
+    assert "built" not in said
+    (controllers / "_gains.py").write_text("GAIN = 5.0\n")
+    _, _, said = yawbench("run", "half.yaml", *swap, "--out", "results/two")
+    assert "controller_follow: built" in said
+    run = load_results(Path("results/two"))
+    assert gain_in(run) == pytest.approx(5.0, rel=0.01)
+
+
+def test_without_building_it_is_said_how_to_build_it(install, yawbench):
+    install()
+    command = ("run", "half.yaml", "--swap", "controller=controller_follow", "--no-build")
+    status, _, said = yawbench(*command)
+    assert status == 2
+    assert golden(said)
+    status, _, said = yawbench("build", "controller_follow")
+    assert status == 0
+    assert "controller_follow of the package my-laws: " in said
+    assert yawbench(*command)[0] == 0
+
+
+def test_it_is_suggested_and_listed(install, yawbench):
+    install()
+    _, _, said = yawbench("run", "half.yaml", "--swap", "controller=controller_folow")
+    assert "did you mean 'controller_follow'?" in said
+    status, out, _ = yawbench("list", "fmus")
+    assert status == 0
+    assert "controller_follow" in out
+    assert "controller_off" in out
+
+
+def test_a_name_that_is_also_in_the_folder_is_told_and_the_folder_counts(install, yawbench):
+    install(name="off")
+    status, _, said = yawbench("check", "half.yaml", "--swap", "controller=controller_off")
+    assert status == 0
+    assert golden(next(line for line in said.splitlines() if "the package my-laws" in line))
+    assert yawbench("run", "half.yaml", "--swap", "controller=controller_off", "--out", "results/off")[0] == 0
+    assert not load_results(Path("results/off")).find("yaw_moment").any()
+
+
+def test_a_name_in_two_packages_is_refused(install, yawbench):
+    install()
+    install("your-laws", gain=4.0)
+    status, _, said = yawbench("run", "half.yaml", "--swap", "controller=controller_follow")
+    assert status == 2
+    assert golden(said)
+
+
+def test_an_entry_point_that_names_nothing_is_told_with_its_package(install, yawbench):
+    install(of="my_laws.parts")
+    status, _, said = yawbench("run", "half.yaml", "--swap", "controller=controller_follow")
+    assert status == 2
+    assert golden(said)
+
+
+def test_folders_of_the_environment_come_after_the_nearest(yawbench, tmp_path, monkeypatch):
+    first, second = tmp_path / "first", tmp_path / "second"
+    first.mkdir()
+    second.mkdir()
+    shutil.copy("fmus/controller_off.fmu", first / "controller_mine.fmu")
+    shutil.copy("fmus/controller_fuzzy_sideslip.fmu", second / "controller_mine.fmu")
+    shutil.copy("fmus/controller_off.fmu", second / "controller_off.fmu")
+    monkeypatch.setenv(places.FOLDERS, f"{first}:{second}")
+    status, _, said = yawbench(
+        "run", "half.yaml", "--swap", "controller=controller_mine", "--out", "results/mine"
+    )
+    assert status == 0
+    assert golden(next(line for line in said.splitlines() if "/first" in line))
+    assert not load_results(Path("results/mine")).find("yaw_moment").any()
+    _, _, said = yawbench("check", "half.yaml", "--swap", "controller=controller_off")
+    assert golden(next(line for line in said.splitlines() if "/second" in line))
+    status, out, _ = yawbench("list", "fmus")
+    assert "controller_mine" in out
+
+
+def test_a_folder_of_the_environment_that_is_not_there_is_told(yawbench, tmp_path, monkeypatch):
+    monkeypatch.setenv(places.FOLDERS, str(tmp_path / "nothing"))
+    status, _, said = yawbench("run", "half.yaml", "--swap", "controller=controller_mine")
+    assert status == 2
+    assert golden(said)
+
+
+def test_nothing_is_searched_where_every_name_is_in_the_folder(yawbench, monkeypatch):
+    def searched():
+        raise AssertionError
+
+    monkeypatch.setattr(places, "packaged_components", searched)
+    assert yawbench("run", "half.yaml")[0] == 0
