@@ -219,14 +219,18 @@ class LoadedThreats:
         """Return the cars of a setting."""
         return self.spec.settings[setting].cars or self.spec.cars
 
+    def cars_facing(self, setting: str, threat: str) -> list[str]:
+        """Return the cars of a setting that a threat applies to."""
+        applicable = self.spec.threats[threat].cars or self.spec.cars
+        return [car for car in self.cars_in(setting) if car in applicable]
+
     def searches(self, only: Collection[str] = ()) -> list[SearchPlace]:
         """Return what is searched; `only`: entries (default: all)."""
         return [
             SearchPlace(name, threat, car, entry)
             for name in self.spec.settings
             for threat in self.threats_in(name)
-            for car in self.cars_in(name)
-            if car in (self.spec.threats[threat].cars or self.spec.cars)
+            for car in self.cars_facing(name, threat)
             for entry in self.entries_in(name)
             if not only or entry in only
         ]

@@ -133,7 +133,7 @@ def _heading(spec: ThreatSpec) -> str:
 
 
 def _of_threat(result: ThreatResult, setting: str, threat: str, entry: str) -> list[Any]:
-    cars = result.threats.spec.threats[threat].cars or result.threats.cars_in(setting)
+    cars = result.threats.cars_facing(setting, threat)
     places = (SearchPlace(setting, threat, car, entry) for car in cars)
     return [result.survived[place] for place in places if place in result.survived]
 
@@ -143,7 +143,7 @@ def car_tables(result: ThreatResult, entries: Sequence[str]) -> list[Table]:
     threats, titles, tables = result.threats, titles_of(result), []
     for name in threats.threats_in(threats.main):
         spec = threats.spec.threats[name]
-        cars = spec.cars or threats.spec.cars
+        cars = threats.cars_facing(threats.main, name)
         heading = f"{spec.title}{f' [{spec.unit}]' if spec.unit else ''}"
         table = Table(heading, ["controller", *cars], numbers=range(1, len(cars) + 1))
         for entry in entries:

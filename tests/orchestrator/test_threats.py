@@ -10,7 +10,7 @@ import pytest
 
 from orchestrator.errors import ScenarioError
 from orchestrator.experiments.execution import side_by_side
-from orchestrator.experiments.threat_runs import RESOLUTION, Attempt, Survived, _search
+from orchestrator.experiments.threat_runs import RESOLUTION, Attempt, Survived, ThreatResult, _search
 from orchestrator.experiments.threat_scores import (
     gains_and_laws,
     groups_of,
@@ -20,6 +20,7 @@ from orchestrator.experiments.threat_scores import (
     score_table,
 )
 from orchestrator.experiments.threats import LoadedThreats, ThreatSpec, load_threats
+from orchestrator.pages.threats_page import car_tables
 from orchestrator.scenario.find_and_load import SHIPPED
 from tests.checkout import ROOT
 from tests.commands import status_of
@@ -221,6 +222,23 @@ entries:
   none: {{title: no control, fmu: controller_off, source: the car alone}}
   fuzzy_pid: {{title: fuzzy PID, fmu: controller_fuzzy_pid, source: paper C}}
 """
+
+OTHER_CAR = f"""  other:
+    title: soft
+    vehicle: {ROOT}/scenarios/vehicles/saloon75.yaml
+    slow_steer: {GROUND}/slowly_increasing_steer.yaml
+"""
+
+
+def test_a_setting_of_some_cars_has_tables_of_these_alone(tmp_path):
+    (tmp_path / "ranking.yaml").write_text(RANKING.replace("conditions:", OTHER_CAR + "conditions:"))
+    some = SMALL.replace("cars: [s]", "cars: [other, s]").replace("limit: 10000", "limit: 10000, cars: [s]")
+    (tmp_path / "threats.yaml").write_text(some)
+    threats = load_threats(tmp_path / "threats.yaml")
+    assert {place.car for place in threats.searches()} == {"s"}
+    survived = {place: Survived(0.5, "") for place in threats.searches()}
+    (table,) = car_tables(ThreatResult(threats, {}, survived, {}), ["fuzzy_pid"])
+    assert list(table.headings) == ["controller", "s"]
 
 
 def rows(file):
