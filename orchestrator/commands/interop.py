@@ -108,7 +108,9 @@ def _show_still(opinion: SecondOpinion) -> None:
     """Print which signals are constant during the run: their agreement is not evidence."""
     from ..messages import counted, fold, listed, printable
 
-    if opinion.still:
+    if opinion.differences and len(opinion.still) == len(opinion.differences):
+        print("No signal changes during the run, so its agreement is not evidence: let it last longer.")
+    elif opinion.still:
         share = f"{len(opinion.still)} of {counted(len(opinion.differences), 'signal')}"
         names = listed(fold(list(opinion.still)))
         print(printable(f"Constant during the run, so their agreement is not evidence: {share}, {names}."))

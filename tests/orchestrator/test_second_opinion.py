@@ -135,6 +135,8 @@ def test_signals_that_do_not_change_are_told(capsys):
     show([SecondOpinion(MASTERS[0], False, "", gaps, {"theirs": 1e-6, "ours": 1e-6}, still)])
     said = capsys.readouterr().out
     assert golden_in(said)
+    show([SecondOpinion(MASTERS[0], False, "", gaps, {"theirs": 1e-6, "ours": 1e-6}, tuple(gaps))])
+    assert golden_in(capsys.readouterr().out.splitlines()[-1])
     show([SecondOpinion(MASTERS[0], False, "", gaps, {"theirs": 1e-6, "ours": 1e-6})])
     assert "Constant" not in capsys.readouterr().out
 
