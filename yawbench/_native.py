@@ -177,7 +177,7 @@ def _functions(cls: type) -> list[Any]:
     functions = [member for member in vars(cls).values() if inspect.isfunction(member)]
     for function in functions:
         for held in (cell.cell_contents for cell in function.__closure__ or ()):
-            classes = held.__mro__ if isinstance(held, type) else ()
+            classes = held.__mro__ if issubclass(type(held), type) else ()  # `isinstance` asks the object
             within = [x for base in classes for x in vars(base).values()] or [held]
             functions += [x for x in within if type(x) is FunctionType and x not in functions]
     return functions

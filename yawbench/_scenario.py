@@ -87,7 +87,9 @@ class Scenario:
         if not arguments.is_a(self.programs, dict):
             arguments.refuse("programs", "programs as `swap` makes them", self.programs)
 
-    def swap(self, **units: ControllerLike) -> Scenario:
+    def swap(
+        self, replacements: Mapping[str, ControllerLike] | None = None, /, **units: ControllerLike
+    ) -> Scenario:
         """Return the scenario with other FMUs or plain Python in place of instances.
 
             >>> linear = base.swap(tyre="tyre_linear")
@@ -96,16 +98,20 @@ class Scenario:
             [True, True]
 
         Args:
-            units: instance of the scenario -> name or path of an FMU, or plain Python: a function whose
-                arguments have the names of signals (`t` is the time in s); an object with `inputs`,
-                `outputs` and `output(t, u)`, and optionally `advance(t, h, u)`, `start(t, u)` and
-                `step_size`; or a component class. Every run uses a copy of the object. Arguments with
-                a default value, and what the object was made with, are parameters for `set`.
+            replacements, units: instance of the scenario -> name or path of an FMU, or plain Python, in a
+                mapping as for `set` or by name. Plain Python is a function whose arguments have the names
+                of signals (`t` is the time in s); an object with `inputs`, `outputs` and `output(t, u)`,
+                and optionally `advance(t, h, u)`, `start(t, u)` and `step_size`; or a component class.
+                Every run uses a copy of the object. Arguments with a default value, and what the object
+                was made with, are parameters for `set`.
 
         Raises:
             ScenarioError: the instance is unknown, or its replacement invalid.
         """
-        return self._swapped(units)
+        wanted = "a mapping of instances to FMUs, {'tyre': 'tyre_linear'}"
+        with arguments.as_scenario_errors("swap"):
+            entries = {} if replacements is None else arguments.mapping(replacements, "replacements", wanted)
+        return self._swapped({**entries, **units})
 
     def _swapped(self, units: Mapping[str, ControllerLike], label: str = "") -> Scenario:
         """Return the scenario with instances replaced; plain Python is known by the label, if any."""

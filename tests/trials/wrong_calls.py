@@ -165,6 +165,8 @@ def _parameters() -> Iterator[Parameter]:
         "unit",
         skip=set(WRONG) - set(TEXTS) | {"hostile text"},
     )
+    yield of("Scenario.swap.replacements", lambda x: b.base.swap(x), "replacements", "unit", right={"None"},
+             may={"dict"})  # fmt: skip
     yield of("Scenario.swap.units [controller]", lambda x: plan(b.base.swap(controller=x)), *names,
              may={"lambda", "builtin"})  # fmt: skip
     yield of("Scenario.set.values", lambda x: b.base.set(x), "values", "has no unit", "set ")
