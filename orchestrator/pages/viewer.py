@@ -247,7 +247,7 @@ def answer_of(runs: Sequence[LabelledRun]) -> str:
     parts += [f"{run.label}: {run.results.ended.rstrip('.')}" for run in runs if run.results.ended]
     for name in METRICS:
         values = [value for run in runs if (value := evaluate(run.results, metric(name)))]
-        if len(values) == len(runs):
+        if 0 < len(values) == len(runs):
             parts.append(f"largest {words(metric(name).signal).lower()}: {_compared(runs, values)}")
             break
     sentence = "; ".join(parts)
