@@ -31,6 +31,15 @@ PLAIN = (bool, int, float, str, type(None))
 """Types of what an object may hold before its first step."""
 
 
+def _values(result: Any) -> Any:
+    """Return what a law returns as a sequence; True and False are refused, as in Python."""
+    values = result if isinstance(result, (tuple, list)) else (result,)
+    for value in values:
+        if isinstance(value, bool):
+            raise TypeError("must be a number")
+    return values
+
+
 def of_function(
     function: Callable[..., Any], inputs: Sequence[str], timed: bool, parameters: Sequence[str]
 ) -> dict[str, Any]:
@@ -46,7 +55,7 @@ def of_function(
             zip([*inputs, *parameters], [*u, *[getattr(self.p, x) for x in parameters]], strict=True)
         )
         result = function(**values, t=t) if timed else function(**values)
-        return result if isinstance(result, (tuple, list)) else (result,)
+        return _values(result)
 
     return {"output": output}
 
@@ -82,7 +91,7 @@ def of_object(program: Any, own: ProgramParameters) -> dict[str, Any]:
 
     def output(self: Any, t: float, u: Sequence[float]) -> Any:
         result = its_output(self, t, self._named(*u))  # type: ignore[misc]
-        return result if isinstance(result, (tuple, list)) else (result,)
+        return _values(result)
 
     members |= {"configure": configure, "output": output}
     members |= {"start": start} if its_start else {}
@@ -112,7 +121,7 @@ def _with_parameters(program: Any, own: ProgramParameters) -> dict[str, Any]:
 
     def output(self: Any, t: float, u: Sequence[float]) -> Any:
         result = self._program.output(t, self._named(*u))
-        return result if isinstance(result, (tuple, list)) else (result,)
+        return _values(result)
 
     members = {"configure": configure, "output": output}
     members |= {"start": start} if hasattr(cls, "start") else {}

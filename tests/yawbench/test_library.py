@@ -211,6 +211,16 @@ def test_plain_python_that_is_not_translated_says_why(what, base):
     assert golden(re.sub(r"(py|>):\d+", r"\1:LINE", note.message))
 
 
+@pytest.mark.parametrize(
+    "law", [lambda yaw_rate: False, lambda yaw_rate: yaw_rate > 0.1], ids=["always", "by sign"]
+)
+def test_a_law_that_returns_a_truth_is_refused_natively_too(law, base):
+    zero = base.set({"stop_time": 0.01}).swap(controller=lambda yaw_rate: 0)
+    assert zero.run().record["fmus"]["controller"]["runs_as"] == "native"  # the same C as for False
+    with refused(yb.SimulationError, "call-failed"):
+        base.swap(controller=law).run()
+
+
 def test_a_value_of_the_module_counts_as_it_is_when_a_run_begins(base, monkeypatch):
     scenario = base.swap(controller=with_gain).set({"stop_time": 0.01})
     before = scenario.run()
