@@ -163,7 +163,8 @@ def _parameters() -> Iterator[Parameter]:
     b = BENCH
     # What there is.
     yield of("load.source", yb.load, "source", "scenario")
-    yield of("open.folder", yb.open, "folder", "contains no results", "loop.yaml", may={"root"})
+    yield of("open.folder", yb.open, "folder", "no results here", "contains no results",
+             "loop.yaml", may={"root"})  # fmt: skip
     yield of("Run.results", yb.Run)
     yield of("Run.__getitem__.name", lambda x: b.run[x], "column")
     yield of("Run.__contains__.name", lambda x: x in b.run, right=set(WRONG))
@@ -252,8 +253,8 @@ def _parameters() -> Iterator[Parameter]:
     yield of("View.labels", lambda x: yb.View(x, ""), may={"tuple", "pair turned around", "pair of texts"})
     yield of("View.html", lambda x: yb.View((), x), right={*PRINTABLE, *EMPTY}, may=set(TEXTS))
     yield of("View.height", lambda x: yb.View((), "", x), right={"numpy uint8"})
-    yield of("View.save.file", beside(lambda x: b.view.save(x)), "file", "page", skip={"root", "path upwards"},
-             right={"number as text", "path"},
+    yield of("View.save.file", beside(lambda x: b.view.save(x)), "file", "page",
+             skip={"root", "path upwards"}, right={"number as text", "path"},
              may={*PRINTABLE, *PATHS, *COLOURED, "point"})  # fmt: skip
     # Experiments.
     speeds = {"driver.amplitude": [0.02]}
