@@ -1,4 +1,4 @@
-"""What other programs show of an FMU: its authors, a page of documentation, an icon.
+"""Metadata of an FMU that other programs show: authors, a page of documentation, an icon.
 
 Nothing here depends on when or where the FMU is built: the date is that of this version of the
 program, and the icons are drawn in advance (`docs/generate/icons.py`).

@@ -1,4 +1,4 @@
-"""How a Python component becomes the files of an FMU; `c.c_recipe` does the same for components in C."""
+"""Recipe of a Python component: the files of its FMU; `c.c_recipe` has that of a component in C."""
 
 from __future__ import annotations
 

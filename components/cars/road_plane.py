@@ -34,9 +34,9 @@ LEVEL = Pull(-0.0, -0.0, -0.0, -0.0)  # adding -0.0 changes no bit of any number
 """On a level road without wind."""
 
 
-def pull_of(told: Sequence[float], mass: float) -> Pull:
+def pull_of(signals: Sequence[float], mass: float) -> Pull:
     """Return the pull of slope, bank [rad], wind force [N] and moment [N.m] on a car of `mass` [kg]."""
-    slope, bank, force, moment = told
+    slope, bank, force, moment = signals
     if slope == bank == force == moment == 0.0:
         return LEVEL
     up, aside = sin(slope), sin(bank)

@@ -191,8 +191,8 @@ class OptimalPreview(Component):
         v, v_y, r = u[0], u[1], u[2]
         eta = ratio * (v_y + car.a * r) / max(v, SLOWEST)
         largest = p.grip_share * p.base_friction * car.m * G * car.b / (car.a + car.b)
-        asked = MOST * ratio * largest / car.c_f
-        self.linear = min(max(self.linear, eta - asked), eta + asked)
+        change = MOST * ratio * largest / car.c_f
+        self.linear = min(max(self.linear, eta - change), eta + change)
         share = (self.linear - eta) / ratio * car.c_f / largest
         alpha: float = 3.0 * largest / car.c_f * (1.0 - (1.0 - abs(share)) ** (1.0 / 3.0))
         return eta + copysign(ratio * alpha, share)

@@ -214,13 +214,13 @@ class Component(Fmi2Slave):
         """Bring the parameters up to date with what has been set."""
         if self._configured:
             return
-        given = {}
+        values = {}
         for variable, value in zip(
             self.variables[self._n_io :], self._values[self._n_io :] + self._others, strict=True
         ):
             check_parameter(variable, value)
-            given[variable.name] = value
-        self.p = self.Parameters(**given)
+            values[variable.name] = value
+        self.p = self.Parameters(**values)
         self.configure()
         self._configured = True
 
@@ -236,10 +236,10 @@ class Component(Fmi2Slave):
 
     def _checked_output(self, t: float, u: list[float]) -> list[float]:
         """Return what `output` gives, checked."""
-        given: Any = self.output(t, u)
-        if given is None:
+        outputs: Any = self.output(t, u)
+        if outputs is None:
             raise TypeError("output() returned nothing; it must return all outputs in declared order")
-        y = list(map(float, given))
+        y = list(map(float, outputs))
         if len(y) != self._n_io - self._n_in:
             raise TypeError(f"output() gave {len(y)} values for {self._n_io - self._n_in} outputs")
         return y
@@ -262,13 +262,13 @@ class Component(Fmi2Slave):
                 if path.startswith(home + os.sep) and path not in machinery:
                     relative = path[len(home) + 1 :].replace(os.sep, "/")
                     where = f" ({relative}:{line})"
-            given = ", ".join(
+            inputs = ", ".join(
                 f"{v.name} = {x!r}" for v, x in zip(self.variables[: self._n_in], self._values, strict=False)
             )
             name = kind.__name__ if kind else "error"
             text = f"{what} at t = {t:.9g} s: {name}: {error}{where}"
-            if given:
-                text += f"; inputs: {given}"
+            if inputs:
+                text += f"; inputs: {inputs}"
             self.log(text, Fmi2Status.error)
             full = "".join(traceback.format_exception(kind, error, trace))
             self.log(full, Fmi2Status.error, "traceback")

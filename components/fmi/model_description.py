@@ -99,10 +99,12 @@ def _scalar_variable(parent: Element, reference: int, v: VariableSpec) -> None:
     if v.start is not None:
         start = str(v.start).lower() if v.type == "Boolean" else str(v.start)
         typed.set("start", repr(float(v.start)) if v.type == "Real" else start)
-    said = {"optional": "true" * v.optional, "choices": ", ".join(v.choices or ()), "source": v.source}
-    if any(said.values()):  # FMI has no words for it; a tool that does not know the annotation passes it over
+    attributes = {"optional": "true" * v.optional, "choices": ", ".join(v.choices or ()), "source": v.source}
+    if any(
+        attributes.values()
+    ):  # FMI has no words for it; a tool that does not know the annotation passes it over
         tool = SubElement(SubElement(element, "Annotations"), "Tool", name="yawbench")
-        SubElement(tool, "variable", {key: text for key, text in said.items() if text})
+        SubElement(tool, "variable", {key: text for key, text in attributes.items() if text})
 
 
 def _model_structure(parent: Element, variables: Sequence[VariableSpec]) -> None:

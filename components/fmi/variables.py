@@ -137,8 +137,8 @@ def _names(what: str, argument: str, value: Iterable[str]) -> tuple[str, ...]:
     """
     if type(value) not in (tuple, list):
         raise DeclarationError(f"{what}: {argument} must be a tuple of texts (got {type(value).__name__})")
-    for one in value:
-        _check(what, f"every item of {argument}", one, str)
+    for item in value:
+        _check(what, f"every item of {argument}", item, str)
     return tuple(value)
 
 
@@ -188,7 +188,7 @@ def parameter(
     """
     kind = _FMI_TYPES.get(type(default))
     if kind is None:
-        known = ", ".join(one.__name__ for one in _FMI_TYPES)
+        known = ", ".join(kind.__name__ for kind in _FMI_TYPES)
         raise DeclarationError(f"parameter: default must be one of {known} (got {type(default).__name__})")
     if kind == "Real":
         _check("parameter", "default", default, float)
@@ -242,7 +242,7 @@ def like(
     parameters: type, name: str, default: float | int | bool | str | None = None, source: str = ""
 ) -> Any:
     """Declare anew a field that a dataclass of parameters has, with another default value if given."""
-    (declared,) = (one for one in parameter_variables(parameters) if one.name == name)
+    (declared,) = (variable for variable in parameter_variables(parameters) if variable.name == name)
     if default is not None and (source or default != declared.start):
         declared = replace(declared, start=default, source=source or "chosen: for this FMU")
     return field(default=declared.start, metadata={"declared": declared})
@@ -256,7 +256,7 @@ def parameter_class(module: str, name: str, declared: Mapping[str, Any], bases: 
         declared: name -> what `parameter` returned.
         bases: dataclasses to add to.
     """
-    made = [(key, type(one.default), one) for key, one in declared.items()]
+    made = [(key, type(variable.default), variable) for key, variable in declared.items()]
     return make_dataclass(name, made, bases=bases, frozen=True, namespace={"__module__": module})
 
 

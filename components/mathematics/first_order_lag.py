@@ -64,14 +64,14 @@ class Stage:
         if len(history) > 1:
             while len(history) > 1 and history[1][0] <= begin:
                 del history[0]
-            for (_, asked), (change, _) in pairwise(history):
+            for (_, target), (change, _) in pairwise(history):
                 if change >= end:
                     break
-                self._relax(asked, change - begin)
+                self._relax(target, change - begin)
                 begin = change
-        asked = current(history, begin)
-        if self.value != asked and end > begin:
-            self._relax(asked, end - begin)
+        target = current(history, begin)
+        if self.value != target and end > begin:
+            self._relax(target, end - begin)
 
     def _relax(self, target: float, h: float) -> None:
         rate = self.rate if target > self.value else self.falling_rate

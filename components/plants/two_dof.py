@@ -105,7 +105,7 @@ class TwoDof(Car):
     )
 
     def rest(self, signals: Sequence[Any]) -> Values:
-        self.given = 0.0
+        self.speed = 0.0
         self.slope = 0.0
         return (lateral_resultants(signals[0], signals[2], self.p)[0] / self.p.mass,)
 
@@ -115,14 +115,14 @@ class TwoDof(Car):
         force, moment = lateral_resultants(delta, signals[2], self.p)
         a_y = force / self.p.mass
         dr = (moment + yaw_moment) / self.p.yaw_inertia
-        given, before = signals[-1], self.given
-        if given > 0.0:
-            self.slope = (given - before) / h if before > 0.0 else 0.0
-            self.given = given
-            self.motion = (given, *self.motion[1:])
+        speed, before = signals[-1], self.speed
+        if speed > 0.0:
+            self.slope = (speed - before) / h if before > 0.0 else 0.0
+            self.speed = speed
+            self.motion = (speed, *self.motion[1:])
         self.motion = drift(self.motion, h, a_y=a_y + pull.y, dr=dr)
-        if given > 0.0:
-            self.motion = (given + 0.5 * h * self.slope, *self.motion[1:])
+        if speed > 0.0:
+            self.motion = (speed + 0.5 * h * self.slope, *self.motion[1:])
         return (a_y,)
 
     def finish(self, carried: Values) -> None:

@@ -157,7 +157,7 @@ def forces_1987(kappa: float, alpha: float, tyre: LoadedTyre) -> tuple[float, fl
     """
     c_x, d_x, k_x, e_x, c_y, d_y, k_y, e_y = tyre
     tan_alpha, forward = lateral_slip(alpha)
-    given, kappa = kappa, practical_slip(kappa, forward)
+    raw, kappa = kappa, practical_slip(kappa, forward)
     if not forward:
         alpha = copysign(pi, alpha) - alpha
     n_x = k_x / d_x
@@ -183,6 +183,6 @@ def forces_1987(kappa: float, alpha: float, tyre: LoadedTyre) -> tuple[float, fl
     by_k = n_x * p_x / k  # dk/dkappa
     slope = d_x * cos(angle) / (1.0 + b * b) * (1.0 - e_x + e_x / (1.0 + x * x))
     stiffness = (slope * by_k * kappa + f_x * tan_alpha * (tan_alpha - kappa * turned * by_k) / square) / size
-    if kappa != given:  # driving: kappa / (1 - kappa), or held at 99
-        stiffness *= (kappa / given) ** 2 if abs(given) < 0.99 else 0.0
+    if kappa != raw:  # driving: kappa / (1 - kappa), or held at 99
+        stiffness *= (kappa / raw) ** 2 if abs(raw) < 0.99 else 0.0
     return f_x * kappa / size, -f_y * tan_alpha / size, stiffness

@@ -128,7 +128,7 @@ class MagicFormula62Transient(Tyre):
     def output(self, t: float, u: list[float]) -> list[float]:
         p, h = self.p, self.step_size
         _, _, loads, frictions, cambers, _, _ = self.by_signal(u)
-        found = []
+        rows = []
         for i, ((x, y), (s_x, v_x, s_y, v_y, forward)) in enumerate(
             zip(self.deflections, self.speeds, strict=True)
         ):
@@ -141,8 +141,8 @@ class MagicFormula62Transient(Tyre):
                 alpha = pi - alpha if alpha >= 0.0 else -pi - alpha
             *forces, slope = wheel_forces(kappa, alpha, cambers[i], loads[i], frictions[i], self.sets[i])
             passed = max(v_x, p.low_speed) * (h * part(v_x * h / sigma_x) / sigma_x + damper_x)
-            found.append((*forces, slope * min(passed, 1.0), self.slips[i], kappa, alpha, sigma_x, sigma_y))
-        return [value for of_wheels in zip(*found, strict=True) for value in of_wheels]
+            rows.append((*forces, slope * min(passed, 1.0), self.slips[i], kappa, alpha, sigma_x, sigma_y))
+        return [value for of_wheels in zip(*rows, strict=True) for value in of_wheels]
 
     def _see(self, u: list[float]) -> None:
         """Keep slip speeds, speeds of rolling and direction from the inputs."""
@@ -158,7 +158,7 @@ class MagicFormula62Transient(Tyre):
     def _stiffnesses(self, u: list[float]) -> list[tuple[float, float, float, float]]:
         """Return per wheel sigma_x, sigma_y [m], K_x [N] and K_y [N/rad] at the load of the inputs."""
         _, _, loads, _, cambers, _, _ = self.by_signal(u)
-        found = []
+        rows = []
         for load, gamma, (common, longitudinal, lateral, *_), lag in zip(
             loads, cambers, self.sets, self.lags, strict=True
         ):
@@ -167,8 +167,8 @@ class MagicFormula62Transient(Tyre):
             df, gamma = load * load_scale - 1.0, mirror * gamma
             k_x = longitudinal_curve(0.0, gamma, load, df, 1.0, longitudinal)[7]
             k_y = side_force(0.0, gamma, load, df, 1.0, lateral)[2]
-            found.append((*relaxation_lengths(load, gamma, k_x, k_y, lag), k_x, k_y))
-        return found
+            rows.append((*relaxation_lengths(load, gamma, k_x, k_y, lag), k_x, k_y))
+        return rows
 
     def _damping(self, v: float) -> float:
         """Return k [N.s/m] at a speed of rolling."""

@@ -114,8 +114,8 @@ class Hydraulic(Component):
     def advance(self, t: float, h: float, u: list[float]) -> None:
         p = self.p
         for i, cylinder in enumerate(self.cylinders):
-            asked = asked_pressure(self.requests[i], u[4 + i], u[8 + i], factor=self.factors[i], p=p)
-            cylinder.advance(t, h, asked)
+            demand = asked_pressure(self.requests[i], u[4 + i], u[8 + i], factor=self.factors[i], p=p)
+            cylinder.advance(t, h, demand)
         self.requests = u[:4]
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:

@@ -1,4 +1,4 @@
-"""The native library of a component: translated, compiled, and let through the gate; or why there is none.
+"""Native library of a component: translated to C and checked by the gate, or the reason why there is none.
 
 What was compiled and let through is kept in the cache by the C text (which has the GUID, and so follows from
 the component's sources), the headers, the compilers, the gate and the Python beside which it was driven. A

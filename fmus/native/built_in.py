@@ -1,4 +1,4 @@
-"""What Python brings along: its functions, and methods of its lists, texts and dictionaries."""
+"""Built-in functions of Python, and methods of its lists, strings and dictionaries."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a component calls: its own functions and classes; `built_in` has what Python brings along."""
+"""Calls of a component's own functions and classes; `built_in` has those of Python."""
 
 from __future__ import annotations
 

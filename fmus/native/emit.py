@@ -1,4 +1,4 @@
-"""C from the intermediate form: the variables, the four functions, and `unit.h` around them."""
+"""C code from the intermediate form: variables, the four functions, and `unit.h` around them."""
 
 from __future__ import annotations
 

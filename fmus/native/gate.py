@@ -1,4 +1,4 @@
-"""The gate: a native unit beside its Python twin, through the same calls, to the last bit.
+"""The gate: drives a native unit and its Python twin through the same calls, and compares every bit.
 
 Both are taken through 2,000 steps at each of three step lengths, with inputs in their usual ranges, a
 hundredth and three times of them; with every value of parameters that have choices, with parameters moved;

@@ -1,4 +1,4 @@
-"""Two paths and where they join: what each has changed is taken back, and becomes one value per place.
+"""Merging of two paths where they join: the changes of each are undone, and become one value per place.
 
 Numbers that differ are joined in a variable, tuples and objects of one kind item by item; values of
 different form become the alternatives of a union.

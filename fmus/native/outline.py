@@ -1,4 +1,4 @@
-"""Functions of a component that compute from numbers alone, as functions in C, each made once.
+"""Outlining: functions of a component that depend on numbers alone become C functions, each emitted once.
 
 A call is followed apart, with its arguments' numbers as parameters; if it changes nothing and is long enough
 to be worth it, the call stays one. All others are evaluated in place.

@@ -1,4 +1,4 @@
-"""A component as four functions: what it does with its parameters, at the start, in a step, and its outputs.
+"""Specialization of a component into four functions: its parameters, its start, a step, and its outputs.
 
 What stays on `self` is the unit's state. Its form is found by following the functions until it no longer
 widens: what is the same in every step is known, every other number has a place in the unit.

@@ -1,4 +1,4 @@
-"""Statements of a component: what they change, where they go on, loops of known and unknown length.
+"""Statements of a component: effects, control flow, loops of known and unknown length.
 
 How a function goes on stands in a place of its frame, `EXIT`: it is joined like any other value where two
 paths join, so returns, breaks and continues on one path need nothing of their own.

@@ -1,4 +1,4 @@
-"""What the evaluation of a component works with, beside plain Python values.
+"""Values that the evaluation of a component works with, beside plain Python values.
 
 Numbers, strings, tuples, classes and functions that are known at build time are themselves. A number that is
 known at run time only is an `ir.Var`. Objects that can change are boxes, so that what one path changes can be
