@@ -27,6 +27,8 @@ from orchestrator.plan import Fmu
 
 from ._parameters import ProgramParameters
 
+LIMIT = 20
+"""Processor time [s] that the gate may take, while a run waits; chosen: a short law takes one."""
 PLAIN = (bool, int, float, str, type(None))
 """Types of what an object may hold before its first step."""
 
@@ -155,6 +157,7 @@ def in_native_code(component: type[Component], translated: type[Component], fmu:
             guid=fmu.guid,
             resources=Path(folder),
             translated=translated,
+            limit=LIMIT,
         )
         if made.why_not:
             return replace(fmu, runs_as=f"Python: {made.why_not}")

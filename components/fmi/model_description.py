@@ -100,9 +100,7 @@ def _scalar_variable(parent: Element, reference: int, v: VariableSpec) -> None:
         start = str(v.start).lower() if v.type == "Boolean" else str(v.start)
         typed.set("start", repr(float(v.start)) if v.type == "Real" else start)
     attributes = {"optional": "true" * v.optional, "choices": ", ".join(v.choices or ()), "source": v.source}
-    if any(
-        attributes.values()
-    ):  # FMI has no words for it; a tool that does not know the annotation passes it over
+    if any(attributes.values()):  # FMI has no attributes for these; other tools ignore the annotation
         tool = SubElement(SubElement(element, "Annotations"), "Tool", name="yawbench")
         SubElement(tool, "variable", {key: text for key, text in attributes.items() if text})
 

@@ -102,6 +102,7 @@ def native(
     resources: Path,
     translated: type[Any] | None = None,
     hurry: bool = False,
+    limit: int = gate.LIMIT,
 ) -> Native:
     """Return the native libraries of a component, or why there are none.
 
@@ -113,6 +114,7 @@ def native(
         resources: folder that an instance is told of.
         translated: a class for the translator that gives the same; default: the component.
         hurry: leave it for later if it took longer than `LONGEST` the last time.
+        limit: processor time [s] that the gate may take.
     """
     if sys.platform != "linux" or platform.machine() != "x86_64":
         return Native(why_not=f"native units are built on Linux on x86-64, this is {platform.system()}")
@@ -123,7 +125,7 @@ def native(
             return Native(why_not=LATER)
         began = _processor_time()
         text = emit(specialise(translated or component, home, *others), source, guid)
-        made, new = _let_through(text, component, guid, resources)
+        made, new = _let_through(text, component, guid, resources, limit)
         if new:
             keep(EFFORTS, entry, str(_processor_time() - began).encode())
         return made
@@ -139,9 +141,11 @@ def _processor_time() -> float:
     return sum(os.times()[:4])  # of this process and the compilers it has waited for
 
 
-def _let_through(text: str, component: type[Any], guid: str, resources: Path) -> tuple[Native, bool]:
+def _let_through(
+    text: str, component: type[Any], guid: str, resources: Path, limit: int
+) -> tuple[Native, bool]:
     """Return what the cache has for a text, or else make it; and whether it was made."""
-    key = hashlib.sha256((text + _gate()).encode()).hexdigest()[:32]
+    key = hashlib.sha256(f"{text}{_gate()}{limit}".encode()).hexdigest()[:32]
     kept = recall(STORE, key)
     if kept is not None:
         length = int.from_bytes(kept[:8], "little")
@@ -150,14 +154,14 @@ def _let_through(text: str, component: type[Any], guid: str, resources: Path) ->
         for path, size in said["files"]:
             files[path], rest = rest[:size], rest[size:]
         return Native(files, said["why_not"]), False
-    made = _made(text, component, guid, resources)
+    made = _made(text, component, guid, resources, limit)
     header = {"files": [[path, len(data)] for path, data in made.files.items()], "why_not": made.why_not}
     head = json.dumps(header).encode()
     keep(STORE, key, len(head).to_bytes(8, "little") + head + b"".join(made.files.values()))
     return made, True
 
 
-def _made(text: str, component: type[Any], guid: str, resources: Path) -> Native:
+def _made(text: str, component: type[Any], guid: str, resources: Path, limit: int) -> Native:
     name = component.fmu_name
     sources = {f"{name}.c": text.encode()} | {n: file.read_bytes() for n, file in HEADERS.items()}
     compilers = {f"binaries/linux64/{NATIVE_LIBRARY}": (compiler_command(), LINUX)}
@@ -172,7 +176,10 @@ def _made(text: str, component: type[Any], guid: str, resources: Path) -> Native
     with tempfile.TemporaryDirectory(prefix="yawbench_") as folder:
         library = Path(folder, f"{name}.so")
         library.write_bytes(files[f"binaries/linux64/{NATIVE_LIBRARY}"])
-        found = gate.differences(library, guid, component, resources)
-    if found:
-        return Native(why_not=f"the translation is not the same as Python: {found}")
+        try:
+            difference = gate.differences(library, guid, component, resources, limit)
+        except TimeoutError as error:
+            return Native(why_not=str(error))
+    if difference:
+        return Native(why_not=f"the translation is not the same as Python: {difference}")
     return Native(files)

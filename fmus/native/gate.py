@@ -356,6 +356,9 @@ def differences(library: Path, guid: str, component: type[Any], resources: Path,
         library, guid: of the native unit.
         component, resources: of its twin.
         limit: processor time [s] that all may take.
+
+    Raises:
+        TimeoutError: it takes longer.
     """
     import resource  # of POSIX alone, as os.fork is
 
@@ -382,7 +385,7 @@ def differences(library: Path, guid: str, component: type[Any], resources: Path,
     if content:
         return content[1:].decode("utf-8", "replace")
     if os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL):
-        return f"it is not done within {limit} s"
+        raise TimeoutError(f"the comparison with Python takes more than {limit} s of processor time")
     return f"it dies of signal {os.WTERMSIG(status)}"
 
 

@@ -221,6 +221,19 @@ def test_a_law_that_returns_a_truth_is_refused_natively_too(law, base):
         base.swap(controller=law).run()
 
 
+def slow_law(yaw_rate_ref, yaw_rate):
+    total = 0.0
+    for k in range(3000):
+        total = 0.5 * total + k * (yaw_rate_ref - yaw_rate)
+    return total
+
+
+def test_a_law_that_takes_long_to_compare_runs_in_python_without_a_long_wait(base, monkeypatch):
+    monkeypatch.setattr("yawbench._native.LIMIT", 1)
+    run = base.swap(controller=slow_law).set({"stop_time": 0.01}).run()
+    assert golden(run.record["fmus"]["controller"]["runs_as"])
+
+
 def test_a_value_of_the_module_counts_as_it_is_when_a_run_begins(base, monkeypatch):
     scenario = base.swap(controller=with_gain).set({"stop_time": 0.01})
     before = scenario.run()
