@@ -97,7 +97,79 @@ def sweep(times: np.ndarray) -> np.ndarray:
     return np.where((times > 0) & (times < LONG), np.radians(20.0) / 16.0 * np.sin(phase), 0.0)
 
 
+def step(times: np.ndarray) -> np.ndarray:
+    """Return the steer angle of a step to 2 m/s2 at 27.8 m/s."""
+    return np.radians(0.9) * np.clip((times - 1.0) / 0.15, 0.0, 1.0)
+
+
+def dwell(amplitude: float) -> Any:
+    """Return the steering of a sine with dwell: 0.7 Hz, held for 0.5 s at its second peak."""
+
+    def angle(times: np.ndarray) -> np.ndarray:
+        since, third = np.clip(times - 0.5, 0.0, None), 0.75 / 0.7
+        after = np.where(since < third + 0.5, third, since - 0.5)
+        phase = np.minimum(np.where(since < third, since, after), 1.0 / 0.7)
+        return np.radians(amplitude) * np.sin(2.0 * np.pi * 0.7 * phase)
+
+    return angle
+
+
 LINEAR = ("stiffness_front", "stiffness_rear", "yaw_inertia")
+PEAKS = ("friction_front", "friction_rear")
+POOR = {"yaw_rate": np.radians(0.3), "acceleration_y": 0.2}
+"""Noise of poor sensors; that of production sensors is `ERRORS`."""
+RATIO = 16.0
+MANOEUVRES: dict[str, Any] = {
+    "sweep": lambda: measured(sweep, [27.8], LONG),
+    "two steps": lambda: [*measured(step, [27.8], 5.0), *measured(lambda t: -step(t), [27.8], 5.0)],
+    "sine with dwell": lambda: [
+        window
+        for amplitude in (1.5, 3.0, 5.0, 8.0, -1.5, -3.0, -5.0, -8.0)
+        for window in measured(dwell(amplitude), [22.2], 4.0)
+    ],
+}
+
+
+@dataclass(frozen=True)
+class SteeredCar(Car):
+    """A car whose steering ratio may be free; its hand wheel is measured."""
+
+    def __call__(self, sets: Sequence[Mapping[str, float]]) -> list[list[Any]]:
+        found = []
+        for values in sets:
+            gain = RATIO / values.get("steering_ratio", RATIO)
+            windows = [replace(window, steer_angle=gain * window.steer_angle) for window in self.windows]
+            own = {name: value for name, value in values.items() if name != "steering_ratio"}
+            found += Car(windows)([own])
+        return found
+
+
+@pytest.mark.sampled(2)
+@pytest.mark.parametrize(
+    ("manoeuvre", "names", "noise", "free_ratio", "within"),
+    [
+        ("two steps", LINEAR, ERRORS, True, 0.03),
+        ("sine with dwell", (*LINEAR, *PEAKS), ERRORS, False, 0.002),
+        ("two steps", LINEAR, ERRORS, False, 0.02),
+        ("sine with dwell", (*LINEAR, *PEAKS), POOR, False, 0.005),
+        ("sweep", LINEAR, POOR, False, 0.02),
+        ("sweep", LINEAR, ERRORS, True, 0.005),
+    ],
+)
+def test_parameters_are_found_from_noisy_manoeuvres(manoeuvre, names, noise, free_ratio, within, monkeypatch):
+    monkeypatch.setitem(globals(), "RATE", 100.0)
+    windows = with_noise(MANOEUVRES[manoeuvre](), noise, 0)
+    ratio = [Parameter("steering_ratio", 1.1 * RATIO, 10.0, 25.0)] if free_ratio else []
+    residuals = Residuals(
+        SteeredCar(windows),
+        [one.window for one in windows],
+        [*off(*names), *ratio],
+        noise,
+        settling=0.0,
+    )
+    found = estimate(residuals, most_sets=100)
+    for name, value in found.values.items():
+        assert value == pytest.approx((TRUTH | {"steering_ratio": RATIO})[name], rel=within)
 
 
 def test_stiffnesses_inertia_and_delay_are_found_from_a_noisy_sweep():
