@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -16,7 +15,7 @@ from orchestrator.errors import Diagnostic, Location, ResultsError, ScenarioErro
 from orchestrator.experiments.experiment import LoadedExperiment as Design
 from orchestrator.experiments.experiment import NamedRun
 from orchestrator.experiments.figures import draw_over_axes
-from orchestrator.experiments.jobs import Job, Outcome, measured
+from orchestrator.experiments.jobs import Job, measured
 from orchestrator.experiments.judged_schema import si_number, text_of
 from orchestrator.experiments.outcome import ExperimentResult
 from orchestrator.experiments.planning import metrics_of, plan_experiment
@@ -26,7 +25,7 @@ from orchestrator.experiments.tables import to_pandas
 from orchestrator.master.fmi import open_instance
 from orchestrator.master.run_loop import OpenInstance
 from orchestrator.master.simulate import simulate_in_memory
-from orchestrator.messages import hint, listed, printable, short
+from orchestrator.messages import hint, listed, short
 from orchestrator.plan import Value
 from orchestrator.results.reader import Results
 from orchestrator.scenario.quantities import number_and_unit
@@ -35,6 +34,7 @@ from orchestrator.scenario.yaml_lines import Document, scalar
 
 from . import arguments
 from ._calls import make_all
+from ._progress import bar
 from ._run import Run, shown_in_notebooks
 from ._scenario import Scenario, warn
 
@@ -167,7 +167,7 @@ class Experiment:
         over = " and ".join(self.design.spec.axes)
         return f"<Experiment {self.design.spec.title!r}: {len(self)} runs over {over}>"
 
-    def run(self, *, workers: int | None = None, keep: bool = True, progress: bool = False) -> Runs:
+    def run(self, *, workers: int | None = None, keep: bool = True, progress: bool | None = None) -> Runs:
         """Make all runs and return their results; nothing is written.
 
         Runs are made by worker processes; those with plain Python that is not native run here, one by one.
@@ -176,19 +176,24 @@ class Experiment:
         Args:
             workers: number of processes; default: the number of cores.
             keep: keep the results of all runs in memory, for `Runs.runs`.
-            progress: show a bar.
+            progress: show a bar; default: in a terminal or a notebook, after two seconds.
 
         Raises:
             YawbenchError: a run cannot start; none has been made.
         """
         workers = None if workers is None else arguments.count(workers, "workers")
-        keep, progress = arguments.flag(keep, "keep"), arguments.flag(progress, "progress")
-        planner = self.base._planner()
-        planned = plan_experiment(self.design, self.base.path.parent, planner=planner)
-        metrics = metrics_of(planned.experiment)
-        with _bar(self.design.spec.title, len(self), shown=progress) as report:
+        keep = arguments.flag(keep, "keep")
+        progress = None if progress is None else arguments.flag(progress, "progress")
+        with bar(self.design.spec.title, len(self), wanted=progress) as shown:
+            planner = self.base._planner()
+            planned = plan_experiment(self.design, self.base.path.parent, planner=planner)
+            metrics = metrics_of(planned.experiment)
             outcomes = make_all(
-                planned.jobs, self.base.programs, workers=workers, done=report, run=_in_memory
+                planned.jobs,
+                self.base.programs,
+                workers=workers,
+                done=lambda outcome: shown.advance(),
+                run=_in_memory,
             )
         records = [measured(outcome.value, metrics) if outcome.ok else outcome.record for outcome in outcomes]
         runs = [Run(outcome.value) if outcome.ok else None for outcome in outcomes] if keep else None
@@ -377,16 +382,3 @@ def _unit(unit: str | None) -> dict[str, str]:
 
 def _axes_of(only: Any) -> dict[str, Any]:
     return {} if only is None else arguments.mapping(only, "only", "a mapping of axes to lists of levels")
-
-
-@contextlib.contextmanager
-def _bar(title: str, total: int, *, shown: bool) -> Iterator[Callable[[Outcome], None]]:
-    """Show a progress bar that advances with every outcome, if `shown`."""
-    if not shown:
-        yield lambda outcome: None
-        return
-    from rich.progress import Progress
-
-    with Progress() as bar:
-        task = bar.add_task(printable(title).replace("[", r"\["), total=total)
-        yield lambda outcome: bar.advance(task)

@@ -29,6 +29,7 @@ from . import _parameters, arguments
 from ._controller import ControllerLike, PythonComponent
 from ._export_source import Cut, Own, literal, refuse
 from ._parameters import ProgramParameters
+from ._progress import bar
 
 STEPS, FEW, STEP = 400, 60, 0.001
 """Steps in which an FMU is compared with its program, those with other parameters, and their length [s]."""
@@ -73,9 +74,16 @@ def export_fmu(controller: ControllerLike, file: str | Path, *, role: str = "con
         )
     if arguments.names_file(controller):
         raise ScenarioError(f"controller: {short(controller)} is an FMU already", code="controller-invalid")
+    with bar(f"Export {path.name}"):
+        _write(controller, path, role, folders[role])
+    return path
+
+
+def _write(controller: Any, path: Path, role: str, folder: str) -> None:
+    """Write the FMU of a program."""
     program = PythonComponent(controller, unit=role, role=role)
     try:
-        recipe = _recipe(controller, program, path.stem, folders[role])
+        recipe = _recipe(controller, program, path.stem, folder)
         files, modules = recipe.make()
         files = presented(files, recipe.listing(), role=role, credits={})
         key = hashlib.sha256(b"".join(files[name] for name in sorted(files))).hexdigest()[:32]
@@ -86,7 +94,6 @@ def export_fmu(controller: ControllerLike, file: str | Path, *, role: str = "con
         raise BuildError([f"{path.stem}: {text}" for text in sentences], code=error.code) from None
     except OSError as error:
         raise BuildError(f"{path}: cannot be written: {error}", code="component-unreadable") from None
-    return path
 
 
 @dataclass(frozen=True)

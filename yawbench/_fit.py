@@ -12,6 +12,7 @@ from orchestrator.experiments.fit_result import FitResult, FittedModel, make_fit
 from orchestrator.planner import Planner
 
 from . import arguments
+from ._progress import bar
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,7 +35,8 @@ def fit(
     """
     loaded = load_fit(arguments.path(path, "path"))
     planner = Planner(build=True, report=lambda text: None)
-    return Fit(make_fit(loaded, planner=planner, workers=workers, say=progress or (lambda text: None)))
+    with bar(f"Fit {path}", wanted=False if progress else None):
+        return Fit(make_fit(loaded, planner=planner, workers=workers, say=progress or (lambda text: None)))
 
 
 @dataclass(frozen=True)

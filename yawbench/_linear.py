@@ -14,6 +14,7 @@ from orchestrator.messages import listed, short
 
 from . import arguments
 from ._operating_point import LARGE, SMALL, OperatingPoint
+from ._progress import bar
 from ._scenario import Scenario
 
 if TYPE_CHECKING:
@@ -124,9 +125,10 @@ def linearize(
     for name, names in (("inputs", into), ("outputs", of)):
         if not names or len(set(names)) < len(names) or (name == "outputs" and set(names) & set(into)):
             raise ValueError(f"{name}: must be signals, each once (got {short(names)})")
-    point = OperatingPoint(scenario, time, into, of)
-    sampled = _reduced(_differences(point))
-    model = sampled.named() if discrete else sampled.continuous(point.dt)
+    with bar(f"Linearize {scenario.title}"):
+        point = OperatingPoint(scenario, time, into, of)
+        sampled = _reduced(_differences(point))
+        model = sampled.named() if discrete else sampled.continuous(point.dt)
     if model is None:
         text = f"a mode changes its sign with every step of {point.dt:g} s, which no continuous model does"
         raise ScenarioError(f"{scenario.title}: {text}: request discrete=True", code="option-invalid")

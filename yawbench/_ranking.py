@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from components.fmi.component import Component
 from orchestrator.errors import ScenarioError
 from orchestrator.experiments.execution import Executor
-from orchestrator.experiments.jobs import Job, OnOutcome, run_job
+from orchestrator.experiments.jobs import Job, OnOutcome, Outcome, run_job
 from orchestrator.experiments.ranking import CONTROLLER, EntrySpec, load_ranking
 from orchestrator.experiments.ranking_scores import RankingResult, run_ranking
 from orchestrator.experiments.ranking_tables import (
@@ -31,6 +31,7 @@ from orchestrator.scenario import find_and_load
 from . import arguments
 from ._calls import make_all
 from ._controller import Controller, ControllerLike, PythonComponent
+from ._progress import bar
 from ._run import shown_in_notebooks
 from ._scenario import fmu_of
 
@@ -53,6 +54,7 @@ def rank(
     ranking: str | Path = "proving_ground/ranking",
     out: str | Path | None = None,
     workers: int | None = None,
+    progress: bool | None = None,
 ) -> Ranking:
     """Rank a controller among others under the conditions of a ranking.
 
@@ -76,6 +78,7 @@ def rank(
         ranking: a name in a folder of scenarios, or the path of a file.
         out: folder for finished runs, such as that of `yawbench rank`; default: they are not kept.
         workers: number of processes; default: the number of cores. Plain Python runs in this process.
+        progress: show a bar; default: in a terminal or a notebook, after two seconds.
 
     Raises:
         YawbenchError: the controller is invalid, or a run cannot start.
@@ -83,6 +86,7 @@ def rank(
     chosen = arguments.texts(conditions, "conditions", ordered=False)
     others = None if against is None else arguments.texts(against, "against", ordered=False)
     quick = arguments.flag(quick, "quick")
+    progress = None if progress is None else arguments.flag(progress, "progress")
     workers = None if workers is None else arguments.count(workers, "workers")
     kept_in = None if out is None else arguments.path(out, "out")
     file = find_and_load.find(arguments.path(ranking, "ranking"), "a ranking file")
@@ -96,14 +100,20 @@ def rank(
         )
     kept = {key: entry for key, entry in loaded.entries.items() if key in wanted or key in more}
     loaded = replace(loaded, entries=kept)
-    opened = {path: program.as_now() for path, program in programs.items()}
-    planner = Planner(build=True, report=lambda text: None, opened=opened)
     with contextlib.ExitStack() as stack:
+        shown = stack.enter_context(bar(loaded.spec.title, wanted=progress))
+        opened = {path: program.as_now() for path, program in programs.items()}
+        planner = Planner(build=True, report=lambda text: None, opened=opened)
         folder = Path(kept_in or stack.enter_context(tempfile.TemporaryDirectory()))
         stack.enter_context(writing(folder))
 
         def runner(jobs: Sequence[Job], on_outcome: OnOutcome) -> None:
-            make_all(jobs, programs, workers=workers, done=on_outcome, run=run_job)
+            def done(outcome: Outcome) -> None:
+                on_outcome(outcome)
+                shown.advance()
+
+            shown.extend(len(jobs))
+            make_all(jobs, programs, workers=workers, done=done, run=run_job)
 
         execute = stack.enter_context(
             Executor(folder, loaded.identity, runner, planner, of_jobs={"format": "parquet"})

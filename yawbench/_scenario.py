@@ -35,6 +35,7 @@ from vocabulary.vehicle import CAR
 from . import arguments
 from ._calls import opener_of
 from ._controller import ControllerLike, PythonComponent
+from ._progress import bar
 from ._run import Run
 
 
@@ -256,19 +257,21 @@ class Scenario:
         opened = {path: program.as_now() for path, program in self.programs.items()}
         return Planner(build=True, report=lambda text: None, opened=opened)
 
-    def run(self, *, progress: Callable[[int, int], None] | None = None) -> Run:
+    def run(self, *, progress: Callable[[int, int], None] | bool | None = None) -> Run:
         """Run the scenario in this process and return its results; nothing is written.
 
         All warnings about the run are issued as one `YawbenchWarning`.
 
         Args:
-            progress: called a few times per second with the number of steps done and in total.
+            progress: called a few times per second with the number of steps done and in total; or whether
+                to show a bar; default: in a terminal or a notebook, after two seconds.
 
         Raises:
             SimulationError: an instance failed; an exception of Python code is its `__cause__`.
         """
-        if progress is not None:
-            arguments.function(progress, "progress", "done", "total")
+        wanted, called = arguments.plain(progress), None
+        if wanted is not None and type(wanted) is not bool:
+            wanted, called = False, arguments.function(progress, "progress", "done", "total")
         opened: list[Any] = []
         make = opener_of(self.programs)
 
@@ -276,21 +279,20 @@ class Scenario:
             opened.append(make(unit, log, corrupted))
             return opened[-1]
 
-        plan = self.plan()
-        try:
+        with bar(self.title, wanted=wanted) as shown:
+            plan, report = self.plan(), called or shown.update
             try:
-                run = Run(simulate_in_memory(plan, opener=opener, progress=progress))
-            except SimulationError:
-                if (again := self._in_python(plan)) == plan:
-                    raise
-                opened.clear()
-                run = Run(simulate_in_memory(again, opener=opener))  # fails, too, with an exception to show
-        except SimulationError as error:
-            warn(plan.title, (*plan.diagnostics, *error.warnings))
-            causes = [
-                getattr(instance, "error", None) for instance in opened if instance.name == error.instance
-            ]
-            raise error from next(iter(causes), None)
+                try:
+                    run = Run(simulate_in_memory(plan, opener=opener, progress=report))
+                except SimulationError:
+                    if (again := self._in_python(plan)) == plan:
+                        raise
+                    opened.clear()
+                    run = Run(simulate_in_memory(again, opener=opener))  # fails, too, with an exception
+            except SimulationError as error:
+                warn(plan.title, (*plan.diagnostics, *error.warnings))
+                ended = [instance for instance in opened if instance.name == error.instance]
+                raise error from next((getattr(instance, "error", None) for instance in ended), None)
         warn(run.title, run.diagnostics)
         return run
 

@@ -225,7 +225,7 @@ def _parameters() -> Iterator[Parameter]:
              right={"None", "three"}, may={"zero", "numpy uint8", "10**18", "hostile int"})  # fmt: skip
     # Runs.
     progress = {"lambda of all", "builtin"}
-    yield of("Scenario.run.progress", lambda x: b.base.run(progress=x), right={"None", *progress},
+    yield of("Scenario.run.progress", lambda x: b.base.run(progress=x), right={"None", *TRUTHS, *progress},
              skip={"hostile call", "builtin type method"})  # fmt: skip
     yield of("Run.metric.name", lambda x: b.run.metric(x), "metric")
     yield of("Run.metric.window", lambda x: b.run.metric("peak(sideslip)", x), "window", "the run lasts",
@@ -277,7 +277,7 @@ def _parameters() -> Iterator[Parameter]:
     yield of("Experiment.run.workers", lambda x: b.experiment.run(workers=x), right={"None", "three",
              "numpy uint8"})  # fmt: skip
     yield of("Experiment.run.keep", lambda x: b.experiment.run(keep=x), right=TRUTHS)
-    yield of("Experiment.run.progress", lambda x: b.experiment.run(progress=x), right=TRUTHS)
+    yield of("Experiment.run.progress", lambda x: b.experiment.run(progress=x), right={"None", *TRUTHS})
     yield of("Runs.findings", lambda x: yb.Runs(x))
     yield of("Runs.runs", lambda x: yb.Runs(b.runs.findings, x), right={"None", "list of None"})
     yield of("Runs.plot.metric", lambda x: b.runs.plot(x, x="driver.amplitude", lines="controller"))
@@ -307,6 +307,7 @@ def _parameters() -> Iterator[Parameter]:
     yield of("rank.ranking", rank("ranking"))
     yield of("rank.out", rank("out"), right={"None", *PATHS, *PRINTABLE},
              may=COLOURED)  # fmt: skip
+    yield of("rank.progress", rank("progress"), right={"None", *TRUTHS})
     yield of("rank.workers", rank("workers"), right={"None", "three", "numpy uint8"})
     yield of("Ranking.ranked", lambda x: yb.Ranking(x))
     yield of("Ranking.place.name", lambda x: b.places.place(x), "entry")

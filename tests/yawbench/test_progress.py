@@ -1,0 +1,110 @@
+"""Progress bars: who sees one, when, and what it says."""
+
+from __future__ import annotations
+
+import io
+import os
+import pty
+import subprocess
+import sys
+import threading
+
+import pytest
+from rich.console import Console
+
+import yawbench as yb
+from tests.checkout import ROOT
+from yawbench import _progress
+
+
+@pytest.fixture(scope="module")
+def base():
+    return yb.load("fnn_sideslip/25mps").set({"stop_time": 1.2})
+
+
+@pytest.fixture
+def terminal(monkeypatch):
+    """What a terminal would show of bars without delay."""
+    shown = io.StringIO()
+
+    def console(*, always: bool = False) -> Console:
+        return Console(file=shown, force_terminal=True, width=120, _environ={})
+
+    monkeypatch.setattr(_progress, "DELAY", 0.0)
+    monkeypatch.setattr(_progress, "_console", console)
+    return shown
+
+
+def damping(yaw_rate):
+    return -1e3 * yaw_rate
+
+
+CALLS = {
+    "run": lambda base, out: base.run(),
+    "experiment": lambda base, out: yb.experiment(base, {"driver.amplitude": [0.01, 0.02]}).run(workers=1),
+    "rank": lambda base, out: yb.rank(against=["none"], conditions=["hard"], quick=True),
+    "linearize": lambda base, out: yb.linearize(
+        base.swap(controller="controller_off"),
+        at=1.0,
+        inputs=["driver.steer_angle"],
+        outputs=["plant.yaw_rate"],
+    ),
+    "export": lambda base, out: yb.export_fmu(damping, out / "law.fmu"),
+}
+TITLES = {"rank": "controllers", "linearize": "Linearize", "export": "Export law.fmu"}
+
+
+@pytest.mark.parametrize("what", CALLS)
+def test_a_call_that_takes_long_shows_a_bar_with_its_title(what, base, terminal, tmp_path):
+    CALLS[what](base, tmp_path)
+    assert TITLES.get(what, base.title) in terminal.getvalue()
+    assert not [thread for thread in threading.enumerate() if isinstance(thread, threading.Timer)]
+
+
+def test_a_bar_goes_to_its_end_and_leaves_nothing_behind(base, terminal):
+    yb.experiment(base, {"driver.amplitude": [0.01, 0.02]}).run(workers=1, progress=True)
+    assert "100%" in terminal.getvalue()
+    assert terminal.getvalue().endswith("\x1b[2K")  # the line is erased
+
+
+def test_calls_within_a_call_show_no_bar_of_their_own(terminal):
+    with _progress.bar("outer", wanted=True), _progress.bar("inner", wanted=True):
+        pass
+    assert "outer" in terminal.getvalue() and "inner" not in terminal.getvalue()
+
+
+def test_a_bar_can_be_refused(base, terminal):
+    base.run(progress=False)
+    base.run(progress=lambda done, total: None)
+    yb.experiment(base, {"driver.amplitude": [0.01]}).run(workers=1, progress=False)
+    assert terminal.getvalue() == ""
+
+
+PROGRAM = """
+import sys
+import yawbench as yb
+from yawbench import _progress
+_progress.DELAY = float(sys.argv[1])
+yb.load("fnn_sideslip/25mps").set({"stop_time": 1}).run()
+print("rich.progress" in sys.modules)
+"""
+
+
+@pytest.mark.parametrize(
+    ("delay", "switch", "seen"), [("0", "", True), ("60", "", False), ("0", "off", False)]
+)
+def test_only_a_terminal_sees_a_bar_and_only_after_the_delay(delay, switch, seen):
+    leader, follower = pty.openpty()
+    environment = os.environ | {"TERM": "xterm", _progress.SWITCH: switch}
+    command = [sys.executable, "-c", PROGRAM, delay]
+    done = subprocess.run(
+        command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=follower, text=True, check=True
+    )
+    os.close(follower)
+    assert done.stdout.split() == [str(seen)]
+    os.set_blocking(leader, False)
+    shown = os.read(leader, 100_000).decode() if seen else ""
+    assert ("Sideslip tracking" in shown) == seen
+    os.close(leader)
+    silent = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=True)
+    assert (silent.stdout.split(), silent.stderr) == (["False"], "")

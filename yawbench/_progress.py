@@ -1,0 +1,108 @@
+"""A progress bar for calls that take long, in terminals and notebooks.
+
+It appears after `DELAY`, and nothing is left of it at the end. Where nobody would see it (output to a file,
+tests, worker processes) no thread is started. `YAWBENCH_PROGRESS=off` shows none.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import threading
+from collections.abc import Iterator
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+from orchestrator.messages import printable
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress
+
+DELAY = 2.0
+"""Time [s] before a bar appears. Chosen: what takes less needs none."""
+SWITCH = "YAWBENCH_PROGRESS"
+"""Environment variable; "off" shows no bars."""
+_shown = threading.Lock()
+"""Held by the call whose bar is shown: calls within it show none."""
+
+
+class Bar:
+    """How far a call is; safe to use from other threads."""
+
+    def __init__(self, title: str, total: int | None) -> None:
+        self._title, self._total, self._done = title, total, 0
+        self._display: Progress | None = None
+        self._task: Any = None
+
+    def update(self, done: int, total: int | None) -> None:
+        """Set how much is done, and of how much if that is known."""
+        self._done, self._total = done, total
+        if self._display is not None:
+            self._display.update(self._task, completed=done, total=total)
+
+    def advance(self) -> None:
+        """Count one more."""
+        self.update(self._done + 1, self._total)
+
+    def extend(self, more: int) -> None:
+        """Count more that is to be done."""
+        self.update(self._done, (self._total or 0) + more)
+
+    def appear(self, on: Console) -> None:
+        """Show the bar."""
+        from rich.progress import Progress
+
+        display = Progress(console=on, transient=True)
+        title = printable(self._title).replace("[", r"\[")
+        self._task = display.add_task(title, total=self._total, completed=self._done)
+        display.start()
+        self._display = display
+
+    def vanish(self) -> None:
+        """Remove the bar."""
+        if self._display is not None:
+            self._display.stop()
+
+
+@contextlib.contextmanager
+def bar(title: str, total: int | None = None, *, wanted: bool | None = None) -> Iterator[Bar]:
+    """Show a bar while the block runs, if it runs long and somebody is there to see it.
+
+    Args:
+        title: what is done.
+        total: number of items, if it is known.
+        wanted: whether to show it: True at once and anywhere, False never.
+    """
+    made, on = Bar(title, total), None if wanted is False else _console(always=bool(wanted))
+    if on is None or not _shown.acquire(blocking=False):
+        yield made
+        return
+    timer = threading.Timer(DELAY, made.appear, (on,))
+    timer.daemon = True
+    try:
+        if wanted:
+            made.appear(on)
+        else:
+            timer.start()
+        yield made
+    finally:
+        timer.cancel()
+        if timer.ident is not None:
+            timer.join()
+        made.vanish()
+        _shown.release()
+
+
+def _console(*, always: bool = False) -> Console | None:
+    """Return where bars are shown, None if nobody would see them."""
+    in_terminal = sys.stderr is not None and sys.stderr.isatty()
+    if not always and (os.environ.get(SWITCH) == "off" or not (in_terminal or "IPython" in sys.modules)):
+        return None
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if console.is_jupyter:
+        return Console() if find_spec("ipywidgets") else None  # rich shows bars with widgets
+    return console if console.is_terminal or always else None
