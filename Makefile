@@ -54,6 +54,7 @@ format: $(READY_TO_TEST)
 	$(BIN)/ruff format .
 
 docs: $(READY_TO_TEST) fmus
+	$(BIN)/python -m docs.generate
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --strict
 	@echo "The docs: site/index.html"
 

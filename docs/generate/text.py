@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-NOTE = "*This page is generated from the program at every build of the docs.*"
+NOTE = "*This page is generated from the program: `python -m docs.generate` writes it.*"
 
 
 def plain(text: str) -> str:

@@ -31,6 +31,8 @@ def page() -> str:
     return "\n\n".join(parts)
 
 
+_FOLDED = '<details markdown="1"><summary>The model</summary>'
+"""Begins what readers unfold, in the built docs and on GitHub."""
 _INTRODUCTION = """All FMUs of this project with their inputs, outputs and parameters; `*` stands for the
 four wheels `fl`, `fr`, `rl`, `rr`. A scenario sets parameters by these names; a value of a vehicle file goes
 to every FMU that has a parameter of its name.
@@ -56,7 +58,7 @@ def _unit(name: str, folder: str, file: str) -> str:
         if (said := v.find("Annotations/Tool[@name='yawbench']/variable")) is not None
     }
     if source:
-        parts.append(f'??? note "The model"\n\n{_indented(docstring(source))}')
+        parts.append(f"{_FOLDED}\n\n{docstring(source).strip()}\n\n</details>")
     follows = {u.variable.name: [d.name for d in u.dependencies or ()] for u in description.outputs}
     parts.append(_signals("input", variables, {}))
     parts.append(_signals("output", variables, follows))
@@ -71,10 +73,6 @@ def _source(archive: zipfile.ZipFile, folder: str, file: str) -> str:
         if path.startswith("resources/yawbench_") and path.endswith(f"/{folder}/{file}.py"):
             return ast.get_docstring(ast.parse(archive.read(path).decode())) or ""
     return ""
-
-
-def _indented(text: str) -> str:
-    return "\n".join(f"    {line}" if line.strip() else "" for line in text.splitlines())
 
 
 def _signals(causality: str, variables: dict[str, Any], follows: dict[str, list[str]]) -> str:

@@ -1,0 +1,44 @@
+"""Write the pages that are generated from the program: `python -m docs.generate`.
+
+They are in the repository, so that links between its pages lead somewhere without a build of the docs. All
+FMUs have to be built.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from . import commands, evidence, metrics, schemas, signals, units, vehicles
+
+DOCS = Path(__file__).resolve().parents[1]
+PAGES: dict[str, Callable[[], str]] = {
+    "reference/commands.md": commands.page,
+    "reference/scenario.md": schemas.scenario_page,
+    "reference/experiment.md": schemas.experiment_page,
+    "reference/ranking.md": schemas.ranking_page,
+    "reference/threats.md": schemas.threats_page,
+    "reference/signals.md": signals.page,
+    "reference/units.md": units.page,
+    "reference/metrics.md": metrics.page,
+    "trust.md": evidence.page,
+    "reference/vehicles.md": vehicles.page,
+}
+"""Path in the docs -> what returns its text."""
+
+
+def text_of(path: str) -> str:
+    """Return the text of a page as it is written: no blanks at line ends, one newline at the end."""
+    lines = (line.rstrip() for line in PAGES[path]().splitlines())
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def main() -> None:
+    """Write all pages."""
+    for path in PAGES:
+        (DOCS / path).parent.mkdir(exist_ok=True)
+        (DOCS / path).write_text(text_of(path), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
