@@ -182,11 +182,11 @@ def _add_region(forecast: Forecast, planned: PlannedExperiment, execute: Executo
     assert region is not None
     plan = plan_region(planned, execute.folder, planner=execute.planner)
     first, every = set[RegionCell](), set[RegionCell]()
-    for (group, _), asked in plan.asked.items():
+    for (group, _), question in plan.questions.items():
         if group == "claims":
-            along = plan.along(asked)
-            first |= {*along, *plan.cells(asked, asked.points[: region.looks[0]])}
-            every |= {*along, *plan.cells(asked, asked.points)}
+            along = plan.along(question)
+            first |= {*along, *plan.cells(question, question.points[: region.looks[0]])}
+            every |= {*along, *plan.cells(question, question.points)}
     made = 0 if execute.fresh else len(records_in(execute.folder))
     forecast.finished += min(made, len(every))
     if not every:

@@ -63,40 +63,42 @@ class RegionRuns:
         Raises:
             ScenarioError: it applies to none.
         """
-        found = {
-            name: [run for run in self.experiment.runs if self._touches(one, run)]
-            for name, one in self.open_values.items()
+        touching = {
+            name: [run for run in self.experiment.runs if self._touches(open_value, run)]
+            for name, open_value in self.open_values.items()
         }
-        problems = [self._touches_none(name) for name, runs in found.items() if not runs]
+        problems = [self._touches_none(name) for name, runs in touching.items() if not runs]
         if problems:
             raise ScenarioError(problems, code="override-without-effect")
-        return found
+        return touching
 
     def own_value(self, run: str, target: Target) -> Given | None:
         """Return the value that a target has in a run; None if the run has no such target."""
-        found = found_at(self.plans[run], target)
-        return None if found is None else found[0]
+        place = found_at(self.plans[run], target)
+        return None if place is None else place[0]
 
     def _touches_none(self, name: str) -> str:
         targets = self.open_values[name].targets
-        instances = dict.fromkeys(one.name for plan in self.plans.values() for one in plan.instances)
-        missing = next((one.instance for one in targets if one.instance not in (*instances, "")), "")
+        instances = dict.fromkeys(
+            instance.name for plan in self.plans.values() for instance in plan.instances
+        )
+        missing = next((target.instance for target in targets if target.instance not in (*instances, "")), "")
         guess = hint(missing, instances, lead="units") if missing else ""
         return (
             f"{self.experiment.path}: region.open_values.{name}: touches no run: none has "
             f"{listed(targets, last='and')} without setting it itself{guess}"
         )
 
-    def _touches(self, one: OpenValueSpec, name: str) -> bool:
+    def _touches(self, open_value: OpenValueSpec, name: str) -> bool:
         run = self.experiment.runs[name]
-        if run not in self.experiment.matching(one.runs):
+        if run not in self.experiment.matching(open_value.runs):
             return False
-        if one.kind == "variant":
-            scenarios = [self._scenario(variant, run) for variant in one.variants.values()]
-            own = [variant for variant in one.variants.values() if not variant.scenario]
+        if open_value.kind == "variant":
+            scenarios = [self._scenario(variant, run) for variant in open_value.variants.values()]
+            own = [variant for variant in open_value.variants.values() if not variant.scenario]
             targets = [target for variant in own for target in variant.targets]
-            return all(path.is_file() for path in scenarios) and self._has(run, targets, one.times)
-        return self._has(run, one.vary, one.times)
+            return all(path.is_file() for path in scenarios) and self._has(run, targets, open_value.times)
+        return self._has(run, open_value.vary, open_value.times)
 
     def _has(self, run: NamedRun, targets: Iterable[Target], times: bool) -> bool:
         """Return whether a run has all targets without overriding them itself."""
@@ -116,51 +118,51 @@ class RegionRuns:
         run, changes = self.experiment.runs[name], []
         scenario = run.scenario
         for key, level in place:
-            one = self.open_values[key]
-            if one.times:
-                for where in one.vary:
+            open_value = self.open_values[key]
+            if open_value.times:
+                for where in open_value.vary:
                     own = self.own_value(run.name, where)
                     changes.append(Override(where, float(own or 0.0) * float(level.value), ORIGIN))
                 continue
-            if one.kind == "variant" and one.variants[str(level.value)].scenario:
-                scenario = self._scenario(one.variants[str(level.value)], run)
-            changes += changes_at(one, level, self.experiment.path.parent, ORIGIN)
+            if open_value.kind == "variant" and open_value.variants[str(level.value)].scenario:
+                scenario = self._scenario(open_value.variants[str(level.value)], run)
+            changes += changes_at(open_value, level, self.experiment.path.parent, ORIGIN)
         return scenario, changes
 
     def cell(self, name: str, place: RegionPoint) -> RegionCell:
         """Return a run at a point, with only those open values that change it there."""
         if (name, place) not in self._cells:
-            other = (one for one in place if name in self.touched[one[0]] and self._is_other(name, one))
+            other = (part for part in place if name in self.touched[part[0]] and self._is_other(name, part))
             self._cells[name, place] = (name, tuple(other))
         return self._cells[name, place]
 
     def _is_other(self, name: str, at: tuple[str, Level]) -> bool:
         """Return whether a level differs from the one chosen in a run."""
         key, level = at
-        one = self.open_values[key]
+        open_value = self.open_values[key]
         scenario, changes = self.changes(name, (at,))
         if scenario != self.experiment.runs[name].scenario:
             return True
-        if not one.numeric:
+        if not open_value.numeric:
             return any(self.own_value(name, change.target) != change.value for change in changes)
         return not math.isclose(self.number(key, level), self.chosen_number(key, [name]), rel_tol=1e-9)
 
     def number(self, key: str, level: Level) -> float:
         """Return a level of a numeric open value: in SI units, or as a factor."""
-        one = self.open_values[key]
-        return float(level.value) if one.times else number_of(one, level, self.unit(key))
+        open_value = self.open_values[key]
+        return float(level.value) if open_value.times else number_of(open_value, level, self.unit(key))
 
     def unit(self, key: str) -> str:
         """Return the unit of an open value in the runs that it applies to."""
         target = self.open_values[key].vary[0]
-        found = (found_at(self.plans[name], target) for name in self.touched[key])
-        return next((one[1] for one in found if one and one[1]), "")
+        places = (found_at(self.plans[name], target) for name in self.touched[key])
+        return next((place[1] for place in places if place and place[1]), "")
 
     def own(self, key: str, names: Iterable[str]) -> set[float]:
         """Return the distinct numbers chosen in runs for a numeric open value."""
         target = self.open_values[key].vary[0]
-        found = [self.own_value(name, target) for name in names if name in self.touched[key]]
-        return {float(value) for value in found if value is not None}
+        values = [self.own_value(name, target) for name in names if name in self.touched[key]]
+        return {float(value) for value in values if value is not None}
 
     def chosen_number(self, key: str, names: Iterable[str]) -> float:
         """Return the number chosen in runs, in SI units; 1 for a factor.
@@ -174,8 +176,8 @@ class RegionRuns:
         if len(own) > 1:
             raise ScenarioError(
                 f"{self.experiment.path}: region.open_values.{key}: the runs of one claim have "
-                f"{listed(f'{one:g}' for one in sorted(own))} there; give factors, with `times: true`, or "
-                "name the `runs` it touches",
+                f"{listed(f'{number:g}' for number in sorted(own))} there; give factors, "
+                "with `times: true`, or name the `runs` it touches",
                 code="region-invalid",
             )
         return own.pop()
@@ -200,7 +202,7 @@ class RegionPlan:
         folder: results folder of the experiment.
         planner: makes the plans.
         test: of the share of points that flip a verdict.
-        asked: what is judged.
+        questions: what is judged.
         jobs: runs of the region; `next_jobs` adds those of further points.
         verdicts: on each claim, point by point.
     """
@@ -209,19 +211,19 @@ class RegionPlan:
     folder: Path
     planner: Planner
     test: SequentialTest
-    asked: dict[RegionKey, RegionQuestion]
+    questions: dict[RegionKey, RegionQuestion]
     jobs: dict[RegionCell, Job] = field(default_factory=dict)
     verdicts: dict[RegionKey, list[Verdict]] = field(default_factory=dict)
 
-    def cells(self, asked: RegionQuestion, places: Iterable[RegionPoint]) -> list[RegionCell]:
+    def cells(self, question: RegionQuestion, places: Iterable[RegionPoint]) -> list[RegionCell]:
         """Return the runs of a claim at points, without those that no open value changes there."""
-        every = (self.runs.cell(run, place) for place in places for run in asked.runs)
+        every = (self.runs.cell(run, place) for place in places for run in question.runs)
         return [cell for cell in every if cell[1]]
 
-    def along(self, asked: RegionQuestion) -> list[RegionCell]:
+    def along(self, question: RegionQuestion) -> list[RegionCell]:
         """Return the runs of a claim along each open value."""
-        places = [((key, level),) for key, levels in asked.lines.items() for level in levels]
-        return self.cells(asked, places)
+        places = [((key, level),) for key, levels in question.lines.items() for level in levels]
+        return self.cells(question, places)
 
 
 def plan_region(planned: PlannedExperiment, folder: Path, *, planner: Planner) -> RegionPlan:
@@ -239,15 +241,17 @@ def plan_region(planned: PlannedExperiment, folder: Path, *, planner: Planner) -
     spec = runs.experiment.spec
     region = spec.region
     assert region is not None
-    continuous = [one.continuous for one in runs.open_values.values()]
+    continuous = [open_value.continuous for open_value in runs.open_values.values()]
     hypercube = extended_hypercube(continuous, region.points, region.most, region.seed)
-    asked = {
+    questions = {
         (group, number): _asked(runs, claim, hypercube)
         for group, claims in (("claims", spec.claims), ("checks", spec.checks))
         for number, claim in enumerate(claims)
     }
     test = SequentialTest(region.looks, 1 / ONE_IN)
-    return RegionPlan(runs, folder, planner, test, {key: one for key, one in asked.items() if one.lines})
+    return RegionPlan(
+        runs, folder, planner, test, {key: question for key, question in questions.items() if question.lines}
+    )
 
 
 def next_jobs(
@@ -269,17 +273,17 @@ def next_jobs(
         ScenarioError: a run cannot take a level of an open value.
     """
     runs, wanted = plan.runs, dict[RegionCell, None]()
-    for key, asked in plan.asked.items():
+    for key, question in plan.questions.items():
         if key[0] == "claims":
-            wanted |= dict.fromkeys(plan.along(asked))
-            wanted |= dict.fromkeys(plan.cells(asked, _further_points(plan, key, findings, records)))
+            wanted |= dict.fromkeys(plan.along(question))
+            wanted |= dict.fromkeys(plan.cells(question, _further_points(plan, key, findings, records)))
     jobs, open_value_of = dict[RegionCell, Job](), dict[str, str]()  # override in words -> open value
     for name, place in wanted:
         if (name, place) in plan.jobs:
             continue
         scenario, own = runs.changes(name, place)
         for key_, level in place:
-            open_value_of |= {str(one): key_ for one in runs.changes(name, ((key_, level),))[1]}
+            open_value_of |= {str(change): key_ for change in runs.changes(name, ((key_, level),))[1]}
         label = ", ".join([name, *(f"{key_} {level.words}" for key_, level in place)])
         changes = (*runs.jobs[name].changes, *own)
         job = replace(runs.jobs[name], label=label, scenario=scenario, changes=changes, plan=None)
@@ -309,50 +313,51 @@ def _further_points(
     plan: RegionPlan, key: RegionKey, findings: ExperimentResult, records: Mapping[str, MeasuredRun]
 ) -> list[RegionPoint]:
     """Judge a claim at the points made, look by look; return those up to the next look, if there is one."""
-    asked, chosen = plan.asked[key], _at_chosen(findings, key)
+    question, chosen = plan.questions[key], _at_chosen(findings, key)
     verdicts = plan.verdicts.setdefault(key, [])
     for look in plan.test.looks:
-        flips = sum(one.holds != chosen.verdict.holds for one in verdicts)
+        flips = sum(verdict.holds != chosen.verdict.holds for verdict in verdicts)
         if plan.test.decision(flips, len(verdicts)) is not Decision.OPEN or chosen.verdict.holds is None:
             break
-        places = asked.points[len(verdicts) : look]
+        places = question.points[len(verdicts) : look]
         if any(
-            cell not in plan.jobs or plan.jobs[cell].key not in records for cell in plan.cells(asked, places)
+            cell not in plan.jobs or plan.jobs[cell].key not in records
+            for cell in plan.cells(question, places)
         ):
             return places
-        verdicts += [_verdict_at(plan, asked, chosen, findings, records, place) for place in places]
+        verdicts += [_verdict_at(plan, question, chosen, findings, records, place) for place in places]
     return []
 
 
 def _asked(runs: RegionRuns, claim: Claim, hypercube: list[tuple[Level, ...]]) -> RegionQuestion:
     names = runs_of(runs.experiment, claim)
     lines = {
-        key: levels_of(one.stepped)
-        for key, one in runs.open_values.items()
+        key: levels_of(open_value.stepped)
+        for key, open_value in runs.open_values.items()
         if (claim.open_values is None or key in claim.open_values)
         and any(name in runs.touched[key] for name in names)
     }
     points = (zip(runs.open_values, point, strict=True) for point in hypercube)
     return RegionQuestion(
-        claim, names, [tuple(one for one in point if one[0] in lines) for point in points], lines
+        claim, names, [tuple(part for part in point if part[0] in lines) for point in points], lines
     )
 
 
 def runs_of(experiment: LoadedExperiment, claim: Claim) -> tuple[str, ...]:
     """Return the names of all runs that a claim depends on."""
-    spec, found = experiment.spec, dict[str, None]()
+    spec, names = experiment.spec, dict[str, None]()
     for condition in claim.holds_if:
         if condition.derived:
-            one = spec.derived[condition.derived]
-            found |= dict.fromkeys(source.run for source in one.of.values())
-            if one.rank_correlation is not None:
-                among = ranked(spec.grids[one.rank_correlation], one.only)
-                found |= dict.fromkeys(cell.run for cell in among)
+            derived = spec.derived[condition.derived]
+            names |= dict.fromkeys(source.run for source in derived.of.values())
+            if derived.rank_correlation is not None:
+                among = ranked(spec.grids[derived.rank_correlation], derived.only)
+                names |= dict.fromkeys(cell.run for cell in among)
         else:
-            found |= dict.fromkeys(run.name for run in experiment.matching([condition.run]))
+            names |= dict.fromkeys(run.name for run in experiment.matching([condition.run]))
         if isinstance(condition.bound, MetricReference):
-            found[condition.bound.run] = None
-    return tuple(found)
+            names[condition.bound.run] = None
+    return tuple(names)
 
 
 def judge_region(
@@ -365,18 +370,18 @@ def judge_region(
         findings: the result at the chosen point.
         records: job key -> record of the run.
     """
-    found = {}
-    for key, asked in plan.asked.items():
-        if all(cell in plan.jobs for cell in plan.along(asked)):
+    judged = {}
+    for key, question in plan.questions.items():
+        if all(cell in plan.jobs for cell in plan.along(question)):
             _further_points(plan, key, findings, records)
             if plan.verdicts[key]:
-                found[key] = _judged(plan, key, findings, records)
-    return found
+                judged[key] = _judged(plan, key, findings, records)
+    return judged
 
 
 def _verdict_at(
     plan: RegionPlan,
-    asked: RegionQuestion,
+    question: RegionQuestion,
     chosen: ClaimResult,
     findings: ExperimentResult,
     records: Mapping[str, MeasuredRun],
@@ -384,7 +389,7 @@ def _verdict_at(
 ) -> Verdict:
     """Return the verdict on a claim at a point."""
     values = {}
-    for name in asked.runs:
+    for name in question.runs:
         cell = plan.runs.cell(name, place)
         record = records[plan.jobs[cell].key] if cell[1] else None
         for key in findings.spec.metrics:
@@ -395,30 +400,30 @@ def _verdict_at(
             if value is not None:
                 values[name, key] = value
     words = {run.name: run.row for run in findings.experiment.runs.values()}
-    return judge(asked.claim, values, words, derive(findings.spec, values)).scaled(chosen)
+    return judge(question.claim, values, words, derive(findings.spec, values)).scaled(chosen)
 
 
 def _judged(
     plan: RegionPlan, key: RegionKey, findings: ExperimentResult, records: Mapping[str, MeasuredRun]
 ) -> Region:
-    runs, asked = plan.runs, plan.asked[key]
+    runs, question = plan.runs, plan.questions[key]
     chosen = _at_chosen(findings, key)
     lines = []
-    for name, levels in asked.lines.items():
-        one = runs.open_values[name]
+    for name, levels in question.lines.items():
+        open_value = runs.open_values[name]
         judged = []
         for level in levels:
             place = ((name, level),)
-            if plan.cells(asked, [place]):  # otherwise this is the chosen level
-                number = runs.number(name, level) if one.numeric else None
-                verdict = _verdict_at(plan, asked, chosen, findings, records, place)
+            if plan.cells(question, [place]):  # otherwise this is the chosen level
+                number = runs.number(name, level) if open_value.numeric else None
+                verdict = _verdict_at(plan, question, chosen, findings, records, place)
                 judged.append(LevelVerdict(level.words, number, verdict))
-        unit, factor = _shown(runs, name, asked.runs) if one.numeric else ("", 1.0)
-        at = runs.chosen_number(name, asked.runs) if one.numeric else None
+        unit, factor = _shown(runs, name, question.runs) if open_value.numeric else ("", 1.0)
+        at = runs.chosen_number(name, question.runs) if open_value.numeric else None
         lines.append(
             OpenValueScan(
                 name,
-                one.says or name,
+                open_value.says or name,
                 unit,
                 factor,
                 LevelVerdict("as chosen", at, chosen.verdict),
@@ -433,11 +438,11 @@ def _shown(runs: RegionRuns, key: str, names: Iterable[str]) -> tuple[str, float
 
     Factors are shown as numbers if all runs have the same chosen value, else as multiples of it.
     """
-    one = runs.open_values[key]
+    open_value = runs.open_values[key]
     unit = runs.unit(key)
-    if one.times:
+    if open_value.times:
         own = runs.own(key, names)
         return (unit, own.pop()) if len(own) == 1 else (TIMES, 1.0)
-    if one.unit is None:
+    if open_value.unit is None:
         return unit, 1.0
-    return one.unit, 1.0 / number_of(one, Level(1.0, ""), unit)
+    return open_value.unit, 1.0 / number_of(open_value, Level(1.0, ""), unit)

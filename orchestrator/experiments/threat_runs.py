@@ -75,10 +75,10 @@ def survivals(
 
     def passing(attempts: dict[SearchPlace, Attempt]) -> dict[SearchPlace, bool]:
         experiment = maker.experiment(attempts)
-        found = execute(experiment, keep=False, record=(*RECORDED, *PATH))
+        result = execute(experiment, keep=False, record=(*RECORDED, *PATH))
         return {
             place: _survives(threats, angles, place, record)
-            for place, record in zip(attempts, found.records, strict=True)
+            for place, record in zip(attempts, result.records, strict=True)
         }
 
     searches = {
@@ -114,7 +114,7 @@ def _survives(
         raise ResultsError(
             f"{place.entry}, {place.threat}: runs are missing; rank without --no-run", code="runs-missing"
         )
-    if wrong := [one for one in record.diagnostics if one.code in NO_LOSS]:
+    if wrong := [diagnostic for diagnostic in record.diagnostics if diagnostic.code in NO_LOSS]:
         raise ScenarioError(wrong)
     spec, bound = threats.spec.threats[place.threat], math.radians(threats.spec.settings[place.setting].bound)
     amplitude = record.values.get("amplitude")
@@ -152,19 +152,21 @@ class _RunMaker:
         setting = threats.spec.settings[place.setting]
         side, repeat = threats.variants(spec)[attempt.variant]
         scenario = threats.scenario(place.car, spec.scenario)
-        changes = {one.target: one for one in threats.ranking.changes(threats.ranking.spec.cars[place.car])}
+        changes = {
+            change.target: change for change in threats.ranking.changes(threats.ranking.spec.cars[place.car])
+        }
         if spec.test == LANE_CHANGE:
             changes.pop(Target.parse("stop_time"), None)
         else:
             amplitude = side * amplitudes(self.angles[place.car])[-1]
             changes[Target.parse(AMPLITUDE)] = Override.of(AMPLITUDE, amplitude, "ranking")
         for part in (setting, spec.filled(attempt.position)):
-            for one in changes_of_file(part, threats.path.parent, "ranking"):
-                changes[one.target] = one
-        for one in self._limited(place, changes):
-            changes[one.target] = one
-        for one in (*self._scaled(place, scenario, spec, spec.level(attempt.position)), *repeat):
-            changes[one.target] = one
+            for change in changes_of_file(part, threats.path.parent, "ranking"):
+                changes[change.target] = change
+        for change in self._limited(place, changes):
+            changes[change.target] = change
+        for change in (*self._scaled(place, scenario, spec, spec.level(attempt.position)), *repeat):
+            changes[change.target] = change
         if spec.distance is not None:
             speed = float(convert(str(changes[Target.parse("speed")].value), "m/s"))
             seconds = math.ceil(10.0 * spec.distance / speed) / 10.0
@@ -215,9 +217,9 @@ class _RunMaker:
             ranking = self.threats.ranking
             changes = *ranking.changes(ranking.spec.cars[place.car]), *ranking.changes_of_entry(place.entry)
             (plan,) = self.execute.plans([NamedRun("", "", "", scenario, changes)])
-            self.instances[key] = {one.name: one for one in plan.instances}
-        one = self.instances[key].get(target.instance)
-        value = one.parameter(target.variable) if one else None
+            self.instances[key] = {instance.name: instance for instance in plan.instances}
+        instance = self.instances[key].get(target.instance)
+        value = instance.parameter(target.variable) if instance else None
         return float(value) if isinstance(value, (int, float)) else None
 
 
@@ -233,7 +235,7 @@ def discipline_experiment(threats: LoadedThreats) -> LoadedExperiment | None:
         for car in spec.cars or threats.spec.cars:
             own = ranking.changes(ranking.spec.cars[car], stop=False)
             changes = (
-                *(one for one in own if one.target.instance != DRIVER),  # drives other scenarios
+                *(change for change in own if change.target.instance != DRIVER),  # drives other scenarios
                 *changes_of_file(spec, threats.path.parent, "ranking"),
                 *([setting_of(Target.parse(MOMENT), f"saturation {limit:.10g}", "ranking")] if limit else []),
             )
@@ -252,7 +254,9 @@ def discipline_experiment(threats: LoadedThreats) -> LoadedExperiment | None:
 
 def table_of_quantities(result: ThreatResult) -> Table:
     """Return the table with a row per quantity of each discipline, car and entry, in SI units."""
-    rows = [(*place, key, value) for place, one in result.quantities.items() for key, value in one.items()]
+    rows = [
+        (*place, key, value) for place, values in result.quantities.items() for key, value in values.items()
+    ]
     names = ("discipline", "car", "entry", "quantity")
     return Table.of_columns(
         [
@@ -293,28 +297,28 @@ class ThreatResult:
         """
         spec = self.threats.spec
         threats, cars = self.threats.threats_in(like or setting), self.threats.cars_in(like or setting)
-        found = np.full((len(entries), len(threats), len(cars)), np.nan)
+        positions = np.full((len(entries), len(threats), len(cars)), np.nan)
         for i, entry in enumerate(entries):
             for k, threat in enumerate(threats):
                 for n, car in enumerate(cars):
                     if car in (spec.threats[threat].cars or spec.cars):
-                        found[i, k, n] = self.survived[SearchPlace(setting, threat, car, entry)].position
-        return found
+                        positions[i, k, n] = self.survived[SearchPlace(setting, threat, car, entry)].position
+        return positions
 
 
 def table_of_levels(result: ThreatResult) -> Table:
     """Return the table with a row per search: its level in the unit of the file, position and end."""
     places = list(result.survived)
-    found = list(result.survived.values())
+    searched = list(result.survived.values())
     specs = [result.threats.spec.threats[place.threat] for place in places]
-    levels = [spec.level(one.position) for spec, one in zip(specs, found, strict=True)]
+    levels = [spec.level(survived.position) for spec, survived in zip(specs, searched, strict=True)]
     return Table.of_columns(
         [
             *(column(key, "string", [getattr(p, key) for p in places]) for key in SearchPlace._fields),
             column("level", "float64", levels),
             column("unit", "string", [spec.unit for spec in specs]),
-            column("position", "float64", [one.position for one in found]),
-            column("end", "string", [one.end for one in found]),
+            column("position", "float64", [survived.position for survived in searched]),
+            column("end", "string", [survived.end for survived in searched]),
         ]
     )
 
@@ -343,12 +347,12 @@ def run_threats(threats: LoadedThreats, execute: Executor, *, only: Collection[s
     quantities, units = {**before.quantities}, {**before.units}
     experiment = discipline_experiment(threats)
     if experiment is not None:
-        found = execute(
+        driven = execute(
             experiment,
             only=lambda case: not only or case.point[0].value in only,
             keep=False,
         )
-        for case, record in zip(found.experiment.cases, found.records, strict=True):
+        for case, record in zip(driven.experiment.cases, driven.records, strict=True):
             discipline, car = case.run.name.split("/")
             values = {key: record.values.get(key) for key in threats.spec.disciplines[discipline].quantities}
             units |= {(discipline, key): value[1] for key, value in values.items() if value}
@@ -380,13 +384,13 @@ def published_result(threats: LoadedThreats) -> ThreatResult:
 
 @reads("table of levels", ScenarioError)
 def _published_levels(path: Path | str, threats: LoadedThreats) -> dict[SearchPlace, Survived]:
-    wanted, found = set(threats.searches()), {}
+    wanted, levels = set(threats.searches()), {}
     with Path(path).open(encoding="utf-8", newline="") as lines:
         for row in csv.DictReader(lines):
             place = SearchPlace(*(row[key] for key in SearchPlace._fields))
             if place in wanted:
-                found[place] = Survived(float(row["position"]), row["end"])  # type: ignore[arg-type]
-    return found
+                levels[place] = Survived(float(row["position"]), row["end"])  # type: ignore[arg-type]
+    return levels
 
 
 @reads("table of quantities", ScenarioError)

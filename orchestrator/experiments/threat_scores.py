@@ -87,7 +87,7 @@ class ScoreTable:
 
     def order(self) -> list[str]:
         """Return the entries, the best first."""
-        return [one.entry for one in self.scores]
+        return [score.entry for score in self.scores]
 
 
 def score_table(
@@ -134,16 +134,16 @@ def table_of_scores(table: ScoreTable) -> Table:
     """Return the table for programs with a row per entry, the best first."""
     rows = table.scores
     numbers = {
-        "score": [one.score for one in rows],
-        "low": [one.bounds.low for one in rows],
-        "high": [one.bounds.high for one in rows],
-        "mean_position": [one.mean for one in rows],
-        "mean_rank": [one.mean_rank for one in rows],
+        "score": [row.score for row in rows],
+        "low": [row.bounds.low for row in rows],
+        "high": [row.bounds.high for row in rows],
+        "mean_position": [row.mean for row in rows],
+        "mean_rank": [row.mean_rank for row in rows],
     }
     return Table.of_columns(
         [
-            column("entry", "string", [one.entry for one in rows]),
-            column("place", "int64", [one.place for one in rows]),
+            column("entry", "string", [row.entry for row in rows]),
+            column("place", "int64", [row.place for row in rows]),
             *(column(name, "float64", values) for name, values in numbers.items()),
         ]
     )
@@ -152,7 +152,7 @@ def table_of_scores(table: ScoreTable) -> Table:
 def groups_of(bounds: Sequence[tuple[float, float]]) -> int:
     """Return the largest number of intervals of which no two overlap."""
     number, end = 0, -np.inf
-    for low, high in sorted(bounds, key=lambda one: one[1]):
+    for low, high in sorted(bounds, key=lambda interval: interval[1]):
         if low > end:
             number, end = number + 1, high
     return number
@@ -163,14 +163,14 @@ def orders_without(
 ) -> dict[tuple[str, int], list[str]]:
     """Return the order without each threat and each car: ("threat" or "car", its index) -> entries."""
     none = entries.index(reference)
-    found = {}
+    orders = {}
     for axis, word in ((1, "threat"), (2, "car")):
         for k in range(positions.shape[axis]) if positions.shape[axis] > 1 else ():
             left = np.delete(positions, k, axis=axis)
             if np.isnan(left[0]).all(axis=1).any():  # a threat that no other car drives
                 left = left[:, ~np.isnan(left[0]).all(axis=1)]
-            found[word, k] = [entries[i] for i in order_of(scores_of_positions(left, none))]
-    return found
+            orders[word, k] = [entries[i] for i in order_of(scores_of_positions(left, none))]
+    return orders
 
 
 class Spread(NamedTuple):

@@ -163,9 +163,9 @@ class ThreatsSpec(StrictModel):
     @model_validator(mode="after")
     def _consistent(self) -> ThreatsSpec:
         for group in ("threats", "settings", "disciplines"):
-            for name, one in getattr(self, group).items():
+            for name, spec in getattr(self, group).items():
                 for key, known in (("cars", self.cars), ("threats", self.threats)):
-                    for word in getattr(one, key, ()):
+                    for word in getattr(spec, key, ()):
                         if word not in known:
                             raise ValueError(
                                 f"{group}.{name}.{key}: there is no {word!r}{hint(word, known, lead='known')}"
@@ -243,8 +243,11 @@ class LoadedThreats:
         """Return side (1: left first) and overrides of the repeats of all runs of a level."""
         sides = SIDES[:1] if threat.mirrored else SIDES
         repeats = product(*([(place, value) for value in values] for place, values in threat.repeats.items()))
-        drawn = [tuple(Override.of(place, value, "ranking") for place, value in one) for one in repeats]
-        return [(round(sign), one) for one in drawn for _, sign in sides]
+        drawn = [
+            tuple(Override.of(place, value, "ranking") for place, value in combination)
+            for combination in repeats
+        ]
+        return [(round(sign), overrides) for overrides in drawn for _, sign in sides]
 
 
 @reads("threat file", ScenarioError)
@@ -283,7 +286,7 @@ def load_threats(
     seeded: dict[str, tuple[EntrySpec, Path]] = {}
     seeds: dict[str, tuple[str, str]] = {}
     for seed, file in {
-        seed: file for one in spec.settings.values() for seed, file in one.seeds.items()
+        seed: file for setting in spec.settings.values() for seed, file in setting.seeds.items()
     }.items():
         listed = yaml_lines.read(path.parent / file, what="file of entries")
         entries = validate(EntriesSpec, listed)
