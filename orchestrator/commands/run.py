@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
-import sys
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
@@ -17,7 +15,7 @@ from ..messages import hint, listed, printable
 from . import output
 from .experiments import chapter_of, command_of, conduct, data_of, write_page
 from .options import CHANGES, MAKING, RunOptions, ScenarioFile, plan_of_scenario, takes
-from .progress import hold, pooled, print_tables, say
+from .progress import hold, pooled, print_tables, say, shows_bars
 from .results import MeasuredFrom
 
 if TYPE_CHECKING:
@@ -145,7 +143,7 @@ def _bar(title: str) -> Iterator[Callable[[int, int], None] | None]:
     It redraws only when the run reports progress: a bar with a thread of its own would take the interpreter
     lock away from the FMUs.
     """
-    if not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
+    if not shows_bars():
         yield None
         return
     from rich.console import Console

@@ -92,3 +92,16 @@ def test_the_installed_library_runs_a_scenario_in_memory(installed, empty):
     )
     assert float(printed) == yb.load("fnn_sideslip/25mps").run().metric("peak(sideslip)")
     assert not list(empty.iterdir())
+
+
+def test_the_installed_command_prints_the_schemas_that_the_package_holds(installed, empty):
+    yawbench = installed / "bin" / "yawbench"
+    (packages,) = installed.glob("lib/python*/site-packages")
+    kinds = run(yawbench, "schema", cwd=empty).split()
+    files = {file.stem: file.read_text() for file in (packages / "scenarios" / "schemas").glob("*.json")}
+    assert sorted(kinds) == sorted(files)
+    assert run(yawbench, "schema", "scenario", cwd=empty) == files["scenario"]
+    run(yawbench, "new", "study", "mine", cwd=empty)
+    assert (empty / "scenarios/schemas/experiment.json").read_text() == files["experiment"]
+    answer = json.loads(run(yawbench, "list", "--json", cwd=empty))
+    assert "fnn_sideslip/25mps" in [row[0] for row in answer["tables"][0]["rows"]]
