@@ -87,8 +87,8 @@ def measure(plan: Plan, change: Change = lambda operation: [operation]) -> dict[
         row = np.zeros(1 + len(plan.record))
         master.initialize(row, [])
         ready = perf_counter()
-        for k in range(1, master.programs.cycle + 1):
-            program = master.programs.at(k)
+        for k in range(1, master.program.cycle + 1):
+            program = master.program.at(k)
             program[:] = [changed for operation in program for changed in change(operation)]
         n = min(STEPS, plan.n_steps)
         started = perf_counter()

@@ -85,7 +85,7 @@ class OperatingPoint:
             unit.name: components[unit.name].open(unit, log) for unit in plan.instances
         }
         self._master = Master(plan, self._running, log, StopFlag())
-        self._pool, cycle = self._master.memory, self._master.programs.cycle
+        self._pool, cycle = self._master.signals, self._master.program.cycle
         steps = int((time - plan.time(0)) / float(plan.step) + 1e-6)
         self._k = steps - steps % cycle
         self.time, self.dt = plan.time(max(self._k, 0)), float(cycle * plan.step)
@@ -98,7 +98,7 @@ class OperatingPoint:
         self.outputs = {name: self._unit_of(name, "output") for name in outputs}
         self.signals = {
             pool.index[s.name, v.name]: (f"{s.name}.{v.name}", v.unit or "")
-            for s in pool.stations
+            for s in pool.slots
             for v in s.outputs
         }
         row = np.empty(1 + len(plan.record))
@@ -106,7 +106,7 @@ class OperatingPoint:
             self._master.initialize(row, [])
             self._master.advance(self._k, [row] * self._k, [])
         self._operations = [  # a series is held
-            [op for op in self._master.programs.at(k) if not isinstance(op.call, SeriesFeed)]
+            [op for op in self._master.program.at(k) if not isinstance(op.call, SeriesFeed)]
             for k in range(self._k + 1, self._k + 1 + cycle)
         ]
         self._start = self._state()

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from ..experiments.tables import Cell, Table
-    from ..vehicles.handling_and_braking import Handling
+    from ..vehicles.handling import Handling
 
 
 VehicleAction = Annotated[Literal["show"], typer.Argument(help="show: drive the car and show its handling.")]
@@ -65,7 +65,7 @@ def vehicle(
     from ..scenario import find_and_load, yaml_lines
     from ..scenario.scenario_schema import Vehicle
     from ..scenario.validation import validate
-    from ..vehicles.handling_and_braking import TestTrack, draw_cars, fitting_plant, handling_of
+    from ..vehicles.handling import TestTrack, draw_cars, fitting_plant, handling_of
     from ..wiring.warnings import suspicious_vehicle
     from .progress import print_tables, save_figure, say
 
@@ -96,7 +96,7 @@ def _tables(cars: list[Handling]) -> list[Table]:
 
     from ..evaluation.steering_tests import LEVELS, G
     from ..experiments.tables import Table
-    from ..vehicles.handling_and_braking import SPEEDS
+    from ..vehicles.handling import SPEEDS
 
     names = [without_role(car.plant) for car in cars]
     numbers = set(range(1, len(names) + 1))

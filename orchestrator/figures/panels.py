@@ -22,7 +22,7 @@ from ..errors import ScenarioError
 from ..messages import cut, fold, hint
 from ..metrics.measures import variable_of, words
 from ..metrics.run_metrics import columns_of, reference_of
-from .portrait import curves_of, draw_portrait, signals_of, spread_rows
+from .phase_portrait import curves_of, draw_portrait, signals_of, spread_rows
 from .style import (
     REFERENCE,
     ROW,

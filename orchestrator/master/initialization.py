@@ -57,65 +57,65 @@ class UnsettledWire:
         return f"{self.wire} ({self.old!r}, then {self.new!r})"
 
 
-def initialize(memory: SignalPool, check: StatusCheck, log: Log) -> int:
+def initialize(signals: SignalPool, check: StatusCheck, log: Log) -> int:
     """Initialize all instances and return the number of passes it took.
 
     Raises:
         SimulationError: a parameter does not take its value or a loop does not settle; `check` may raise
             others.
     """
-    plan = memory.plan
-    for station in memory.stations:
-        tolerance = station.instance.tolerance or station.instance.fmu.tolerance
+    plan = signals.plan
+    for slot in signals.slots:
+        tolerance = slot.instance.tolerance or slot.instance.fmu.tolerance
         experiment = ExperimentSetup(plan.time(0), plan.time(plan.n_steps), tolerance)
-        check(station.name, "initialization", station.fmu_instance.setup(experiment))
-        _put(station, station.instance.parameters, "setting parameters", check)
-        _put(station, _known_inputs(memory, station), "setting inputs", check)
-        check(station.name, "initialization", station.fmu_instance.enter())
-        _check_parameters(station, check, log)
-        _get(memory, station, check)
+        check(slot.name, "initialization", slot.fmu_instance.setup(experiment))
+        _put(slot, slot.instance.parameters, "setting parameters", check)
+        _put(slot, _known_inputs(signals, slot), "setting inputs", check)
+        check(slot.name, "initialization", slot.fmu_instance.enter())
+        _check_parameters(slot, check, log)
+        _get(signals, slot, check)
     for number in range(1, PASSES + 1):  # noqa: B007  the number is the result
-        moving = [movement for s in memory.stations for movement in _renew(memory, s, check)]
+        moving = [movement for s in signals.slots for movement in _renew(signals, s, check)]
         if not moving:
             break
     if any(movement.large for movement in moving):
         raise SimulationError(
             _unsettled(moving), instance=None, time=plan.time(0), code="initialization-unsettled"
         )
-    for station in memory.stations:
-        check(station.name, "initialization", station.fmu_instance.exit())
-        _get(memory, station, check)
-        _check_constants(station, check, log)
-    for station in memory.stations:
-        for _, wire in station.other_inputs:
+    for slot in signals.slots:
+        check(slot.name, "initialization", slot.fmu_instance.exit())
+        _get(signals, slot, check)
+        _check_constants(slot, check, log)
+    for slot in signals.slots:
+        for _, wire in slot.other_inputs:
             if wire is not None:
-                memory.other(wire)  # raises if the input cannot be this number
-    memory.start_history()
+                signals.other(wire)  # raises if the input cannot be this number
+    signals.start_history()
     return number
 
 
-def _put(station: InstanceSlot, requested: Mapping[str, Value], what: str, check: StatusCheck) -> None:
+def _put(slot: InstanceSlot, requested: Mapping[str, Value], what: str, check: StatusCheck) -> None:
     """Set variables; the other elements of an array are set to their start values."""
-    variables = station.instance.fmu.variables
+    variables = slot.instance.fmu.variables
     arrays = {variables[name].reference for name in requested if variables[name].elements > 1}
     others = (v for v in variables.values() if v.reference in arrays) if arrays else ()
     values = {v.name: v.start for v in others if v.start is not None} | dict(requested)
     for chosen in by_type(variables[name] for name in values):
-        status = station.fmu_instance.put([v.place for v in chosen], [values[v.name] for v in chosen])
-        check(station.name, what, status)
+        status = slot.fmu_instance.put([v.place for v in chosen], [values[v.name] for v in chosen])
+        check(slot.name, what, status)
 
 
-def _known_inputs(memory: SignalPool, station: InstanceSlot) -> dict[str, Value]:
+def _known_inputs(signals: SignalPool, slot: InstanceSlot) -> dict[str, Value]:
     """Return the inputs known so far: constants and outputs of earlier instances."""
     known: dict[str, Value] = {}
-    values = memory.taken(station).tolist()
-    for variable, wire, value in zip(station.inputs, station.wires, values, strict=True):
-        if _comes_before(memory, wire, station) and np.isfinite(value):
+    values = signals.taken(slot).tolist()
+    for variable, wire, value in zip(slot.inputs, slot.wires, values, strict=True):
+        if _comes_before(signals, wire, slot) and np.isfinite(value):
             known[variable.name] = value
-    return known | memory.given_others(station)
+    return known | signals.given_others(slot)
 
 
-def _check_parameters(station: InstanceSlot, check: StatusCheck, log: Log) -> None:
+def _check_parameters(slot: InstanceSlot, check: StatusCheck, log: Log) -> None:
     """Read all parameters back and compare them with the values that were set.
 
     If the FMU cannot return a parameter, that is only a warning: its value may well be right.
@@ -124,37 +124,37 @@ def _check_parameters(station: InstanceSlot, check: StatusCheck, log: Log) -> No
         SimulationError: a parameter has another value.
     """
     differing: list[str] = []
-    for chosen, status, lost in _read_back(station, station.instance.parameters, check, log):
+    for chosen, status, lost in _read_back(slot, slot.instance.parameters, check, log):
         if status > WARNING:
             names = listed([v.name for v in chosen][:NAMED]) + (" and others" if len(chosen) > NAMED else "")
             text = f"whether {names} took the value that was set is not known: reading returned"
-            log.add(station.name, WARNING, "", f"{text} {STATUS[status]}")
+            log.add(slot.name, WARNING, "", f"{text} {STATUS[status]}")
         differing += [f"{name} is {actual}, not {expected}" for name, actual, expected in lost]
     if differing:
         more = f" and {len(differing) - NAMED} more" if len(differing) > NAMED else ""
         what = "a parameter" if len(differing) == 1 else "parameters"
         raise SimulationError(
-            f"{station.name}: {what} did not take the value that was set: {listed(differing[:NAMED])}{more}",
-            instance=station.name, time=log.time.value, code="fmu-ignores-value")  # fmt: skip
+            f"{slot.name}: {what} did not take the value that was set: {listed(differing[:NAMED])}{more}",
+            instance=slot.name, time=log.time.value, code="fmu-ignores-value")  # fmt: skip
 
 
-def _check_constants(station: InstanceSlot, check: StatusCheck, log: Log) -> None:
+def _check_constants(slot: InstanceSlot, check: StatusCheck, log: Log) -> None:
     """Read constant inputs back; a difference is a warning: an FMU may legally take inputs only in a step."""
-    for _, _, lost in _read_back(station, station.instance.constants, check, log):
+    for _, _, lost in _read_back(slot, slot.instance.constants, check, log):
         for name, actual, expected in lost:
-            log.add(station.name, WARNING, "", f"the constant {name} reads back as {actual}, not {expected}")
+            log.add(slot.name, WARNING, "", f"the constant {name} reads back as {actual}, not {expected}")
 
 
 def _read_back(
-    station: InstanceSlot, requested: Mapping[str, Value], check: StatusCheck, log: Log
+    slot: InstanceSlot, requested: Mapping[str, Value], check: StatusCheck, log: Log
 ) -> Iterator[tuple[list[Variable], Status, list[tuple[str, str, str]]]]:
     """Yield variables of one type, the status of reading them, and those that differ: name, read, set."""
-    for chosen in by_type(station.instance.fmu.variables[name] for name in requested):
+    for chosen in by_type(slot.instance.fmu.variables[name] for name in requested):
         with log.muted():
-            raw, values = station.fmu_instance.fetch([v.place for v in chosen])
+            raw, values = slot.fmu_instance.fetch([v.place for v in chosen])
         status = known(raw)
         if status >= FATAL:
-            check(station.name, "reading back what was set", status)
+            check(slot.name, "reading back what was set", status)
         lost = []
         for variable, actual in zip(chosen, values, strict=True) if status <= WARNING else ():
             expected = requested[variable.name]
@@ -178,17 +178,17 @@ def _shown(variable: Variable, value: Value) -> str:
     return names.get(value, repr(value))
 
 
-def _comes_before(memory: SignalPool, wire: Wire | None, station: InstanceSlot) -> bool:
+def _comes_before(signals: SignalPool, wire: Wire | None, slot: InstanceSlot) -> bool:
     """Return whether an input is known before the instance is evaluated: a constant or an earlier output."""
-    return wire is None or wire.delayed or memory.of[wire.source].position < station.position
+    return wire is None or wire.delayed or signals.of[wire.source].position < slot.position
 
 
-def _renew(memory: SignalPool, s: InstanceSlot, check: StatusCheck) -> list[UnsettledWire]:
+def _renew(signals: SignalPool, s: InstanceSlot, check: StatusCheck) -> list[UnsettledWire]:
     """Update the inputs and outputs of an instance; return the wires that have changed.
 
     A value that is not finite is not passed on yet: later passes may make it finite.
     """
-    new = memory.taken(s)
+    new = signals.taken(s)
     new = np.where(np.isfinite(new) | np.isnan(s.u), new, s.u)
     changed = np.flatnonzero(new.view(np.int64) != s.u.view(np.int64))
     moving = [
@@ -201,23 +201,23 @@ def _renew(memory: SignalPool, s: InstanceSlot, check: StatusCheck) -> list[Unse
     if changed.size:
         s.u[:] = new
         check(s.name, "setting inputs", s.calls.set())
-    renewed = _renew_others(memory, s, check, moving)
+    renewed = _renew_others(signals, s, check, moving)
     if moving or changed.size or renewed:
-        _get(memory, s, check)
+        _get(signals, s, check)
     return moving
 
 
 def _renew_others(
-    memory: SignalPool, s: InstanceSlot, check: StatusCheck, moving: list[UnsettledWire]
+    signals: SignalPool, s: InstanceSlot, check: StatusCheck, moving: list[UnsettledWire]
 ) -> bool:
     """Do the same for inputs that are not Real: extend `moving`, return whether an input has changed."""
     changed = set()
-    values = memory.given_others(s)
+    values = signals.given_others(s)
     for variable, wire in s.other_inputs:
-        value, old = values.get(variable.name), memory.others.get((s.name, variable.name))
+        value, old = values.get(variable.name), signals.others.get((s.name, variable.name))
         if value is None or value == old:
             continue
-        memory.others[s.name, variable.name] = value
+        signals.others[s.name, variable.name] = value
         changed.add(variable.place[:2])
         if wire is not None:
             text = f"{wire.source}.{wire.output} -> {s.name}.{variable.name}"
@@ -228,9 +228,9 @@ def _renew_others(
     return bool(changed)
 
 
-def _get(memory: SignalPool, s: InstanceSlot, check: StatusCheck) -> None:
+def _get(signals: SignalPool, s: InstanceSlot, check: StatusCheck) -> None:
     """Read the outputs of an instance into the pool, with their faults."""
-    for operation in getting(memory, s):
+    for operation in getting(signals, s):
         check(s.name, "reading outputs", operation.call() or OK)
     if s.outputs and s.output_faults is not None:
         s.output_faults.begin(s.y)

@@ -329,7 +329,7 @@ class InstanceServer:
         self._channel = channel
         self._memory = memory
         self._log = LogRelay(channel, timed=False)
-        self._surroundings: ProcessState | None = ProcessState()  # until stepping begins
+        self._process_state: ProcessState | None = ProcessState()  # until stepping begins
         self._instance: CtypesInstance
 
     def serve(self) -> None:
@@ -343,8 +343,8 @@ class InstanceServer:
             else:
                 name, arguments = self._channel.receive_object()
                 reply = getattr(self if hasattr(self, name) else self._instance, name)(*arguments)
-                if self._surroundings is not None:
-                    self._surroundings.restore("", self._log)
+                if self._process_state is not None:
+                    self._process_state.restore("", self._log)
             if os.getpid() != process:
                 return
             if parts:
@@ -389,7 +389,7 @@ class InstanceServer:
         self._calls = ((SET, calls.set), (STEP, calls.step), (GET, calls.get))
 
     def exit(self) -> int:
-        self._surroundings = None
+        self._process_state = None
         return self._instance.exit()
 
     def free(self) -> None:

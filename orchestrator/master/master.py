@@ -75,30 +75,30 @@ class Master:
         self._reached = ctypes.c_int64(-1) if reached is None else reached
         self._returned = ctypes.c_double() if returned is None else returned
         self.passes = 0
-        self.memory = memory = SignalPool(plan, fmu_instances)
-        slow = {s.instance.period for s in memory.stations} - {1}
+        self.signals = signals = SignalPool(plan, fmu_instances)
+        slow = {s.instance.period for s in signals.slots} - {1}
         self.clocks = {1: log.time} | {period: ctypes.c_double(0.0) for period in slow}
-        for s in memory.stations:
+        for s in signals.slots:
             period = s.instance.period
             size = ctypes.c_double(float(period * plan.step))
             into, of = [v.place for v in s.inputs], [v.place for v in s.outputs]
             s.calls = s.fmu_instance.connect(Buffers(s.u, into, s.y, of, self.clocks[period], size))
-        self.programs = StepProgram(memory)
+        self.program = StepProgram(signals)
         self._operations: dict[int, list[Operation]] = {}  # of the current `advance`, by phase
         q = math.lcm(plan.step.denominator, plan.start.denominator)
         self._grid = int(plan.start * q), int(plan.step * q), q  # the k-th point is at (s + k p) / q
-        real = [memory.index[key] for key in plan.record if key in memory.index]
-        self._recorded = np.array([memory.time_at, *real], np.intp)
-        self._recorded_others = [key for key in plan.record if key not in memory.index]
-        self._wires = [w for w in plan.wires if (w.source, w.output) in memory.index]
+        real = [signals.index[key] for key in plan.record if key in signals.index]
+        self._recorded = np.array([signals.time_at, *real], np.intp)
+        self._recorded_others = [key for key in plan.record if key not in signals.index]
+        self._wires = [w for w in plan.wires if (w.source, w.output) in signals.index]
         wired = {(w.source, w.output) for w in self._wires}
-        self._spare = {key: at for key, at in memory.index.items() if key not in wired}
+        self._spare = {key: at for key, at in signals.index.items() if key not in wired}
         """Outputs that are recorded but not wired, and have been finite so far."""
-        self._expected = np.arange(memory.n_outputs)  # outputs checked to be finite
-        self._ones = np.ones(memory.n_outputs)
+        self._expected = np.arange(signals.n_outputs)  # outputs checked to be finite
+        self._ones = np.ones(signals.n_outputs)
         self._ending: EndRequested | None = None
         self._points: Iterator[int] = iter(())  # communication points still to be reached
-        self._surroundings = ProcessState()
+        self._process_state = ProcessState()
         self._copies = copies or Copies()
         self._compiled: CompiledLoop | None = None
         self.loop = self._choose_loop()
@@ -106,12 +106,12 @@ class Master:
 
     def _choose_loop(self) -> str:
         """Have the compiled loop make the run if there is something in it that it can do by itself."""
-        if not any(isinstance(s.calls.step, PlainCall) for s in self.memory.stations):
+        if not any(isinstance(s.calls.step, PlainCall) for s in self.signals.slots):
             return "Python: no instance is stepped in this process by a C function"
         if missing := missing_loop(self._grid, self.plan.n_steps):
             return f"Python: {missing}"
-        memory = self.memory
-        parts = memory.pool, memory.time_at, self.clocks, self._grid, self._recorded, self._reached
+        signals = self.signals
+        parts = signals.pool, signals.time_at, self.clocks, self._grid, self._recorded, self._reached
         self._compiled = CompiledLoop(*parts, self.stop.flag)
         self._compiled.expect(self._expected)
         return "compiled"
@@ -122,9 +122,9 @@ class Master:
         Raises:
             SimulationError: an instance fails or logs an error, a wire does not settle or is not finite.
         """
-        self.passes = initialize(self.memory, self._check_initialization, self.log)
+        self.passes = initialize(self.signals, self._check_initialization, self.log)
         self._check_finite(0)
-        self.memory.pool.take(self._recorded, None, row, "clip")
+        self.signals.pool.take(self._recorded, None, row, "clip")
         if self._recorded_others:
             others.append(self._values_of_others())
         self.completed = self._reached.value = 0
@@ -132,7 +132,7 @@ class Master:
     def advance(self, end: int, rows: Sequence[np.ndarray], others: list[list[Value]]) -> None:
         """Step to communication point `end`, filling one of `rows` per point.
 
-        Rows lie at the same distance in memory. Recorded values that are not Real are appended to `others`,
+        Rows lie at the same distance in signals. Recorded values that are not Real are appended to `others`,
         one list per row.
 
         Raises:
@@ -140,9 +140,9 @@ class Master:
             Interrupted: a stop was requested.
             EndRequested: an instance asked to end the run.
         """
-        first, cycle = self.completed + 1, self.programs.cycle
+        first, cycle = self.completed + 1, self.program.cycle
         self._operations = {
-            k % cycle: self.programs.at(k) for k in range(first, min(end, first + cycle - 1) + 1)
+            k % cycle: self.program.at(k) for k in range(first, min(end, first + cycle - 1) + 1)
         }
         if self._compiled is None:
             self._loop(range(first, end + 1), rows, others)
@@ -155,12 +155,12 @@ class Master:
     def _loop(self, points: range, rows: Sequence[np.ndarray], others: list[list[Value]]) -> None:
         """Step to the points by the loop in Python, the reference."""
         s, p, q = self._grid
-        stop, reached, cycle = self.stop.flag, self._reached, self.programs.cycle
+        stop, reached, cycle = self.stop.flag, self._reached, self.program.cycle
         calls = {phase: [op.call for op in operations] for phase, operations in self._operations.items()}
         clocks = list(self.clocks.items())
-        total, ones, finite = self.memory.now.dot, self._ones, math.isfinite
+        total, ones, finite = self.signals.now.dot, self._ones, math.isfinite
         getpid, process = os.getpid, self._copies.process
-        take, recorded, time = self.memory.pool.take, self._recorded, self.memory.time
+        take, recorded, time = self.signals.pool.take, self._recorded, self.signals.time
         self._points = iter(points)
         for k, row in zip(self._points, rows, strict=False):
             if stop.value:
@@ -184,7 +184,7 @@ class Master:
 
     def _walk(self, loop: CompiledLoop, end: int, others: list[list[Value]]) -> None:
         """Step to `end` by the compiled loop, and do what it leaves to Python."""
-        cycle = self.programs.cycle
+        cycle = self.program.cycle
         while self.completed < end:
             answer = loop.walk(self.completed + 1 if self._recorded_others else end)
             self.completed, k = self._reached.value, loop.k
@@ -210,7 +210,7 @@ class Master:
                     end = end if self._ending is None else k
                 loop.pass_operation()
 
-    def check_surroundings(self, since: int) -> None:
+    def check_process_state(self, since: int) -> None:
         """Check that no FMU has changed the floating-point environment that all instances share.
 
         Args:
@@ -219,11 +219,11 @@ class Master:
         Raises:
             SimulationError: an FMU has changed it.
         """
-        if not self._surroundings.arithmetic_changed():
+        if not self._process_state.arithmetic_changed():
             return
         time = self.plan.time(since)
         among = suspects(self.plan.instances)
-        self._surroundings.restore("", self.log)
+        self._process_state.restore("", self.log)
         self.completed = self._reached.value = since
         raise SimulationError(
             f"after t = {time:.9g} s an instance ({listed(among, last='or')}) changed how numbers are "
@@ -235,31 +235,31 @@ class Master:
 
     def inputs_of(self, unit: str) -> dict[str, Value]:
         """Return the inputs with which an instance was last stepped."""
-        s = self.memory.of[unit]
+        s = self.signals.of[unit]
         real = {v.name: float(u) for v, u in zip(s.inputs, s.u, strict=True)}
-        return real | self.memory.given_others(s)
+        return real | self.signals.given_others(s)
 
     def operation_of(self, k: int, call: Callable[[], Status | None]) -> Operation:
         """Return the operation of the step to `k` that a call belongs to."""
-        return next(op for op in self._operations[k % self.programs.cycle] if op.call is call)
+        return next(op for op in self._operations[k % self.program.cycle] if op.call is call)
 
     def walked_operation(self) -> Operation | None:
         """Return the operation that the compiled loop is at, None between two steps."""
         loop = self._compiled
         if loop is None or loop.at < 0:
             return None
-        operations = self._operations[loop.k % self.programs.cycle]
+        operations = self._operations[loop.k % self.program.cycle]
         return operations[loop.at] if loop.at < len(operations) else None
 
     def _values_of_others(self) -> list[Value]:
-        return [self.memory.others[key] for key in self._recorded_others]
+        return [self.signals.others[key] for key in self._recorded_others]
 
     def _check_initialization(self, unit: str, what: str, status: Status) -> None:
         """Check a call made during initialization, where a logged error counts whatever the status is."""
         self._returned.value = time.monotonic()
         self._copies.end()
-        self._surroundings.restore(unit, self.log)
-        status = self.memory.of[unit].fmu_instance.note(status)
+        self._process_state.restore(unit, self.log)
+        status = self.signals.of[unit].fmu_instance.note(status)
         if status > WARNING or self.log.errors(unit):
             start = self.plan.time(0)
             raise self._failure(describe(unit, what, start, status, self.log), unit, start)
@@ -270,15 +270,15 @@ class Master:
 
     def _answer(self, k: int, operation: Operation, status: Status) -> None:
         """Handle an operation of the step from `k` - 1 to `k` that did not return OK."""
-        station = self.memory.of[operation.instance]
-        kind = station.fmu_instance.part(operation.kind)
-        status = station.fmu_instance.note(status)
+        slot = self.signals.of[operation.instance]
+        kind = slot.fmu_instance.part(operation.kind)
+        status = slot.fmu_instance.note(status)
         if status == WARNING:
             self._note_warning(operation.instance, WORDS[kind])
             return
         self._check_finite(k)  # a non-finite value upstream is the better explanation
-        time = self.plan.time(k - station.instance.period)
-        if status == DISCARD and kind == "step" and (reached := station.fmu_instance.ended()) is not None:
+        time = self.plan.time(k - slot.instance.period)
+        if status == DISCARD and kind == "step" and (reached := slot.fmu_instance.ended()) is not None:
             self._end(k, operation.instance, time if math.isnan(reached) else reached)
             return
         sentence = describe(operation.instance, WORDS[kind], time, status, self.log)
@@ -317,13 +317,13 @@ class Master:
         Raises:
             SimulationError: a wire has such a value; reported is the first in evaluation order.
         """
-        memory = self.memory
-        if np.isfinite(memory.now[self._expected]).all():
+        signals = self.signals
+        if np.isfinite(signals.now[self._expected]).all():
             return
         time = self.plan.time(k)
-        wires = sorted(self._wires, key=lambda w: memory.of[w.source].position)
+        wires = sorted(self._wires, key=lambda w: signals.of[w.source].position)
         for wire in wires:
-            value = memory.pool[memory.index[wire.source, wire.output]]
+            value = signals.pool[signals.index[wire.source, wire.output]]
             if math.isfinite(value):
                 continue
             if self.log.errors(wire.source):
@@ -335,7 +335,7 @@ class Master:
                 )
             raise SimulationError(problem, instance=wire.source, time=time, code="value-not-finite")
         for (unit, name), at in list(self._spare.items()):
-            if not math.isfinite(value := memory.pool[at]):
+            if not math.isfinite(value := signals.pool[at]):
                 del self._spare[unit, name]
                 self.log.add(unit, WARNING, MASTER, f"{name} is {_spelled(value)}; it is on no wire", time)
                 self._expected = self._expected[self._expected != at]

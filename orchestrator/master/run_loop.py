@@ -118,9 +118,9 @@ class RunLoop:
             try:
                 master.advance(end, self._rows.rows[filled:], self._rows.others)
             except EndRequested:
-                master.check_surroundings(since)
+                master.check_process_state(since)
                 raise
-            master.check_surroundings(since)
+            master.check_process_state(since)
             self._refuse_copies(master.completed)
             now = time.perf_counter()
             if now - reported < REPORT_EVERY:

@@ -113,11 +113,11 @@ class SignalPool:
 
     def __init__(self, plan: Plan, fmu_instances: Mapping[str, FmuInstance]) -> None:
         self.plan = plan
-        self.stations = _make_slots(plan, fmu_instances)
-        self.of = {s.name: s for s in self.stations}
-        self.placed = sorted(self.stations, key=lambda s: s.instance.period > 1)
-        n_out = sum(len(s.outputs) + len(s.converted) for s in self.stations)
-        n_in = sum(len(s.inputs) for s in self.stations)
+        self.slots = _make_slots(plan, fmu_instances)
+        self.of = {s.name: s for s in self.slots}
+        self.placed = sorted(self.slots, key=lambda s: s.instance.period > 1)
+        n_out = sum(len(s.outputs) + len(s.converted) for s in self.slots)
+        n_in = sum(len(s.inputs) for s in self.slots)
         self.n_outputs = n_out
         self.pool = np.zeros(2 * n_out + 2 * n_in + 1)
         self.now = self.pool[:n_out]
@@ -131,7 +131,7 @@ class SignalPool:
         self.time.value = plan.time(0)
         self._place_outputs()
         self._place_inputs(2 * n_out, 2 * n_out + n_in)
-        for s in self.stations if plan.faults else ():
+        for s in self.slots if plan.faults else ():
             s.output_faults = faulting(self, s, of_output=True)
             s.input_faults = faulting(self, s, of_output=False)
 
@@ -251,7 +251,7 @@ class SignalPool:
     def start_history(self) -> None:
         """Set all earlier samples to the current ones."""
         self.pool[self.n_outputs : 2 * self.n_outputs] = self.now
-        for s in self.stations:
+        for s in self.slots:
             self.pool.take(s.sources, None, s.kept, "clip")
 
 
@@ -349,9 +349,9 @@ class FaultInjector:
         return act
 
 
-def faulting(memory: SignalPool, s: InstanceSlot, *, of_output: bool) -> FaultInjector | None:
+def faulting(signals: SignalPool, s: InstanceSlot, *, of_output: bool) -> FaultInjector | None:
     """Return the injector for the faults of an instance's outputs or inputs, None if it has none."""
-    plan, period = memory.plan, s.instance.period
+    plan, period = signals.plan, s.instance.period
     places = {v.name: (i, v) for i, v in enumerate(s.outputs if of_output else s.inputs)}
     disturbances = []
     for signal in plan.faults:
@@ -364,6 +364,6 @@ def faulting(memory: SignalPool, s: InstanceSlot, *, of_output: bool) -> FaultIn
             assert wire is not None
             ahead = ALGORITHMS[plan.algorithm].halves_ahead(period, s.direct(variable))
             ahead = min(ahead, 2 * period - 2) if wire.delayed else ahead
-            held = memory.of[wire.source].instance.fmu.variables[wire.output].discrete
+            held = signals.of[wire.source].instance.fmu.variables[wire.output].discrete
         disturbances.append((i, ahead, KINDS[signal.fault.kind].disturbance(signal, held)))
     return FaultInjector(plan, period, disturbances) if disturbances else None

@@ -39,14 +39,14 @@ class SeriesFeed:
     Samples are made in blocks; those of Reals are read from there by the compiled loop, too.
     """
 
-    def __init__(self, memory: SignalPool, s: InstanceSlot) -> None:
+    def __init__(self, signals: SignalPool, s: InstanceSlot) -> None:
         real = [(i, v) for i, v in enumerate(s.inputs) if v.name in s.instance.series]
         others = [v for v, _ in s.other_inputs if v.name in s.instance.series]
-        self._pool, self._kept = memory.pool, memory.others
+        self._pool, self._kept = signals.pool, signals.others
         self._slots = s.sources[[i for i, _ in real]] if real else np.empty(0, np.intp)
         self._others = [(s.name, v.name) for v in others]
-        self._columns = [_column(memory.plan, s, v, s.instance.series[v.name]) for _, v in real]
-        self._other_columns = [_column(memory.plan, s, v, s.instance.series[v.name]) for v in others]
+        self._columns = [_column(signals.plan, s, v, s.instance.series[v.name]) for _, v in real]
+        self._other_columns = [_column(signals.plan, s, v, s.instance.series[v.name]) for v in others]
         self._block = np.empty((BLOCK, len(real)))
         self._row = ctypes.c_int64(BLOCK)
         self.data: OperationData | None = None
@@ -110,17 +110,17 @@ def _of_fmu(s: InstanceSlot, kind: OperationKind, call: Callable[[], Status]) ->
 class StepProgram:
     """The step programs of all phases, each built when it is first needed."""
 
-    def __init__(self, memory: SignalPool) -> None:
-        self._memory = memory
-        self._algorithm = ALGORITHMS[memory.plan.algorithm]
-        self.cycle = math.lcm(*(s.instance.period for s in memory.stations))
+    def __init__(self, signals: SignalPool) -> None:
+        self._signals = signals
+        self._algorithm = ALGORITHMS[signals.plan.algorithm]
+        self.cycle = math.lcm(*(s.instance.period for s in signals.slots))
         self._made: dict[int, list[Operation]] = {}
         self._gathers: dict[tuple[Any, ...], list[Operation]] = {}
-        feeds = {s.name: SeriesFeed(memory, s) for s in memory.stations if s.instance.series}
+        feeds = {s.name: SeriesFeed(signals, s) for s in signals.slots if s.instance.series}
         self._feeds = {name: Operation(name, "gather", feed, feed.data) for name, feed in feeds.items()}
-        self._delayed = {wire.source for wire in memory.plan.wires if wire.delayed}  # instances
-        self._of_outputs = {s.name: _acting(s, s.output_faults, s.y) for s in memory.stations}
-        self._of_inputs = {s.name: _acting(s, s.input_faults, s.u) for s in memory.stations}
+        self._delayed = {wire.source for wire in signals.plan.wires if wire.delayed}  # instances
+        self._of_outputs = {s.name: _acting(s, s.output_faults, s.y) for s in signals.slots}
+        self._of_inputs = {s.name: _acting(s, s.input_faults, s.u) for s in signals.slots}
 
     def at(self, k: int) -> list[Operation]:
         """Return the operations that lead from communication point `k` - 1 to `k`."""
@@ -133,9 +133,9 @@ class StepProgram:
 
     def _at_once(self, k: int) -> list[Operation]:
         """Gather all inputs before any instance steps, a slow instance's at the start of its period."""
-        m = self._memory
+        m = self._signals
         beginning = [s for s in m.placed if (k - 1) % s.instance.period == 0]
-        ending = [s for s in m.stations if k % s.instance.period == 0]
+        ending = [s for s in m.slots if k % s.instance.period == 0]
         fast = [s for s in beginning if s.instance.period == 1 and s.inputs]
         operations = [self._feeds[s.name] for s in beginning if s.instance.series]
         if fast:
@@ -154,19 +154,19 @@ class StepProgram:
     def _in_sequence(self, k: int) -> list[Operation]:
         """Step the instances in order, each with the newest values; slow ones at the end of their period."""
         operations: list[Operation] = []
-        for s in self._memory.stations:
+        for s in self._signals.slots:
             if k % s.instance.period == 0:
                 operations += [self._feeds[s.name]] if s.instance.series else []
                 operations += [*self._gathering(s, k), *self._of_inputs[s.name]]
-                operations += _setting(self._memory, s)
+                operations += _setting(self._signals, s)
                 operations.append(_of_fmu(s, "step", s.calls.step))
                 if (self._algorithm.needs_before or s.name in self._delayed) and s.samples.size:
-                    operations.append(_keeping_outputs(self._memory, s))
-                operations += [*getting(self._memory, s), *self._of_outputs[s.name]]
+                    operations.append(_keeping_outputs(self._signals, s))
+                operations += [*getting(self._signals, s), *self._of_outputs[s.name]]
         return operations
 
     def _gathering(self, s: InstanceSlot, k: int) -> list[Operation]:
-        m = self._memory
+        m = self._signals
         if not s.driven:
             return []
         per_input = []

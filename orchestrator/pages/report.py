@@ -39,7 +39,7 @@ from ..experiments.verdict_tables import (
     run_tables,
     verdict,
 )
-from ..figures.portrait import signals_of
+from ..figures.phase_portrait import signals_of
 from ..figures.style import LabelledRun
 from ..messages import changed, counted, listed
 from ..metrics.run_metrics import evaluate, metric

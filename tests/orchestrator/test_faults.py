@@ -237,7 +237,7 @@ def operations(faults, algorithm):
     stage = Stage(units)
     log = Log()
     slaves = {unit.name: stage(unit, log, set()) for unit in made.instances}
-    return [(op.instance, op.kind) for op in Master(made, slaves, log, StopFlag()).programs.at(1)]
+    return [(op.instance, op.kind) for op in Master(made, slaves, log, StopFlag()).program.at(1)]
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)

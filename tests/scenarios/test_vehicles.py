@@ -18,8 +18,8 @@ from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.planner import Planner
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.tyre_stand import cornering_stiffness
-from orchestrator.vehicles import handling_and_braking as handling
-from orchestrator.vehicles.handling_and_braking import (
+from orchestrator.vehicles import handling as handling
+from orchestrator.vehicles.handling import (
     SAMPLE,
     STEP,
     TURN_SPEED,
