@@ -18,7 +18,7 @@ from orchestrator.evaluation.trace import trace_of
 from orchestrator.messages import hint, short
 from orchestrator.metrics.run_metrics import STANDARD, MetricValue, evaluate, evaluate_all, metric, why_none
 from orchestrator.plan import Override
-from orchestrator.results.measured import measured_results
+from orchestrator.results.measured import filtered_alike, measured_results
 from orchestrator.results.reader import Results
 
 from . import arguments
@@ -226,7 +226,7 @@ class Run:
 
         wanted = [arguments.text(panel, f"panels[{k}]") for k, panel in enumerate(panels)]
         title = None if title is None else arguments.text(title, "title")
-        runs = [LabelledRun(self.title, self.results)]
+        runs = [LabelledRun(self.title, *filtered_alike([self.results]))]
         drawing.check_panels(runs, wanted, option="panel ")
         return shown_in_notebooks(draw(runs, wanted or OVERVIEW, title=title))
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ..evaluation.validation import Validation
     from ..experiments.fit_result import FitResult, FittedModel
     from ..experiments.tables import Table
+    from ..measured.measurement import Measurement
     from ..planner import Planner
 
 MeasuredAction = Annotated[Literal["show"], typer.Argument(help="show: examine the recording.")]
@@ -29,15 +30,20 @@ BandsOption = Annotated[
     str,
     typer.Option("--bands", metavar="NAME", help="File of tolerances, or its name in scenarios/bands."),
 ]
+FigureFile = Annotated[
+    Path | None, typer.Option("--out", metavar="FILE.svg", help="Figure of all signals to write.")
+]
 SETS = "sets"
 """Subfolder of what sets of values gave, until the fit has ended."""
 
 
-def measured(action: MeasuredAction, file: MeasurementFile) -> None:
-    """Show what a recording holds, and its flaws.
+def measured(action: MeasuredAction, file: MeasurementFile, out: FigureFile = None) -> None:
+    """Show what a recording holds, its flaws, and what a fit to it can identify.
 
     Names spikes, uneven, repeated and restarting time, and what contradicts the motion of a rigid car: signs,
-    factors of mistaken units, lag, place and zero points of sensors. Exit status 1 if there is any flaw.
+    factors of mistaken units, lag, place and zero points of sensors, a speed other than that of the position.
+    The table of effects tells which parameters of a car the recording shows. Exit status 1 if there is any
+    flaw.
     """
     from ..experiments.tables import Cell, Table
     from ..measured.flaws import flaws_of
@@ -51,7 +57,12 @@ def measured(action: MeasuredAction, file: MeasurementFile) -> None:
             (one.name, f"{one.time[0]:.6g}", f"{one.time[-1]:.6g}", f"{one.rate:.4g}", ", ".join(one.signals))
             for one in measurement.segments
         ]
-        print_tables([Table("Segments", ["segment", "from [s]", "to [s]", "rate [Hz]", "signals"], rows)])
+        print_tables([
+            Table("Segments", ["segment", "from [s]", "to [s]", "rate [Hz]", "signals"], rows),
+            *([] if flaws else [effects_table(measurement)]),
+        ])  # fmt: skip
+        if out is not None:
+            draw_measurement(file, measurement, out)
     output.answer(
         flaws=[
             {"kind": flaw.kind, "signal": flaw.signal, "value": flaw.value, "text": flaw.text}
@@ -63,6 +74,58 @@ def measured(action: MeasuredAction, file: MeasurementFile) -> None:
     if flaws:
         raise typer.Exit(1)
     say("no flaw found")
+
+
+def effects_table(measurement: Measurement) -> Table:
+    """Return the table of what a fit to a measurement can identify, or of why that is not known."""
+    from ..experiments.tables import Table
+    from ..measured.effects import CHANGE, SEEN, effects_in
+    from ..measured.measurement import MEASURABLE
+    from ..metrics.run_metrics import MetricValue
+
+    headings = [f"rms change of {name}" for name in SEEN]
+    table = Table(
+        f"Effects of parameters that are {100 * CHANGE:g} % larger, in a single track driven like the car",
+        ["parameter", *headings, "seen"],
+        numbers=range(1, 1 + len(SEEN)),
+    )
+    try:
+        effects = effects_in(measurement)
+    except ValueError as error:
+        table.notes.append(f"not known: {error}")
+        return table
+    for effect in effects:
+        numbers = [MetricValue(effect.changes[name], MEASURABLE[name].unit) for name in SEEN]
+        table.rows.append([effect.parameter, *numbers, "yes" if effect.seen else "no"])
+    table.notes.append("mass scales with stiffnesses and yaw inertia: give it, or a prior, in a fit")
+    return table
+
+
+def draw_measurement(file: Path, measurement: Measurement, out: Path) -> None:
+    """Write a figure of all signals of a measurement, its segments overlaid.
+
+    Raises:
+        ScenarioError: the format is unknown.
+        ResultsError: the figure cannot be written.
+    """
+    from ..errors import ScenarioError
+    from ..figures.plots import draw
+    from ..figures.style import KINDS, LabelledRun, save
+    from ..results.measured import filtered_alike, measured_results, segments_of
+
+    if out.suffix[1:] not in KINDS:
+        raise ScenarioError(
+            f"--out {out}: must end in {', '.join(f'.{k}' for k in KINDS)}", code="option-invalid"
+        )
+    results = filtered_alike([measured_results(path) for path in segments_of(file)])
+    runs = [
+        LabelledRun(segment.name, run) for segment, run in zip(measurement.segments, results, strict=True)
+    ]
+    figure = draw(
+        runs, list(measurement.segments[0].signals), title=measurement.title, note=measurement.origin
+    )
+    (written,) = save(figure, out.with_suffix(""), [out.suffix[1:]])
+    say(str(written))
 
 
 @takes("out", "fmus", "no_build", "jobs")

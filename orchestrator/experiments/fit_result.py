@@ -33,8 +33,8 @@ from ..measured.estimate import (
     as_measured,
     estimate,
 )
-from ..measured.single_track import PARAMETERS, SingleTrack, SingleTrackWindow, start_states
 from ..measured.single_track import SIGNALS as OF_SINGLE_TRACK
+from ..measured.single_track import SingleTrack, SingleTrackWindow, start_states, typical_values
 from ..messages import hint
 from ..names import Target
 from ..planner import Planner
@@ -46,8 +46,6 @@ from .jobs import NEEDED
 if TYPE_CHECKING:
     pass
 
-STIFFNESS_PER_LOAD = 12.0
-"""Start value of an axle's cornering stiffness over its load [1/rad]; chosen: a passenger car's tyres."""
 PARTS = {"training": "training", "held_out": "held-out"}
 
 
@@ -295,13 +293,9 @@ def _single_track(
     if not all(isinstance(value, (int, float)) for value in car):
         raise ValueError("the plant has no mass, or no distances of its axles")
     mass, front, rear = map(float, car)  # type: ignore[arg-type]
-    weight = mass * 9.81 / (front + rear)
-    starts = (
-        STIFFNESS_PER_LOAD * weight * rear, STIFFNESS_PER_LOAD * weight * front, 1.0, 1.0, mass * front * rear
-    )  # fmt: skip
     own = [
         Parameter(name, start, 0.2 * start, 5.0 * start)
-        for name, start in zip(PARAMETERS, starts, strict=True)
+        for name, start in typical_values(mass, front, rear).items()
     ]
     steering = {"steer_angle", "steering_wheel_angle"}
     for parameter in parameters:

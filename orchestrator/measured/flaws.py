@@ -28,6 +28,11 @@ NEAR = 0.25
 """Relative distance from a factor that still names it. Chosen: the factors lie further apart."""
 SPIKE = 12.0
 """Distance of a spike from its median, over that of 98 of 100 samples. Chosen: noise has less than 3."""
+OF_POSITION = 1.0
+"""Cut-off of the low pass of positions before they are differentiated [Hz]. Chosen: GPS is noisy."""
+SLOWEST, WRONG_SPEED = 5.0, 0.03
+"""Speed [m/s] above which it is compared with that of the position, and relative difference that is named.
+Chosen: sideslip of 10 degrees is 1.5 % of it."""
 EVEN = 0.05
 """Part of the steps that may be uneven. Chosen: single gaps are no uneven sampling."""
 LEAST = {"lag": 0.004, "place": 0.1, "zero of acceleration_y": 0.05, "zero of yaw_rate": 0.002}
@@ -72,7 +77,8 @@ def _of_segment(segment: Segment) -> list[Flaw]:
         flaws.append(Flaw("uneven time", "", uneven, words))
     if flaws:
         return flaws
-    contradiction = _contradiction(segment.even())
+    even = segment.even()
+    contradiction = _contradiction(even) or _against_position(even)
     return [contradiction] if contradiction else []
 
 
@@ -122,6 +128,27 @@ def _contradiction(even: Segment) -> Flaw | None:
             ("zero", "yaw_rate"): -v[inner],
         },
     )
+
+
+def _against_position(even: Segment) -> Flaw | None:
+    """Return the factor of a speed that is not that of the recorded position, such as of GPS."""
+    signals = even.signals
+    if not {"velocity_x", "position_x", "position_y"} <= signals.keys() or even.rate < 3.0 * OF_POSITION:
+        return None
+    low, edge = LowPass(OF_POSITION), int(even.rate / OF_POSITION)
+    x, y, v = (low(signals[name], even.rate) for name in ("position_x", "position_y", "velocity_x"))
+    inner = slice(edge, -edge)
+    over_ground = np.hypot(np.gradient(x, even.time), np.gradient(y, even.time))[inner]
+    moving = over_ground > SLOWEST
+    if np.count_nonzero(moving) < 10:
+        return None
+    factor = float(np.median(v[inner][moving] / over_ground[moving]))
+    if abs(factor - 1.0) < WRONG_SPEED:
+        return None
+    words = (
+        f"is {factor:.3g} times the speed of the recorded position: 'gain: {1.0 / factor:.4g}', or its unit"
+    )
+    return Flaw("factor", "velocity_x", factor, words)
 
 
 def _lateral_velocity(smooth: Mapping[str, np.ndarray]) -> np.ndarray | None:

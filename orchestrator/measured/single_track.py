@@ -31,6 +31,15 @@ STEP = 0.01
 """Longest step of the integration [s] (Runge-Kutta of fourth order); chosen: stable above `LEAST_SPEED`."""
 PARAMETERS = ("stiffness_front", "stiffness_rear", "friction_front", "friction_rear", "yaw_inertia")
 SIGNALS = ("yaw_rate", "acceleration_y", "sideslip")
+STIFFNESS_PER_LOAD = 12.0
+"""Typical cornering stiffness of an axle over its load [1/rad]; chosen: a passenger car's tyres."""
+
+
+def typical_values(mass: float, front: float, rear: float) -> dict[str, float]:
+    """Return typical values of `PARAMETERS` for a mass [kg] and distances of the axles [m]."""
+    weight = mass * G / (front + rear)
+    stiffnesses = STIFFNESS_PER_LOAD * weight * rear, STIFFNESS_PER_LOAD * weight * front
+    return dict(zip(PARAMETERS, (*stiffnesses, 1.0, 1.0, mass * front * rear), strict=True))
 
 
 @dataclass(frozen=True)

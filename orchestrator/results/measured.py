@@ -71,8 +71,10 @@ def segments_of(path: Path) -> list[Path]:
 def filtered_alike(runs: Sequence[Results]) -> list[Results]:
     """Return runs, the simulated ones filtered by the low pass of the measured one among them.
 
-    Only signals that are measured are filtered. Without a measured run, all are returned unchanged.
+    Only signals that are measured are filtered. Measured runs alone are drawn like any other.
     """
+    if all(isinstance(run, MeasuredResults) for run in runs):
+        return [Results(run.folder, run.time, run.columns, run.units, run.record) for run in runs]
     measured = next((run for run in runs if isinstance(run, MeasuredResults) and run.low_pass), None)
     if measured is None or measured.low_pass is None:
         return list(runs)

@@ -7,8 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from orchestrator.measured.effects import effects_in
 from orchestrator.measured.flaws import flaws_of
+from orchestrator.measured.measurement import load_measurement
 from tests.commands import status_of
+from tests.sentences import golden
 
 T = np.arange(0.0, 30.0, 0.01)
 
@@ -126,3 +129,50 @@ def test_the_command_lists_segments_and_flaws(tmp_path, capsys):
     late(signals)
     assert status_of("measured", "show", write(tmp_path, signals)) == 1
     assert "acceleration_y: lags by" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("factor", "named"), [(1.0, False), (1.08, True)])
+def test_a_speed_other_than_that_of_the_position_is_named(factor, named, tmp_path):
+    rng = np.random.default_rng(4)
+    speed, heading = 22.0 + 4.0 * np.sin(0.2 * T), 0.3 * np.sin(0.3 * T)
+    x, y = (np.cumsum(speed * part(heading)) * 0.01 for part in (np.cos, np.sin))
+    noisy = [x + rng.normal(0.0, 0.02, T.size), y + rng.normal(0.0, 0.02, T.size)]
+    header = "time [s],velocity_x [m/s],position_x [m],position_y [m]"
+    table = np.column_stack([T, factor * speed, *noisy])
+    np.savetxt(tmp_path / "run.csv", table, "%.9g", ",", header=header, comments="")
+    path = tmp_path / "measured.yaml"
+    names = ("velocity_x", "position_x", "position_y")
+    path.write_text(f"files: [run.csv]\nsignals: {{{', '.join(f'{name}: {name}' for name in names)}}}\n")
+    flaws = flaws_of(path)
+    assert [(flaw.kind, flaw.signal) for flaw in flaws] == [("factor", "velocity_x")] * named
+    assert not named or flaws[0].value == pytest.approx(factor, rel=5e-3)
+
+
+VEHICLE = "vehicle: {mass: 1600 kg, cg_to_front_axle: 1.2 m, cg_to_rear_axle: 1.5 m, steering_ratio: 16}\n"
+
+
+@pytest.mark.parametrize(("factor", "friction_seen"), [(0.2, False), (1.2, True)])
+def test_a_gentle_drive_shows_stiffnesses_and_no_friction(factor, friction_seen, tmp_path):
+    signals = recording(0)
+    signals["steering_wheel_angle"] *= factor
+    signals["acceleration_y"] *= factor
+    path = write(tmp_path, signals)
+    path.write_text(path.read_text() + VEHICLE)
+    seen = {effect.parameter: effect.seen for effect in effects_in(load_measurement(path))}
+    assert seen["stiffness_front"] and seen["stiffness_rear"]
+    assert seen["friction_front"] == friction_seen
+
+
+def test_what_is_missing_to_know_the_effects_is_said(tmp_path):
+    with pytest.raises(ValueError, match="mass"):
+        effects_in(load_measurement(write(tmp_path, recording(0))))
+
+
+def test_the_command_shows_the_effects_and_draws_the_signals(tmp_path, capsys):
+    path = write(tmp_path, recording(0))
+    path.write_text(path.read_text() + VEHICLE)
+    assert status_of("measured", "show", path, "--out", tmp_path / "signals.svg") == 0
+    assert (tmp_path / "signals.svg").is_file()
+    assert "stiffness_front" in capsys.readouterr().out
+    assert status_of("measured", "show", path, "--out", tmp_path / "signals.doc") == 2
+    assert golden(capsys.readouterr().err.splitlines()[-1])
