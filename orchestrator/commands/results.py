@@ -233,6 +233,33 @@ def _settings(style: str | None, size: str | None) -> Any:
     return settings
 
 
+def _check_output(out: Path | None, page: bool, format: str | None, published: bool) -> None:
+    """Check that the file, its format and the kind of output agree; `published`: with a style or a size.
+
+    Raises:
+        ScenarioError: they do not.
+    """
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    from ..errors import ScenarioError
+    from ..figures.style import KINDS
+    from ..messages import listed
+
+    kind = out.suffix[1:].lower() if out else ""
+    others = {"html", "gif", "bmp", *FigureCanvasBase.get_supported_filetypes()} - KINDS.keys()
+    problem = ""
+    if page and (format or published):
+        problem = "--page: --format, --size and --style are of figures, not of pages"
+    elif not page and kind in others:
+        problem = f"--out {out}: a figure is {listed(KINDS, last='or')}" + "; a page needs --page" * (
+            kind == "html"
+        )
+    elif not page and format and kind in KINDS and kind != format:
+        problem = f"--out {out}: its ending differs from --format {format}"
+    if problem:
+        raise ScenarioError(problem, code="option-invalid")
+
+
 @takes(*CHANGES, *MAKING)
 def plot(
     sources: RunSources,
@@ -263,6 +290,7 @@ def plot(
     from .progress import say
 
     settings = _settings(style, size)
+    _check_output(options.out, page, format, bool(settings))
     file = options.out if options.out and options.out.suffix[1:] in KINDS and not page else None
     start = start_of(begin)
     folders = with_segments(recorded(sources, options), measured)

@@ -180,7 +180,7 @@ def save(figure: Figure, stem: Path, kinds: Sequence[str] = ("svg", "png")) -> l
                 write_whole(path, content.getvalue())
         except RuntimeError as error:  # of matplotlib, which measures texts with LaTeX
             raise ResultsError(
-                f"{stem}: PGF needs LaTeX (xelatex), which is not installed", code="package-missing"
+                f"{stem}.pgf: PGF needs LaTeX (xelatex), which is not installed", code="package-missing"
             ) from error
         except OSError as error:
             raise ResultsError(

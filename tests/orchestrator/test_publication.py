@@ -65,6 +65,19 @@ def test_a_size_that_is_none_is_refused(run, capsys):
     assert golden(capsys.readouterr().err)
 
 
+def test_outputs_that_contradict_each_other_are_refused(run, capsys):
+    for options in (
+        ("--out", "fig.jpeg"),
+        ("--out", "fig.html"),
+        ("--out", "fig.svg", "--format", "pdf"),
+        ("--page", "--style", "ieee"),
+        ("--page", "--format", "pdf", "--out", "fig.pdf"),
+    ):
+        assert status_of("plot", run, *SINGLE, *options) == 2, options
+    assert golden(capsys.readouterr().err)
+    assert not [path for path in Path().iterdir() if path.name.startswith("fig")]
+
+
 @pytest.mark.skipif(bool(shutil.which("xelatex")), reason="LaTeX is installed")
 def test_pgf_without_latex_is_refused_in_a_sentence(run, capsys):
     assert status_of("plot", run, *SINGLE, "--format", "pgf") == 2

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from lxml import html
 
 from orchestrator.cli import main
 from tests.orchestrator.test_ranking import SMALL
@@ -32,6 +33,17 @@ def test_the_first_cell_is_open_and_all_of_it_can_be_read_by_everyone(chromium: 
     assert chromium.overflow() <= 0
     assert chromium.run("return document.querySelectorAll('main').length") == 1
     assert inaccessible(chromium) == []
+
+
+def test_every_count_is_that_of_its_table(page):
+    tree = html.fromstring(page.read_text(encoding="utf-8"))
+    rows = tree.cssselect("table.matrix tbody tr")
+    conditions = tree.cssselect("table.matrix th.leaning")
+    answer = tree.xpath("string(//p[@class='said'])")
+    assert answer.startswith(f"Of {len(rows)} controllers")
+    assert f"of {len(conditions)} conditions" in answer
+    assert len(tree.cssselect("td.cell")) == len(rows) * len(conditions)
+    assert len(list((page.parent / "data").glob("*.js"))) == len(rows) * len(conditions)
 
 
 def test_a_cell_shows_its_worst_run_while_the_matrix_stays_in_sight(chromium: Browser, page):

@@ -173,6 +173,21 @@ def test_the_answer_comes_first_and_a_claim_shows_its_runs(chromium, paper):
     assert chromium.console() == []
 
 
+def test_every_count_is_that_of_its_table(paper):
+    folded = [
+        (int(count.text), len(details.xpath(".//tbody/tr")))
+        for details in paper.tree.cssselect("details.group")
+        for count in details.xpath("summary/small")
+    ]
+    assert len(folded) > 5
+    assert all(count == rows for count, rows in folded)
+    answer = paper.tree.xpath("string(//p[@class='said'])")
+    claims = len(paper.tree.cssselect("table.claims")[0].xpath("tbody/tr"))
+    assert answer.startswith(f"Of {claims} claims, ")
+    verdicts = paper.tree.cssselect("table.claims")[0].cssselect(".verdict.good")
+    assert f"{len(verdicts)} hold" in answer
+
+
 def test_parameters_tell_their_source(paper):
     every = paper.tree.cssselect("table.parameters tbody tr")  # the vehicle's first, then those of units
     rows = {row[0].text_content(): row for row in reversed(every)}

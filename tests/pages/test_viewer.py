@@ -15,7 +15,7 @@ from orchestrator.cli import main
 from orchestrator.errors import ResultsError
 from orchestrator.figures.panels import LabelledRun
 from orchestrator.figures.style import LINES, digits_of, shown_unit
-from orchestrator.pages.viewer import MOST, PANELS, Settings, View, assets, page, still_of, viewer
+from orchestrator.pages.viewer import MOST, PANELS, Settings, View, answer_of, assets, page, still_of, viewer
 from orchestrator.results.reader import Results
 from tests.orchestrator.recorded import car, noted, write
 from tests.sentences import golden, golden_in
@@ -23,6 +23,7 @@ from vocabulary.lane_change import lanes_of
 from vocabulary.wheels import WHEELS
 
 from .browser import DESK, PHONE, Browser
+from .flaws import inaccessible
 from .made_up import MU, SIZES, data_in, whole_car, without
 
 VIEWER = "const viewer = document.querySelector('.yv').viewer;"
@@ -278,6 +279,31 @@ def test_the_page_is_drawn_at_every_width_without_complaint(chromium, two, width
     assert all(ratio == pytest.approx(2.0, rel=0.02) for ratio, _ in sizes)  # crisp: device pixels
     assert all(wide > 120 for _, wide in sizes)
     assert chromium.run("return document.querySelectorAll('*').length") <= 2000
+
+
+@pytest.mark.parametrize("width", [390, DESK])
+def test_the_page_can_be_read_by_everyone(chromium, two, width):
+    opened(chromium, two, width=width)
+    assert inaccessible(chromium) == []
+
+
+def test_the_page_begins_with_what_the_runs_came_to(tmp_path):
+    failed = noted(replace(whole_car(), time=whole_car().time[:31]), status="failed")
+    few = [LabelledRun("free", whole_car(2.0)), LabelledRun("held", whole_car())]
+    many = [LabelledRun(f"run {k}", whole_car(1.0 + 0.1 * k)) for k in range(5)]
+    peaks = [np.degrees(np.max(np.abs(run.results["plant.sideslip"]))) for run in (*few, many[-1])]
+    assert answer_of(few) == f"Largest sideslip angle: {peaks[0]:.3g} ° (free) and {peaks[1]:.3g} ° (held)."
+    assert answer_of(few[:1]) == f"Largest sideslip angle: {peaks[0]:.3g} °."
+    assert f"{peaks[2]:.3g} ° (run 4), of 5 runs." in answer_of(many)
+    assert answer_of([LabelledRun("short", failed)]).startswith("Short failed at 0.3")
+    assert answer_of([LabelledRun("bare", without(whole_car(), "sideslip", "yaw", "acceleration"))]) == ""
+
+
+def test_values_that_differ_read_differently(tmp_path):
+    near = whole_car()
+    near.columns["plant.sideslip"] *= 1.0 + 1e-5
+    first, second = re.findall(r"[\d.]+ °", answer_of(labelled(whole_car(), near)))
+    assert first != second
 
 
 def test_decoded_samples_equal_the_recorded_ones(chromium, two):
@@ -610,14 +636,13 @@ def test_a_bare_run_is_drawn_without_complaint(chromium, tmp_path):
 def test_runs_of_other_steps_lengths_and_signals_and_failed_ones_share_a_page(chromium, tmp_path):
     whole, coarse = whole_car(), whole_car(2.0, n=81)
     short = replace(whole, time=whole.time[:401], columns={k: x[:401] for k, x in whole.columns.items()})
-    cut = {k: x[:401] for k, x in whole.columns.items()}
-    failed = noted(replace(whole_car(), time=whole.time[:401], columns=cut), status="failed")
-    failed.columns["plant.position_y"] = np.where(
-        np.arange(401) < 300, failed.columns["plant.position_y"], np.nan
+    rows = 31  # to 0.3 s
+    failed = noted(
+        replace(whole_car(), time=whole.time[:rows], columns={k: x[:rows] for k, x in whole.columns.items()}),
+        status="failed",
     )
-    failed.columns["plant.yaw_rate"] = np.where(
-        np.arange(401) < 300, failed.columns["plant.yaw_rate"], np.nan
-    )
+    for name in ("plant.position_y", "plant.yaw_rate"):
+        failed.columns[name] = np.where(np.arange(rows) < 20, failed.columns[name], np.nan)
     file = tmp_path / "mixed.html"
     file.write_text(page(labelled(whole, coarse, short, failed, without(whole, "yaw_rate"))), "utf-8")
     opened(chromium, file, "run?difference=true")
@@ -689,6 +714,12 @@ def test_print_is_finer_and_shows_no_controls(chromium, two):
     assert ratio == pytest.approx(3.0, rel=0.02)
     chromium.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
     display = "return getComputedStyle(document.querySelector(arguments[0])).display"
+    chromium.run(VIEWER + "viewer.print()")
+    places = chromium.run(
+        "const box = (name) => document.querySelector(name).getBoundingClientRect();"
+        "return [box('.yv-panels').bottom, box('.yv-road').top, box('.yv-scene').width, box('.yv').width]"
+    )
+    assert places[1] >= places[0] and places[2] < places[3]  # the road is below the panels, not on them
     shown = {
         name: chromium.run(display, f".yv-{name}") for name in ("bar", "time", "scene", "panels", "runs")
     }

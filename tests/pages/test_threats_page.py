@@ -1,0 +1,55 @@
+"""The page of threats, from the published levels, in a browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from lxml import html
+
+from docs.generate.threat_tables import FILE
+from orchestrator.experiments.threat_runs import published_result
+from orchestrator.experiments.threats import load_threats
+from orchestrator.pages.threats_page import scored, threats_page
+
+from .browser import DESK, Browser
+from .flaws import inaccessible, open_all
+from .test_sweep_page import MOST_ELEMENTS
+
+
+@pytest.fixture(scope="module")
+def published():
+    return published_result(load_threats(FILE))
+
+
+@pytest.fixture(scope="module")
+def page(published, tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("threats")
+    text = threats_page(published, scored(published), folder, "yawbench rank proving_ground/threats")
+    (folder / "report.html").write_text(text, encoding="utf-8")
+    return folder / "report.html"
+
+
+@pytest.mark.parametrize("width", [390, DESK])
+def test_it_keeps_its_budget_and_can_be_read_by_everyone(chromium: Browser, page, width):
+    chromium.open(page, width=width)
+    assert chromium.run("return document.querySelectorAll('*').length") <= MOST_ELEMENTS
+    assert chromium.overflow() <= 0
+    open_all(chromium)
+    chromium.wait_for("!document.querySelector('details > template')")
+    assert inaccessible(chromium) == []
+    assert chromium.console() == []
+    assert chromium.requests() == []
+
+
+def test_every_level_is_on_the_page_and_counts_are_those_of_its_tables(published, page):
+    tree = html.fromstring(page.read_text(encoding="utf-8"))
+    entries = published.complete[published.threats.main]
+    folded = tree.xpath("//details/template/table")
+    assert len(folded) == len(published.threats.threats_in(published.threats.main))
+    assert all(len(table.xpath("tbody/tr")) == len(entries) for table in folded)
+    scores = scored(published)
+    first = sum(score.place == 1 for score in scores.scores)
+    answer = tree.xpath("string(//p[@class='said'])")
+    assert answer.startswith(f"Of {len(entries)} controllers, {first} share the first place")
+    assert f"Of {scores.pairs} pairs, {scores.told_apart} can be told apart" in answer
