@@ -180,6 +180,7 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
         signals_table,
         units_table,
     )
+    from ..fmu.places import hidden
     from ..results.reader import found_runs
     from ..scenario import find_and_load
     from .progress import print_tables
@@ -208,7 +209,10 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
         scenario = find_and_load.find(place, "a scenario")
         table = recorded_table(plan_of_scenario(scenario, options))
     else:
-        fmus, errors = fmus_in(_folder_of_fmus(place or options.fmus), *further)
+        folder = _folder_of_fmus(place or options.fmus)
+        fmus, errors = fmus_in(folder, *further)
+        if further:
+            errors += hidden((fmu.path.stem for fmu in fmus), folder, packages=True)
         table = fmus_table(fmus, errors)
         if what == "signals":
             table = signals_table(fmus)

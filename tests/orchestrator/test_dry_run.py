@@ -12,7 +12,7 @@ from orchestrator.experiments.dry_run import Forecast, Pace, Span, forecast_tabl
 from orchestrator.experiments.journal import records_in
 
 from .test_batch_commands import SCENARIO, STUDY
-from .test_output import SWEEP
+from .test_output import ALWAYS, SWEEP, documented
 from .test_ranking import SMALL
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
@@ -101,7 +101,9 @@ def test_a_region_is_bounded_by_its_first_and_its_last_look(forecast, yawbench, 
 
 def test_a_tuning_takes_its_budget_and_the_runs_beside_it(forecast, yawbench, fmus):
     assert forecast("tune", "tuning.yaml")["left"] == [5 * 3 + 1, 5 * 3 + 1]
-    made_by(yawbench, fmus, "tune", "tuning.yaml")
+    status, out, _ = yawbench("tune", "tuning.yaml", "--fmus", fmus, "--json")
+    assert status == 0
+    assert set(json.loads(out)) == ALWAYS | documented()["tune"]
     after = forecast("tune", "tuning.yaml")
     assert after["left"] == [0, 0]
 

@@ -14,6 +14,8 @@ from orchestrator.errors import ScenarioError
 from orchestrator.experiments.fit import load_fit
 from orchestrator.scenario import yaml_lines
 
+from .test_output import ALWAYS, documented
+
 TRUTH = {"yaw_inertia": 1791.6, "front": 0.72, "rear": 1.0}
 SCENARIO = """title: 7 DOF
 vehicle: {vehicle}
@@ -84,8 +86,11 @@ def run(*arguments: object) -> int:
 
 
 def test_a_car_is_found_again_and_the_single_track_stands_beside(folder, capsys):
-    assert run("fit", folder / "fit.yaml", "--out", folder / "out", "--jobs", "1") == 0
+    assert run("fit", folder / "fit.yaml", "--out", folder / "out", "--jobs", "1", "--json") == 0
     data = json.loads((folder / "out" / "fit.json").read_text())
+    answer = json.loads(capsys.readouterr().out)
+    assert set(answer) == ALWAYS | documented()["fit"]
+    assert answer["fit"] == data
     own, single = data["models"].values()
     for name, truth in zip(own["parameters"], TRUTH.values(), strict=True):
         assert own["parameters"][name]["value"] == pytest.approx(truth, rel=1e-4)
@@ -95,7 +100,7 @@ def test_a_car_is_found_again_and_the_single_track_stands_beside(folder, capsys)
         assert own["scores"]["held_out"][name]["rms"] < 0.1 * single["scores"]["held_out"][name]["rms"]
         assert own["scores"]["held_out"][name]["fit"] > 99.9
     assert data["verdict"].startswith("better than")
-    assert "held-out" in capsys.readouterr().out
+    assert "held-out" in answer["tables"][-1]["columns"][-1]["heading"]
     assert not (folder / "out" / "sets").exists()
     text = (folder / "out" / "vehicle.yaml").read_text()
     assert "fitted to made up" in text

@@ -149,6 +149,21 @@ def test_measured_answers_with_flaws(answers, tmp_path):
     assert made["status"] == 1
 
 
+def test_evaluate_answers_with_what_evaluation_json_has(answers, tmp_path):
+    rows = "".join(
+        f"{k / 100},{0.5 * (k > 100)},{0.2 * (k > 120)},{4.0 * (k > 130)},25\n" for k in range(500)
+    )
+    header = "time [s],delta [rad],r [rad/s],ay [m/s2],v [m/s]\n"
+    (tmp_path / "step.csv").write_text(header + rows)
+    signals = "steering_wheel_angle: delta, yaw_rate: r, acceleration_y: ay, velocity_x: v"
+    (tmp_path / "step.yaml").write_text(f"files: [step.csv]\nsignals: {{{signals}}}\n")
+    made = answers("evaluate", "step-steer", "step.yaml", "--no-figures", with_fmus=False)
+    assert set(made) == ALWAYS | documented()["evaluate"]
+    written = json.loads((Path(made["folder"]) / "evaluation.json").read_text())
+    assert made["evaluation"] == written
+    assert made["evaluation"]["test"] == "step-steer"
+
+
 def test_list_answers_with_its_tables(answers):
     made = answers("list", "metrics", with_fmus=False)
     assert set(made) == ALWAYS

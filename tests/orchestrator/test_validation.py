@@ -14,6 +14,8 @@ from orchestrator.evaluation.validation import BANDS, Tolerance, load_bands
 from tests.commands import status_of
 from tests.sentences import golden
 
+from .test_output import ALWAYS, documented
+
 UNITS = (
     "driver_ramp", "reference_steady_state", "controller_off", "allocator_single_wheel",
     "wheel_control_hydraulic", "plant_fourteen_dof", "tyre_magic_formula",
@@ -123,11 +125,15 @@ def test_the_command_draws_writes_and_ends_with_the_verdict(tmp_path, capsys):
     run = yb.measured(line(tmp_path, "run"), segment=1).save(tmp_path / "results")
     near, far = line(tmp_path, "near", up=0.05), line(tmp_path, "far", up=0.2)
     assert status_of("validate", run, "--measured", near, "--out", tmp_path / "out") == 0
-    assert status_of("validate", run, "--measured", far, "--out", tmp_path / "out") == 1
+    capsys.readouterr()
+    assert status_of("validate", run, "--measured", far, "--out", tmp_path / "out", "--json") == 1
+    answer = json.loads(capsys.readouterr().out)
+    assert set(answer) == ALWAYS | documented()["validate"]
     assert (tmp_path / "out" / "validation.svg").is_file()
     data = json.loads((tmp_path / "out" / "validation.json").read_text())
     signal = data["signals"]["steering_wheel_angle"]
     assert signal["verdict"] == "failed" and signal["value"] > 1.0 and not data["holds"]
+    assert answer["validation"] == data
     assert "TUMFTM" in data["source"]
     capsys.readouterr()
 
