@@ -90,9 +90,9 @@ def _defects(fmu: str, *modules: str) -> list[str]:
 
     from .staging import isolated_modules
 
-    found = [f"model description: {problem}" for problem in validate_fmu(fmu)]
-    if found or fmpy.platform not in fmpy.supported_platforms(fmu):
-        return found
+    defects = [f"model description: {problem}" for problem in validate_fmu(fmu)]
+    if defects or fmpy.platform not in fmpy.supported_platforms(fmu):
+        return defects
     description = fmpy.read_model_description(fmu)
     with tempfile.TemporaryDirectory(prefix="yawbench_") as folder, isolated_modules(*modules):
         fmpy.extract(fmu, folder)

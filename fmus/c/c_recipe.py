@@ -49,11 +49,11 @@ WINDOWS = ("-static", "-Wl,--no-insert-timestamp", "-s")
 
 def find_c_components(root: Path) -> dict[str, Path]:
     """Return name of FMU -> folder of every unit in C below `root`."""
-    found = {}
+    components = {}
     for role in ROLES:
         for file in sorted((root / role).glob(f"*/{DESCRIPTION}")):
-            found[f"{ROLES[role].name}_{file.parent.name}"] = file.parent
-    return found
+            components[f"{ROLES[role].name}_{file.parent.name}"] = file.parent
+    return components
 
 
 @dataclass(frozen=True)

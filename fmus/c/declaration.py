@@ -64,12 +64,12 @@ def read_declaration(xml: bytes, name: str, role: Role) -> tuple[ElementTree.Ele
 
 def _variable(element: ElementTree.Element, real: ElementTree.Element) -> CVariable:
     def number(key: str) -> float | None:
-        given = real.get(key)
+        text = real.get(key)
         try:
-            return None if given is None else float(given)
+            return None if text is None else float(text)
         except ValueError:
             raise BuildError(
-                f"{DESCRIPTION}: {element.get('name')}: {key} must be a number (got {given!r})",
+                f"{DESCRIPTION}: {element.get('name')}: {key} must be a number (got {text!r})",
                 code="declaration-invalid",
             ) from None
 

@@ -80,12 +80,12 @@ def _gate() -> str:
 
 @cache
 def _compilers(compiler: tuple[str, ...]) -> str:
-    said = [platform.python_version(), *FLAGS, *LINUX, *WINDOWS]
+    parts = [platform.python_version(), *FLAGS, *LINUX, *WINDOWS]
     for command in (compiler, (TO_WINDOWS,)):
-        said += command
+        parts += command
         if shutil.which(command[0]):
-            said.append(compiler_version(command))
-    return "\0".join(said) + _digests(*HEADERS.values())
+            parts.append(compiler_version(command))
+    return "\0".join(parts) + _digests(*HEADERS.values())
 
 
 @cache
@@ -149,11 +149,11 @@ def _let_through(
     kept = recall(STORE, key)
     if kept is not None:
         length = int.from_bytes(kept[:8], "little")
-        said, rest = json.loads(kept[8 : 8 + length]), kept[8 + length :]
+        record, rest = json.loads(kept[8 : 8 + length]), kept[8 + length :]
         files = {}
-        for path, size in said["files"]:
+        for path, size in record["files"]:
             files[path], rest = rest[:size], rest[size:]
-        return Native(files, said["why_not"]), False
+        return Native(files, record["why_not"]), False
     made = _made(text, component, guid, resources, limit)
     header = {"files": [[path, len(data)] for path, data in made.files.items()], "why_not": made.why_not}
     head = json.dumps(header).encode()

@@ -334,8 +334,8 @@ class BuiltIn(Looping):
             return issubclass(dict if isinstance(value, Dict) else list, kinds)
         return isinstance(value, kinds)
 
-    def _python_dist(self, one: Any, other: Any) -> Any:
-        pairs = zip(self.items(one), self.items(other), strict=True)
+    def _python_dist(self, first: Any, second: Any) -> Any:
+        pairs = zip(self.items(first), self.items(second), strict=True)
         return self.function("dist", *[self.binary("-", a, b) for a, b in pairs])
 
     def _python_hypot(self, *values: Any) -> Any:

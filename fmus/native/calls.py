@@ -64,9 +64,9 @@ class Calling(BuiltIn):
         mro = me.cls.__mro__
         for base in mro[mro.index(cls) + 1 :]:
             if name in base.__dict__:
-                found = base.__dict__[name]
-                if isinstance(found, types.FunctionType):
-                    return Bound(found, me)
+                member = base.__dict__[name]
+                if isinstance(member, types.FunctionType):
+                    return Bound(member, me)
                 if name == "__init__":
                     return lambda: None
                 raise Refused(f"super().{name}")
@@ -97,8 +97,8 @@ class Calling(BuiltIn):
             return self._inlined(function, args, named)
         if isinstance(function, operator.itemgetter):
             keys = function.__reduce__()[1]
-            found = tuple(self.subscript(args[0], key) for key in keys)
-            return found if len(keys) > 1 else found[0]
+            picked = tuple(self.subscript(args[0], key) for key in keys)
+            return picked if len(keys) > 1 else picked[0]
         if isinstance(function, type) and not self._is_python(function):
             return self._made(function, args, named)
         return self._built_in(function, args, named)
@@ -184,10 +184,10 @@ class Calling(BuiltIn):
 
     def _fill(self, made: Instance, cls: type, args: list[Any], named: dict[str, Any]) -> None:
         fields = [f for f in dataclasses.fields(cls) if f.init]
-        given = dict(zip([f.name for f in fields], args, strict=False)) | named
+        arguments = dict(zip([f.name for f in fields], args, strict=False)) | named
         for f in fields:
-            if f.name in given:
-                value = given[f.name]
+            if f.name in arguments:
+                value = arguments[f.name]
             elif f.default is not dataclasses.MISSING:
                 value = f.default
             elif f.default_factory is not dataclasses.MISSING:

@@ -128,7 +128,7 @@ class _Function:
         """Return the lines of a function that computes from numbers alone."""
         body: list[str] = []
         self._statements(function.body, body, 1)
-        given = "".join(f", {TYPES[x.type]} {x.name}" for x in function.parameters)
+        parameters = "".join(f", {TYPES[x.type]} {x.name}" for x in function.parameters)
         types = dict.fromkeys(TYPES[type] for type in map(ir.type_of, function.results))
         out = "".join(f", {type} *{type}s" for type in types)
         made, counts = [], dict.fromkeys(types, 0)
@@ -137,7 +137,7 @@ class _Function:
             made.append(f"    {type}s[{counts[type]}] = {self._as(ir.type_of(x), x)};")
             counts[type] += 1
         always = "Problem *problem, const Variables *v, const Configured *c"
-        head = f"static int {self.names[function]}({always}{given}{out})"
+        head = f"static int {self.names[function]}({always}{parameters}{out})"
         return self._whole(head, body, made, function.results, function.parameters)
 
     def _whole(
@@ -146,11 +146,11 @@ class _Function:
         body: list[str],
         made: list[str],
         results: Sequence[ir.Operand],
-        given: Sequence[ir.Var],
+        parameters: Sequence[ir.Var],
     ) -> list[str]:
         used = dict.fromkeys(x for x in self._used(self.function.body, results))
         assigned = list(dict.fromkeys(_targets(self.function.body)))
-        own = {*assigned, *given}
+        own = {*assigned, *parameters}
         reads = [
             f"    const {TYPES[x.type]} {x.name} = {self.program.reads[x]};"
             for x in used
@@ -241,7 +241,7 @@ class _Function:
                 lines.append(f"{pad}{s.target.name} = (unsigned char){text};")
 
     def _invoke(self, s: ir.Invoke, pad: str) -> list[str]:
-        given = "".join(
+        arguments = "".join(
             f", {self._as(p.type, x)}" for p, x in zip(s.function.parameters, s.operands, strict=True)
         )
         types = [TYPES[ir.type_of(x)] for x in s.function.results]
@@ -250,7 +250,7 @@ class _Function:
         lines = [f"{pad}{{"]
         lines += [f"{pad}    {type} {type}s[{types.count(type)}];" for type in used]
         lines += [
-            f"{pad}    if ({self.names[s.function]}(problem, v, c{given}{out})) {{",
+            f"{pad}    if ({self.names[s.function]}(problem, v, c{arguments}{out})) {{",
             f"{pad}        return 1;",
         ]
         lines.append(f"{pad}    }}")

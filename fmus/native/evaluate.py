@@ -126,9 +126,9 @@ class Evaluation(Merging):
         call = self.calls[-1]
         frame: Frame | None = call.frame
         while frame is not None:
-            found = self.read(frame).get(node.id, UNSET)
-            if found is not UNSET:
-                return self.present(found, "UnboundLocalError", node.id)
+            value = self.read(frame).get(node.id, UNSET)
+            if value is not UNSET:
+                return self.present(value, "UnboundLocalError", node.id)
             frame = frame.parent
         for names in (call.source.cells, call.source.names, vars(builtins)):
             if node.id in names:
@@ -182,13 +182,13 @@ class Evaluation(Merging):
 
     def values(self, nodes: Sequence[ast.expr]) -> list[Any]:
         """Return the values of expressions, some of which may be starred."""
-        found: list[Any] = []
+        results: list[Any] = []
         for node in nodes:
             if isinstance(node, ast.Starred):
-                found += self.items(self.evaluate(node.value))
+                results += self.items(self.evaluate(node.value))
             else:
-                found.append(self.evaluate(node))
-        return found
+                results.append(self.evaluate(node))
+        return results
 
     def _tuple(self, node: ast.Tuple) -> Any:
         return tuple(self.values(node.elts))
@@ -326,8 +326,8 @@ class Evaluation(Merging):
             and not -len(items) <= index < len(items)
         ):
             self.end("IndexError", _beyond(items))
-        found = items[index]
-        return List(found) if isinstance(owner, List) and isinstance(index, slice) else found
+        item = items[index]
+        return List(item) if isinstance(owner, List) and isinstance(index, slice) else item
 
     def within(self, index: ir.Operand, count: int, text: str) -> ir.Operand:
         """Return an index known at run time as one from the beginning, raising where there is no item."""

@@ -66,18 +66,18 @@ class Native:
         self.said.append(text.decode("utf-8", "replace").replace("%%", "%"))
 
     def _answer(self, status: int, values: bytes = b"") -> Answer:
-        said, self.said = self.said, []
-        return status == 0, said, values
+        messages, self.said = self.said, []
+        return status == 0, messages, values
 
     def reset(self) -> Answer:
         return self._answer(self.library.fmi2Reset(self.instance))
 
     def set(self, kind: str, refs: Sequence[int], values: Sequence[Any]) -> Answer:
         type: Any = {"Real": c_double, "String": c_char_p}.get(kind, c_int)
-        given = [v.encode() if isinstance(v, str) else v for v in values]
+        encoded = [v.encode() if isinstance(v, str) else v for v in values]
         call = getattr(self.library, f"fmi2Set{kind}")
         n = len(refs)
-        return self._answer(call(self.instance, (c_uint * n)(*refs), c_size_t(n), (type * n)(*given)))
+        return self._answer(call(self.instance, (c_uint * n)(*refs), c_size_t(n), (type * n)(*encoded)))
 
     def get(self, refs: Sequence[int]) -> Answer:
         n = len(refs)
@@ -122,22 +122,22 @@ class Twin:
 
     def __init__(self, component: type[Any], resources: Path) -> None:
         self.said: list[str] = []
-        said = self.said
+        messages = self.said
 
         def log(
             unit: Any, text: str, status: int = 0, category: str | None = None, debug: object = None
         ) -> None:
             if category != "traceback":
-                said.append(text)
+                messages.append(text)
 
         component.log = log
         self._make: Callable[[], Any] = lambda: component(instance_name="gate", resources=str(resources))
         self.unit = self._make()
 
     def _answer(self, succeeded: Any = True, values: Sequence[float] = ()) -> Answer:
-        said = list(self.said)
+        messages = list(self.said)
         self.said.clear()
-        return succeeded is not False and not said, said, struct.pack(f"{len(values)}d", *values)
+        return succeeded is not False and not messages, messages, struct.pack(f"{len(values)}d", *values)
 
     def reset(self) -> Answer:
         self.unit = self._make()
@@ -184,17 +184,18 @@ class _Beside:
 
     def call(self, what: str, *args: Any) -> bool:
         """Call both and return whether they succeeded."""
-        one, other = getattr(self.native, what)(*args), getattr(self.twin, what)(*args)
-        if one[0] != other[0] or one[1] != other[1] or not _same(one[2], other[2]):
-            raise Difference(f"{self.told}{what}{_shown(args)}: {self._apart(one, other)}")
-        return one[0]  # type: ignore[no-any-return]
+        native, python = getattr(self.native, what)(*args), getattr(self.twin, what)(*args)
+        if native[0] != python[0] or native[1] != python[1] or not _same(native[2], python[2]):
+            raise Difference(f"{self.told}{what}{_shown(args)}: {self._apart(native, python)}")
+        return native[0]  # type: ignore[no-any-return]
 
-    def _apart(self, one: Answer, other: Answer) -> str:
-        if one[0] != other[0]:
-            return f"native {'succeeds' if one[0] else 'fails'}, Python does not: {(one[1] or other[1])[:1]}"
-        if one[1] != other[1]:
-            return f"native says {one[1]}, Python {other[1]}"
-        for i, (a, b) in enumerate(zip(_numbers(one[2]), _numbers(other[2]), strict=True)):
+    def _apart(self, native: Answer, python: Answer) -> str:
+        if native[0] != python[0]:
+            did, reason = "succeeds" if native[0] else "fails", (native[1] or python[1])[:1]
+            return f"native {did}, Python does not: {reason}"
+        if native[1] != python[1]:
+            return f"native says {native[1]}, Python {python[1]}"
+        for i, (a, b) in enumerate(zip(_numbers(native[2]), _numbers(python[2]), strict=True)):
             if struct.pack("d", a) != struct.pack("d", b):
                 name = self.variables[self.of["output"][i]].name
                 return f"{name} is {a!r} natively, {b!r} in Python"
@@ -230,10 +231,10 @@ def _numbers(content: bytes) -> tuple[float, ...]:
     return struct.unpack(f"{len(content) // 8}d", content)
 
 
-def _same(one: bytes, other: bytes) -> bool:
-    return one == other or all(
+def _same(first: bytes, second: bytes) -> bool:
+    return first == second or all(
         struct.pack("d", a) == struct.pack("d", b) or (math.isnan(a) and math.isnan(b))
-        for a, b in zip(_numbers(one), _numbers(other), strict=True)
+        for a, b in zip(_numbers(first), _numbers(second), strict=True)
     )
 
 
@@ -285,10 +286,10 @@ def compare(library: Path, guid: str, component: type[Any], resources: Path, ste
             _restored(beside, inputs, h, t)
     settings = list(_choices(beside, variables))
     few = max(FEWEST, min(FEW, IN_ALL // max(len(settings), 1)))
-    for told, choose in settings:
-        beside.told = f"{told}: "
+    for label, choose in settings:
+        beside.told = f"{label}: "
         if beside.start(choose, 0.25, next(inputs)):
-            beside.steps(few, random.Random(told).choice(LENGTHS), inputs, 0.25)
+            beside.steps(few, random.Random(label).choice(LENGTHS), inputs, 0.25)
     for i in beside.of["input"]:
         for value in (math.nan, math.inf, -math.inf, 1e300, -0.0):
             beside.told = f"{variables[i].name} = {value}: "

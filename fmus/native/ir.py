@@ -172,15 +172,15 @@ def type_of(value: Operand) -> str:
     return REAL
 
 
-def joined(one: str, other: str) -> str:
+def joined(first: str, second: str) -> str:
     """Return the type that holds the values of both.
 
     Raises:
         ValueError: there is none.
     """
-    if one == other:
-        return one
-    both = {one, other}
+    if first == second:
+        return first
+    both = {first, second}
     if WIDE in both:
         raise ValueError("an integer beyond 64 bits is kept")
     if WORD in both:

@@ -89,8 +89,8 @@ class Facts:
             return self.truths[condition]
         kind, *of = self.meanings.get(condition, ("",))
         if kind == "not":
-            found = self.known(of[0])
-            return None if found is None else not found
+            value = self.known(of[0])
+            return None if value is None else not value
         if kind in ("and", "or"):
             both = self.known(of[0]), self.known(of[1])
             decisive = kind == "or"
@@ -190,27 +190,27 @@ class Lowering:
         kind, *of = self.facts.meanings.get(condition, ("",))
         if kind == "not":
             return of[0]  # type: ignore[no-any-return]
-        found = self.let(ir.BOOL, "not", condition)
-        self.facts.meanings[found] = ("not", condition)
-        return found
+        negated = self.let(ir.BOOL, "not", condition)
+        self.facts.meanings[negated] = ("not", condition)
+        return negated
 
     def compare(self, op: str, a: ir.Operand, b: ir.Operand) -> ir.Operand:
         """Return whether a comparison of two numbers holds."""
         if not isinstance(a, ir.Var) and not isinstance(b, ir.Var):
             return bool(OPERATORS[op](a, b))
         if isinstance(a, ir.Var) and a in self.choices and not isinstance(b, ir.Var):
-            condition, one, other = self.choices[a]
-            first, second = bool(OPERATORS[op](one, b)), bool(OPERATORS[op](other, b))
+            condition, if_true, if_false = self.choices[a]
+            first, second = bool(OPERATORS[op](if_true, b)), bool(OPERATORS[op](if_false, b))
             if first == second:
                 return first
             return condition if first else self.negation(condition)
         a, b = self.settled(a, self.facts), self.settled(b, self.facts)
         if not isinstance(a, ir.Var) and not isinstance(b, ir.Var):
             return bool(OPERATORS[op](a, b))
-        found = self.let(ir.BOOL, _COMPARED[op], a, b)
+        comparison = self.let(ir.BOOL, _COMPARED[op], a, b)
         if op == "==" and isinstance(a, ir.Var) and isinstance(b, int) and a.type == ir.INT:
-            self.facts.meanings[found] = ("is", a, int(b))
-        return found
+            self.facts.meanings[comparison] = ("is", a, int(b))
+        return comparison
 
     # ---- arithmetic -------------------------------------------------------------------------
 
@@ -237,8 +237,8 @@ class Lowering:
             return self.let(ir.INT, "mul_int" if op == "*" else _NAMES[op], a, b)
         if op in ("/", "//", "%"):
             if b == 0 or isinstance(b, ir.Var):
-                one = 1.0 if real else 1
-                self.require(self.compare("!=", b, 0), *complaint(lambda: OPERATORS[op](one, 0 * one)))
+                unit = 1.0 if real else 1
+                self.require(self.compare("!=", b, 0), *complaint(lambda: OPERATORS[op](unit, 0 * unit)))
             if op == "/":
                 return self.let(ir.REAL, "div", a, b)
             name = "floordiv" if op == "//" else "mod"
@@ -270,10 +270,10 @@ class Lowering:
         if isinstance(b, ir.Var) or b != int(b):
             bad = self.let(ir.BOOL, "complex_power", a, b)
             self.require(self.negation(bad), "TypeError", "must be real number, not complex")
-        found = self.let(ir.REAL if real else ir.INT, "pow", a, b)
-        bad = self.let(ir.BOOL, "overflown", found, a, b)
+        power = self.let(ir.REAL if real else ir.INT, "pow", a, b)
+        bad = self.let(ir.BOOL, "overflown", power, a, b)
         self.require(self.negation(bad), *complaint(lambda: 1e200**2.0))
-        return found
+        return power
 
     def negative(self, a: ir.Operand) -> ir.Operand:
         """Return -a."""
@@ -337,14 +337,14 @@ class Lowering:
             return self._power(self.as_real(operands[0]), self.as_real(operands[1]), True)
         if name not in FUNCTIONS:
             raise Refused(f"math.{name}")
-        found = self.let(ir.REAL, name, *operands)
+        result = self.let(ir.REAL, name, *operands)
         if name in CAN_OVERFLOW:
-            bad = self.let(ir.BOOL, "overflown", found, operands[0])
+            bad = self.let(ir.BOOL, "overflown", result, operands[0])
             self.require(self.negation(bad), *complaint(lambda: math.exp(1e3)))
         elif name in DOMAIN:
-            bad = self.let(ir.BOOL, "undefined", found, *operands)
+            bad = self.let(ir.BOOL, "undefined", result, *operands)
             self.require(self.negation(bad), *complaint(lambda: math.sqrt(-1.0)))
-        return found
+        return result
 
     def total(self, items: list[ir.Operand], start: ir.Operand) -> ir.Operand:
         """Return sum(items, start), by the summation of the Python that builds."""

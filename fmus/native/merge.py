@@ -173,13 +173,13 @@ class Merging(Lowering):
         value = join.of(a.value, b.value)
         changes = []
         for box in dict.fromkeys((*a.changed, *b.changed)):
-            one, other = a.slots(box), b.slots(box)
-            if isinstance(one, list) and len(one) != len(other):
+            slots_a, slots_b = a.slots(box), b.slots(box)
+            if isinstance(slots_a, list) and len(slots_a) != len(slots_b):
                 raise Refused("a list is made longer or shorter on one path only")
-            one, other = self.relevant(box, one, other)
-            keys = range(len(one)) if isinstance(one, list) else dict.fromkeys((*one, *other))
-            merged = {key: join.of(items_of(one, key), items_of(other, key)) for key in keys}
-            changes.append((box, list(merged.values()) if isinstance(one, list) else merged))
+            slots_a, slots_b = self.relevant(box, slots_a, slots_b)
+            keys = range(len(slots_a)) if isinstance(slots_a, list) else dict.fromkeys((*slots_a, *slots_b))
+            merged = {key: join.of(items_of(slots_a, key), items_of(slots_b, key)) for key in keys}
+            changes.append((box, list(merged.values()) if isinstance(slots_a, list) else merged))
         join.finish()
         if a.out or b.out:
             self.out.append(ir.If(test, a.out, b.out))
@@ -188,9 +188,9 @@ class Merging(Lowering):
             box.slots = slots if isinstance(slots, list) else {k: v for k, v in slots.items()}
         return value
 
-    def relevant(self, box: Box, one: Any, other: Any) -> tuple[Any, Any]:
+    def relevant(self, box: Box, slots_a: Any, slots_b: Any) -> tuple[Any, Any]:
         """Return what a box holds on two paths, without what is of no more use on one of them."""
-        return one, other
+        return slots_a, slots_b
 
     def by_form(self, value: Any, use: Callable[[Any], Any]) -> Any:
         """Return what `use` makes of the alternative that a value is."""
@@ -349,22 +349,22 @@ class _Join:
             return a
         if (a, b) in self.boxes:
             return self.boxes[a, b]
-        one, other = self.a.slots(a), self.b.slots(b)
-        if isinstance(a, Ring) or (isinstance(a, List) and len(one) != len(other)):
+        slots_a, slots_b = self.a.slots(a), self.b.slots(b)
+        if isinstance(a, Ring) or (isinstance(a, List) and len(slots_a) != len(slots_b)):
             raise Refused("a list is made longer or shorter on one path only")
         made: Box
         if isinstance(a, Instance):
             made = Instance(a.cls)
         elif isinstance(a, List):
-            made = List(one)
+            made = List(slots_a)
         elif isinstance(a, Frame) and isinstance(b, Frame):
             parent = self.box(a.parent, b.parent) if a.parent and b.parent else None
             made = Frame({}, parent)
         else:
             made = type(a)({})  # type: ignore[call-arg]
         self.boxes[a, b] = made
-        keys = keys_of(made) if isinstance(made, List) else dict.fromkeys((*one, *other))
-        joined = {key: self.of(items_of(one, key), items_of(other, key)) for key in keys}
+        keys = keys_of(made) if isinstance(made, List) else dict.fromkeys((*slots_a, *slots_b))
+        joined = {key: self.of(items_of(slots_a, key), items_of(slots_b, key)) for key in keys}
         made.slots = list(joined.values()) if isinstance(made, List) else joined
         return made
 
@@ -388,23 +388,23 @@ class _Join:
         alternatives = list(forms(a))
         places: list[int] = []
         for value in forms(b):
-            found = next((i for i, x in enumerate(alternatives) if alike(x, value)), None)
-            if found is None:
+            place = next((i for i, x in enumerate(alternatives) if alike(x, value)), None)
+            if place is None:
                 alternatives.append(value)
                 places.append(len(alternatives) - 1)
             else:
-                alternatives[found] = self.of(alternatives[found], value)
-                places.append(found)
+                alternatives[place] = self.of(alternatives[place], value)
+                places.append(place)
         if len(alternatives) > MOST_FORMS:
             raise Refused(f"a value of more than {MOST_FORMS} forms")
-        one: ir.Operand = a.tag if isinstance(a, Union) else 0
-        other: ir.Operand = places[0]
+        tag_a: ir.Operand = a.tag if isinstance(a, Union) else 0
+        tag_b: ir.Operand = places[0]
         if isinstance(b, Union):
-            other = b.tag
+            tag_b = b.tag
             if places != list(range(len(places))):
-                other = self.machine.new(ir.INT)
-                self.b.out.append(ir.Load(other, tuple(places), b.tag))
-        tag = self.number(one, other)
+                tag_b = self.machine.new(ir.INT)
+                self.b.out.append(ir.Load(tag_b, tuple(places), b.tag))
+        tag = self.number(tag_a, tag_b)
         if not isinstance(tag, ir.Var):
             raise Refused("two forms that cannot be told apart")
         return Union(tag, tuple(alternatives))

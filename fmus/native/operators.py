@@ -38,12 +38,12 @@ class Operating(Evaluation):
     # ---- comprehensions ---------------------------------------------------------------------
 
     def _comprehended(self, generators: list[ast.comprehension], make: Any) -> list[Any]:
-        call, found = self.calls[-1], []
+        call, elements = self.calls[-1], []
         inner = replace(call, frame=Frame({}, call.frame))
 
         def go(k: int) -> None:
             if k == len(generators):
-                found.append(make())
+                elements.append(make())
                 return
             for item in self.items(self.evaluate(generators[k].iter)):
                 self.assign(generators[k].target, item)  # type: ignore[attr-defined]
@@ -61,7 +61,7 @@ class Operating(Evaluation):
             go(0)
         finally:
             self.calls.pop()
-        return found
+        return elements
 
     def _listcomp(self, node: ast.ListComp) -> Any:
         return List(self._comprehended(node.generators, lambda: self.evaluate(node.elt)))
@@ -179,8 +179,8 @@ class Operating(Evaluation):
         if isinstance(a, Union) or isinstance(b, Union):
             return self.by_form(a, lambda x: self.by_form(b, lambda y: self.compared(op, x, y)))  # type: ignore
         if isinstance(op, (ast.In, ast.NotIn)):
-            found = self._contained(a, b)
-            return found if isinstance(op, ast.In) else self.negation(found)
+            contained = self._contained(a, b)
+            return contained if isinstance(op, ast.In) else self.negation(contained)
         if isinstance(op, (ast.Is, ast.IsNot)):
             if isinstance(a, ir.Var) and isinstance(b, ir.Var):
                 raise Refused("whether two numbers are the same object")
@@ -204,8 +204,8 @@ class Operating(Evaluation):
             return self.compare("==", a, b)
         lists = isinstance(a, List), isinstance(b, List)
         if all(lists) or (isinstance(a, tuple) and isinstance(b, tuple)):
-            one, other = self.items(a), self.items(b)
-            return len(one) == len(other) and self._all_equal(list(zip(one, other, strict=True)))
+            items_a, items_b = self.items(a), self.items(b)
+            return len(items_a) == len(items_b) and self._all_equal(list(zip(items_a, items_b, strict=True)))
         if isinstance(a, Box) or isinstance(b, Box):
             return a is b
         return not (isinstance(a, ir.Var) or isinstance(b, ir.Var)) and bool(a == b)

@@ -61,16 +61,16 @@ class Outlining(Calling):
             if isinstance(value, Picked):
                 call.frame.slots[name] = self.loaded(value)
         chosen = {tag: left for tag in self.choosers if (left := self.facts.left(tag)) is not None}
-        given = shape_of(call.frame, self.read, "", Memo(self.fixed))
-        key = id(call.source), id(node), _key(given, {}), frozenset(chosen.items())
+        shape = shape_of(call.frame, self.read, "", Memo(self.fixed))
+        key = id(call.source), id(node), _key(shape, {}), frozenset(chosen.items())
         if key not in self.library.made:
-            self.library.kept.append((call.source, given))
-            self.library.made[key] = self._tried(call, node, given, chosen)
-        found = self.library.made[key]
-        if found is None:
+            self.library.kept.append((call.source, shape))
+            self.library.made[key] = self._tried(call, node, shape, chosen)
+        outlined = self.library.made[key]
+        if outlined is None:
             return self.inside(call, node)
-        function, result = found
-        numbers = numbers_of(given, call.frame, self.read, self)
+        function, result = outlined
+        numbers = numbers_of(shape, call.frame, self.read, self)
         targets = tuple(self.new(type) for type in types_of(result))
         self.out.append(ir.Invoke(targets, function, tuple(numbers)))
         return build(result, iter(targets))
@@ -79,12 +79,12 @@ class Outlining(Calling):
         self,
         call: Call,
         node: ast.FunctionDef | ast.Lambda,
-        given: Shape,
+        shape: Shape,
         chosen: dict[ir.Var, frozenset[int]],
     ) -> tuple[ir.Outlined, Shape] | None:
-        parameters = tuple(self.new(type) for type in types_of(given))
+        parameters = tuple(self.new(type) for type in types_of(shape))
         copies: dict[int, Any] = {}
-        frame = build(given, iter(parameters), copies)
+        frame = build(shape, iter(parameters), copies)
         assert isinstance(frame, Frame)
         facts = Facts()
         facts.meanings, facts.domains = self.facts.meanings, self.facts.domains

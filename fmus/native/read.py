@@ -39,14 +39,14 @@ class Source:
 
 @cache
 def _functions(file: str, content: bytes) -> dict[tuple[int, str], list[Tree]]:
-    found: dict[tuple[int, str], list[Tree]] = {}
+    functions: dict[tuple[int, str], list[Tree]] = {}
     for node in ast.walk(ast.parse(content)):
         if isinstance(node, ast.FunctionDef):
             first = min([node.lineno, *(d.lineno for d in node.decorator_list)])
-            found.setdefault((first, node.name), []).append(node)
+            functions.setdefault((first, node.name), []).append(node)
         elif isinstance(node, ast.Lambda):
-            found.setdefault((node.lineno, "<lambda>"), []).append(node)
-    return found
+            functions.setdefault((node.lineno, "<lambda>"), []).append(node)
+    return functions
 
 
 @cache
@@ -64,13 +64,13 @@ def names_within(node: ast.AST) -> Counter[tuple[str, type[ast.expr_context]]]:
 @cache
 def _codes(file: str, content: bytes) -> dict[tuple[int, str], CodeType]:
     """Return the code of every function in a file, by its first line and name."""
-    found: dict[tuple[int, str], CodeType] = {}
+    codes: dict[tuple[int, str], CodeType] = {}
     waiting = [compile(content, file, "exec", dont_inherit=True)]
     while waiting:
         within = [x for x in waiting.pop().co_consts if isinstance(x, CodeType)]
-        found |= {(code.co_firstlineno, code.co_name): code for code in within}
+        codes |= {(code.co_firstlineno, code.co_name): code for code in within}
         waiting += within
-    return found
+    return codes
 
 
 def content_of(file: str) -> bytes | None:

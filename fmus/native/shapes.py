@@ -321,30 +321,30 @@ def build(shape: Shape, leaves: Iterator[Any], memo: dict[int, Any] | None = Non
 
 def numbers_of(shape: Shape, value: Any, slots: Place, machine: Merging) -> list[ir.Operand]:
     """Return the numbers of a value at the leaves of a shape that is wide enough for it."""
-    found: list[ir.Operand] = []
-    _collect(shape, value, slots, machine, found, set())
-    return found
+    operands: list[ir.Operand] = []
+    _collect(shape, value, slots, machine, operands, set())
+    return operands
 
 
 def _collect(
-    shape: Shape, value: Any, slots: Place, machine: Merging, found: list[ir.Operand], seen: set[int]
+    shape: Shape, value: Any, slots: Place, machine: Merging, operands: list[ir.Operand], seen: set[int]
 ) -> None:
     if value is ANY:
-        found += [0] * len(list(_types(shape, seen)))
+        operands += [0] * len(list(_types(shape, seen)))
     elif isinstance(shape, Leaf):
-        found.append(value)
+        operands.append(value)
     elif isinstance(shape, Items):
         for item, x in zip(shape.items, value, strict=True):
-            _collect(item, x, slots, machine, found, seen)
+            _collect(item, x, slots, machine, operands, seen)
     elif isinstance(shape, Held):
         if id(shape) in seen:
             return
         seen.add(id(shape))
         held = slots(value)
         for key, item in shape.items.items():
-            _collect(item, items_of(held, key), slots, machine, found, seen)
+            _collect(item, items_of(held, key), slots, machine, operands, seen)
         if shape.parent is not None:
-            _collect(shape.parent, value.parent, slots, machine, found, seen)
+            _collect(shape.parent, value.parent, slots, machine, operands, seen)
     elif isinstance(shape, Growing):
         if isinstance(value, List):
             machine.out.append(ir.Drop(shape.number, every=True))
@@ -353,12 +353,12 @@ def _collect(
                 machine.out.append(ir.Push(shape.number, tuple(numbers)))
     elif isinstance(shape, Made):
         inner = value.frame if isinstance(value, Closure) else value.owner
-        _collect(shape.inner, inner, slots, machine, found, seen)
+        _collect(shape.inner, inner, slots, machine, operands, seen)
     elif isinstance(shape, Forms):
-        given = list(value.alternatives) if isinstance(value, Union) else [value]
+        alternatives = list(value.alternatives) if isinstance(value, Union) else [value]
         memo = Memo()
         places: list[int] = []
-        for x in given:
+        for x in alternatives:
             form = shape_of(x, slots, "", memo)
             places.append(_place(shape.alternatives, form, len(places)))
         tag: ir.Operand = places[0]
@@ -367,12 +367,12 @@ def _collect(
             if places != list(range(len(places))):
                 tag = machine.new(ir.INT)
                 machine.out.append(ir.Load(tag, tuple(places), value.tag))
-        found += [tag] * isinstance(shape.tag, Leaf)
+        operands += [tag] * isinstance(shape.tag, Leaf)
         for i, mine in enumerate(shape.alternatives):
             if i in places:
-                _collect(mine, given[places.index(i)], slots, machine, found, seen)
+                _collect(mine, alternatives[places.index(i)], slots, machine, operands, seen)
             else:
-                found += [0] * len(list(_types(mine, seen)))
+                operands += [0] * len(list(_types(mine, seen)))
 
 
 __all__ = ["Forms", "Growing", "Held", "Known", "Leaf", "Shape", "Widening", "build", "keys_of", "numbers_of"]

@@ -62,13 +62,13 @@ def specialise(component: type[Any], home: Path, *others: Path) -> Program:
         Refused: what cannot be translated, with file and line.
     """
     _refuse_replaced_life_cycle(component, home)
-    found: list[Any] = []
+    outcomes: list[Any] = []
 
     def run() -> None:
         try:
-            found.append(_Specialising(component, Sources(home, *others)).program())
+            outcomes.append(_Specialising(component, Sources(home, *others)).program())
         except BaseException as error:
-            found.append(error)
+            outcomes.append(error)
 
     size, deepest = threading.stack_size(STACK), sys.getrecursionlimit()
     sys.setrecursionlimit(200_000)
@@ -79,9 +79,9 @@ def specialise(component: type[Any], home: Path, *others: Path) -> Program:
     finally:
         threading.stack_size(size)
         sys.setrecursionlimit(deepest)
-    if isinstance(found[0], BaseException):
-        raise found[0]
-    return found[0]  # type: ignore[no-any-return]
+    if isinstance(outcomes[0], BaseException):
+        raise outcomes[0]
+    return outcomes[0]  # type: ignore[no-any-return]
 
 
 def _refuse_replaced_life_cycle(component: type[Any], home: Path) -> None:
@@ -137,10 +137,10 @@ class _Specialising:
         for _ in range(WIDEST):
             try:
                 return self._attempt()
-            except Promote as found:  # noqa: PERF203 - each attempt follows from the last
-                if found.path in self.growing:
+            except Promote as promoted:  # noqa: PERF203 - each attempt follows from the last
+                if promoted.path in self.growing:
                     raise Refused("a list whose length changes in ways that are not followed") from None
-                self.growing[found.path] = Growing(len(self.growing), found.item)
+                self.growing[promoted.path] = Growing(len(self.growing), promoted.item)
         raise Refused("too many lists whose length changes")
 
     # ---- one attempt ------------------------------------------------------------------------
@@ -194,10 +194,10 @@ class _Specialising:
         after = self._numbers(state, me, machine)
         if widening.grew or any(x is not leaf for x, leaf in zip(after, leaves, strict=True)):
             raise Refused("output() changes what the unit keeps", self._line_of("output"))
-        given = self.given
-        if isinstance(given, Union) or not isinstance(given, (tuple, List)):
+        outputs = self.given
+        if isinstance(outputs, Union) or not isinstance(outputs, (tuple, List)):
             raise Refused("output() returns what has several forms", self._line_of("output"))
-        values = machine.items(given)
+        values = machine.items(outputs)
         if len(values) != self.outputs or not all(map(is_number, values)):
             raise Refused("output() returns something other than all outputs", self._line_of("output"))
         return ir.Function(machine.out, _placed("y", list(map(machine.as_real, values))))

@@ -79,15 +79,15 @@ class Execution(Operating):
             self.at(node)
             raise Refused(f"not translated: {type(error).__name__}: {error}", self.where()) from error
 
-    def relevant(self, box: Box, one: Any, other: Any) -> tuple[Any, Any]:
-        if box is not self.frame or not isinstance(one, dict) or self._has_closures():
-            return one, other
-        exits = one.get(EXIT), other.get(EXIT)
+    def relevant(self, box: Box, slots_a: Any, slots_b: Any) -> tuple[Any, Any]:
+        if box is not self.frame or not isinstance(slots_a, dict) or self._has_closures():
+            return slots_a, slots_b
+        exits = slots_a.get(EXIT), slots_b.get(EXIT)
         if [x is RETURN for x in exits] == [True, False]:
-            one = {**other, **{k: one[k] for k in (EXIT, RESULT)}}
+            slots_a = {**slots_b, **{k: slots_a[k] for k in (EXIT, RESULT)}}
         elif [x is RETURN for x in exits] == [False, True]:
-            other = {**one, **{k: other[k] for k in (EXIT, RESULT)}}
-        return one, other
+            slots_b = {**slots_a, **{k: slots_b[k] for k in (EXIT, RESULT)}}
+        return slots_a, slots_b
 
     def _has_closures(self) -> bool:
         kinds = kinds_within(self.calls[-1].source.node)

@@ -199,18 +199,18 @@ def is_plain(value: Any) -> bool:
     return isinstance(value, (int, float, str, bytes, complex, type(None), range, frozenset))
 
 
-def same(one: Any, other: Any) -> bool:
+def same(first: Any, second: Any) -> bool:
     """Return whether two values known at build time are the same, signs of zeros and types included."""
-    if one is other:
+    if first is second:
         return True
-    if type(one) is not type(other) or isinstance(one, ir.Var | Box | Union | Closure | Bound):
+    if type(first) is not type(second) or isinstance(first, ir.Var | Box | Union | Closure | Bound):
         return False
-    if isinstance(one, (int, float, str)):
-        return repr(one) == repr(other)
-    if isinstance(one, tuple):
-        return len(one) == len(other) and all(map(same, one, other))
+    if isinstance(first, (int, float, str)):
+        return repr(first) == repr(second)
+    if isinstance(first, tuple):
+        return len(first) == len(second) and all(map(same, first, second))
     try:
-        return bool(one == other)
+        return bool(first == second)
     except Exception:
         return False
 
