@@ -167,6 +167,8 @@ def job_of(path: Path, inputs: str, validate: bool) -> tuple[Job | None, str, st
 def run_in_fmpy(job: Job) -> np.ndarray:
     """Run an FMU in a loop of FMPy's functions; return the recorded values, shape (rows, variables)."""
     from fmpy import extract, instantiate_fmu, read_model_description
+    from fmpy.fmi1 import FMICallException
+    from fmpy.fmi2 import fmi2Discard, fmi2LastSuccessfulTime, fmi2Terminated
 
     description = read_model_description(job.path, validate=False)
     modern = description.fmiVersion != "2.0"
@@ -198,9 +200,16 @@ def run_in_fmpy(job: Job) -> np.ndarray:
     rows = [fetch()]
     for k, time in enumerate(times[:-1]):
         put(k)
-        answer = fmu.doStep(currentCommunicationPoint=time, communicationStepSize=step)
-        rows.append(fetch())
-        if modern and answer[1]:  # it asks to end
+        try:
+            answer = fmu.doStep(currentCommunicationPoint=time, communicationStepSize=step)
+            ending, reached = bool(modern and answer[1]), times[k + 1]
+        except FMICallException as error:
+            if modern or error.status != fmi2Discard or not fmu.getBooleanStatus(fmi2Terminated):
+                raise
+            ending, reached = True, fmu.getRealStatus(fmi2LastSuccessfulTime)
+        if reached > times[k + 1] - step / 2:
+            rows.append(fetch())
+        if ending:
             break
     return np.array(rows).reshape(len(rows), len(job.record))
 
