@@ -78,6 +78,13 @@ def test_outputs_that_contradict_each_other_are_refused(run, capsys):
     assert not [path for path in Path().iterdir() if path.name.startswith("fig")]
 
 
+@pytest.mark.exhaustive  # LaTeX measures every text: half a minute
+@pytest.mark.skipif(not shutil.which("xelatex"), reason="LaTeX is not installed")
+def test_pgf_is_written_with_latex(run):
+    assert status_of("plot", run, *SINGLE, "--style", "ieee", "--out", "fig.pgf") == 0
+    assert Path("fig.pgf").read_text(encoding="utf-8").count(r"\begin{pgfpicture}") == 1
+
+
 @pytest.mark.skipif(bool(shutil.which("xelatex")), reason="LaTeX is installed")
 def test_pgf_without_latex_is_refused_in_a_sentence(run, capsys):
     assert status_of("plot", run, *SINGLE, "--format", "pgf") == 2
