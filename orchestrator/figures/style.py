@@ -176,7 +176,7 @@ def save(figure: Figure, stem: Path, kinds: Sequence[str] = ("svg", "png")) -> l
         try:
             for path, kind in zip(paths, kinds, strict=True):
                 content = io.BytesIO()
-                known = {"metadata": KINDS[kind]} if KINDS[kind] else {}  # PGF takes none
+                known: dict[str, Any] = {"metadata": KINDS[kind]} if KINDS[kind] else {}  # PGF takes none
                 figure.savefig(content, format=kind, **known)
                 write_whole(path, content.getvalue())
         except RuntimeError as error:  # of matplotlib, which measures texts with LaTeX
