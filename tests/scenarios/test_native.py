@@ -27,6 +27,7 @@ RUNS = {
     "proving_ground/sine_sweep": {"controller": "controller_lqr"},
     "proving_ground/sine_with_dwell": {},
     "real_signals/monitored_lane_change": {"sensor": "sensor_poor"},
+    "real_signals/parity_lane_change": {},
     "real_signals/single_sine": {"estimator": "estimator_kinematic", "sensor": "sensor_ideal"},
     "real_signals/told_fnn": {},
     "road/split_braking": {},
