@@ -34,7 +34,7 @@ def test_the_observer_misses_no_more_than_it_may_and_the_documentation_says_what
 
 @pytest.mark.parametrize("name", FILES)
 def test_four_lines_put_sensor_and_estimator_into_a_loop(name):
-    more = name.startswith(("told_", "monitored_"))  # who is told the truth, who watches
+    more = name.startswith(("told_", "monitored_", "parity_"))  # who is told the truth, who watches
     assert len(yb.load(f"real_signals/{name}").loaded.connections) <= 4 + more
 
 
@@ -89,7 +89,7 @@ def test_the_documentation_has_what_the_studies_measure(name, rows, page, tmp_pa
     assert [row for row in rows(study) if row not in written] == []
 
 
-@pytest.mark.parametrize(("name", "noisy"), [("degradation", 6 * 4), ("faults", 104)])
+@pytest.mark.parametrize(("name", "noisy"), [("degradation", 6 * 4), ("faults", 177)])
 def test_every_run_with_noise_that_a_mean_is_made_of_has_ten_seeds(name, noisy):
     study = load_experiment(ROOT / f"scenarios/real_signals/{name}.yaml")
     seeds: dict[str, set[object]] = {}
