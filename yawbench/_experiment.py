@@ -9,9 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-
-from orchestrator.errors import Diagnostic, Location, ResultsError, ScenarioError
+from orchestrator.errors import Diagnostic, Location, ScenarioError
 from orchestrator.experiments.experiment import LoadedExperiment as Design
 from orchestrator.experiments.experiment import NamedRun
 from orchestrator.experiments.figures import draw_over_axes
@@ -34,6 +32,7 @@ from orchestrator.scenario.yaml_lines import Document, scalar
 
 from . import arguments
 from ._calls import make_all
+from ._dataset import dataset
 from ._progress import bar
 from ._run import Run, shown_in_notebooks
 from ._scenario import Scenario, warn
@@ -248,26 +247,7 @@ class Runs:
         Raises:
             ResultsError: results were not kept, or the runs have different times.
         """
-        import xarray as xr
-
-        runs = [run for run in self.runs or () if run is not None]
-        if not runs or any(not np.array_equal(run.time, runs[0].time) for run in runs):
-            why = "the runs have different times" if runs else "no results were kept"
-            raise ResultsError(f"{self.findings.spec.title}: {why}", code="signal-unknown")
-        axes = {name: list(dict.fromkeys(self.table[name])) for name in self.findings.spec.axes}
-        units = self.table.attrs["units"]
-        coordinates = {name: (name, levels, _unit(units.get(name))) for name, levels in axes.items()}
-        shape = [*map(len, axes.values()), runs[0].time.size]
-        columns = {name: run.unit_of(name) for run in runs for name in run}
-        variables = {}
-        for name, unit in columns.items():
-            values = np.full(shape, np.nan)
-            for run, row in zip(self.runs or (), self.table[list(axes)].itertuples(index=False), strict=True):
-                if run is not None and name in run:
-                    values[tuple(axes[axis].index(x) for axis, x in zip(axes, row, strict=True))] = run[name]
-            variables[name] = ((*axes, "time"), values, _unit(unit))
-        time = ("time", runs[0].time, _unit("s"))
-        return xr.Dataset(variables, {**coordinates, "time": time}, {"title": self.findings.spec.title})
+        return dataset(self.findings.spec.title, self.table, list(self.findings.spec.axes), self.runs or ())
 
     def plot(
         self,
@@ -374,10 +354,6 @@ class Runs:
 
     def _repr_html_(self) -> str:
         return str(self.table.drop(columns="key").to_html(index=False, na_rep=""))
-
-
-def _unit(unit: str | None) -> dict[str, str]:
-    return {"units": unit} if unit else {}
 
 
 def _axes_of(only: Any) -> dict[str, Any]:

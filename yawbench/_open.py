@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from orchestrator.errors import ResultsError
 from orchestrator.messages import counted, listed
@@ -15,13 +16,21 @@ from orchestrator.results.reader import found_runs, load_results
 from orchestrator.results.run_folder import PART, RUN_FILE
 
 from . import arguments
-from ._run import Run
+from ._dataset import dataset
+from ._run import Run, measured, shown_in_notebooks
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
+    from matplotlib.figure import Figure
 
-MAIN = ("table", "trials")
-"""Names of a command's main table: of experiments and rankings, of tunings."""
+EVALUATED = "evaluation"
+"""Name of the file and of the table of an evaluation."""
+
+MAIN = ("trials", "table", EVALUATED)
+"""Names of a command's main table: of tunings, of experiments and rankings, of evaluations."""
+STATUS = "status"
+"""Column of an experiment's table that follows the run and the axes."""
 
 
 def open(folder: str | Path) -> Run | RecordedRuns:
@@ -31,14 +40,19 @@ def open(folder: str | Path) -> Run | RecordedRuns:
         'Sideslip tracking at 25 m/s, mu 0.65'
 
     Args:
-        folder: of a run, or of a sweep, a study, a tuning, a ranking or an evaluation.
+        folder: of a run, or of a sweep, a study, a tuning, a ranking or an evaluation; or a measurement file.
 
     Raises:
         ResultsError: there is nothing of the kind, or it is unreadable.
+        ScenarioError: the measurement file, or a recording that it names, cannot be used.
     """
     place = arguments.path(folder, "folder")
+    if place.suffix in (".yaml", ".yml") and place.is_file():
+        return measured(place)
     if place.is_dir() and not any((place / name).exists() for name in (RUN_FILE, f"{RUN_FILE}{PART}")):
         tables = {file.stem: file for file in sorted(place.glob("*.csv")) if file.name != RESULTS_FILE}
+        if (evaluated := place / f"{EVALUATED}.json").is_file():
+            tables[EVALUATED] = evaluated
         if tables:
             return RecordedRuns(place, tables)
         if found_runs(place):
@@ -56,7 +70,7 @@ class RecordedRuns:
 
     Attributes:
         folder: the folder.
-        files: name -> CSV file of each table.
+        files: name -> file of each table.
     """
 
     __module__ = "yawbench"
@@ -66,7 +80,10 @@ class RecordedRuns:
 
     @property
     def table(self) -> pd.DataFrame:
-        """The main table: a row per run, or per controller of a ranking; `attrs["units"]` holds the units."""
+        """The main table, whose `attrs["units"]` holds the units.
+
+        A row is a run, a trial of a tuning, a controller of a ranking, or an evaluated run.
+        """
         name = next((name for name in (*MAIN, *self.files) if name in self.files), None)
         if name is None:
             raise ResultsError(f"{self.folder}: holds runs, but no table", code="results-missing")
@@ -75,7 +92,10 @@ class RecordedRuns:
     @cached_property
     def tables(self) -> dict[str, pd.DataFrame]:
         """All tables by name, their columns named without units."""
-        return {name: _frame(file) for name, file in self.files.items()}
+        return {
+            name: _evaluated(file) if file.suffix == ".json" else _frame(file)
+            for name, file in self.files.items()
+        }
 
     @cached_property
     def runs(self) -> dict[str, Run]:
@@ -86,6 +106,49 @@ class RecordedRuns:
             return {}
         done = [run.folder for run in found if run.status == "completed"]
         return {folder.relative_to(self.folder).as_posix(): Run(load_results(folder)) for folder in done}
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return all columns of all runs over the axes, or the names of the runs, and time.
+
+        Each has its unit in `attrs["units"]`. What is missing is NaN.
+
+        Raises:
+            ResultsError: it is no folder of an experiment, no results were kept, or the runs have different
+                times.
+        """
+        table = self.tables.get("table")
+        if table is None or not {STATUS, "key", "run"} <= set(table.columns):
+            raise ResultsError(f"{self.folder}: holds no table of runs", code="results-missing")
+        axes = list(table.columns[: list(table.columns).index(STATUS)])
+        if len(axes) > 1 and not table.duplicated(axes[1:]).any():
+            del axes[0]  # the number or the name of the run
+        names = zip(table["key"], table["run"], strict=True)
+        runs = [self.runs.get(f"runs/{key[:12]}") or self.runs.get(str(name)) for key, name in names]
+        return dataset(self.folder.name, table, axes, runs)
+
+    def plot(self, *panels: str, title: str | None = None) -> Figure:
+        """Return a figure of all runs, as `yawbench plot` draws them.
+
+            >>> yb.open("results").plot("sideslip").savefig("runs.svg")
+
+        Args:
+            panels, title: as of `Run.plot`.
+
+        Raises:
+            ScenarioError: a signal was not recorded.
+            ResultsError: no results were kept, or no recorded signal can be drawn.
+        """
+        from orchestrator.figures import panels as drawing
+        from orchestrator.figures.plots import OVERVIEW, draw
+        from orchestrator.figures.style import LabelledRun
+
+        wanted = [arguments.text(panel, f"panels[{k}]") for k, panel in enumerate(panels)]
+        title = None if title is None else arguments.text(title, "title")
+        if not self.runs:
+            raise ResultsError(f"{self.folder}: no results were kept", code="results-missing")
+        runs = [LabelledRun(name, run.results) for name, run in self.runs.items()]
+        drawing.check_panels(runs, wanted, option="panel ")
+        return shown_in_notebooks(draw(runs, wanted or OVERVIEW, title=title or self.folder.name))
 
     def __repr__(self) -> str:
         held = listed(list(self.files), last="and") or "no table"
@@ -98,10 +161,12 @@ class RecordedRuns:
 def _frame(file: Path) -> pd.DataFrame:
     """Return a table that a command has written as CSV."""
     import pandas as pd
+    import pyarrow as pa
+    from pyarrow import csv
 
     try:
-        frame = pd.read_csv(file, float_precision="round_trip")
-    except (OSError, ValueError) as error:
+        frame = csv.read_csv(file, convert_options=csv.ConvertOptions(strings_can_be_null=True)).to_pandas()
+    except (OSError, pa.ArrowException) as error:
         raise ResultsError(f"{file}: cannot be read: {error}", code="results-unreadable") from None
     units = {}
     names = []
@@ -111,5 +176,26 @@ def _frame(file: Path) -> pd.DataFrame:
         if bracket and unit.endswith("]"):
             units[name] = unit[:-1]
     frame.columns = pd.Index(names)
+    frame.attrs["units"] = units
+    return frame
+
+
+def _evaluated(file: Path) -> pd.DataFrame:
+    """Return the table of an evaluation: a row per run with verdicts of the criteria, and quantities."""
+    import pandas as pd
+
+    try:
+        runs = json.loads(file.read_bytes())["runs"]
+        rows: list[dict[str, Any]] = []
+        units: dict[str, str] = {}
+        for run in runs:
+            row = {"label": run["label"], "verdict": run["verdict"]}
+            row |= {name: verdict["verdict"] for name, verdict in run["criteria"].items()}
+            row |= {name: quantity["value"] for name, quantity in run["quantities"].items()}
+            units |= {name: quantity["unit"] for name, quantity in run["quantities"].items()}
+            rows.append(row)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise ResultsError(f"{file}: cannot be read: {error!r}", code="results-unreadable") from None
+    frame = pd.DataFrame(rows)
     frame.attrs["units"] = units
     return frame
