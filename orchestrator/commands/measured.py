@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -14,7 +14,7 @@ from .progress import hold, print_tables, say, stoppable
 
 if TYPE_CHECKING:
     from ..evaluation.validation import Validation
-    from ..experiments.fit_result import FitResult, FittedModel
+    from ..experiments.fit_result import FitResult
     from ..experiments.tables import Table
     from ..measured.measurement import Measurement
     from ..planner import Planner
@@ -133,15 +133,18 @@ def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
     """Fit parameters of a scenario to a measured car.
 
     Prints the parameters with their intervals, and the differences on training and held-out windows beside
-    those of a single track with Fiala tyres, fitted to the same windows. Writes fit.json and vehicle.yaml,
-    the vehicle file with the fitted values. Parameters that cannot be identified are refused. Without --out,
-    results go to results/<folder of the fit file>/<its name>. An interrupted fit goes on where it was.
+    those of a single track with Fiala tyres, fitted to the same windows. Writes fit.json, vehicle.yaml (the
+    vehicle file with the fitted values) and fit.html (all of it, with the histories). Parameters that cannot
+    be identified are refused. Without --out, results go to results/<folder of the fit file>/<its name>. An
+    interrupted fit goes on where it was.
     """
     import json
 
     from ..experiments.fit import load_fit
     from ..experiments.fit_result import make_fit
+    from ..experiments.fit_tables import parameter_table, score_table
     from ..files import write_whole
+    from ..pages.fit_page import fit_page
     from ..planner import Planner
     from ..results.run_folder import default_folder
 
@@ -159,7 +162,8 @@ def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
     write_whole(folder / "vehicle.yaml", vehicle_text(result, folder, planner))
     output.answer(folder=folder, fit=result.data)
     print_tables([*map(parameter_table, result.models), score_table(result)])
-    say(f"Written: {folder / 'fit.json'}, {folder / 'vehicle.yaml'}")
+    write_whole(folder / "fit.html", fit_page(result))
+    say(f"Written: {folder / 'fit.json'}, vehicle.yaml, fit.html")
 
 
 def vehicle_text(result: FitResult, folder: Path, planner: Planner) -> str:
@@ -198,62 +202,6 @@ def vehicle_text(result: FitResult, folder: Path, planner: Planner) -> str:
         bounds = f"95 % {interval[0]:.4g} to {interval[1]:.4g}" if interval else "no interval"
         lines.append(f"  {name}: {model.estimate.values[one.name]:.6g}  # {one.unit}; fitted, {bounds}")
     return "\n".join(lines) + "\n"
-
-
-def parameter_table(model: FittedModel) -> Table:
-    """Return the table of a model's parameters."""
-    from ..experiments.tables import Table
-
-    table = Table(model.title, ["parameter", "value", "95 % interval", "start", "bounds", "prior"])
-    intervals = model.estimate.intervals()
-    for one in model.parameters:
-        interval = intervals[one.name]
-        words = None
-        if one.name in model.estimate.at_bound:
-            words = "at its bound"
-        elif interval:
-            words = f"{interval[0]:.5g} to {interval[1]:.5g}"
-        prior = one.prior and f"{one.prior[0]:.5g} ± {one.prior[1]:.3g}"
-        value = f"{model.estimate.values[one.name]:.6g} {one.unit if one.unit != '1' else ''}".strip()
-        table.rows.append(
-            [one.name, value, words, f"{one.start:.5g}", f"{one.low:.5g} to {one.high:.5g}", prior]
-        )
-    found = model.estimate
-    table.notes.append(
-        f"condition {found.identifiability.condition:.3g}; {found.sets} sets of values; {found.message}"
-    )
-    if found.covariance is None:
-        table.notes.append(f"no intervals: {found.pieces} pieces of 5 s are too few")
-    for first, second, shared in found.correlated():
-        table.notes.append(f"{first} and {second} are correlated: {shared:.2f}")
-    return table
-
-
-def score_table(result: FitResult) -> Table:
-    """Return the table of scores, training and held-out side by side."""
-    from vocabulary.signals import SIGNALS
-
-    from ..experiments.fit_result import PARTS
-    from ..experiments.tables import Table
-    from ..metrics.run_metrics import MetricValue
-
-    columns = [f"{what}, {words}" for words in PARTS.values() for what in ("rms", "largest", "fit")]
-    headings = ["signal", "model", *columns]
-    table = Table("Differences", headings, numbers=set(range(2, 8)))
-    for name in result.fit.errors:
-        for model in result.models:
-            row: list[Any] = [name, model.title]
-            for part in PARTS:
-                one = result.scores.get((model.title, part, name))
-                unit = SIGNALS[name].unit
-                row += (
-                    [MetricValue(one.rms, unit), MetricValue(one.largest, unit), f"{one.fit:.1f} %"]
-                    if one
-                    else [None, None, None]
-                )
-            table.rows.append(row)
-    table.notes.append(result.verdict)
-    return table
 
 
 @takes(*CHANGES, *MAKING)

@@ -102,6 +102,9 @@ def test_a_car_is_found_again_and_the_single_track_stands_beside(folder, capsys)
     assert data["verdict"].startswith("better than")
     assert "held-out" in answer["tables"][-1]["columns"][-1]["heading"]
     assert not (folder / "out" / "sets").exists()
+    page = (folder / "out" / "fit.html").read_text(encoding="utf-8")
+    for words in ("better than a single track", "Rms differences over |acceleration_y|", "over lateral"):
+        assert words in page.replace("Better", "better")
     text = (folder / "out" / "vehicle.yaml").read_text()
     assert "fitted to made up" in text
     vehicle = yaml_lines.read(folder / "out" / "vehicle.yaml", what="vehicle file").data
