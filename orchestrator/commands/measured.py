@@ -57,10 +57,13 @@ def measured(action: MeasuredAction, file: MeasurementFile, out: FigureFile = No
             (one.name, f"{one.time[0]:.6g}", f"{one.time[-1]:.6g}", f"{one.rate:.4g}", ", ".join(one.signals))
             for one in measurement.segments
         ]
-        print_tables([
-            Table("Segments", ["segment", "from [s]", "to [s]", "rate [Hz]", "signals"], rows),
-            *([] if flaws else [effects_table(measurement)]),
-        ])  # fmt: skip
+        tables = [Table("Segments", ["segment", "from [s]", "to [s]", "rate [Hz]", "signals"], rows)]
+        if not flaws:
+            try:
+                tables.append(effects_table(measurement))
+            except ValueError as error:
+                say(f"note: what a fit can identify is not known: {error}")
+        print_tables(tables)
         if out is not None:
             draw_measurement(file, measurement, out)
     output.answer(
@@ -77,10 +80,14 @@ def measured(action: MeasuredAction, file: MeasurementFile, out: FigureFile = No
 
 
 def effects_table(measurement: Measurement) -> Table:
-    """Return the table of what a fit to a measurement can identify, or of why that is not known."""
+    """Return the table of what a fit to a measurement can identify.
+
+    Raises:
+        ValueError: steering, speed, mass or axles are not known.
+    """
     from ..experiments.tables import Table
-    from ..measured.effects import CHANGE, SEEN, effects_in
     from ..measured.measurement import MEASURABLE
+    from ..measured.single_track import CHANGE, SEEN, effects_in
     from ..metrics.run_metrics import MetricValue
 
     headings = [f"rms change of {name}" for name in SEEN]
@@ -89,12 +96,7 @@ def effects_table(measurement: Measurement) -> Table:
         ["parameter", *headings, "seen"],
         numbers=range(1, 1 + len(SEEN)),
     )
-    try:
-        effects = effects_in(measurement)
-    except ValueError as error:
-        table.notes.append(f"not known: {error}")
-        return table
-    for effect in effects:
+    for effect in effects_in(measurement):
         numbers = [MetricValue(effect.changes[name], MEASURABLE[name].unit) for name in SEEN]
         table.rows.append([effect.parameter, *numbers, "yes" if effect.seen else "no"])
     table.notes.append("mass scales with stiffnesses and yaw inertia: give it, or a prior, in a fit")
@@ -142,9 +144,8 @@ def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
 
     from ..experiments.fit import load_fit
     from ..experiments.fit_result import make_fit
-    from ..experiments.fit_tables import parameter_table, score_table
     from ..files import write_whole
-    from ..pages.fit_page import fit_page
+    from ..pages.fit_page import fit_page, parameter_table, score_table
     from ..planner import Planner
     from ..results.run_folder import default_folder
 

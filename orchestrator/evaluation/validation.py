@@ -33,9 +33,11 @@ from pydantic import AfterValidator, Field, WithJsonSchema
 from vocabulary.signals import SIGNALS
 
 from ..errors import Diagnostic, ResultsError, ScenarioError, code_of, warnings_in
+from ..figures.style import CHANGED, frame, line_style, new_figure, shown_unit
 from ..files import reads
 from ..measured.measurement import Measurement
 from ..messages import counted, hint
+from ..metrics.measures import words
 from ..metrics.verdict import Verdict, compare, not_judged, worst
 from ..results.reader import Results
 from ..scenario import find_and_load, yaml_lines
@@ -55,6 +57,12 @@ SPACING = 0.05
 """Distance of points on a cross plot over the tolerance; chosen: distances are exact to 0.1 %."""
 LONGEST = 20_000
 """Most points of a cross plot; chosen: some seconds for an hour of measurement."""
+POINTS = 2000
+"""Points drawn of each test; those outside are all drawn. Chosen: dense on the page."""
+ELLIPSES = 500
+"""Ellipses of the tolerance that are drawn around a cross plot; chosen: they look like a band."""
+BAND = "#DCE9F5"
+MEASURED = "#111111"
 MIRRORED = ("steering_wheel_angle", "steer_angle", "yaw_rate", "acceleration_y", "velocity_y", "sideslip",
             "roll_angle", "roll_rate")  # fmt: skip
 """Signals that change their sign in a mirror; others are not compared with tests to the other side."""
@@ -226,9 +234,7 @@ class Validation:
 
     def plot(self) -> Figure:
         """Return the cross plots with their bands as a figure."""
-        from .validation_figure import draw
-
-        return draw(self)
+        return _draw(self)
 
     def as_data(self) -> dict[str, Any]:
         """Return the comparison as plain data for files, in SI units."""
@@ -240,9 +246,9 @@ class Validation:
         }  # fmt: skip
 
     def __repr__(self) -> str:
-        words = "; ".join(f"{name} {verdict}" for name, verdict in self.verdicts.items())
+        verdicts = "; ".join(f"{name} {verdict}" for name, verdict in self.verdicts.items())
         noted = "".join(f"; {text}" for text in warnings_in(self.diagnostics))
-        return f"<Validation of {self.title!r}: {words}{noted}>"
+        return f"<Validation of {self.title!r}: {verdicts}{noted}>"
 
 
 Validation.__module__ = "yawbench"  # where users import it from
@@ -347,3 +353,49 @@ class _Band:
             up = (values[some, None] - y) / eps_y
             distance[some] = np.sqrt((aside * aside + up * up).min(axis=1))
         return ComparedTest(name, over, values, distance)
+
+
+def _draw(validation: Validation) -> Figure:
+    """Return the cross plots of a validation."""
+    from matplotlib.collections import EllipseCollection
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    unit_x, factor_x = shown_unit(SIGNALS[validation.horizontal].unit)
+    with new_figure() as figure:
+        panels = figure.subplots(1, max(1, len(validation.plots)), squeeze=False)[0]
+        for axes, plot in zip(panels, validation.plots, strict=False):
+            unit, factor = shown_unit(SIGNALS[plot.signal].unit)
+            every = slice(None, None, max(1, plot.over.size // ELLIPSES))
+            axes.add_collection(EllipseCollection(
+                2.0 * factor_x * plot.of_over[every], 2.0 * factor * plot.of_values[every], 0.0, units="xy",
+                offsets=np.column_stack([factor_x * plot.over, factor * plot.values])[every],
+                offset_transform=axes.transData, facecolor=BAND, edgecolor="none", zorder=0,
+            ))  # fmt: skip
+            axes.plot(factor_x * plot.over, factor * plot.values, **line_style(0))
+            for test in plot.tests:
+                beyond = test.distance > 1.0
+                some = np.zeros(beyond.size, dtype=bool)
+                some[:: max(1, beyond.size // POINTS)] = True
+                for chosen, colour, layer in ((some & ~beyond, MEASURED, 3), (beyond, CHANGED, 4)):
+                    x, y = factor_x * test.over[chosen], factor * test.values[chosen]
+                    axes.plot(x, y, ".", color=colour, markersize=1.5, zorder=layer)
+            axes.margins(0.03, 0.1)
+            axes.set_title(f"{words(plot.signal)} [{unit}]")
+            axes.set_xlabel(f"{words(validation.horizontal)} [{unit_x}]")
+        dot: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 7}
+        handles: list[Any] = [
+            Line2D([], [], label=validation.title, **line_style(0)),
+            Patch(color=BAND, label="tolerance"),
+            Line2D([], [], label=validation.measured, color=MEASURED, **dot),
+        ]
+        if any((test.distance > 1.0).any() for plot in validation.plots for test in plot.tests):
+            handles.append(Line2D([], [], label="outside", color=CHANGED, **dot))
+        verdicts = ", ".join(f"{words(name)} {v.status.value}" for name, v in validation.verdicts.items())
+        tests = counted(len(validation.plots[0].tests), "test") if validation.plots else "no test"
+        note = " · ".join(filter(None, [
+            f"{validation.bands}: {validation.source}", tests, validation.origin,
+            *(f"{words(name)}: {verdict.why}" for name, verdict in validation.verdicts.items()),
+        ]))  # fmt: skip
+        frame(figure, 4.2, handles, f"Validation: {verdicts}", note)
+    return figure

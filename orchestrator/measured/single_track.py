@@ -7,6 +7,9 @@
 with steer angle and v_x as measured, static axle loads, and friction mu per axle: five parameters that any
 car has. A model with more of them that is not better on runs it was not fitted to explains nothing more.
 
+Driven like a recorded car, with typical values, it tells what a fit can identify (`effects_in`): a parameter
+whose effect on yaw rate and lateral acceleration is below the noise of sensors is not seen in the recording.
+
 Source: E. Fiala, Seitenkräfte am rollenden Luftreifen, VDI-Zeitschrift 96, 1954; in this form, with friction,
 J. Pacejka, Tire and Vehicle Dynamics, 3rd edition, 2012, section 3.2.1 (brush model of parabolic pressure).
 """
@@ -23,12 +26,25 @@ import numpy as np
 from vocabulary.gravity import G
 
 from .estimate import Simulated, Window
+from .measurement import Measurement
 from .segment import Segment
 
 LEAST_SPEED = 3.0
 """Speed [m/s] below which slip angles refer to it; chosen: slower, tyre and step are stiff."""
 STEP = 0.01
 """Longest step of the integration [s] (Runge-Kutta of fourth order); chosen: stable above `LEAST_SPEED`."""
+CHANGE = 0.1
+"""Relative change of a parameter; chosen: what a fit should tell apart."""
+DURATION = 10.0
+"""Of a window [s]; chosen: a few bends."""
+MOST = 12
+"""Windows of a measurement; chosen: a second of simulation."""
+SEEN = {"yaw_rate": np.radians(0.1), "acceleration_y": 0.05}
+"""Rms of an effect that is seen, in SI; chosen: the noise of production sensors."""
+FRICTIONS = ("friction_front", "friction_rear")
+RESERVE = 1.15
+"""Friction over the largest recorded a_y / g; chosen: no axle slides for long in the recording."""
+NEEDED = ("mass", "cg_to_front_axle", "cg_to_rear_axle")
 PARAMETERS = ("stiffness_front", "stiffness_rear", "friction_front", "friction_rear", "yaw_inertia")
 SIGNALS = ("yaw_rate", "acceleration_y", "sideslip")
 STIFFNESS_PER_LOAD = 12.0
@@ -167,3 +183,86 @@ def start_states(segment: Segment, time: float) -> dict[str, float]:
         along = math.cos(sideslip or 0.0) if "velocity_x" in at else 1.0
         states["initial_speed"] = forward / along
     return {name: value for name, value in states.items() if value is not None}
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Rms changes of signals by a parameter that is `CHANGE` larger, in SI."""
+
+    parameter: str
+    changes: dict[str, float]
+
+    @property
+    def seen(self) -> bool:
+        """Whether one of them exceeds the noise of sensors."""
+        return any(self.changes[name] > least for name, least in SEEN.items())
+
+
+def effects_in(measurement: Measurement) -> list[Effect]:
+    """Return the effect of each parameter of the single track in a measurement.
+
+    Raises:
+        ValueError: steering, speed, mass or axles are not known; the message says which.
+    """
+    car = [measurement.vehicle.get(name) for name in NEEDED]
+    if missing := [name for name, value in zip(NEEDED, car, strict=True) if value is None]:
+        raise ValueError(f"'vehicle:' lacks {', '.join(missing)}")
+    mass, front, rear = (float(value or 0.0) for value in car)
+    windows = [window for segment in measurement.segments for window in _windows(segment, measurement)]
+    if not windows:
+        raise ValueError("its segments are shorter than a second")
+    chosen = windows[:: -(-len(windows) // MOST)]
+    start = typical_values(mass, front, rear) | dict.fromkeys(FRICTIONS, _friction(measurement))
+    moved = [start | {name: (1.0 + CHANGE) * value} for name, value in start.items()]
+    plain, *others = SingleTrack(chosen, mass, front, rear)([start, *moved])
+    return [
+        Effect(name, {
+            signal: float(np.sqrt(np.mean(np.concatenate([
+                (before[signal] - after[signal]) ** 2
+                for before, after in zip(plain, other, strict=True)
+                if before is not None and after is not None
+            ] or [np.zeros(1)]))))
+            for signal in SEEN
+        })
+        for name, other in zip(start, others, strict=True)
+    ]  # fmt: skip
+
+
+def _friction(measurement: Measurement) -> float:
+    """Return a friction with which the car stays on the road: what it uses, and some more."""
+    used = [
+        float(np.quantile(np.abs(segment.signals["acceleration_y"]), 0.999)) / G
+        for segment in measurement.segments
+        if "acceleration_y" in segment.signals
+    ]
+    return max([measurement.vehicle.get("friction", 1.0), *(RESERVE * share for share in used)])
+
+
+def _windows(segment: Segment, measurement: Measurement) -> list[SingleTrackWindow]:
+    """Return the windows of a segment, with the inputs of the single track.
+
+    Raises:
+        ValueError: steering or speed is not measured.
+    """
+    even = segment.even()
+    if "velocity_x" not in even.signals:
+        raise ValueError("velocity_x is not measured")
+    if "steer_angle" in even.signals:
+        steer_angle = even.signals["steer_angle"]
+    elif "steering_wheel_angle" in even.signals and "steering_ratio" in measurement.vehicle:
+        steer_angle = even.signals["steering_wheel_angle"] / measurement.vehicle["steering_ratio"]
+    else:
+        raise ValueError("neither steer_angle nor steering_wheel_angle with a steering_ratio is known")
+    rows = max(2, round(min(DURATION * even.rate, even.time.size)))
+    windows = []
+    for first in range(0, even.time.size - rows + 1, rows):
+        times = even.time[first : first + rows]
+        states = start_states(even, float(times[0]))
+        speed = states.get("initial_speed", 0.0)
+        start = (
+            speed * float(np.sin(states.get("initial_sideslip", 0.0))),
+            states.get("initial_yaw_rate", 0.0),
+        )
+        window = Window(segment.name, times, {})
+        windows.append(SingleTrackWindow(window, even.time, steer_angle, even.signals["velocity_x"], start))
+    return windows

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.measured.effects import effects_in
 from orchestrator.measured.flaws import flaws_of
 from orchestrator.measured.measurement import load_measurement
+from orchestrator.measured.single_track import effects_in
 from tests.commands import status_of
 from tests.sentences import golden
 
