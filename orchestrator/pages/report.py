@@ -217,6 +217,17 @@ def answer(findings: ExperimentResult) -> str:
     return f"Of {len(results)} {kind}, {listed(counts, last='and')}{f', {where}' if where else ''}."
 
 
+def of_all(chapters: Sequence[dict[str, Any]]) -> str:
+    """Return in a sentence how many claims of all chapters hold; "" for a single chapter."""
+    counts: Counter[str] = Counter()
+    for facts in chapters:
+        counts.update(facts["counts"])
+    if len(chapters) < 2 or not counts:
+        return ""
+    parts = [f"{n} {word if n == 1 else SEVERAL.get(word, word)}" for word, n in counts.items()]
+    return f"Of {sum(counts.values())} claims in {counted(len(chapters), 'chapter')}, {listed(parts)}."
+
+
 def judged(result: ClaimResult) -> dict[str, Any]:
     """Return a claim with its measured values and verdict."""
     return {
@@ -412,4 +423,5 @@ def report_page(chapters: Sequence[dict[str, Any]], ranking: str = "") -> str:
     scripts = assets(*sweeps) if sweeps or any(chapter["viewer"] for chapter in chapters) else ""
     return render(
         "report.html.j2", title=title, chapters=chapters, ranking=ranking, assets=scripts,
+        answer=of_all(chapters),
     )  # fmt: skip

@@ -304,6 +304,8 @@ def test_several_studies_make_one_page_with_an_overview(report, half):
     titles = ["A paper before", "A paper before, more", "Half a paper"]
     assert texts(tree, ".chapter > h2") == titles
     assert texts(tree, "table.overview tbody th") == titles
+    claims = len(tree.cssselect("table.claims > tbody > tr"))
+    assert tree.xpath("string(//p[@class='said'])").startswith(f"Of {claims} claims in 3 chapters, ")
     places = {element.get("id") for element in tree.cssselect("[id]")}
     assert {link.get("href")[1:].partition("?")[0] for link in tree.cssselect("a[href^='#']")} <= places
     first = next(code for code in texts(tree, "details li code") if code.endswith(".svg"))
