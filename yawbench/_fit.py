@@ -33,7 +33,11 @@ def fit(
     Raises:
         ScenarioError: the file is invalid, or the parameters cannot be identified.
     """
-    loaded = load_fit(arguments.path(path, "path"))
+    file = arguments.path(path, "path")
+    workers = None if workers is None else arguments.count(workers, "workers")
+    if progress is not None:
+        arguments.function(progress, "progress", "line")
+    loaded = load_fit(file)
     planner = Planner(build=True, report=lambda text: None)
     with bar(f"Fit {path}", wanted=False if progress else None):
         return Fit(make_fit(loaded, planner=planner, workers=workers, say=progress or (lambda text: None)))

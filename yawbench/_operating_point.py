@@ -86,7 +86,8 @@ class OperatingPoint:
         }
         self._master = Master(plan, self._running, log, StopFlag())
         self._pool, cycle = self._master.signals, self._master.program.cycle
-        steps = int((time - plan.time(0)) / float(plan.step) + 1e-6)
+        reached = (time - plan.time(0)) / float(plan.step) + 1e-6
+        steps = int(min(reached, plan.n_steps + cycle))  # a time far beyond the end overflows
         self._k = steps - steps % cycle
         self.time, self.dt = plan.time(max(self._k, 0)), float(cycle * plan.step)
         if time < plan.time(0) or self._k + cycle > plan.n_steps:

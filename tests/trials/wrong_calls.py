@@ -312,6 +312,25 @@ def _parameters() -> Iterator[Parameter]:
     yield of("Ranking.ranked", lambda x: yb.Ranking(x))
     yield of("Ranking.place.name", lambda x: b.places.place(x), "entry")
     yield of("Ranking.plot.kind", lambda x: b.places.plot(x), "kind", "picture")
+    # Recordings, fits, linear models.
+    yield of("measured.file", lambda x: yb.measured(x), "file", "measurement", "loop.yaml")
+    yield of("measured.segment", lambda x: yb.measured(f"{SENTINEL}.yaml", x),
+             right={"None", "three", "numpy uint8"}, may=INTEGERS)  # fmt: skip
+    yield of("measured.start", lambda x: yb.measured(f"{SENTINEL}.yaml", start=x), may=FINITE)
+    yield of("fit.path", lambda x: yb.fit(x), "path", "fit", "loop.yaml")
+    yield of("fit.workers", lambda x: yb.fit(f"{SENTINEL}.yaml", workers=x),
+             right={"None", "three", "numpy uint8"})  # fmt: skip
+    yield of("fit.progress", lambda x: yb.fit(f"{SENTINEL}.yaml", progress=x), right={"None"},
+             may={"lambda", "lambda of x", "lambda of all", "builtin", "builtin type method",
+                  "hostile call"})  # fmt: skip
+    yield of("linearize.scenario", lambda x: yb.linearize(x, at=0.01, inputs=["a"], outputs=["b"]))
+    yield of("linearize.at", lambda x: yb.linearize(b.base, at=x, inputs=[SENTINEL], outputs=["a.b"]),
+             may=FINITE)  # fmt: skip
+    for name in ("inputs", "outputs"):
+        yield of(f"linearize.{name}", lambda x, n=name: yb.linearize(b.base, at=0.01,
+                 **{"inputs": ["driver.steer_angle"], "outputs": ["plant.yaw_rate"], n: x}))  # fmt: skip
+    yield of("linearize.discrete", lambda x: yb.linearize(b.base, at=0.01, inputs=[SENTINEL],
+             outputs=["plant.yaw_rate"], discrete=x), right=TRUTHS)  # fmt: skip
     # FMUs of plain Python.
     yield of("export_fmu.controller", lambda x: yb.export_fmu(x, "made.fmu"), "controller", "made",
              may={"lambda", "builtin"})  # fmt: skip
@@ -404,7 +423,7 @@ UNHASHABLE = {label for label, make in WRONG.items() if not _is_key(make())}
 NOT_CALLED = (
     yb.Controller, yb.Diagnostic, yb.Evaluation, yb.Location, yb.MetricValue, yb.Override, yb.Plan,
     yb.TestQuantity, yb.Validation, yb.Verdict, yb.Fit, yb.LinearModel,
-    yb.RecordedRuns, yb.measured, yb.fit, yb.linearize, yb.validate,  # calls need files or take seconds
+    yb.RecordedRuns, yb.validate,  # calls need files or take seconds
 )  # fmt: skip
 """What users write, or only read."""
 
