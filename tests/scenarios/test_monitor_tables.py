@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import pytest
+from scipy.stats import chi2
 
+import yawbench as yb
 from docs.generate import monitor_tables
 from docs.generate.monitor_tables import GYRO, WHEEL, Outcome
+from tests.commands import status_of
 
 
 @pytest.fixture(scope="module")
@@ -61,3 +64,17 @@ def test_outcomes_count_alarms_and_whom_they_blame():
     assert (outcome.number, outcome.delays, outcome.blamed) == (2, [0.5], [WHEEL])
     assert (outcome.located(WHEEL), outcome.located(GYRO)) == (1, 0)
     assert outcome.sideslip == pytest.approx([5.7296, 11.4592], abs=1e-4)
+
+
+@pytest.mark.exhaustive
+def test_false_alarms_in_two_hours_are_what_the_page_says(tmp_path):
+    assert status_of("sweep", "real_signals/false_alarms", "--out", tmp_path / "out") == 0
+    alarms = yb.open(tmp_path / "out").table
+    hours = 81 * 90.0 / 3600.0
+    page = monitor_tables.PAGE.read_text(encoding="utf-8")
+    for name, count, text in (("redundancy", 0, "at most 1.8 an hour"), ("parity", 1, "0.01 to 2.8 an hour")):
+        assert (alarms[name] > 0).sum() == count
+        low = chi2.ppf(0.025, 2 * count) / 2.0 / hours if count else 0.0
+        high = chi2.ppf(0.975, 2 * count + 2) / 2.0 / hours
+        assert text == (f"{low:.2f} to {high:.1f} an hour" if count else f"at most {high:.1f} an hour")
+        assert text in page
