@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from ..experiments.experiment import LoadedExperiment
     from ..experiments.outcome import Each, ExperimentResult
     from ..experiments.planning import PlannedExperiment
+    from ..figures.style import LabelledRun
     from ..pages.viewer import View
 
 
@@ -143,6 +144,7 @@ def chapter_of(
     *,
     shown_in: Path,
     views: Sequence[View] = (),
+    measured: Sequence[LabelledRun] = (),
     each: Each = map,
     **more: Any,
 ) -> dict[str, Any]:
@@ -165,6 +167,7 @@ def chapter_of(
             folder=folder,
             shown_in=shown_in,
             views=views,
+            measured=measured,
             each=each,
         )
     for name, why in out_of_date.items():

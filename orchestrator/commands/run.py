@@ -16,10 +16,11 @@ from . import output
 from .experiments import chapter_of, command_of, conduct, data_of, write_page
 from .options import CHANGES, MAKING, RunOptions, ScenarioFile, plan_of_scenario, takes
 from .progress import hold, pooled, print_tables, say, shows_bars
-from .results import MeasuredFrom
+from .results import MeasuredFrom, MeasuredRuns, distinct, start_of, with_segments
 
 if TYPE_CHECKING:
     from ..errors import Diagnostic
+    from ..figures.style import LabelledRun
 
 
 MetricsOption = Annotated[
@@ -173,11 +174,18 @@ Swaps = Annotated[
 
 
 @takes("set_", "fault", *MAKING, "jobs", "format_", "fresh")
-def compare(context: typer.Context, scenario: ScenarioFile, swap: Swaps, options: RunOptions) -> None:
+def compare(
+    context: typer.Context,
+    scenario: ScenarioFile,
+    swap: Swaps,
+    options: RunOptions,
+    measured: MeasuredRuns = None,
+    begin: MeasuredFrom = "0 s",
+) -> None:
     """Run a scenario with several FMUs for a unit and compare.
 
     Writes report.html: metrics side by side, the signals that differ most, when the runs diverge,
-    overlays, and the system.
+    overlays, and the system. Recordings of a car are shown beside them.
 
     Without --out, results go to results/<folder of the scenario>/<its name>-compare. A run that
     fails is reported; the other runs continue.
@@ -186,19 +194,35 @@ def compare(context: typer.Context, scenario: ScenarioFile, swap: Swaps, options
     from ..pages.comparison import comparison_facts
     from ..results.run_folder import default_folder
 
+    recordings = labelled_recordings(measured, begin)
     folder = options.out or default_folder(scenario, options.changes, suffix="-compare")
     hold(context, folder)
     each = pooled(context, options)
     findings = conduct(comparison(scenario, swap, options.changes), folder, options, each)
     print_tables([comparison_table(findings)])
-    command = command_of("compare", scenario, **options.changing | {"swap": swap})
+    beside = {"measured": measured, "from": [begin]} if measured else {}
+    command = command_of("compare", scenario, **options.changing | {"swap": swap} | beside)
     facts = comparison_facts(findings)
     views = facts["views"] if facts else []
-    chapter = chapter_of(findings, folder, command, shown_in=folder, views=views, comparison=facts)
+    chapter = chapter_of(
+        findings, folder, command, shown_in=folder, views=views, measured=recordings, comparison=facts
+    )
     write_page([chapter], folder)
     output.answer(experiments=[data_of(findings, folder)])
     if findings.failed:
         raise typer.Exit(1)
+
+
+def labelled_recordings(measured: Sequence[Path] | None, begin: str) -> list[LabelledRun]:
+    """Return the segments of measurement files, as runs that begin at a time of theirs."""
+    from ..figures.style import LabelledRun
+    from ..results.measured import load_run
+
+    places, start = with_segments((), measured), start_of(begin)
+    labels = distinct(places) if places else []
+    return [
+        LabelledRun(label, load_run(place, start=start)) for label, place in zip(labels, places, strict=True)
+    ]
 
 
 Halvings = Annotated[

@@ -46,6 +46,7 @@ from ..metrics.run_metrics import evaluate, metric
 from ..plan import Plan
 from ..planner import Planner
 from ..results.freshness import run_record
+from ..results.measured import filtered_alike
 from ..results.reader import Results
 from ..results.run_record import RunRecord, load_record
 from ..scenario import find_and_load, yaml_lines
@@ -73,6 +74,7 @@ def chapter(
     folder: Path,
     shown_in: Path,
     views: Sequence[View] = (),
+    measured: Sequence[LabelledRun] = (),
     each: Each = map,
 ) -> dict[str, Any]:
     """Return the template data of an experiment's chapter; write the side files of its runs.
@@ -84,6 +86,7 @@ def chapter(
         folder: of its results and figures.
         shown_in: folder of the page.
         views: of the viewer, before those of the figures.
+        measured: recordings that the viewer shows beside the runs.
         each: `map`, or a parallel equivalent, to write side files with.
     """
     experiment, spec = findings.experiment, findings.spec
@@ -92,7 +95,7 @@ def chapter(
     groups = groups_of([(record_of(job, plan), plan) for job, (_, plan) in plans])
     made = runs_made(findings)
     failed = findings.failed
-    drawing, numbers = viewer_of(findings, name, views)
+    drawing, numbers = viewer_of(findings, name, views, measured)
     sweep = None
     if spec.axes and findings.planned and len(findings.records) > 1:
         sides = write_sides(findings, folder, each)
@@ -265,7 +268,10 @@ LARGEST = 1_500_000
 
 
 def viewer_of(
-    findings: ExperimentResult, chapter: str, views: Sequence[View] = ()
+    findings: ExperimentResult,
+    chapter: str,
+    views: Sequence[View] = (),
+    measured: Sequence[LabelledRun] = (),
 ) -> tuple[Markup | None, dict[str, int]]:
     """Return the viewer of all runs of figures and claims, and the number of each run in it.
 
@@ -273,6 +279,7 @@ def viewer_of(
         findings: the experiment and its results.
         chapter: anchor of its chapter.
         views: of all runs, before those of the figures, of which the liveliest comes first.
+        measured: recordings that all views show; their filter acts on the runs, too.
     """
     overlays = [spec for spec in findings.spec.figures if spec.what.shows == "runs"]
     named: dict[str, LabelledRun] = {}
@@ -287,14 +294,20 @@ def viewer_of(
     if not named:
         return None, {}
     numbers = {name: number for number, name in enumerate(named)}
+    beside = range(len(named), len(named) + len(measured))
     drawn: list[tuple[float, View]] = []
     for spec in overlays:
         shown = [numbers[run.name] for run in findings.experiment.matching(spec.runs) if run.name in numbers]
         lively = _liveliest([run for number, run in enumerate(named.values()) if number in shown])
-        drawn += [(lively, view) for view in _views(spec, title_of(findings, spec), shown) if shown]
+        drawn += [
+            (lively, view) for view in _views(spec, title_of(findings, spec), [*shown, *beside]) if shown
+        ]
     ordered = [view for _, view in sorted(drawn, key=lambda item: -item[0])]
     settings = Settings([*views, *ordered], largest=LARGEST)
-    return viewer([*named.values()], settings, name=f"{chapter}{VIEW}"), numbers
+    runs = [*named.values(), *measured]
+    alike = filtered_alike([run.results for run in runs])
+    runs = [LabelledRun(run.label, results) for run, results in zip(runs, alike, strict=True)]
+    return viewer(runs, settings, name=f"{chapter}{VIEW}"), numbers
 
 
 def _views(spec: FigureSpec, title: str, shown: Sequence[int]) -> Iterator[View]:

@@ -73,6 +73,16 @@ def test_the_commands_take_measurements_beside_runs(places, tmp_path, capsys):
     assert "yaw_rate" in capsys.readouterr().out
 
 
+def test_compare_shows_a_recording_beside_all_runs(places, tmp_path):
+    swaps = ("--swap", "controller=controller_off,controller_fnn", "--set", "stop_time=0.5 s")
+    options = ("--measured", places[1], "--from", "10 s", "--out", tmp_path)
+    assert status_of("compare", "fnn_sideslip/25mps", *swaps, *options) == 0
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "--measured" in page and "--from" in page  # the command that repeats it
+    assert page.replace(" ", "").count(f'"dash":{list(MEASURED_LINE[1])}'.replace(" ", "")) == 1
+    assert status_of("compare", "fnn_sideslip/25mps", *swaps, "--measured", tmp_path / "none.yaml") == 2
+
+
 def test_in_python_a_recording_begins_where_the_run_does(places):
     assert yb.measured(places[1], start=10.0).time[0] == pytest.approx(0.0)
 
