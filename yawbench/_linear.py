@@ -248,9 +248,11 @@ class _Reduced:
         d = (of_fast[outputs] - c @ follows) @ settled
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of inaccuracy, which is checked here
-            rates = np.real(logm(a)) / dt if n else a
-        if np.abs(expm(rates * dt) - a).max(initial=0.0) > TOLERANCE * np.abs(a).max(initial=0.0):
+            # of Schur's form: in states of different units it would lose digits
+            logarithm = np.real(logm(slow)) if n else slow
+        if np.abs(expm(logarithm) - slow).max(initial=0.0) > TOLERANCE * np.abs(slow).max(initial=0.0):
             return None
+        rates = _changed(logarithm, t) / dt
         b = _held_input(rates, dt, b)
         return rates, b, c, d, names
 

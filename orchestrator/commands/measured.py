@@ -38,7 +38,7 @@ SETS = "sets"
 
 
 def measured(action: MeasuredAction, file: MeasurementFile, out: FigureFile = None) -> None:
-    """Show what a recording holds, its flaws, and what a fit to it can identify.
+    """Examine a recording: signals, flaws, what a fit can find.
 
     Names spikes, uneven, repeated and restarting time, and what contradicts the motion of a rigid car: signs,
     factors of mistaken units, lag, place and zero points of sensors, a speed other than that of the position.

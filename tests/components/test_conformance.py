@@ -291,12 +291,16 @@ def test_every_default_says_where_it_comes_from(component):
     assert [v.name for v in parameters if "; chosen" in v.description or "; paper" in v.description] == []
 
 
+def within(v, x: float) -> bool:
+    return (v.minimum is None or v.minimum <= x) and (v.maximum is None or x <= v.maximum)
+
+
 @every
 def test_parameters_arrive_after_the_instance_is_made(component):
     declared = parameters_of(component)
     stand = Stand(component)
     changed = {
-        v.name: 1.01 * v.start if v.maximum is None or 1.01 * v.start <= v.maximum else 0.99 * v.start
+        v.name: next(x for x in (1.01 * v.start, 0.99 * v.start) if within(v, x))
         for v in component.variables
         if v.causality == "parameter" and v.type == "Real"
     }

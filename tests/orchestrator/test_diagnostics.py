@@ -50,7 +50,8 @@ def codes_of(tree: ast.AST) -> set[str]:
             values = node.value.values if isinstance(node.value, ast.Dict) else [node.value]
             found |= texts_in(value for value in values if value is not None)
         elif isinstance(node, ast.arguments):
-            takers = [*node.args[len(node.args) - len(node.defaults) :], *node.kwonlyargs]
+            positional = [*node.posonlyargs, *node.args]
+            takers = [*positional[len(positional) - len(node.defaults) :], *node.kwonlyargs]
             pairs = zip(takers, [*node.defaults, *node.kw_defaults], strict=True)
             found |= texts_in(value for one, value in pairs if one.arg == "code" and value is not None)
     return found - {"error", "warning", "info"}
