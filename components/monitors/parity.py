@@ -55,7 +55,7 @@ from ..estimation.single_track_filter import FilterParameters
 from ..estimation.steered_track import SteeredTrack, limited
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter, signal
-from .redundancy import INPUTS, SLOW, RedundancyParameters
+from .redundancy import INPUTS, SLOW, RedundancyParameters, median_speed
 
 GYRO, ACCELEROMETER, HAND_WHEEL, WHEEL, UNLOCATED = 1.0, 2.0, 3.0, 4.0, 5.0
 SIGNALS = (GYRO, ACCELEROMETER, HAND_WHEEL, WHEEL)
@@ -218,7 +218,7 @@ class Parity(Component):
             return
         r, felt, delta, *wheels, mu, moment = u
         a_y = felt / (1.0 + self.p.roll_at_1_g)
-        median = self._median(wheels, rolling)
+        median = median_speed(wheels, self.rolling, rolling)
         v = self.p.wheel_radius * median
         if v < SLOWEST:
             self._forget()
@@ -237,11 +237,6 @@ class Parity(Component):
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...]:
         return self.share * u[-1], self.fault, self.z, max(*self.statistic, *self.wheel_statistic)
-
-    def _median(self, wheels: list[float], count: int) -> float:
-        """Return the median speed [rad/s] of the wheels that are believed, `count` of them, two at least."""
-        ordered = sorted([w if rolls else inf for rolls, w in zip(self.rolling, wheels, strict=True)])
-        return 0.5 * (ordered[(count - 1) // 2] + ordered[count // 2])
 
     def _grip_moment(self, mu: float) -> float:
         """Return the moment [N.m] of all wheels of one side that drive or brake as far as the road bears."""

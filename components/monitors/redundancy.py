@@ -55,6 +55,12 @@ SLOW = 10.0
 """Speed below which a jump of a_y counts as at this one [m/s]; chosen: five times the noise of a_y / v."""
 
 
+def median_speed(wheels: list[float], rolling: list[bool], count: int) -> float:
+    """Return the median speed [rad/s] of the wheels that are believed, `count` of them, two at least."""
+    ordered = sorted([w if rolls else inf for rolls, w in zip(rolling, wheels, strict=True)])
+    return 0.5 * (ordered[(count - 1) // 2] + ordered[count // 2])
+
+
 @dataclass(frozen=True)
 class RedundancyParameters:
     """Of the car, and how far signals may be apart."""
@@ -157,7 +163,7 @@ class Redundancy(Component):
         if rolling < 2:
             return
         r, a_y, delta, *wheels, mu, _ = u
-        median = self._median(wheels, rolling)
+        median = median_speed(wheels, self.rolling, rolling)
         v = p.wheel_radius * median
         if v < SLOWEST:
             self.since, self.implied, self.contradicted, self.off = [None, None], 0.0, 0.0, [0.0] * 4
@@ -184,11 +190,6 @@ class Redundancy(Component):
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...]:
         return self.share * u[-1], self.fault, self.implied
-
-    def _median(self, wheels: list[float], count: int) -> float:
-        """Return the median speed [rad/s] of the wheels that are believed, `count` of them, two at least."""
-        ordered = sorted([w if rolls else inf for rolls, w in zip(self.rolling, wheels, strict=True)])
-        return 0.5 * (ordered[(count - 1) // 2] + ordered[count // 2])
 
     def _lose(self, found: float) -> None:
         """Believe a signal no more."""
