@@ -1,4 +1,4 @@
-"""What mkdocs does beside copying pages: JSON Schemas of files, formulas as MathML."""
+"""Hooks of mkdocs: JSON Schemas of files, formulas as MathML."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What commands have written, read again."""
+"""Reader of the folders that commands write."""
 
 from __future__ import annotations
 

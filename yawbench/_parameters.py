@@ -31,7 +31,7 @@ PLAIN = (bool, int, float, str)
 DECLARATIONS = frozenset({"inputs", "outputs", "sampled", *SETTINGS})
 """Attributes of an object that declare it, and settings of every instance."""
 UNIT = "1"
-"""Declared for values whose unit Python does not know, until `without_units` removes it."""
+"""Placeholder for units that Python does not know, until `without_units` removes it."""
 
 
 @dataclass(frozen=True)

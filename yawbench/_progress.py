@@ -25,11 +25,11 @@ DELAY = 2.0
 SWITCH = "YAWBENCH_PROGRESS"
 """Environment variable; "off" shows no bars."""
 _shown = threading.Lock()
-"""Held by the call whose bar is shown: calls within it show none."""
+"""Lock of the call whose bar is shown; calls within it show none."""
 
 
 class Bar:
-    """How far a call is; safe to use from other threads."""
+    """Progress of a call; safe to use from other threads."""
 
     def __init__(self, title: str, total: int | None) -> None:
         self._title, self._total, self._done = title, total, 0

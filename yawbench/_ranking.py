@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 
 Ranked = ControllerLike | type[Controller]
-"""What can be ranked: what can replace an FMU, or a class of such objects."""
+"""Controllers that can be ranked: replacements of an FMU, or classes of such objects."""
 
 
 def rank(

@@ -52,7 +52,7 @@ SIGNALS = (
     "acceleration_y",
     "steer_angle",
 )
-"""What a policy observes by default, in SI."""
+"""Signals that a policy observes by default, in SI."""
 ANGLE = 0.77667
 """Hand-wheel angle at 0.3 g of the default car [rad], from proving_ground/slowly_increasing_steer."""
 LARGEST = 10_000.0

@@ -73,7 +73,7 @@ OTHERS = {
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a monitor makes of a fault in several runs that differ in the seed of the noise."""
+    """Detections, delays and blame of a fault, over runs that differ in the seed of the noise."""
 
     number: int
     delays: list[float]  # of runs with an alarm after the fault [s]

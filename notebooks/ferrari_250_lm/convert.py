@@ -34,7 +34,7 @@ COLUMNS = {
 }
 """Signal -> its file in the recording, without .txt, and its unit."""
 RATE = 100.0
-"""Of the recording [Hz]; its own times have seven digits, so that steps are uneven."""
+"""Sample rate of the recording [Hz]; its own times have seven digits, so that steps are uneven."""
 HELD_OUT = (300.0, 400.0)
 """Laps that no car is fitted to [s]."""
 TRACK, WHEEL_RADIUS = 1.35, 0.31

@@ -1,4 +1,4 @@
-"""What a command prints to standard output: tables for people, tables in LaTeX, or one JSON object.
+"""Standard output of commands: tables for people, tables in LaTeX, or one JSON object.
 
 The option `--json` or `--latex` decides; with them nothing else reaches standard output, whoever prints it,
 FMUs included: it goes to standard error. Commands print their tables with `progress.print_tables` and hand
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ..experiments.tables import Table
 
 VERSION = 1
-"""Of the JSON object: increased when a field changes its meaning or is removed."""
+"""Version of the JSON object; increased when a field changes its meaning or is removed."""
 Form = Literal["text", "json", "latex"]
 COMMANDS = (
     "check", "run", "compare", "converge", "study", "report", "sweep", "evaluate", "drive", "fit", "validate",

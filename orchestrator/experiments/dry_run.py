@@ -1,4 +1,4 @@
-"""What an experiment would still take: runs, time, disk space. Plans and reads, but writes no results.
+"""Forecasts of an experiment: the runs, time and disk space it still needs; writes no results.
 
 The time of a run comes from its last run where its results are recorded, else from short runs of the same
 FMUs in a temporary folder: `Pace`. Experiments that depend on results are bounded: a region by its first and
@@ -60,7 +60,7 @@ class Span(NamedTuple):
 
 @dataclass
 class Forecast:
-    """What an experiment would still take."""
+    """Forecast of the runs, time and disk space that an experiment still needs."""
 
     title: str
     finished: int = 0  # runs that are up to date
@@ -78,7 +78,7 @@ class Forecast:
 
 @dataclass
 class Pace:
-    """How long runs take."""
+    """Estimates of how long runs take."""
 
     known: dict[tuple[str, ...], tuple[float, float]] = field(default_factory=dict)
     """SHA-256 of the FMUs -> time [s] of a run without steps, and of a step."""

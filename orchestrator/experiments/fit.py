@@ -63,7 +63,7 @@ TRANSIENT = 2.0
 
 
 class PriorSpec(StrictModel):
-    """What is known of a parameter beforehand."""
+    """Prior of a parameter."""
 
     mean: Scalar
     deviation: Scalar = Field(description="Standard deviation; weighs as much as one sample at its error")

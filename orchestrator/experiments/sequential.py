@@ -32,7 +32,7 @@ from .confidence import LEVEL, Bounds
 
 
 class Decision(Enum):
-    """What is known of a share."""
+    """State of the test of a share."""
 
     BELOW = "below"
     ABOVE = "above"

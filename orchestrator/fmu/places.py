@@ -1,4 +1,4 @@
-"""Where FMUs are looked for beyond the folder `fmus`: folders of the environment, then installed packages.
+"""Sources of FMUs beyond the folder `fmus`: folders of the environment, then installed packages.
 
 `YAWBENCH_FMUS` names folders of FMUs, separated as in PATH. Packages provide components by an entry point of
 the group `yawbench.components`, whose value is a package with folders of roles:
@@ -40,7 +40,7 @@ class PackagedComponent:
 
     @property
     def archive(self) -> Path:
-        """Where its FMU is built, in the cache."""
+        """Path of its FMU, which is built in the cache."""
         from fmus.upkeep import in_cache
 
         return in_cache(self.source.parent) / f"{self.fmu}.fmu"

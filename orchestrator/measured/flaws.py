@@ -41,7 +41,7 @@ LEAST = {"lag": 0.004, "place": 0.1, "zero of acceleration_y": 0.05, "zero of ya
 
 @dataclass(frozen=True)
 class Flaw:
-    """What is wrong with a recording."""
+    """Flaw of a recording."""
 
     kind: str  # "sign", "factor", "lag", "place", "zero", "spikes", "uneven time", or "refused"
     signal: str

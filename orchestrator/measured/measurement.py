@@ -185,7 +185,7 @@ class MeasurementSpec(StrictModel):
 
 @dataclass(frozen=True)
 class Measurement:
-    """What a file `measured.yaml` describes."""
+    """Content of a measurement file, `measured.yaml`."""
 
     path: Path
     segments: tuple[Segment, ...]

@@ -36,7 +36,7 @@ STEP = 0.01
 CHANGE = 0.1
 """Relative change of a parameter; chosen: what a fit should tell apart."""
 DURATION = 10.0
-"""Of a window [s]; chosen: a few bends."""
+"""Length of a window [s]; chosen: a few bends."""
 MOST = 12
 """Windows of a measurement; chosen: a second of simulation."""
 SEEN = {"yaw_rate": np.radians(0.1), "acceleration_y": 0.05}

@@ -33,7 +33,7 @@ DIFFERENCES = {
     "units": "wiring-unit-mismatch",
     "enumerations": "wiring-enumeration-mismatch",
 }
-"""What differs at the ends of a wire -> code."""
+"""Property in which the ends of a wire differ -> code."""
 
 
 def contradicts_its_name(variable: Variable) -> bool:
