@@ -28,7 +28,7 @@ from vocabulary.roles import ROLES
 from .build_stamp import BuildStamp, read_stamp
 from .c.c_recipe import CRecipe, find_c_components
 from .check import defects, reference_files
-from .closure import Parts, Sources
+from .closure import Parts, Sources, UserModules
 from .compiler import compile_launcher
 from .native.build import LATER
 from .packing import to_bytes
@@ -194,8 +194,8 @@ def build_component(
 
     Args:
         source: a Python file inside or outside `root`, or the folder of a component in C. A file
-            outside imports the project's modules as `components.<...>` and files in its own folder as
-            `.<file>`.
+            outside imports the project's modules as `components.<...>`, and those of its own folder or
+            package by relative or absolute names.
         role: folder of a role, such as "controllers"; default: that of the source's folder or of the
             file's name ("controller_idea.py").
         name: of the FMU; default `<role>_<file>`.
@@ -246,11 +246,10 @@ def recipe_of(
             f"{source}: has no role: put it into a folder with one of the names {', '.join(ROLES)}",
             code="component-without-role",
         )
-    elsewhere = {} if source.is_relative_to(root) else {role: source.parent}
-    sources = Sources(root, elsewhere=elsewhere)
-    recipe = PythonRecipe(
-        name or natural_name((role, stem)), (role, source.stem), sources, dict(defaults or {})
-    )
+    module = (role, source.stem)
+    user = None if source.is_relative_to(root) else UserModules(source)
+    sources = Sources(root, user=user, entry=module)
+    recipe = PythonRecipe(name or natural_name((role, stem)), module, sources, dict(defaults or {}))
     if not recipe.name.isidentifier() or not recipe.name.isascii():
         raise BuildError(f"{recipe.name}: the name of an FMU may contain letters, digits and _ only")
     return recipe

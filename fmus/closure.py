@@ -3,10 +3,12 @@
 Only the closure is packed and hashed, so a change of `mathematics/fuzzy.py` changes only the FMUs that use
 it. Imports are read from the syntax tree; nothing is executed. Absolute imports must be of the standard
 library, because the host's Python may have nothing else, or of packages that the component declares as
-`host_packages`.
-Three packages are allowed and their imports made relative: `components.<...>`, used by files outside this
-project, and `vocabulary.<...>` and `pythonfmu.<...>`. Each FMU carries its own copy of these, so that it does
-not use another FMU's version in the same process.
+`host_packages`. All others are made relative, so that an FMU uses neither another FMU's version of a module
+nor one of its host that has the same name:
+
+    components.<...>, vocabulary.<...>, pythonfmu.<...>    modules of this project
+    yawbench                                               its functions for declarations
+    <...>                                                  modules of the user, see `UserModules`
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ import ast
 import contextlib
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,8 +35,69 @@ PYTHONFMU = Path(pythonfmu.__file__).resolve().parent
 """Folder of the installed PythonFMU."""
 BESIDE = {"pythonfmu": PYTHONFMU, "vocabulary": Path(vocabulary.__file__).resolve().parent}
 """Packages that are copied into FMUs besides the components -> their folders."""
-_ABSOLUTE = re.compile(rf"\bfrom\s+(?:components\b\.?|(?=(?:{'|'.join(BESIDE)})\.))")
-"""Beginning of an import that is made relative."""
+DECLARATIONS = ("fmi", "variables")
+"""Module of `yawbench.parameter`, `yawbench.signal` and `yawbench.output`."""
+OWN = "own"
+"""Package of the user's modules inside an FMU."""
+
+
+class UserModules:
+    """Modules of a user that an FMU takes along: those beside a file, and those of the file's package.
+
+    Args:
+        file: of the component or program.
+        module: its name; default: as if imported from above all folders that have an `__init__.py`.
+
+    Attributes:
+        root: folder from which the modules are imported.
+        package: of the file.
+    """
+
+    def __init__(self, file: Path, module: str | None = None) -> None:
+        self.file = file
+        above = [folder for folder in file.parents if not (folder / "__init__.py").is_file()]
+        depth = module.count(".") + (file.name == "__init__.py") if module else 0
+        self.root = file.parents[depth] if module else above[0]
+        self.package: Parts = file.parent.relative_to(self.root).parts
+        self._installed = self.root.name in ("site-packages", "dist-packages")
+
+    def find(self, parts: Parts) -> Path | None:
+        """Return the file of a module, or the folder of a package without `__init__.py`."""
+        roots = [folder.parent for folder in self.file.parents if folder.name == parts[0]]
+        if not self._installed:
+            roots.insert(0, self.root)
+        for root in roots:
+            folder = root.joinpath(*parts)
+            for file in (folder / "__init__.py", folder.with_name(f"{folder.name}.py")):
+                if file.is_file():
+                    return file
+            if parts[0] not in sys.stdlib_module_names and any(folder.glob("*.py")):
+                return folder
+        return None
+
+    def base(self, node: ast.ImportFrom) -> Parts | None:
+        """Return the module that a relative import of the file is of, None if it is not the user's."""
+        depth = len(self.package) + 1 - node.level
+        if depth < 0:
+            return None
+        base = (*self.package[:depth], *(node.module.split(".") if node.module else ()))
+        known = self.find(base) if base else all(self.find((alias.name,)) for alias in node.names)
+        return base if known else None
+
+
+@dataclass(frozen=True)
+class ResolvedImport:
+    """An import statement inside an FMU.
+
+    Attributes:
+        modules: of the package that it needs.
+        outside: packages that it needs outside of the standard library.
+        text: the statement with relative names; None: as it is.
+    """
+
+    modules: tuple[Parts, ...] = ()
+    outside: tuple[str, ...] = ()
+    text: str | None = None
 
 
 @dataclass(frozen=True)
@@ -54,17 +117,21 @@ class Sources:
 
     Args:
         root: folder of the package `components`.
-        elsewhere: folder of the package -> a folder outside of `root` whose files come first.
+        user: modules of the user, for a component outside of `root`.
+        entry: module that the user's file becomes.
     """
 
-    def __init__(self, root: Path, *, elsewhere: Mapping[str, Path] | None = None) -> None:
+    def __init__(self, root: Path, *, user: UserModules | None = None, entry: Parts | None = None) -> None:
         self.root = root
-        self.elsewhere = dict(elsewhere or {})
+        self.user, self.entry = user, entry
         self.evidence: dict[Parts, dict[str, str]] = {}  # module -> evidence of its closure, see `evidence`
         self._modules: dict[Parts, _Module | None] = {}
 
     def closure(self, module: Parts) -> dict[str, str]:
         """Return path -> text of every file that importing `module` executes, sorted.
+
+        The `__init__.py` of a user's package is empty unless something is imported from it: it often imports
+        what an FMU does not need and cannot take along.
 
         Raises:
             BuildError: a file is missing, cannot be parsed, or imports what an FMU must not.
@@ -83,19 +150,21 @@ class Sources:
             visited.add(parts)
             source = self._module(parts)
             if source is None:
-                raise BuildError(
-                    f"{where}no module {'.'.join(parts)} in {self.root}{self._namesake(parts)}",
-                    code="component-import-forbidden",
-                )
-            waiting += [(parts[:i], where) for i in range(len(parts))]  # the packages above it
-            is_package = self.file(parts).name == "__init__.py"
-            files["/".join((*parts, "__init__") if is_package else parts) + ".py"] = source.text
+                raise BuildError(f"{where}{self._missing(parts)}", code="component-import-forbidden")
+            files[self._path(parts)] = source.text
+            above = [parts[:i] for i in range(len(parts))]
+            if parts[0:1] == (OWN,):
+                for package in above[1:]:
+                    files.setdefault("/".join((*package, "__init__.py")), "")
+                above = above[:1]
+            waiting += [(package, where) for package in above]
             waiting += source.imports
-            for package, line in source.outside:
-                if package not in allowed:
+            for name, line in source.outside:
+                if name not in allowed:
+                    is_program = self.user is not None and self.entry is None
+                    ways_out = "" if is_program else _WAYS_OUT.format(package=name)
                     raise BuildError(
-                        f"{line}: imports {package}, {_WAYS_OUT.format(package=package)}",
-                        code="component-import-forbidden",
+                        f"{line}: imports {name}, {NOT_PACKED}{ways_out}", code="component-import-forbidden"
                     )
             if source.file is not None:
                 evidence[str(source.file)] = source.digest
@@ -103,21 +172,32 @@ class Sources:
         self.evidence[module] = evidence | SourceDigests().evidence(sorted(folders))
         return dict(sorted(files.items()))
 
-    def _namesake(self, parts: Parts) -> str:
-        """Return a suggestion, as the end of a message: a module of this name in another package."""
+    def _missing(self, parts: Parts) -> str:
+        """Return the message about a module that does not exist."""
+        if self.user and parts[0] == OWN:
+            return f"no module {'.'.join(parts[1:])} in {self.user.root}"
+        if self.user and self.entry and parts[:-1] == self.entry[:-1]:
+            return f"no module {parts[-1]} in {self.user.file.parent}"
         matches = [
             file.relative_to(self.root).with_suffix("") for file in self.root.glob(f"*/{parts[-1]}.py")
         ]
-        return "".join(f"; did you mean components.{'.'.join(file.parts)}?" for file in matches[:1])
+        suggestion = "".join(f"; did you mean components.{'.'.join(file.parts)}?" for file in matches[:1])
+        return f"no module {'.'.join(parts)} in {self.root}{suggestion}"
+
+    def _path(self, parts: Parts) -> str:
+        """Return the path of an existing module in the package of the FMU."""
+        file = self.file(parts)
+        is_package = file.name == "__init__.py" or not file.is_file()
+        return "/".join((*parts, "__init__") if is_package else parts) + ".py"
 
     def file(self, parts: Parts) -> Path:
         """Return the file of a module or package, whether or not it exists."""
         if parts and parts[0] in BESIDE:
             return _module_file(BESIDE[parts[0]], parts[1:])
-        if len(parts) > 1 and parts[0] in self.elsewhere:
-            file = _module_file(self.elsewhere[parts[0]], parts[1:])
-            if file.exists():
-                return file
+        if self.user and parts == self.entry:
+            return self.user.file
+        if self.user and len(parts) > 1 and parts[0] == OWN:
+            return self.user.find(parts[1:]) or self.user.root.joinpath(*parts[1:])
         return _module_file(self.root, parts)
 
     def _module(self, parts: Parts) -> _Module | None:
@@ -127,9 +207,9 @@ class Sources:
             source = None
             if parts == ("pythonfmu",):
                 source = _Module(_PYTHONFMU, ())
-            elif file.exists():
+            elif file.is_file():
                 source = self._parse(file, parts)
-            elif self.root.joinpath(*parts).is_dir() or (len(parts) == 1 and parts[0] in self.elsewhere):
+            elif file.is_dir() or self.root.joinpath(*parts).is_dir():
                 source = _Module("", ())  # a folder without __init__.py
             self._modules[parts] = source
         return self._modules[parts]
@@ -150,44 +230,95 @@ class Sources:
         lines = text.split("\n")
         imports: list[tuple[Parts, str]] = []
         outside: list[tuple[str, str]] = []
-        for node in _imports(tree):
+        for node in sorted(_imports(tree), key=lambda node: (-node.lineno, -node.col_offset)):
             where = f"{name}:{node.lineno}"
-            if isinstance(node, ast.Import):
-                outside += [(top, where) for alias in node.names if (top := _outside(alias.name, where))]
-                continue
-            base = self._base(node, package, where)
-            if base is None:
-                outside += [(top, where)] if (top := _outside(node.module or "", where)) else []
-                continue
-            if node.level == 0:
-                dots = "." * (len(package) + 1)  # relative, edited in the line itself
-                lines[node.lineno - 1] = _ABSOLUTE.sub(f"from {dots}", lines[node.lineno - 1], 1)
-            modules = [base] + [(*base, a.name) for a in node.names if self.file((*base, a.name)).exists()]
-            imports += [(module, f"{where}: ") for module in modules]
+            resolved = self.resolve(node, package, where, is_entry=parts == self.entry)
+            imports += [(module, f"{where}: ") for module in reversed(resolved.modules)]
+            outside += [(top, where) for top in resolved.outside]
+            if resolved.text is not None:
+                _replace(lines, node, resolved.text)
         return _Module(
             "\n".join(lines),
-            tuple(imports),
-            tuple(outside),
+            tuple(reversed(imports)),
+            tuple(reversed(outside)),
             _declared_packages(tree),
             file,
             content_digest(content),
         )
 
+    def resolve(
+        self, node: ast.Import | ast.ImportFrom, package: Parts, where: str, *, is_entry: bool = False
+    ) -> ResolvedImport:
+        """Resolve an import in a module of `package`, or in the entry. `where` begins messages.
+
+        Raises:
+            BuildError: the import cannot be written with relative names.
+        """
+        if isinstance(node, ast.Import):
+            return self._resolve_names(node, package, where)
+        own = self.user.base(node) if self.user and is_entry and node.level else None
+        base = self._base(node, package, where) if own is None else (OWN, *own)
+        if base is None:
+            top = _outside(node.module or "", where)
+            return ResolvedImport(outside=(top,) if top else ())
+        members = [(*base, alias.name) for alias in node.names]
+        modules = [member for member in members if self._is_module(member)]
+        if base == (OWN,):
+            modules = members
+        elif base[:1] != (OWN,) or len(modules) < len(members):
+            modules.insert(0, base)
+        names = ", ".join(map(ast.unparse, node.names))
+        text = f"from {_dots(package)}{'.'.join(base)} import {names}"
+        is_relative = node.level > 0 and own is None
+        return ResolvedImport(tuple(modules), text=None if is_relative else text)
+
+    def _resolve_names(self, node: ast.Import, package: Parts, where: str) -> ResolvedImport:
+        """Resolve `import a, b.c as d`."""
+        modules, outside, statements = [], [], []
+        for alias in node.names:
+            base = self._absolute(alias.name)
+            is_own = base is not None and base[0:1] == (OWN,)
+            if base is None or not (is_own or alias.asname or base == DECLARATIONS):
+                outside += [top for top in (_outside(alias.name, where),) if top]
+                statements.append(f"import {ast.unparse(alias)}")
+                continue
+            modules.append(base)
+            dots = _dots(package)
+            if alias.asname or len(base) == 2:
+                name = alias.asname or alias.name
+                statements.append(f"from {dots}{'.'.join(base[:-1])} import {base[-1]} as {name}")
+            else:  # binds the first name; importing the others makes them its attributes
+                statements.append(f"from {dots}{OWN} import {base[1]}")
+                statements.append(f"from {dots}{'.'.join(base[:-1])} import {base[-1]} as _{base[-1]}")
+        return ResolvedImport(tuple(modules), tuple(outside), "; ".join(statements) if modules else None)
+
+    def _is_module(self, parts: Parts) -> bool:
+        if self.user and parts[0] == OWN:
+            return self.user.find(parts[1:]) is not None
+        return self.file(parts).exists()
+
+    def _absolute(self, module: str) -> Parts | None:
+        """Return the module of the package with an absolute name, None if it is not in the package."""
+        names = tuple(module.split("."))
+        if names[0] == "components":
+            return names[1:]
+        if names[0] in BESIDE:
+            return names if len(names) > 1 else None
+        if self.user and names == ("yawbench",):
+            return DECLARATIONS
+        is_own = self.user and (self.user.find(names) or self.user.find(names[:1]))
+        return (OWN, *names) if is_own else None
+
     def _base(self, node: ast.ImportFrom, package: Parts, where: str) -> Parts | None:
         """Return the module of the package that a `from` imports from, None for the standard library."""
-        names = tuple(node.module.split(".")) if node.module else ()
         if node.level == 0:
-            if names[0] == "components":
-                return names[1:]
-            if names[0] in BESIDE and len(names) > 1:
-                return names
-            return None
+            return self._absolute(node.module or "")
         if node.level > len(package) + 1:
             raise BuildError(
                 f"{where}: the relative import leaves the package of the components",
                 code="component-import-forbidden",
             )
-        return package[: len(package) + 1 - node.level] + names
+        return package[: len(package) + 1 - node.level] + tuple(node.module.split(".") if node.module else ())
 
 
 _PYTHONFMU = '"""The part of PythonFMU 0.7.0 (MIT licence) that runs inside an FMU."""\n'
@@ -196,6 +327,26 @@ _PYTHONFMU = '"""The part of PythonFMU 0.7.0 (MIT licence) that runs inside an F
 def _module_file(folder: Path, parts: Parts) -> Path:
     package = folder.joinpath(*parts, "__init__.py")
     return package if package.exists() or not parts else folder.joinpath(*parts[:-1], parts[-1] + ".py")
+
+
+def _dots(package: Parts) -> str:
+    """Return the beginning of relative names in a module of `package`."""
+    return "." * (len(package) + 1)
+
+
+def _replace(lines: list[str], node: ast.Import | ast.ImportFrom, text: str) -> None:
+    """Replace a statement in the lines of a module; the lines keep their numbers."""
+    first, last = node.lineno - 1, (node.end_lineno or node.lineno) - 1
+    before = lines[first].encode()[: node.col_offset].decode()
+    after = lines[last].encode()[node.end_col_offset :].decode()
+    if isinstance(node, ast.ImportFrom):
+        module = text.partition(" import ")[0]  # imported names keep their lines and comments
+        lines[first] = before + _FROM.sub(module, lines[first][len(before) :], count=1)
+        return
+    lines[first : last + 1] = [before + text + after, *[""] * (last - first)]
+
+
+_FROM = re.compile(r"from\s+[.\w]+")
 
 
 def _imports(tree: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:
@@ -210,9 +361,9 @@ def _imports(tree: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:
             yield from _imports(node)
 
 
+NOT_PACKED = "which is not in the standard library; an FMU must run in a Python with nothing else installed"
 _WAYS_OUT = (
-    "which is not in the standard library; an FMU must run in a Python with nothing else installed. "
-    'Declare host_packages = ("{package}",) in the component if every host\'s Python has it, take an FMU '
+    '. Declare host_packages = ("{package}",) in the component if every host\'s Python has it, take an FMU '
     "from elsewhere, or run the controller as plain Python with the library `yawbench`"
 )
 

@@ -6,6 +6,7 @@ import functools
 import hashlib
 import inspect
 import struct
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,7 +16,7 @@ from typing import Any
 from components.fmi.component import Component
 from fmus.build import COMPONENTS, put
 from fmus.build_stamp import BuildStamp
-from fmus.closure import Parts, Sources
+from fmus.closure import Parts, Sources, UserModules
 from fmus.native.gate import Twin, random_inputs
 from fmus.packing import to_bytes
 from fmus.presentation import presented
@@ -27,7 +28,7 @@ from vocabulary.roles import ROLES
 
 from . import _parameters, arguments
 from ._controller import ControllerLike, PythonComponent
-from ._export_source import Cut, Own, literal, refuse
+from ._export_source import Cut, literal, refuse
 from ._parameters import ProgramParameters
 from ._progress import bar
 
@@ -119,16 +120,13 @@ def _recipe(program: Any, known: PythonComponent, name: str, folder: str) -> Pyt
     code = target if is_class or inspect.isfunction(target) else type(target)
     if not (is_class or inspect.isfunction(target) or hasattr(target, "output")):
         raise refuse(f"{type(target).__name__}: give a function, or an object with a method output(t, u)")
-    own = Own(code.__module__, inspect.getsourcefile(code) if _has_file(code) else None)
-    cut = Cut(own, (folder,))
-    cut.module = code.__module__
+    sources = Sources(COMPONENTS, user=_user_modules(code))
+    cut = Cut(sources, (folder,), code.__module__)
     called = code.__name__ if code.__name__.isidentifier() else "law"
     cut.add(called, code, called)
-    sources = Sources(COMPONENTS)
-    base = dict(sources.closure(("fmi", "component")))
-    for place in own.ours:
-        base |= sources.closure(place)
-    texts = {**base, **own.files, f"{folder}/{name}_program.py": cut.text()}
+    texts = {f"{folder}/{name}_program.py": cut.text()}
+    for module in sorted({("fmi", "component"), *cut.imports}):
+        texts |= sources.closure(module)
     texts.setdefault(f"{folder}/__init__.py", "")
     difference = ""
     for exact in (False, True):
@@ -144,11 +142,16 @@ def _recipe(program: Any, known: PythonComponent, name: str, folder: str) -> Pyt
     raise refuse(f"its values would differ from those of {called} in Python: {difference}")
 
 
-def _has_file(code: Any) -> bool:
+def _user_modules(code: Any) -> UserModules:
+    """Return the modules beside a function or class; without a file, those of the working folder."""
     try:
-        return bool(inspect.getsourcefile(code))
+        file = Path(inspect.getsourcefile(code) or "").resolve()
     except (TypeError, OSError):
-        return False
+        file = Path()
+    if not file.is_file():  # of a notebook or an interactive session
+        return UserModules(Path.cwd() / "__main__.py", "__main__")
+    spec = getattr(sys.modules.get(code.__module__), "__spec__", None)
+    return UserModules(file, spec.name if spec else code.__module__)
 
 
 HEAD = '''"""{doc}"""

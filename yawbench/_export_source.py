@@ -21,16 +21,12 @@ from pathlib import Path
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any
 
-from fmus.native.read import Sources
+from fmus.closure import NOT_PACKED, Parts, Sources
+from fmus.native.read import Sources as SourceTrees
 from fmus.native.values import Refused
 from orchestrator.errors import BuildError
 
 from . import arguments
-
-OWN = "own"
-"""Folder of the user's modules in the package of an FMU."""
-OURS = ("components", "vocabulary")
-WAYS_OUT = "an FMU must run in a Python with nothing else installed"
 
 
 def refuse(text: str) -> BuildError:
@@ -62,147 +58,21 @@ def literal(value: Any, what: str) -> str:
     raise refuse(f"{what} is of type {name}: an FMU takes along only numbers, texts and lists of them")
 
 
-class Own:
-    """The user's own modules: those in the folder, or in the package, of a module.
-
-    Attributes:
-        files: path in the package of the FMU -> text of every module that is needed.
-        ours: modules of yawbench that are needed, by their places.
-    """
-
-    def __init__(self, module: str, file: str | None) -> None:
-        spec = getattr(sys.modules.get(module), "__spec__", None)
-        parts = (spec.name if spec else module).split(".")
-        self.top = parts[0]
-        path = Path(file).resolve() if file and Path(file).is_file() else None
-        depth = len(parts) - (0 if path and path.name == "__init__.py" else 1)
-        self.root = path.parents[depth] if path else Path.cwd()
-        self.installed = self.root.name in ("site-packages", "dist-packages")
-        self.files: dict[str, str] = {}
-        self.ours: set[tuple[str, ...]] = set()
-
-    def place(self, module: str, line: str, *, take: bool = True) -> tuple[str, ...] | None:
-        """Return the place of a module in the package of the FMU, None if it is in the standard library.
-
-        With `take`, a module of the user is taken along.
-
-        Raises:
-            BuildError: it is of another package.
-        """
-        top, *rest = module.split(".")
-        if top in OURS:
-            self.ours.add(place := (*((top,) if top != OURS[0] else ()), *rest))
-            return place
-        if self._file(module.split(".")) is not None and (top == self.top or not self.installed):
-            if take:
-                self._take(module)
-            return (OWN, *module.split("."))
-        if top in sys.stdlib_module_names:
-            return None
-        raise refuse(
-            f"{line}: imports {top}, which is neither in the standard library nor beside it; {WAYS_OUT}"
-        )
-
-    def _file(self, parts: list[str]) -> Path | None:
-        folder = self.root.joinpath(*parts)
-        for file in (folder / "__init__.py", folder.with_name(f"{folder.name}.py")):
-            if file.is_file():
-                return file
-        return folder if folder.is_dir() and len(parts) > 0 and any(folder.glob("*.py")) else None
-
-    def _take(self, module: str) -> None:
-        """Take a module with what it imports; packages above it are empty unless something is imported."""
-        parts = module.split(".")
-        for n in range(len(parts)):
-            self.files.setdefault("/".join((OWN, *parts[:n], "__init__.py")), "")
-        file = self._file(parts)
-        assert file is not None
-        is_package = file.is_dir() or file.name == "__init__.py"
-        path = "/".join((OWN, *parts)) + ("/__init__.py" if is_package else ".py")
-        if self.files.get(path) or file.is_dir():
-            self.files.setdefault(path, "")
-            return
-        try:
-            text = file.read_bytes().decode("utf-8").replace("\r\n", "\n")
-            tree = ast.parse(text)
-        except (OSError, ValueError, SyntaxError) as error:
-            raise refuse(f"{file.parent.name}/{file.name}: cannot be read: {error}") from None
-        self.files[path] = text or "\n"
-        package = parts if is_package else parts[:-1]
-        self.files[path] = self.with_own_imports(text, tree, package, f"{file.parent.name}/{file.name}")
-
-    def with_own_imports(self, text: str, tree: ast.AST, package: list[str], shown: str) -> str:
-        """Return the text of a module in which imports of own modules are relative."""
-        lines = text.split("\n")
-        for node in sorted(_imports(tree), key=lambda node: node.lineno, reverse=True):
-            where = f"{shown}:{node.lineno}"
-            if isinstance(node, ast.ImportFrom) and node.level:
-                base = package[: len(package) + 1 - node.level]
-                self._take_from(".".join([*base, *(node.module or "").split(".")]).strip("."), node, where)
-                continue
-            new = self.import_of(node, (OWN, *package), where)
-            if new is not None:
-                first, last = node.lineno - 1, (node.end_lineno or node.lineno) - 1
-                before, after = lines[first][: node.col_offset], lines[last][node.end_col_offset :]
-                lines[first : last + 1] = [before + new + after, *[""] * (last - first)]
-        return "\n".join(lines)
-
-    def import_of(
-        self, node: ast.Import | ast.ImportFrom, package: tuple[str, ...], where: str
-    ) -> str | None:
-        """Return an absolute import as a relative one, None if it is of the standard library."""
-        dots = "." * (len(package) + 1)
-        if isinstance(node, ast.ImportFrom):
-            place = self._declarations(node.module or "") or self._take_from(node.module or "", node, where)
-            if place is None:
-                return None
-            return f"from {dots}{'.'.join(place)} import {', '.join(map(ast.unparse, node.names))}"
-        made = []
-        for alias in node.names:
-            place = self._declarations(alias.name) or self.place(alias.name, where)
-            if place is None:
-                made.append(f"import {ast.unparse(alias)}")
-            elif alias.asname or len(place) == 2 or alias.name == "yawbench":
-                bound = alias.asname or alias.name
-                made.append(f"from {dots}{'.'.join(place[:-1])} import {place[-1]} as {bound}")
-            else:  # binds the first name, and the others become its attributes
-                made.append(f"from {dots}{place[0]} import {place[1]}")
-                made.append(f"from {dots}{'.'.join(place[:-1])} import {place[-1]} as _{place[-1]}")
-        return "; ".join(made) if any(text.startswith("from .") for text in made) else None
-
-    @staticmethod
-    def _declarations(module: str) -> tuple[str, ...] | None:
-        """Return the place of what the library offers for declarations."""
-        return ("fmi", "variables") if module == "yawbench" else None
-
-    def _take_from(self, module: str, node: ast.ImportFrom, where: str) -> tuple[str, ...] | None:
-        place = self.place(module, where, take=False)
-        if place is not None and place[0] == OWN:
-            for alias in node.names:
-                within = f"{module}.{alias.name}"
-                self._take(within if self._file(within.split(".")) is not None else module)
-        return place
-
-
-def _imports(tree: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:
-    """Yield all imports that run, so none below `if TYPE_CHECKING:`."""
-    for node in ast.iter_child_nodes(tree):
-        if isinstance(node, (ast.Import, ast.ImportFrom)):
-            yield node
-        elif not (isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")):
-            yield from _imports(node)
-
-
 class Cut:
     """The part of a module that some of its functions and classes need, as the text of another module.
 
     Args:
-        own: the user's own modules.
-        package: of the module that is made, in the package of the FMU.
+        sources: of the modules that it imports.
+        package: of the new module, in the package of the FMU.
+        module: name of the module that is cut.
+
+    Attributes:
+        imports: modules in the package of the FMU that it needs.
     """
 
-    def __init__(self, own: Own, package: tuple[str, ...]) -> None:
-        self.own, self.package = own, package
+    def __init__(self, sources: Sources, package: Parts, module: str) -> None:
+        self.sources, self.package, self.module = sources, package, module
+        self.imports: set[Parts] = set()
         self._values: dict[str, Any] = {}
         self._blocks: list[str] = []
 
@@ -226,8 +96,7 @@ class Cut:
             return
         self._values[name] = value
         if isinstance(value, ModuleType):
-            imported = ast.parse(f"import {value.__name__} as {name}").body[0]
-            self._import(imported, user)
+            self._import(f"import {value.__name__} as {name}", user)
         elif isinstance(value, (FunctionType, BuiltinFunctionType, type)):
             self._add_code(name, value, user)
         elif getattr(type(value), "__module__", "") in ("typing", "types"):
@@ -235,15 +104,20 @@ class Cut:
         else:
             self._blocks.append(f"{name} = {literal(value, f'{user} uses {name}, which')}")
 
-    def _import(self, node: Any, user: str) -> None:
-        self._blocks.append(self.own.import_of(node, self.package, user) or ast.unparse(node))
+    def _import(self, statement: str, user: str) -> None:
+        node = ast.parse(statement).body[0]
+        assert isinstance(node, (ast.Import, ast.ImportFrom))
+        resolved = self.sources.resolve(node, self.package, user)
+        for package in resolved.outside:
+            raise refuse(f"{user}: imports {package}, {NOT_PACKED}")
+        self.imports.update(resolved.modules)
+        self._blocks.append(resolved.text or statement)
 
     def _add_code(self, name: str, value: Any, user: str) -> None:
         module, called = value.__module__ or "", value.__name__
         home = sys.modules.get(module)
         if module != self.module and getattr(home, called, None) is value:
-            node = ast.parse(f"from {module} import {called} as {name}").body[0]
-            self._import(node, user)
+            self._import(f"from {module} import {called} as {name}", user)
             return
         where = f"{user} uses {name}" if user != name else name
         if isinstance(value, BuiltinFunctionType):
@@ -254,9 +128,6 @@ class Cut:
         )
         if value.__name__ == "<lambda>":
             self._blocks[-1] = f"{name} = {block}"
-
-    module = ""
-    """Name of the module that is cut."""
 
     def _function(self, function: FunctionType, where: str) -> str:
         node = self._checked(function, where)
@@ -293,7 +164,7 @@ class Cut:
     def _checked(function: FunctionType, where: str) -> ast.FunctionDef | ast.Lambda:
         """Return the syntax tree of a function whose source is as it was when it was imported."""
         try:
-            return Sources(Path("/"), Path("/")).of(function).node
+            return SourceTrees(Path("/"), Path("/")).of(function).node
         except Refused as refused:
             raise refuse(f"{where}: {refused}") from None
 
