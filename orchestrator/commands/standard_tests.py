@@ -94,7 +94,7 @@ def drive(
     changes = (*_vehicle(vehicle), *options.changes)
     one_run = find_and_load.find(scenario or f"{GROUND}/{str(test).replace('-', '_')}", "a scenario")
     folder = options.out or default_folder(one_run, changes, suffix="_series")
-    execute = executor_of(folder, str(one_run), options, format="parquet")
+    execute = context.with_resource(executor_of(folder, str(one_run), options, format="parquet"))
     if (angle or slow_steer) and not chosen.needs_angle:
         raise ScenarioError(f"{test} takes no A: omit --angle and --slow-steer", code="option-invalid")
     for change in changes:

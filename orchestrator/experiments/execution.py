@@ -24,6 +24,7 @@ from ..plan import Plan
 from ..planner import Planner
 from ..results.freshness import altered, staleness
 from ..results.run_folder import RUN_FILE
+from ..workers import Pool
 from .experiment import Case, LoadedExperiment, NamedRun
 from .jobs import (
     Job,
@@ -32,6 +33,7 @@ from .jobs import (
     OnOutcome,
     Outcome,
     execute,
+    pool_for,
     read_back,
     ready,
 )
@@ -92,7 +94,9 @@ class Executor(AbstractContextManager["Executor"]):
         """
         return Journal(self.folder, self.identity, fresh=self.fresh)
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if isinstance(self.runner, LocalRunner):
+            self.runner.end(terminate=kind is not None)
         if "journal" in self.__dict__:
             self.journal.close()
 
@@ -327,8 +331,35 @@ def finish(
     return outcomes
 
 
+class LocalRunner:
+    """Executes jobs in local worker processes (see `execute`), which the executor ends.
+
+    Rounds of a search share them, and with them the instances that they keep.
+
+    Args:
+        workers: number of processes; None: one per core.
+    """
+
+    def __init__(self, workers: int | None) -> None:
+        self._workers = workers
+        self._pool: Pool | None = None
+
+    def __call__(self, jobs: Sequence[Job], on_outcome: OnOutcome) -> None:
+        self._pool = self._pool or pool_for(jobs, self._workers)
+        try:
+            execute(jobs, done=on_outcome, pool=self._pool)
+        except BaseException:
+            self.end(terminate=True)
+            raise
+
+    def end(self, *, terminate: bool) -> None:
+        """End the processes; `terminate`: without waiting for their runs."""
+        if self._pool:
+            self._pool.end(terminate=terminate)
+
+
 def runner_of(workers: int | None, scheduler: str | None) -> Runner:
-    """Return a runner: local worker processes (see `execute`), or a Dask cluster.
+    """Return a runner: local worker processes (see `LocalRunner`), or a Dask cluster.
 
     Args:
         workers: number of processes; None: one per core.
@@ -338,7 +369,7 @@ def runner_of(workers: int | None, scheduler: str | None) -> Runner:
         ScenarioError: the package `distributed` is missing.
     """
     if not scheduler:
-        return lambda jobs, on_outcome: execute(jobs, workers=workers, done=on_outcome)
+        return LocalRunner(workers)
     try:
         from .cluster import run_on_cluster
     except ImportError:

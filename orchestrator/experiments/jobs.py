@@ -336,9 +336,8 @@ def execute(
         if stop.requested:
             raise Interrupted(number=stop.number)
 
-    preload = (*NEEDED, *(FOR_TESTS if any(job.test for job in jobs) else ()))
     left = list(range(len(jobs)))
-    own = nullcontext(pool) if pool else Pool(workers, preload=preload, lasting=LASTING)
+    own = nullcontext(pool) if pool else pool_for(jobs, workers)
     with interrupts(stop, lambda: None), own as pool:
         for tries in reversed(range(TRIES)):
             again = []
@@ -354,6 +353,20 @@ def execute(
                 done(outcome)
             left = again
     return [outcomes[number] for number in range(len(jobs))]
+
+
+def pool_for(jobs: Sequence[Job], workers: int | None = None) -> Pool:
+    """Return a pool of worker processes for such jobs.
+
+    Args:
+        jobs: what they need is imported once for all processes.
+        workers: number of processes; None: one per core.
+
+    Raises:
+        YawbenchError: the limit of open files is too low.
+    """
+    preload = (*NEEDED, *(FOR_TESTS if any(job.test for job in jobs) else ()))
+    return Pool(workers, preload=preload, lasting=LASTING)
 
 
 def _outcome(job: Job, finished: Finished) -> Outcome:

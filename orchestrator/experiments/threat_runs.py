@@ -227,9 +227,15 @@ Quantities = dict[tuple[str, str, str], dict[str, float | None]]
 """(discipline, car, entry) -> key -> magnitude in SI units; None if the run does not yield it."""
 
 
-def discipline_experiment(threats: LoadedThreats) -> LoadedExperiment | None:
-    """Return the runs of all disciplines in the main setting; None if there are none."""
+def discipline_experiment(threats: LoadedThreats, only: Collection[str] = ()) -> LoadedExperiment | None:
+    """Return the runs of all disciplines in the main setting; None if there are none.
+
+    Args:
+        threats: as loaded.
+        only: entries; empty: all.
+    """
     ranking, runs, design = threats.ranking, [], []
+    entries = [entry for entry in threats.entries_in(threats.main) if not only or entry in only]
     limit = threats.spec.settings[threats.main].limit
     for name, spec in threats.spec.disciplines.items():
         for car in spec.cars or threats.spec.cars:
@@ -242,10 +248,9 @@ def discipline_experiment(threats: LoadedThreats) -> LoadedExperiment | None:
             words = f"{spec.title}, {car}"
             scenario = threats.scenario(car, spec.scenario)
             runs.append(NamedRun(f"{name}/{car}", words, words, scenario, changes, (spec.test, None)))
-            design += [(runs[-1].name, (Level(entry, entry),)) for entry in threats.entries_in(threats.main)]
+            design += [(runs[-1].name, (Level(entry, entry),)) for entry in entries]
     if not runs:
         return None
-    entries = threats.entries_in(threats.main)
     axes = {"entry": DesignAxisSpec.model_construct(variants={n: ranking.variant(n) for n in entries})}
     return experiment_of(
         threats.path, runs, title="other disciplines", axes=axes, design=design, origin="ranking"
@@ -345,13 +350,9 @@ def run_threats(threats: LoadedThreats, execute: Executor, *, only: Collection[s
         only = {*only, REFERENCE}
     survived = before.survived | survivals(threats, angles, execute, only)
     quantities, units = {**before.quantities}, {**before.units}
-    experiment = discipline_experiment(threats)
+    experiment = discipline_experiment(threats, only)
     if experiment is not None:
-        driven = execute(
-            experiment,
-            only=lambda case: not only or case.point[0].value in only,
-            keep=False,
-        )
+        driven = execute(experiment, keep=False)
         for case, record in zip(driven.experiment.cases, driven.records, strict=True):
             discipline, car = case.run.name.split("/")
             values = {key: record.values.get(key) for key in threats.spec.disciplines[discipline].quantities}

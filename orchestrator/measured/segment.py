@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -40,13 +41,21 @@ class LowPass:
 
     def __call__(self, x: np.ndarray, rate: float) -> np.ndarray:
         """Return x filtered; shape (rows,), evenly sampled at `rate` [Hz]."""
-        from scipy.signal import butter, sosfilt, sosfilt_zi, sosfiltfilt
+        from scipy.signal import sosfilt, sosfilt_zi, sosfiltfilt
 
         if self.phaseless:
-            sections = butter(self.order // 2, self.cut_off, fs=rate, output="sos")
+            sections = _sections(self.order // 2, self.cut_off, rate)
             return np.asarray(sosfiltfilt(sections, x, padlen=min(len(x) - 1, int(rate))))
-        sections = butter(self.order, self.cut_off, fs=rate, output="sos")
+        sections = _sections(self.order, self.cut_off, rate)
         return np.asarray(sosfilt(sections, x, zi=sosfilt_zi(sections) * x[0])[0])
+
+
+@lru_cache(maxsize=64)  # chosen: more than the filters and rates of a campaign, whose runs share them
+def _sections(order: int, cut_off: float, rate: float) -> np.ndarray:
+    """Return the second-order sections of a Butterworth low pass."""
+    from scipy.signal import butter
+
+    return np.asarray(butter(order, cut_off, fs=rate, output="sos"))
 
 
 def even_grid(time: np.ndarray, step: float | None = None) -> np.ndarray:

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import pytest
 
+from orchestrator import workers
 from orchestrator.errors import ScenarioError
 from orchestrator.experiments.axes import DesignAxisSpec, Level, axis_of_levels
-from orchestrator.experiments.execution import Executor, highest_passing, side_by_side
+from orchestrator.experiments.execution import Executor, highest_passing, runner_of, side_by_side
 from orchestrator.experiments.experiment import NamedRun, experiment_of
 from orchestrator.experiments.jobs import Outcome, run_job
 from orchestrator.plan import Override
@@ -70,6 +71,22 @@ def test_a_bisection_of_several_runs_resumes_with_what_is_in_the_journal(executo
         found = bisected(tmp_path, execute, 0.7, 1 / 16)
     assert found == {"slow": (0.6875, 0.75), "fast": (0.3125, 0.375)}
     assert len(made) == len(RATES) * 4  # one more halving
+
+
+def test_rounds_of_a_search_share_their_processes_which_end_with_the_executor(tmp_path, fmus, monkeypatch):
+    started = []
+
+    class Counted(workers.Worker):
+        def __init__(self, *arguments):
+            started.append(self)
+            super().__init__(*arguments)
+
+    monkeypatch.setattr(workers, "Worker", Counted)
+    with Executor(tmp_path, "bisection", runner_of(1, None), of_jobs={"fmus": fmus}) as execute:
+        bisected(tmp_path, execute, 0.7, 1 / 8)  # three rounds
+        assert len(started) == 1
+        assert not started[0].child.ended()
+    assert started[0].child.ended()
 
 
 def test_cases_left_out_count_only_if_they_are_finished(executor, tmp_path):
