@@ -41,7 +41,8 @@ def tables_text(result: ThreatResult) -> str:
     for name, spec in threats.spec.settings.items():
         if threats_page.is_compared(result, name):
             parts += [f"### Setting: {spec.title}", _text(threats_page.setting_table(result, name))]
-    for table in (*threats_page.lane_change_tables(result), *threats_page.discipline_tables(result)):
+    driven = [threats_page.discipline_table(result, test) for test in threats_page.disciplines(result)]
+    for table in (threats_page.overview(result, scores), *driven):
         parts += [f"### {table.title}", _text(table)]
     return "\n\n".join(parts)
 

@@ -37,7 +37,11 @@ Only = Annotated[
 ]
 ConditionOption = Annotated[
     list[str] | None,
-    typer.Option("--condition", metavar="NAME", help="Run only this condition. Repeatable."),
+    typer.Option(
+        "--condition",
+        metavar="NAME",
+        help="Run only this condition; of a threat file this setting or discipline. Repeatable.",
+    ),
 ]
 Quick = Annotated[
     bool,
@@ -58,14 +62,13 @@ def rank(
     """Rank controllers by sine with dwell or by threats.
 
     A ranking file compares which conditions they pass; a threat file, such as proving_ground/threats, how far
-    each threat can be turned up. There --quick searches the first setting alone, and with --only the other
-    entries count with their published levels.
+    each threat can be turned up. There --quick searches the first setting alone, and what --only and
+    --condition leave out counts with its published levels and quantities.
 
     Start reading at report.html. Without --out, results go to results/<folder of the ranking>/<its name>.
     Runs already made from the same scenario, FMUs and program version are not repeated, so an interrupted
     ranking is resumed. Entries with missing runs are not ranked.
     """
-    from ..errors import ScenarioError
     from ..experiments.ranking import load_ranking
     from ..experiments.ranking_scores import run_ranking
     from ..experiments.ranking_tables import columns_of_entries, table_of
@@ -76,12 +79,12 @@ def rank(
 
     more = dict(map(_entry, controller or ()))
     if "threats" in (yaml_lines.read(file, what="ranking file").data or {}):
-        if condition:
-            raise ScenarioError(f"--condition: {file} has threats, not conditions", code="option-invalid")
-        _rank_by_threats(context, options, file, more, only or (), quick=quick, controller=controller)
+        _rank_by_threats(
+            context, options, file, more, only or (), condition or (), quick=quick, controller=controller
+        )
         return
     ranking = load_ranking(file, more=more, quick=quick, chosen=condition or ())
-    _check_only(only or (), ranking.entries)
+    _check("--only", "entry", only or (), ranking.entries)
     folder = options.out or default_folder(file)
     if options.dry_run:
         from ..experiments.dry_run import of_ranking
@@ -100,14 +103,14 @@ def rank(
         say(f"not ranked (missing runs): {', '.join(unranked)}")
 
 
-def _check_only(only: Sequence[str], entries: Mapping[str, Any]) -> None:
+def _check(option: str, what: str, names: Sequence[str], known: Mapping[str, Any]) -> None:
     from ..errors import ScenarioError
     from ..messages import hint
 
-    for name in only:
-        if name not in entries:
+    for name in names:
+        if name not in known:
             raise ScenarioError(
-                f"--only {name}: unknown entry{hint(name, entries, lead='known')}", code="entry-unknown"
+                f"{option} {name}: unknown {what}{hint(name, known, lead='known')}", code=f"{what}-unknown"
             )
 
 
@@ -117,6 +120,7 @@ def _rank_by_threats(
     file: Path,
     more: Mapping[str, EntrySpec],
     only: Sequence[str],
+    chosen: Sequence[str],
     *,
     quick: bool,
     controller: list[str] | None,
@@ -132,23 +136,24 @@ def _rank_by_threats(
     from ..results.run_folder import default_folder
 
     threats = load_threats(file, more=more, quick=quick)
-    _check_only(only, threats.ranking.entries)
+    _check("--only", "entry", only, threats.ranking.entries)
+    _check("--condition", "condition", chosen, {**threats.spec.settings, **threats.spec.disciplines})
     folder = options.out or default_folder(file)
     if options.dry_run:
         from ..experiments.dry_run import of_threats
 
         execute = executor_of(folder, threats.identity, options)
-        print_forecasts(options, lambda pace: [of_threats(threats, execute, pace, only=only)])
+        print_forecasts(options, lambda pace: [of_threats(threats, execute, pace, only=only, chosen=chosen)])
         return
     hold(context, folder)
     with stoppable(folder), executor_of(folder, threats.identity, options) as execute:
-        result = run_threats(threats, execute, only=only)
+        result = run_threats(threats, execute, only=only, chosen=chosen)
     write_whole(folder / "levels.csv", to_csv(table_of_levels(result)))
     write_whole(folder / "quantities.csv", to_csv(table_of_quantities(result)))
     table = scored(result)
     write_whole(folder / "scores.csv", to_csv(table_of_scores(table)))
     page = folder / PAGE
-    command = command_of("rank", file, quick=quick, controller=controller)
+    command = command_of("rank", file, quick=quick, controller=controller, condition=[*chosen])
     write_whole(page, threats_page(result, table, folder, command))
     say(f"The page: {page} ({page.stat().st_size / 1e6:.1f} MB)")
     output.answer(folder=folder, page=page, entries=records_in(table_of_scores(table)))

@@ -260,7 +260,12 @@ def _angles(
 
 
 def of_threats(
-    threats: LoadedThreats, execute: Executor, pace: Pace, *, only: Collection[str] = ()
+    threats: LoadedThreats,
+    execute: Executor,
+    pace: Pace,
+    *,
+    only: Collection[str] = (),
+    chosen: Collection[str] = (),
 ) -> Forecast:
     """Return what a ranking by threats would take: bounds, as each search ends where the car is lost.
 
@@ -270,7 +275,7 @@ def of_threats(
     forecast = Forecast(threats.spec.title)
     _angles(forecast, threats.ranking, execute, pace, threats.spec.cars)
     runs = Span()
-    for place in threats.searches(only):
+    for place in threats.searches(only, chosen):
         spec = threats.spec.threats[place.threat]
         halvings = math.ceil(math.log2(STEP * abs(math.log(spec.hard / spec.easy)) / RESOLUTION))
         levels = Span(1 + 0.0, 1 + round(1 / STEP) + max(0, halvings))

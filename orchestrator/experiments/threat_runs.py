@@ -58,7 +58,11 @@ class Survived(NamedTuple):
 
 
 def survivals(
-    threats: LoadedThreats, angles: Mapping[str, float], execute: Executor, only: Collection[str] = ()
+    threats: LoadedThreats,
+    angles: Mapping[str, float],
+    execute: Executor,
+    only: Collection[str] = (),
+    chosen: Collection[str] = (),
 ) -> dict[SearchPlace, Survived]:
     """Search the highest levels survived, all side by side.
 
@@ -67,6 +71,7 @@ def survivals(
         angles: car -> A [rad], of which the regulation's last amplitude follows.
         execute: executes the runs of each round.
         only: entries; empty: all.
+        chosen: settings; empty: all.
 
     Raises:
         YawbenchError: a run cannot start.
@@ -83,7 +88,7 @@ def survivals(
 
     searches = {
         place: _search(spec, len(threats.variants(spec)))
-        for place in threats.searches(only)
+        for place in threats.searches(only, chosen)
         for spec in (threats.spec.threats[place.threat],)
     }
     return side_by_side(searches, passing)
@@ -227,18 +232,21 @@ Quantities = dict[tuple[str, str, str], dict[str, float | None]]
 """(discipline, car, entry) -> key -> magnitude in SI units; None if the run does not yield it."""
 
 
-def discipline_experiment(threats: LoadedThreats, only: Collection[str] = ()) -> LoadedExperiment | None:
-    """Return the runs of all disciplines in the main setting; None if there are none.
+def discipline_experiment(
+    threats: LoadedThreats, only: Collection[str] = (), chosen: Collection[str] = ()
+) -> LoadedExperiment | None:
+    """Return the runs of disciplines in the main setting; None if there are none.
 
     Args:
         threats: as loaded.
         only: entries; empty: all.
+        chosen: disciplines; empty: all.
     """
     ranking, runs, design = threats.ranking, [], []
     entries = [entry for entry in threats.entries_in(threats.main) if not only or entry in only]
     limit = threats.spec.settings[threats.main].limit
     for name, spec in threats.spec.disciplines.items():
-        for car in spec.cars or threats.spec.cars:
+        for car in (spec.cars or threats.spec.cars) if not chosen or name in chosen else ():
             own = ranking.changes(ranking.spec.cars[car], stop=False)
             changes = (
                 *(change for change in own if change.target.instance != DRIVER),  # drives other scenarios
@@ -281,7 +289,9 @@ class ThreatResult:
     survived: dict[SearchPlace, Survived]
     quantities: Quantities
     units: dict[tuple[str, str], str] = field(default_factory=dict)  # (discipline, key) -> SI unit
-    published: frozenset[str] = frozenset()  # entries whose levels were found before
+    published: frozenset[str] = frozenset()  # entries whose levels in the main setting were found before
+    passed: dict[str, tuple[int, int]] = field(default_factory=dict)
+    """Entry -> conditions of the ranking's matrix that it passes, and all; as published."""
 
     @cached_property
     def complete(self) -> dict[str, list[str]]:
@@ -328,13 +338,16 @@ def table_of_levels(result: ThreatResult) -> Table:
     )
 
 
-def run_threats(threats: LoadedThreats, execute: Executor, *, only: Collection[str] = ()) -> ThreatResult:
+def run_threats(
+    threats: LoadedThreats, execute: Executor, *, only: Collection[str] = (), chosen: Collection[str] = ()
+) -> ThreatResult:
     """Search all levels of a threat file and drive its disciplines.
 
     Args:
         threats: as loaded.
         execute: executes experiments.
         only: entries to run; the others count with the published levels. Empty: all.
+        chosen: settings to search and disciplines to drive; the others count as published. Empty: all.
 
     Raises:
         YawbenchError: a run cannot start, or A cannot be determined.
@@ -345,12 +358,14 @@ def run_threats(threats: LoadedThreats, execute: Executor, *, only: Collection[s
             f"{execute.folder}: runs for A are missing; rank without --no-run", code="runs-missing"
         )
     angles = angles_of(threats.ranking, slow, threats.spec.cars)
-    before = published_result(threats) if only else ThreatResult(threats, angles, {}, {})
+    before = published_result(threats)
+    if not only and not chosen:  # everything is run, the matrix apart
+        before = ThreatResult(threats, angles, {}, {}, passed=before.passed)
     if only and REFERENCE not in before.published:
         only = {*only, REFERENCE}
-    survived = before.survived | survivals(threats, angles, execute, only)
+    survived = before.survived | survivals(threats, angles, execute, only, chosen)
     quantities, units = {**before.quantities}, {**before.units}
-    experiment = discipline_experiment(threats, only)
+    experiment = discipline_experiment(threats, only, chosen)
     if experiment is not None:
         driven = execute(experiment, keep=False)
         for case, record in zip(driven.experiment.cases, driven.records, strict=True):
@@ -361,7 +376,10 @@ def run_threats(threats: LoadedThreats, execute: Executor, *, only: Collection[s
                 quantities[discipline, car, str(case.point[0].value)] = {
                     key: None if value is None else abs(value[0]) for key, value in values.items()
                 }
-    return ThreatResult(threats, angles, survived, quantities, units, before.published - {*only})
+    searched = {place.entry for place in threats.searches(only, chosen) if place.setting == threats.main}
+    return ThreatResult(
+        threats, angles, survived, quantities, units, before.published - searched, before.passed
+    )
 
 
 def published_result(threats: LoadedThreats) -> ThreatResult:
@@ -378,9 +396,9 @@ def published_result(threats: LoadedThreats) -> ThreatResult:
     units: dict[tuple[str, str], str] = {}
     if published.quantities:
         quantities, units = _published_quantities(threats.path.parent / published.quantities, threats)
-    return ThreatResult(
-        threats, {}, survived, quantities, units, frozenset(place.entry for place in survived)
-    )
+    passed = _published_matrix(threats.path.parent / published.matrix) if published.matrix else {}
+    entries = frozenset(place.entry for place in survived if place.setting == threats.main)
+    return ThreatResult(threats, {}, survived, quantities, units, entries, passed)
 
 
 @reads("table of levels", ScenarioError)
@@ -408,3 +426,9 @@ def _published_quantities(
                 value = float(row["value"]) if row["value"] else None
                 quantities.setdefault((name, row["car"], row["entry"]), {})[key] = value
     return quantities, units
+
+
+@reads("table of a ranking", ScenarioError)
+def _published_matrix(path: Path | str) -> dict[str, tuple[int, int]]:
+    with Path(path).open(encoding="utf-8", newline="") as lines:
+        return {row["entry"]: (int(row["passed"]), int(row["conditions"])) for row in csv.DictReader(lines)}

@@ -130,6 +130,17 @@ def score_table(
     )  # fmt: skip
 
 
+def rank_correlation(table: ScoreTable, other: ScoreTable, reference: str) -> float:
+    """Return Spearman's rank correlation of the scores of entries in both tables; NaN for less than 3."""
+    from scipy.stats import spearmanr
+
+    first, second = ({row.entry: row.score for row in scores.scores} for scores in (table, other))
+    both = [entry for entry in first if entry in second and entry != reference]
+    if len(both) < 3:
+        return float("nan")
+    return float(spearmanr([first[entry] for entry in both], [second[entry] for entry in both]).statistic)
+
+
 def table_of_scores(table: ScoreTable) -> Table:
     """Return the table for programs with a row per entry, the best first."""
     rows = table.scores

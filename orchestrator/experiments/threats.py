@@ -24,7 +24,8 @@ A run is survived if it meets the regulation's criteria and its sideslip stays b
 change if no cone is touched. Unless the threat sets the amplitude, it is that of the regulation's last run.
 Where left and right differ, both are driven; where noise acts, all seeds.
 
-Disciplines are runs of other standard tests whose quantities are compared; less is better.
+Disciplines are runs of other standard tests whose quantities are compared; less is better. A quantity has a
+range, too, from a good to a bad end, on the same geometric scale.
 """
 
 from __future__ import annotations
@@ -121,7 +122,25 @@ class QuantitySpec(StrictModel):
     """A quantity of a discipline; less is better."""
 
     title: str = Field(min_length=1, description="Its words")
+    best: float = Field(ge=0.0, description="Good end of its range, in SI units")
+    worst: float = Field(gt=0.0, description="Bad end of its range, in SI units; with it counts a car lost")
     offset: float = Field(0.0, ge=0.0, description="Added before ratios are taken, in SI units")
+
+    @model_validator(mode="after")
+    def _has_a_range(self) -> QuantitySpec:
+        if not 0.0 < self.best + self.offset < self.worst + self.offset:
+            raise ValueError("best, with the offset, has to be above 0 and below worst")
+        return self
+
+    def position(self, magnitude: float | None) -> float:
+        """Return where a magnitude lies in the range on a geometric scale: 0 bad end, 1 good end.
+
+        Beyond an end it is that end; None, the car is lost, is the bad one.
+        """
+        if magnitude is None:
+            return 0.0
+        best, worst, value = (x + self.offset for x in (self.best, self.worst, magnitude))
+        return 1.0 - min(1.0, math.log(max(value, best) / best) / math.log(worst / best))
 
 
 class DisciplineSpec(OverrideSpec):
@@ -140,6 +159,7 @@ class PublishedSpec(StrictModel):
 
     levels: str = Field(min_length=1, description="Of levels survived, as levels.csv")
     quantities: str = Field("", description="Of the disciplines, as quantities.csv")
+    matrix: str = Field("", description="Of the ranking's conditions passed, as its table.csv")
 
 
 class ThreatsSpec(StrictModel):
@@ -224,11 +244,12 @@ class LoadedThreats:
         applicable = self.spec.threats[threat].cars or self.spec.cars
         return [car for car in self.cars_in(setting) if car in applicable]
 
-    def searches(self, only: Collection[str] = ()) -> list[SearchPlace]:
-        """Return what is searched; `only`: entries (default: all)."""
+    def searches(self, only: Collection[str] = (), chosen: Collection[str] = ()) -> list[SearchPlace]:
+        """Return what is searched; `only`: entries, `chosen`: settings (default: all)."""
         return [
             SearchPlace(name, threat, car, entry)
             for name in self.spec.settings
+            if not chosen or name in chosen
             for threat in self.threats_in(name)
             for car in self.cars_facing(name, threat)
             for entry in self.entries_in(name)

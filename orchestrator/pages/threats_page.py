@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +19,11 @@ from ..experiments.threat_scores import (
     Spread,
     gains_and_laws,
     orders_without,
+    rank_correlation,
     score_table,
 )
 from ..experiments.threats import LANE_CHANGE, REFERENCE, LoadedThreats, SearchPlace, ThreatSpec
+from ..figures.style import shown_unit
 from ..messages import counted
 from .page_parts import render
 from .report import PAGE, RANKING
@@ -87,7 +90,7 @@ def _published(result: ThreatResult, order: Sequence[str]) -> str:
     """Return a sentence on the entries with published levels; "" without any."""
     titles = [titles_of(result)[entry] for entry in order if entry in result.published]
     if len(titles) == len(order):
-        return "All levels are the published ones; none was searched in these runs."
+        return "All levels of the main setting are the published ones; none was searched in these runs."
     return f"Published levels, not searched in these runs: {'; '.join(titles)}." if titles else ""
 
 
@@ -271,53 +274,124 @@ def gains_sentence(gains: GainsAndLaws) -> str:
     return "Whether gains matter more than laws is undecided: the interval of the difference holds zero."
 
 
-def discipline_tables(result: ThreatResult) -> list[Table]:
-    """Return a table per discipline driven: quantities as means over cars, and their score with interval."""
-    titles, tables = titles_of(result), []
-    entries = result.complete[result.threats.main]
+@dataclass(frozen=True)
+class Discipline:
+    """A discipline as driven, with columns of its own."""
+
+    title: str
+    scores: ScoreTable
+    cells: dict[str, list[str]]  # entry -> texts of its own columns
+    headings: list[str]  # of these columns
+    about: str  # what is driven, and what the columns are
+
+
+def disciplines(result: ThreatResult) -> list[Discipline]:
+    """Return the disciplines: settings whose threats are all judged by a lane change, then standard tests."""
+    threats = result.threats
+    names = [name for name in threats.spec.settings if _of_lane_changes(threats, name)]
+    of_changes = [_of_lane_change(result, name) for name in names if result.complete[name]]
     driven = {discipline for discipline, _, _ in result.quantities}
-    for name, spec in result.threats.spec.disciplines.items():
-        if name not in driven:
-            continue
-        cars = spec.cars or result.threats.spec.cars
-        magnitudes = np.array([
-            [
-                [result.quantities.get((name, car, entry), {}).get(key) for car in cars]
-                for key in spec.quantities
-            ]
-            for entry in entries
-        ], dtype=float)  # fmt: skip
-        lost = np.isnan(magnitudes)
-        offsets = np.array([quantity.offset for quantity in spec.quantities.values()])[None, :, None]
-        logs = -np.log(np.where(lost, np.nan, magnitudes + offsets))
-        worst = np.nanmin(np.where(lost, np.inf, logs), axis=0)
-        logs = np.where(lost, np.where(np.isfinite(worst), worst, 0.0), logs)
-        table = score_table(entries, logs, REFERENCE)
-        rows = []
-        for score in table.scores:
-            i = entries.index(score.entry)
-            means = [
-                f"{np.nanmean(magnitudes[i, k]):.3g}"
-                + (f", lost on {n}" if (n := int(lost[i, k].sum())) else "")
-                if not lost[i, k].all()
-                else "lost"
-                for k in range(len(spec.quantities))
-            ]
-            rows.append(
-                [
-                    str(score.place),
-                    titles[score.entry],
-                    f"{score.score:.0f}",
-                    interval_text(score.bounds),
-                    *means,
-                ]
+    return of_changes + [
+        _of_standard_test(result, name) for name in threats.spec.disciplines if name in driven
+    ]
+
+
+def _of_lane_change(result: ThreatResult, setting: str) -> Discipline:
+    threats = result.threats
+    name, cars = threats.threats_in(setting)[0], threats.cars_in(setting)
+    spec = threats.spec.threats[name]
+    cells = {}
+    for entry in result.complete[setting]:
+        levels = (result.survived[SearchPlace(setting, name, car, entry)] for car in cars)
+        cells[entry] = [level_text(spec, level.position, level.end) for level in levels]
+    headings, title = [f"{car} [{spec.unit}]" for car in cars], threats.spec.settings[setting].title
+    return Discipline(title, scored(result, setting), cells, headings, "More is better.")
+
+
+def _of_standard_test(result: ThreatResult, name: str) -> Discipline:
+    spec = result.threats.spec.disciplines[name]
+    cars = spec.cars or result.threats.spec.cars
+    entries = [
+        entry
+        for entry in result.threats.entries_in(result.threats.main)
+        if all((name, car, entry) in result.quantities for car in cars)
+    ]
+    positions = np.array([
+        [
+            [quantity.position(result.quantities[name, car, entry].get(key)) for car in cars]
+            for key, quantity in spec.quantities.items()
+        ]
+        for entry in entries
+    ])  # fmt: skip
+    cells = {
+        entry: [
+            _mean_text(
+                [result.quantities[name, car, entry].get(key) for car in cars],
+                result.units.get((name, key), ""),
             )
-        headings = ["place", "controller", "score", "95 % interval"]
-        headings += [f"{quantity.title}{f' [{u}]' if (u := result.units.get((name, key))) else ''}"
-                     for key, quantity in spec.quantities.items()]  # fmt: skip
-        notes = [f"{spec.source}. Means over {', '.join(cars)}; less is better. {told_apart(table)}"]
-        tables.append(Table(spec.title, headings, [*rows], notes, {0, 2, *range(4, len(headings))}))
-    return tables
+            for key in spec.quantities
+        ]
+        for entry in entries
+    }
+    headings, ranges = [], []
+    for key, quantity in spec.quantities.items():
+        unit, scale = shown_unit(result.units.get((name, key), ""))
+        headings.append(f"{quantity.title}{f' [{unit}]' if unit else ''}")
+        ends = (f"{x * scale:.3g}" for x in (quantity.best, quantity.worst))
+        ranges.append(f"{quantity.title} {' to '.join(ends)}{f' {unit}' if unit else ''}")
+    about = (
+        f"{spec.source}. Means over {', '.join(cars)}; less is better. Each range counts as one unit: "
+        f"{'; '.join(ranges)}."
+    )
+    return Discipline(spec.title, score_table(entries, positions, REFERENCE), cells, headings, about)
+
+
+def _mean_text(magnitudes: Sequence[float | None], unit: str) -> str:
+    """Return the mean over the cars that were not lost, in the unit shown."""
+    known = [x for x in magnitudes if x is not None]
+    if not known:
+        return "lost"
+    lost = f", lost on {len(magnitudes) - len(known)}" if len(known) < len(magnitudes) else ""
+    return f"{shown_unit(unit)[1] * sum(known) / len(known):#.3g}{lost}"
+
+
+def discipline_table(result: ThreatResult, discipline: Discipline) -> Table:
+    """Return the table of a discipline: scores with intervals, the best first, and its own columns."""
+    titles = titles_of(result)
+    rows = [
+        [
+            str(score.place), titles[score.entry], f"{score.score:.0f}", interval_text(score.bounds),
+            *discipline.cells[score.entry],
+        ]
+        for score in discipline.scores.scores
+    ]  # fmt: skip
+    headings = ["place", "controller", "score", "95 % interval", *discipline.headings]
+    notes = [f"{discipline.about} {told_apart(discipline.scores)}"]
+    return Table(discipline.title, headings, [*rows], notes, {0, 2, *range(4, len(headings))})
+
+
+def overview(result: ThreatResult, table: ScoreTable) -> Table:
+    """Return the table with all disciplines beside each other: the matrix, the threats, the other tests."""
+    titles = titles_of(result)
+    driven = disciplines(result)
+    columns = [("threats", table), *((discipline.title, discipline.scores) for discipline in driven)]
+    rows = []
+    for score in table.scores:
+        passed = result.passed.get(score.entry)
+        cells = [f"{passed[0]} of {passed[1]}" if passed else None]
+        for _, scores in columns:
+            own = next((other for other in scores.scores if other.entry == score.entry), None)
+            cells.append(f"{own.score:.0f} ({own.place})" if own else None)
+        rows.append([titles[score.entry], *cells])
+    notes = [
+        "Conditions of the matrix passed, as published; then scores, in brackets places, shared where "
+        "intervals overlap. No control has 0, the best 100; below 0 is worse than no control."
+    ]
+    if driven:
+        agreements = (f"{d.title} {rank_correlation(table, d.scores, REFERENCE):.2f}" for d in driven)
+        notes.append(f"Rank correlation with the order by threats (Spearman): {', '.join(agreements)}.")
+    headings = ["controller", "matrix", *(title for title, _ in columns)]
+    return Table("All disciplines", headings, [*rows], notes, {*range(1, len(headings))})
 
 
 def is_compared(result: ThreatResult, setting: str) -> bool:
@@ -328,39 +402,8 @@ def is_compared(result: ThreatResult, setting: str) -> bool:
     )
 
 
-def lane_change_tables(result: ThreatResult) -> list[Table]:
-    """Return a table for each setting whose threats are all judged by a lane change."""
-    threats = result.threats
-    names = [name for name in threats.spec.settings if _of_lane_changes(threats, name)]
-    return [_lane_change_table(result, name) for name in names if result.complete[name]]
-
-
 def _of_lane_changes(threats: LoadedThreats, setting: str) -> bool:
     return all(threats.spec.threats[name].test == LANE_CHANGE for name in threats.threats_in(setting))
-
-
-def _lane_change_table(result: ThreatResult, setting: str) -> Table:
-    titles, threats = titles_of(result), result.threats
-    name, cars = threats.threats_in(setting)[0], threats.cars_in(setting)
-    spec, table = threats.spec.threats[name], scored(result, setting)
-    rows = []
-    for score in table.scores:
-        levels_found = [result.survived[SearchPlace(setting, name, car, score.entry)] for car in cars]
-        levels = [level_text(spec, level.position, level.end) for level in levels_found]
-        rows.append(
-            [
-                str(score.place),
-                titles[score.entry],
-                f"{score.score:.0f}",
-                interval_text(score.bounds),
-                *levels,
-            ]
-        )
-    headings = ["place", "controller", "score", "95 % interval", *(f"{car} [{spec.unit}]" for car in cars)]
-    notes = [f"More is better. {told_apart(table)}"]
-    return Table(
-        threats.spec.settings[setting].title, headings, [*rows], notes, {0, 2, *range(4, len(headings))}
-    )
 
 
 def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command: str) -> str:
@@ -391,7 +434,8 @@ def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command:
         settings=[setting_table(result, name) for name in others],
         gains=gains_table(gains) if gains else None,
         sentence=gains_sentence(gains) if gains else "",
-        disciplines=[*lane_change_tables(result), *discipline_tables(result)],
+        overview=overview(result, table),
+        disciplines=[discipline_table(result, discipline) for discipline in disciplines(result)],
         cars=car_tables(result, order),
         described=threats_table(result),
         command=command,

@@ -17,10 +17,11 @@ from orchestrator.experiments.threat_scores import (
     mean_positions,
     mean_ranks,
     orders_without,
+    rank_correlation,
     score_table,
 )
-from orchestrator.experiments.threats import LoadedThreats, ThreatSpec, load_threats
-from orchestrator.pages.threats_page import car_tables
+from orchestrator.experiments.threats import LoadedThreats, QuantitySpec, ThreatSpec, load_threats
+from orchestrator.pages.threats_page import car_tables, discipline_table, disciplines, overview, scored
 from orchestrator.scenario.find_and_load import SHIPPED
 from tests.checkout import ROOT
 from tests.commands import status_of
@@ -277,7 +278,89 @@ def test_an_entry_joins_the_published_levels_with_its_own_runs(tmp_path, capsys)
     assert "Published levels" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
-def test_conditions_are_refused_for_a_threat_file(tmp_path, capsys):
+def test_a_setting_that_is_chosen_is_searched_and_the_others_count_as_published(tmp_path, capsys):
+    (tmp_path / "ranking.yaml").write_text(RANKING)
+    other = "  slippery: {title: slippery, limit: 10000, bound: 30}\n"
+    (tmp_path / "threats.yaml").write_text(SMALL + other + "published: {levels: levels.csv}\n")
+    (tmp_path / "levels.csv").write_text(
+        "setting,threat,car,entry,level,unit,position,end\n"
+        "main,friction,s,none,0.9,,0.0,easy\nmain,friction,s,fuzzy_pid,0.3,,0.5,\n"
+    )
+    options = ("--condition", "slippery", "--out", tmp_path / "out", "--jobs", 1)
+    assert status_of("rank", tmp_path / "threats.yaml", *options) == 0, capsys.readouterr().err
+    levels = {(row["setting"], row["entry"]): row for row in rows(tmp_path / "out" / "levels.csv")}
+    assert float(levels["main", "fuzzy_pid"]["position"]) == 0.5
+    assert 0.1 < float(levels["slippery", "fuzzy_pid"]["level"]) < 0.9
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "All levels of the main setting are the published ones" in page
+    assert "--condition slippery" in page
+
+
+def test_an_unknown_setting_is_refused_with_the_known_ones(tmp_path, capsys):
+    (tmp_path / "ranking.yaml").write_text(RANKING)
     (tmp_path / "threats.yaml").write_text(SMALL)
     assert status_of("rank", tmp_path / "threats.yaml", "--condition", "dry") != 0
-    assert "has threats, not conditions" in capsys.readouterr().err
+    message = capsys.readouterr().err
+    assert "--condition dry: unknown condition" in message
+    assert "main" in message
+
+
+def quantity(**keys) -> QuantitySpec:
+    return QuantitySpec.model_validate({"title": "distance", "best": 50.0, "worst": 200.0, **keys})
+
+
+def test_a_quantity_has_a_geometric_range_and_a_car_that_is_lost_its_bad_end():
+    distance = quantity()
+    assert distance.position(100.0) == pytest.approx(0.5)
+    assert (distance.position(50.0), distance.position(20.0)) == (1.0, 1.0)
+    assert (distance.position(200.0), distance.position(900.0), distance.position(None)) == (0.0, 0.0, 0.0)
+    overshoot = quantity(best=0.0, worst=3.0, offset=1.0)
+    assert overshoot.position(1.0) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("keys", [{"best": 0.0}, {"worst": 50.0}, {"worst": 40.0}])
+def test_a_quantity_without_a_range_is_refused(keys):
+    with pytest.raises(ValueError, match="best, with the offset, has to be above 0 and below worst"):
+        quantity(**keys)
+
+
+def test_disciplines_stand_beside_the_threats_and_entries_that_did_not_drive_them_are_left_out(tmp_path):
+    (tmp_path / "ranking.yaml").write_text(
+        RANKING + "  pid: {title: PID, fmu: controller_pid, source: here}\n"
+        "  new: {title: new, fmu: controller_pid, source: here}\n"
+    )
+    (tmp_path / "threats.yaml").write_text(
+        SMALL
+        + f"""disciplines:
+  braking:
+    title: Braking
+    scenario: {SHIPPED}/road/split_braking.yaml
+    test: straight-braking
+    source: Here
+    quantities: {{distance: {{title: distance, best: 50, worst: 200}}}}
+"""
+    )
+    threats = load_threats(tmp_path / "threats.yaml")
+    positions = {"none": 0.0, "fuzzy_pid": 0.5, "pid": 0.4, "new": 0.3}
+    survived = {place: Survived(positions[place.entry], "") for place in threats.searches()}
+    driven = {"none": None, "fuzzy_pid": 100.0, "pid": 50.0}
+    quantities = {("braking", "s", entry): {"distance": value} for entry, value in driven.items()}
+    units = {("braking", "distance"): "m"}
+    result = ThreatResult(threats, {}, survived, quantities, units, passed={"pid": (3, 4)})
+    (braking,) = disciplines(result)
+    assert braking.scores.order() == ["pid", "fuzzy_pid", "none"]
+    table = discipline_table(result, braking)
+    assert table.headings[-1] == "distance [m]"
+    assert [row[-1] for row in table.rows] == ["50.0", "100", "lost"]
+    rows_of_all = {row[0]: row[1:] for row in overview(result, scored(result)).rows}
+    assert rows_of_all["PID"] == ["3 of 4", "80 (2)", "100 (1)"]
+    assert rows_of_all["fuzzy PID"] == [None, "100 (1)", "50 (2)"]
+    assert rows_of_all["new"] == [None, "60 (3)", None]
+
+
+def test_orders_that_agree_have_a_rank_correlation_of_one():
+    cube = np.array([[[0.0]], [[0.2]], [[0.5]], [[0.9]]])
+    names = ["none", "a", "b", "c"]
+    table, opposite = (score_table(names, x, "none") for x in (cube, np.concatenate([cube[:1], cube[:0:-1]])))
+    assert rank_correlation(table, table, "none") == pytest.approx(1.0)
+    assert rank_correlation(table, opposite, "none") == pytest.approx(-1.0)

@@ -45,6 +45,14 @@ def test_the_matrix_of_the_docs_has_a_cell_for_every_controller_and_condition():
     assert all(re.fullmatch(r"✓|\d+/\d+( spun)?", cell) for cell in matrix().values())
 
 
+def test_the_conditions_passed_that_pages_of_threats_show_are_those_of_the_matrix():
+    ranking = load_ranking(RANKING)
+    with (RANKING.parent / "matrix.csv").open(encoding="utf-8", newline="") as lines:
+        passed = {row["entry"]: (int(row["passed"]), int(row["conditions"])) for row in csv.DictReader(lines)}
+    cells = {entry: [matrix()[entry, name] for name in ranking.conditions] for entry in ranking.entries}
+    assert passed == {entry: (row.count("✓"), len(row)) for entry, row in cells.items()}
+
+
 @pytest.mark.exhaustive
 @pytest.mark.parametrize("entry, condition", random.Random(16).sample(sorted(matrix()), 8))
 def test_cells_of_the_docs_are_what_runs_come_to(entry, condition, tmp_path):
