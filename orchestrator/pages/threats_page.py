@@ -23,7 +23,7 @@ from ..experiments.threat_scores import (
     score_table,
 )
 from ..experiments.threats import LANE_CHANGE, REFERENCE, LoadedThreats, SearchPlace, ThreatSpec
-from ..figures.style import shown_unit
+from ..figures.style import digits_of, shown_unit
 from ..messages import counted
 from .page_parts import render
 from .report import PAGE, RANKING
@@ -290,7 +290,7 @@ def disciplines(result: ThreatResult) -> list[Discipline]:
     threats = result.threats
     names = [name for name in threats.spec.settings if _of_lane_changes(threats, name)]
     of_changes = [_of_lane_change(result, name) for name in names if result.complete[name]]
-    driven = {discipline for discipline, _, _ in result.quantities}
+    driven = {name for name, _, entry in result.quantities if entry == REFERENCE}
     return of_changes + [
         _of_standard_test(result, name) for name in threats.spec.disciplines if name in driven
     ]
@@ -352,7 +352,7 @@ def _mean_text(magnitudes: Sequence[float | None], unit: str) -> str:
     if not known:
         return "lost"
     lost = f", lost on {len(magnitudes) - len(known)}" if len(known) < len(magnitudes) else ""
-    return f"{shown_unit(unit)[1] * sum(known) / len(known):#.3g}{lost}"
+    return f"{digits_of(shown_unit(unit)[1] * sum(known) / len(known), 3)}{lost}"
 
 
 def discipline_table(result: ThreatResult, discipline: Discipline) -> Table:
