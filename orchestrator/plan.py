@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 from math import copysign
 from operator import is_
 from pathlib import Path
@@ -138,7 +139,15 @@ class Fmu:
 
     def of(self, causality: str) -> list[Variable]:
         """Return the variables of a causality, in the order of the FMU, without aliases of inputs."""
-        return [v for v in self.variables.values() if v.causality == causality and v.alias_of is None]
+        return self._by_causality.get(causality, [])
+
+    @cached_property
+    def _by_causality(self) -> dict[str, list[Variable]]:
+        variables: dict[str, list[Variable]] = {}
+        for variable in self.variables.values():
+            if variable.alias_of is None:
+                variables.setdefault(variable.causality, []).append(variable)
+        return variables
 
     def aliases(self) -> dict[str, str]:
         """Return other name -> name of the inputs that have several."""
@@ -375,7 +384,10 @@ def _shared(new: Any, old: Any) -> Any:
     if kind is float:
         return old if new == old and copysign(1.0, new) == copysign(1.0, old) else new
     if kind is dict:
-        found = {key: _shared(value, old.get(key)) for key, value in new.items()}
+        found = {
+            key: value if value is (other := old.get(key)) else _shared(value, other)
+            for key, value in new.items()
+        }
         same = list(new) == list(old) and all(map(is_, found.values(), old.values()))
         return old if same else found
     if issubclass(kind, tuple):
@@ -384,8 +396,12 @@ def _shared(new: Any, old: Any) -> Any:
             return old
         return kind(*parts) if hasattr(kind, "_make") else kind(parts)
     if kind in (Plan, Instance, Wire, Override, ValueOrigin, ValueSource, Diagnostic, Location, Target):
-        fields = {name: _shared(value, getattr(old, name)) for name, value in vars(new).items()}
-        if all(value is getattr(old, name) for name, value in fields.items()):
+        before = vars(old)
+        fields = {
+            name: value if value is (other := before[name]) else _shared(value, other)
+            for name, value in vars(new).items()
+        }
+        if all(map(is_, fields.values(), before.values())):
             return old
         copied = object.__new__(kind)
         vars(copied).update(fields)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +16,7 @@ from .scenario import yaml_lines
 from .scenario.find_and_load import LoadedScenario, load_scenario
 from .scenario.yaml_lines import Document
 from .tyre_stand import cornering_stiffness
-from .wiring.make_plan import make_plan
+from .wiring.make_plan import Network, make_plan
 
 
 class Planner:
@@ -37,6 +36,7 @@ class Planner:
         opened: Mapping[Path, Fmu] | None = None,
     ) -> None:
         self._documents: dict[Path, Document] = {}
+        self._networks: dict[Hashable, Network] = {}
         self._stiffnesses: dict[Hashable, dict[str, float]] = {}
         self.opener = Opener(build=build, report=report, opened=opened)
 
@@ -75,7 +75,10 @@ class Planner:
             YawbenchError: an FMU is missing or cannot be built, the instances cannot be connected, or a
                 signal is not recorded.
         """
-        plan = make_plan(scenario, fmus=fmus, opener=self.opener, isolated=isolated, measure=self._measure)
+        plan = make_plan(
+            scenario, fmus=fmus, opener=self.opener, isolated=isolated, measure=self._measure,
+            networks=self._networks,
+        )  # fmt: skip
         if not record:
             return plan
         recorded = {str(name): name for name in plan.record}
@@ -101,7 +104,7 @@ class Planner:
         return self._stiffnesses[key]
 
     def _read(self, path: Path, *, what: str) -> Document:
-        """Return a fresh copy of what `yaml_lines.read` returns."""
+        """Return what `yaml_lines.read` returns, for changes of its own."""
         if path not in self._documents:
             self._documents[path] = yaml_lines.read(path, what=what)
-        return copy.deepcopy(self._documents[path])
+        return self._documents[path].fresh()

@@ -18,6 +18,7 @@ import traceback
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import fields
 from typing import Any, NamedTuple, TypeVar
 
 from .errors import RecordWarning, YawbenchError
@@ -84,7 +85,7 @@ class Worker(SupervisedProcess):
         if number in self._sent:
             return _kept, (number,)
         self._sent[number] = fmu  # refers to it, so that no other object gets its number
-        return _keep, (number, vars(fmu))
+        return _keep, (number, {of.name: getattr(fmu, of.name) for of in fields(fmu)})
 
     def descriptors(self) -> tuple[int, int]:
         """Return the descriptors that can be read when it has answered or died."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from importlib.util import find_spec
@@ -56,6 +56,10 @@ class Opener:
         self._preopened = dict(opened or {})
         self._opened: dict[tuple[Path, BuildInfo | None, bool], Fmu] = {}
         self._built: dict[Path, BuildInfo | None] = {}
+        self.folders: dict[tuple[Path, Path], Path] = {}
+        """Folder of a scenario, working directory -> what `find_folder` has returned."""
+        self.found: dict[Hashable, Fmu] = {}
+        """What scenarios name, and where from -> the opened FMU."""
 
     @cached_property
     def _upkeep(self) -> FmuUpdater:
@@ -131,9 +135,11 @@ def find_folder(scenario: Path, *, opener: Opener) -> Path:
     """
     above = scenario.absolute().parent
     here = Path.cwd()
+    if known := opener.folders.get((above, here)):
+        return known
     for folder in (above, *above.parents, here, *here.parents):
         if any((folder / "fmus").glob("*.fmu")):
-            return folder / "fmus"
+            return opener.folders.setdefault((above, here), folder / "fmus")
     if opener.build:
         return HOME
     raise ModelDescriptionError(

@@ -15,6 +15,7 @@ from dataclasses import asdict, astuple
 from datetime import datetime, timezone
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from operator import is_
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from ..cache import OF_RESULTS, checksum, sources_hash
 from ..errors import ResultsError
 from ..fmu.binary import runs_as
 from ..names import SignalName
-from ..plan import DEFAULT, InputSeries, Instance, Plan, ValueSource, Wire
+from ..plan import DEFAULT, Fmu, InputSeries, Instance, Plan, ValueSource, Wire
 from .reader import load_results
 from .run_folder import COMPLETED, RUN_FILE, is_dead
 from .run_record import (
@@ -187,7 +188,7 @@ def key_of(plan: Plan, also: Any = None) -> str:
         "series": [
             [u.name, name, s.sha256, s.column, s.held] for u in plan.instances for name, s in u.series.items()
         ],
-        "wires": [wire.model_dump(by_alias=True, exclude_unset=True) for wire in connections_of(plan)],
+        "wires": _WIRES.of(plan),
         "faults": [list(astuple(signal)) for signal in plan.faults],
         "record": plan.record,
         "time": [str(plan.start), str(plan.step), plan.n_steps],
@@ -196,6 +197,25 @@ def key_of(plan: Plan, also: Any = None) -> str:
     }
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
 
+
+class _Described:
+    """The wires of a plan as in keys, kept for the next plan, which often has the same."""
+
+    def __init__(self) -> None:
+        self._wires: tuple[Wire, ...] = ()
+        self._fmus: list[Fmu] = []
+        self._described: list[dict[str, Any]] = []
+
+    def of(self, plan: Plan) -> list[dict[str, Any]]:
+        fmus = [unit.fmu for unit in plan.instances]
+        if not (plan.wires is self._wires and all(map(is_, fmus, self._fmus))):
+            self._wires, self._fmus = plan.wires, fmus
+            records = connections_of(plan)
+            self._described = [wire.model_dump(by_alias=True, exclude_unset=True) for wire in records]
+        return self._described
+
+
+_WIRES = _Described()
 
 COMPARED = {
     "algorithm": "the algorithm has changed",

@@ -253,7 +253,7 @@ def _put_faults(document: Document, change: Override, place: str) -> bool:
     places = [spelled(str(fault.get("on"))) if isinstance(fault, dict) else None for fault in faults]
     there = [i for i, at in enumerate(places) if at == place]
     before = [faults[i] for i in there]
-    document.data[FAULTS] = faults
+    faults = document.to_change(())[FAULTS] = [*faults]
     for i in reversed(there):
         document.remove((FAULTS,), i)
     document.overrides |= {(FAULTS, len(faults) + k): change for k in range(len(items))}
@@ -265,9 +265,9 @@ def _put_faults(document: Document, change: Override, place: str) -> bool:
 
 def leave_unvalidated(document: Document) -> None:
     """Let every instance use its FMU even if the model description is invalid."""
-    for spec in _mapping(document.data, "units").values():
+    for name, spec in _mapping(document.data, "units").items():
         if isinstance(spec, dict):
-            spec["validate"] = False
+            document.to_change(("units", name))["validate"] = False
 
 
 def apply_to_all_runs(document: Document, changes: Iterable[Override]) -> None:
@@ -296,11 +296,7 @@ def _swap(document: Document, unit: str, change: Override) -> bool:
 
 def _put(document: Document, key: KeyPath, change: Override, value: Any = None) -> bool:
     """Set the value at a key, by default that of the override; return whether it differs from before."""
-    holder = document.data
-    for part in key[:-1]:
-        if isinstance(holder, dict) and holder.get(part) is None:
-            holder[part] = {}
-        holder = _mapping(holder, str(part))
+    holder = document.to_change(key[:-1])
     value = change.value if value is None else value
     before = holder.get(key[-1])
     if isinstance(document.data, dict):

@@ -18,7 +18,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cache
+from functools import cache, lru_cache
 
 from ..errors import InvalidValueError
 from ..messages import closest, listed, short
@@ -381,6 +381,10 @@ def instant(value: object) -> Fraction:
     Raises:
         ValueError: not a time.
     """
+    return _instant(value) if isinstance(value, (str, float, int)) else _point(value)
+
+
+def _point(value: object) -> Fraction:
     time = _time(value)
     if abs(time) > LONGEST_QUANTITY:
         raise ValueError(f"must be a time of at most {LONGEST_QUANTITY:g} s (got {value!r})")
@@ -393,6 +397,10 @@ def seconds(value: object) -> Fraction:
     Raises:
         ValueError: not a positive time.
     """
+    return _seconds(value) if isinstance(value, (str, float, int)) else _duration(value)
+
+
+def _duration(value: object) -> Fraction:
     time = _time(value)
     if not 0 < time <= LONGEST_QUANTITY:
         limit = f" and at most {LONGEST_QUANTITY:g} s" if time > 0 else ""
@@ -400,6 +408,10 @@ def seconds(value: object) -> Fraction:
     if time < SHORTEST:
         raise ValueError(f"must be a time of at least {float(SHORTEST):g} s (got {value!r})")
     return time
+
+
+_instant = lru_cache(maxsize=10_000, typed=True)(_point)
+_seconds = lru_cache(maxsize=10_000, typed=True)(_duration)
 
 
 def exact_text(time: Fraction) -> str:

@@ -108,17 +108,24 @@ KINDS: dict[str, tuple[str, type, str]] = {
 
 def validate(model: type[Model], document: Document) -> Model | None:
     """Return the validated content; if it is invalid, add the errors to the document and return None."""
-    if document.data is None:
+    data = document.data
+    if data is None:
         return None
-    if another := _another_kind(model, document.data):
+    accepted = document.accepted.get(model)
+    if accepted is not None and accepted[0] is data:
+        content: Model = accepted[1]
+        return content
+    if another := _another_kind(model, data):
         document.report((), another, "file-wrong-kind")
         return None
     try:
-        return model.model_validate(document.data)
+        content = model.model_validate(data)
     except ValidationError as errors:
         for error in errors.errors(include_url=False):
-            _report(model, document, _place(document.data, error["loc"]), error)
-    return None
+            _report(model, document, _place(data, error["loc"]), error)
+        return None
+    document.accepted[model] = data, content
+    return content
 
 
 def _another_kind(model: type[BaseModel], data: Any) -> str | None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,29 @@ class Document:
     """Line that holds nothing else -> its comment."""
     notes: list[Diagnostic] = field(default_factory=list)
     """Diagnostics that are not errors, for the plan."""
+    accepted: dict[type, tuple[Any, Any]] = field(default_factory=dict)
+    """Schema -> the data that it has accepted last, and their content."""
+
+    def fresh(self) -> Document:
+        """Return a document with the same content, and overrides, errors and notes of its own."""
+        return replace(
+            self, lines={**self.lines}, overrides={**self.overrides}, errors={**self.errors},
+            notes=[*self.notes],
+        )  # fmt: skip
+
+    def to_change(self, key: KeyPath) -> dict[str | int, Any]:
+        """Return the mapping at `key`, added if it is missing, in order to change it.
+
+        It and those around it are copied first: `fresh` documents share their data. Without a mapping there
+        the result is empty, and changes of it are lost.
+        """
+        self.data = holder = copy(self.data)
+        for part in key:
+            if isinstance(holder, dict):
+                inner = holder.get(part)
+                holder[part] = {} if inner is None else copy(inner)
+                holder = holder[part]
+        return holder if isinstance(holder, dict) else {}
 
     def report(self, key: KeyPath, sentence: str, code: str = ScenarioError.default_code) -> None:
         """Add an error about the value (or the missing value) at `key`."""

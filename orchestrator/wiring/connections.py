@@ -17,11 +17,11 @@ from itertools import pairwise
 
 from ..messages import fold, hint, listed
 from ..names import SignalName, matching
-from ..plan import DEFAULT, InputSeries, Value, Variable, Wire
+from ..plan import Variable, Wire
 from ..scenario.find_and_load import Connection
 from ..scenario.yaml_lines import KeyPath, dotted
 from .compatibility import DIFFERENCES, alike, contradicts_its_name, conversion_between, difference, fits
-from .constants import Constant, Input, constants
+from .constants import Constant, Input
 from .context import WiringContext
 from .order import in_order
 
@@ -44,34 +44,31 @@ class Connector:
         self._refused: set[Input] = set()  # not to be driven by equal names (`from: null`)
         self._fitting: dict[object, dict[str, list[str]]] = {}  # kind of an input -> see `_fitting_outputs`
 
-    def connect(self) -> tuple[list[Wire], dict[str, dict[str, Value | InputSeries]]]:
-        """Return all wires, and the constants and time series of each instance."""
+    def connect(self, by_input: Mapping[Input, Constant]) -> tuple[list[Wire], list[Input]]:
+        """Return all wires, and the inputs that keep their start values.
+
+        Args:
+            by_input: the constant of each input, which counts where no wire takes precedence.
+        """
         wires = self._by_connections()
         self._put_in_order()
-        by_input = constants(self._system)
         own = {target for target, constant in by_input.items() if constant.of_unit}
         self._note_overruled(own - wires.keys())
         ambiguous = self._by_names(wires, own | self._refused)
-        values: dict[Input, Value | InputSeries] = {}
-        for target, constant in self._given(by_input, wires).items():
-            values[target] = constant.value
-            self._system.origins[target[0]][target[1]] = constant.origin
+        self._refuse_overruled(by_input, wires)
         fed = wires.keys() | by_input.keys() | ambiguous
+        kept = []
         for instance, inputs in self._inputs.items():
             for name, variable in inputs.items():
                 if (instance, name) in fed:
                     continue
                 if (variable.optional or self._explicit(instance)) and variable.start is not None:
-                    values[(instance, name)] = variable.start
-                    self._system.origins[instance][name] = DEFAULT
+                    kept.append((instance, name))
                 else:
                     self._report(("units", instance), self._undriven(instance, variable), "input-undriven")
         fitted = [self._fitted(wire, key) for wire, key in wires.values()]
         self._note_units(wire for wire, key in wires.values() if self._scale(key) is None)
-        by_unit: dict[str, dict[str, Value | InputSeries]] = {instance: {} for instance in self._fmus}
-        for (instance, name), value in values.items():
-            by_unit[instance][name] = value
-        return fitted, by_unit
+        return fitted, kept
 
     def _note_overruled(self, inputs: Set[Input]) -> None:
         """Note inputs with a constant that takes precedence over an output of the same name."""
@@ -262,10 +259,10 @@ class Connector:
                 return [preferred], key
         return having, ("units", instance)
 
-    def _given(
+    def _refuse_overruled(
         self, by_input: Mapping[Input, Constant], wires: Mapping[Input, tuple[Wire, KeyPath]]
-    ) -> dict[Input, Constant]:
-        """Return the constants of inputs without a wire; report the others.
+    ) -> None:
+        """Report the constants of inputs with a wire.
 
         Facts are not reported: they apply to those inputs of theirs that nothing drives.
         """
@@ -280,7 +277,6 @@ class Connector:
                 f"{driven}: a constant is for inputs that no unit drives{unless}",
                 "constant-overruled",
             )
-        return {target: constant for target, constant in by_input.items() if target not in wires}
 
     def _undriven(self, instance: str, variable: Variable) -> str:
         """Return the message for an input without a source."""

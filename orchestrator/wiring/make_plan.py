@@ -14,9 +14,8 @@ the same numbers.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
-from functools import cache
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from vocabulary.roles import role_in, role_of
@@ -29,13 +28,14 @@ from ..fmu.opener import Opener, find_fmu, find_folder, host_needs, stale_fmus
 from ..fmu.places import hidden
 from ..messages import closest, fold, hint, listed
 from ..names import SignalName, match
-from ..plan import Fmu, InputSeries, Instance, Plan, Value, ValueOrigin, Variable, Wire
+from ..plan import DEFAULT, Fmu, InputSeries, Instance, Plan, Value, ValueOrigin, Variable, Wire
 from ..scenario.find_and_load import LoadedScenario
 from ..scenario.overrides import is_path
 from .connections import Connector
+from .constants import Constant, Input, constants
 from .context import WiringContext
 from .faults import faults_of
-from .order import evaluate
+from .order import EvaluationOrder, evaluate
 from .parameters import STATIC_LOADS, STIFFNESSES, Parameters
 from .warnings import exact, suspicious_values
 
@@ -122,6 +122,76 @@ TyreMeasurement = Callable[[Instance, Mapping[str, float]], Mapping[str, float]]
 """Callback: (instance of tyres, wheel -> load [N]) -> wheel -> cornering stiffness of one tyre [N/rad]."""
 
 
+NETWORKS = 100
+"""Largest number of networks that are kept. Chosen: more than a study has, little memory."""
+
+
+@dataclass
+class Network:
+    """The connected instances: what plans share whose scenarios differ only in values."""
+
+    wires: list[Wire]
+    kept: list[Input]  # inputs that keep their start values
+    record: tuple[SignalName, ...]
+    evaluation: EvaluationOrder
+    in_order: tuple[Wire, ...]  # the wires, see `_sorted`
+    shadowed: list[str]  # see `shadowed_modules`
+    notes: list[Diagnostic]
+    follows: object  # what it was made of
+    exact: list[Diagnostic] | None = None  # see `exact`
+
+
+def _network(
+    system: WiringContext,
+    by_input: Mapping[Input, Constant],
+    isolated: bool,
+    networks: dict[Hashable, Network],
+) -> Network:
+    """Return the network of a system: a known one if FMUs, connections, and inputs with constants are equal.
+
+    A network with errors is not kept.
+    """
+    scenario, data = system.scenario, system.scenario.document.data
+    follows = *system.fmus.values(), data.get("connections"), data.get("record")
+    constant = tuple((target, c.key, c.of_unit, c.of_fact) for target, c in by_input.items())
+    swapped, units = tuple(scenario.replaced.items()), tuple(system.fmus)
+    key = tuple(map(id, follows)), units, constant, swapped, scenario.explicit, isolated
+    if key not in networks:
+        errors, notes = len(system.found), len(system.notes)
+        wires, kept = Connector(system).connect(by_input)
+        record = recorded(system)
+        evaluation = evaluate(system.fmus, wires)
+        in_order = _sorted(wires, evaluation.order, system.fmus)
+        shadowed = shadowed_modules(system.fmus, isolated=isolated)
+        made = Network(wires, kept, record, evaluation, in_order, shadowed, system.notes[notes:], follows)
+        if len(system.found) > errors:
+            return made
+        if len(networks) == NETWORKS:
+            networks.clear()
+        networks[key] = made
+    else:
+        system.notes += networks[key].notes
+    return networks[key]
+
+
+def _values(
+    system: WiringContext, by_input: Mapping[Input, Constant], network: Network
+) -> dict[str, dict[str, Value | InputSeries]]:
+    """Return the constants, time series and start values of the inputs without a wire, by instance."""
+    values: dict[str, dict[str, Value | InputSeries]] = {instance: {} for instance in system.fmus}
+    wired = {(wire.target, wire.input) for wire in network.wires}
+    for (instance, name), constant in by_input.items():
+        if (instance, name) not in wired:
+            values[instance][name] = constant.value
+            system.origins[instance][name] = constant.origin
+    for instance, name in network.kept:
+        start = system.inputs[instance][name].start
+        assert start is not None  # else it would have been reported
+        values[instance][name] = start
+        system.origins[instance][name] = DEFAULT
+    return values
+
+
 def make_plan(
     scenario: LoadedScenario,
     *,
@@ -129,6 +199,7 @@ def make_plan(
     opener: Opener | None = None,
     isolated: bool = False,
     measure: TyreMeasurement | None = None,
+    networks: dict[Hashable, Network] | None = None,
 ) -> Plan:
     """Open the scenario's FMUs and connect them.
 
@@ -139,6 +210,7 @@ def make_plan(
         isolated: whether each instance will run in its own process (see `master.isolation`).
         measure: measures the cornering stiffness of tyres, for instances that need it if the vehicle file
             does not give it (see `tyre_stand.cornering_stiffness`).
+        networks: those of earlier plans, to be used again; this plan's is added.
 
     Raises:
         ModelDescriptionError: FMUs are missing, damaged or not supported.
@@ -150,15 +222,15 @@ def make_plan(
     notes += [*scenario.document.notes, *stale_fmus(opened.values()), *host_needs(opened.values())]
     distributed = Parameters(system)
     parameters = distributed.of_units()
-    wires, values = Connector(system).connect()
-    record = recorded(system)
+    by_input = constants(system)
+    network = _network(system, by_input, isolated, {} if networks is None else networks)
+    wires, record, evaluation = network.wires, network.record, network.evaluation
+    values = _values(system, by_input, network)
     faults = faults_of(system, wires, record)
     if not isolated:
         _check_instances(system)
-    evaluation = evaluate(opened, wires)
     errors = system.errors()
-    shadowed = shadowed_modules(opened, isolated=isolated)
-    of_all = [Diagnostic("fmu-modules-conflict", sentence) for sentence in shadowed]
+    of_all = [Diagnostic("fmu-modules-conflict", sentence) for sentence in network.shadowed]
     of_all += [
         Diagnostic(
             "algebraic-loop",
@@ -182,10 +254,12 @@ def make_plan(
             f"possible algebraic loop: {loop}; an FMU here does not say which inputs its outputs follow, "
             "so a wire against the evaluation order uses earlier values",
         )
-    notes += exact(list(instances.values()), wires)
+    if network.exact is None:
+        network.exact = exact(list(instances.values()), wires)
+    notes += network.exact
     return Plan(
         instances=tuple(instances[name] for name in evaluation.order),
-        wires=_sorted(wires, evaluation.order, opened),
+        wires=network.in_order,
         record=record,
         step=scenario.step_size,
         n_steps=int((scenario.stop_time - scenario.start_time) / scenario.step_size),
@@ -282,10 +356,14 @@ def _open_all(scenario: LoadedScenario, fmus: Path | None, opener: Opener) -> Wi
     if fmus is None and not all(is_path(spec.fmu) for spec in scenario.units.values()):
         folder = find_folder(scenario.path, opener=opener)
 
-    @cache
+    above, found = scenario.path.absolute().parent, opener.found
+
     def opened(fmu: str, validate: bool, build: bool = True) -> Fmu:
-        path = find_fmu(fmu, scenario=scenario.path, fmus=folder, opener=opener, build=build)
-        return opener.open(path, validate=validate)
+        known = fmu, above, folder, validate, build
+        if known not in found:
+            path = find_fmu(fmu, scenario=scenario.path, fmus=folder, opener=opener, build=build)
+            found[known] = opener.open(path, validate=validate)
+        return found[known]
 
     def replaced(instance: str) -> Fmu | None:
         try:

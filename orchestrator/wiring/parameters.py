@@ -11,6 +11,7 @@ import re
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache, lru_cache
 from pathlib import Path
 
 from vocabulary.friction_table import table_of
@@ -114,15 +115,23 @@ def origin(scenario: LoadedScenario, key: KeyPath, *, unit: str | None = None) -
     change = document.override(key)
     if change is not None:
         return ValueOrigin(change.origin, source=ValueSource(VARIED, change.origin))
-    comment, of_file = document.comment(key), scenario.source
+    comment, of_file, line = document.comment(key), scenario.source, document.lines.get(key, 0)
     if of_vehicle:
-        of_file = scenario.vehicle_file.source
-        comment = re.sub(rf"^{re.escape(unit or '1')}(?![\w/.])[,;]?\s*", "", comment)
-    else:
-        comment = comment or (document.comment_above(key[:2]) if key[0] == "units" else "") or of_file
+        return _in_vehicle_file(comment, unit or "1", scenario.vehicle_file.source, str(document.path), line)
+    comment = comment or (document.comment_above(key[:2]) if key[0] == "units" else "") or of_file
+    return _in_file("scenario", comment, of_file, str(document.path), line)
+
+
+@lru_cache(maxsize=10_000)
+def _in_vehicle_file(comment: str, unit: str, of_file: str, path: str, line: int) -> ValueOrigin:
+    words = re.sub(rf"^{re.escape(unit)}(?![\w/.])[,;]?\s*", "", comment)
+    return _in_file("vehicle", words, of_file, path, line)
+
+
+@lru_cache(maxsize=10_000)
+def _in_file(kind: str, comment: str, of_file: str, path: str, line: int) -> ValueOrigin:
     source = ValueSource.of_comment(comment, of_file)
-    placed = replace(source, file=str(document.path), line=document.lines.get(key, 0))
-    return ValueOrigin("vehicle" if of_vehicle else "scenario", source=placed)
+    return ValueOrigin(kind, source=replace(source, file=path, line=line))
 
 
 class Parameters:
@@ -355,6 +364,7 @@ def known_car(parameters: Mapping[str, Value]) -> CarQuantities:
     return car_of({name: float(value_for(_quantity(name), raw)) for name, raw in of_car.items()})
 
 
+@cache
 def _quantity(name: str) -> Variable:
     """Return a parameter with the unit and limits of a quantity of a car."""
     quantity = CAR[name]

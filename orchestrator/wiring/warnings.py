@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
+from functools import lru_cache
 from itertools import product
 from typing import NamedTuple
 
@@ -101,12 +102,16 @@ def suspicious_vehicle(parameters: Mapping[str, Value]) -> list[Diagnostic]:
 
 
 def _of_file(parameters: Mapping[str, Value]) -> Iterator[_Given]:
-    for name, raw in parameters.items():
-        if name in CAR:
-            try:
-                yield _Given(f"vehicle.{name}", name, known_car({name: raw}).values[name], raw)
-            except ValueError:  # in a unit that only an FMU defines
-                continue
+    items = (_quantity(name, raw) for name, raw in parameters.items() if name in CAR)
+    return filter(None, items)
+
+
+@lru_cache(maxsize=10_000, typed=True)
+def _quantity(name: str, raw: Value) -> _Given | None:
+    try:
+        return _Given(f"vehicle.{name}", name, known_car({name: raw}).values[name], raw)
+    except ValueError:  # in a unit that only an FMU defines
+        return None
 
 
 def _of_units(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[_Given]:
@@ -169,6 +174,8 @@ def _index(units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
 
 OF_CAR = (*(name for name, quantity in CAR.items() if quantity.needed), *STIFFNESSES, "steering_ratio")
 """Parameters that describe the car in any instance."""
+IN_FACTS = {name for fact in FACTS.values() for name in (*fact.inputs, *fact.parameters)}
+"""Inputs and parameters that facts set."""
 OF_FILES = ("default", "vehicle", "derived", "scenario", "file")
 """Origins of values that are not overrides."""
 SAME = 1e-9
@@ -180,6 +187,7 @@ SLIPS = (
     ("rad", 4 * math.pi, "deg", 180 / math.pi),  # chosen: two turns of a hand wheel
 )
 """Unit, largest plausible value in it, unit that was probably meant, factor to it."""
+LEAST_SLIP = min(largest for _, largest, *_ in SLIPS)
 
 
 class GivenValue(NamedTuple):
@@ -194,11 +202,12 @@ class GivenValue(NamedTuple):
 
 def suspicious_values(scenario: LoadedScenario, units: Mapping[str, Instance]) -> list[Diagnostic]:
     """Return warnings about the values of a scenario's instances."""
+    parameters, given = [*_parameters(units.values())], [*_constants(units.values())]
     return [
-        *_two_values(units),
-        *_other_cars(scenario, units),
-        *_slips(scenario, units),
-        *_of_tyres(scenario, units),
+        *_two_values(units, parameters, given),
+        *_other_cars(scenario, parameters),
+        *_slips(scenario, parameters, given),
+        *_of_tyres(scenario, units, parameters),
         *suspicious_car(scenario, units),
         *_idle_units(scenario, units),
     ]
@@ -207,9 +216,10 @@ def suspicious_values(scenario: LoadedScenario, units: Mapping[str, Instance]) -
 def _idle_units(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
     """Yield a warning for every instance that would take its first step after the end of the run."""
     lasts = scenario.stop_time - scenario.start_time
+    steps = lasts / scenario.step_size
     for unit in units.values():
-        step = unit.period * scenario.step_size
-        if step > lasts:
+        if unit.period > steps:
+            step = unit.period * scenario.step_size
             says = (
                 f"{unit.name} never takes a step: its step_size, {float(step):g} s, is longer than the run, "
                 f"{float(lasts):g} s; its outputs keep their initial values"
@@ -217,18 +227,20 @@ def _idle_units(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iter
             yield _warning("instance-never-steps", f"{unit.name}.step_size", says, float(step))
 
 
-def _of_tyres(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
+def _of_tyres(
+    scenario: LoadedScenario, units: Mapping[str, Instance], parameters: Sequence[GivenValue]
+) -> Iterator[Diagnostic]:
     """Yield a warning for every value that contradicts the tyre property files."""
     tyres = [unit for unit in units.values() if "pcy1_front" in unit.parameters]
     if not tyres or not scenario.tyre_files:
         return
     law = without_role(tyres[0].fmu.name).removesuffix("_transient")
-    for item in _parameters(units.values()):
+    for item in parameters:
         if item.name == "tyre" and "pcx1_front" in units[item.instance].parameters and item.value != law:
             says = f"{item.instance}.tyre is {item.value}: {tyres[0].name} follows {law}"
             yield _warning("tyre-mismatch", f"{item.instance}.tyre", says)
     radii = {str(f.path.name): f.rolling_radius for f in scenario.tyre_files.values() if f.rolling_radius}
-    wheel_radii = [item for item in _parameters(units.values()) if item.name == "wheel_radius"]
+    wheel_radii = [item for item in parameters if item.name == "wheel_radius"]
     for (file, radius), item in product(radii.items(), wheel_radii):
         if isinstance(item.value, float) and radius and abs(item.value / radius - 1.0) > RADIUS:
             says = (
@@ -238,24 +250,28 @@ def _of_tyres(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterat
             yield _warning("wheel-radius-mismatch", f"{item.instance}.wheel_radius", says, item.value)
 
 
-def _two_values(units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
+def _two_values(
+    units: Mapping[str, Instance], parameters: Sequence[GivenValue], given: Sequence[GivenValue]
+) -> Iterator[Diagnostic]:
     """Yield a warning for every quantity that has different values in several instances.
 
     Exceptions are values that the scenario gives to the single instances, and defaults of FMUs for
     quantities that are not properties of the car: these are intended. A target speed that differs from the
     initial speed is always reported.
     """
-    in_facts = {name for fact in FACTS.values() for name in (*fact.inputs, *fact.parameters)}
     groups: dict[str, list[GivenValue]] = {}
-    for item in _parameters(units.values()):
+    for item in parameters:
         groups.setdefault(item.name, []).append(item)
     for name, items in groups.items():
-        if name not in in_facts and _one_matter(name, items) and _differ(items):
+        if name in IN_FACTS or all(item.value == items[0].value for item in items):
+            continue
+        if _one_matter(name, items) and _differ(items):
             vehicle = f"--set vehicle.{name}=VALUE sets it in all of them without a value of their own"
             yield _values_differ(name, items, vehicle)
     for name, fact in FACTS.items():
-        items = [item for item in _parameters(units.values()) if fact.counts(units[item.instance], item.name)]
-        items += [item for item in _constants(units.values()) if item.name in fact.inputs]
+        of_fact = [item for item in parameters if item.name in fact.parameters]
+        items = [item for item in of_fact if fact.counts(units[item.instance], item.name)]
+        items += [item for item in given if item.name in fact.inputs]
         meant = ({"scenario"}, {"default"}) if fact.inputs else ()  # a road may differ from wheel to wheel
         if _differ(items) and {item.origin for item in items} not in meant:
             yield _values_differ(name, items, f"--set {name}=VALUE sets it in all of them")
@@ -265,7 +281,7 @@ def _one_matter(name: str, items: list[GivenValue]) -> bool:
     """Return whether a parameter of several instances should have the same value in all of them."""
     origins = {item.origin for item in items}
     measured_alike = len({item.variable.unit or "1" for item in items}) == 1
-    if len(items) < 2 or not measured_alike or origins == {"scenario"}:
+    if not measured_alike or origins == {"scenario"}:
         return False
     if origins == {"default"}:
         return name in OF_CAR
@@ -316,14 +332,14 @@ def _warning(code: str, signal: str, says: str, value: float | None = None) -> D
     return Diagnostic(code, says, "warning", Location(signal=signal), value)
 
 
-def _other_cars(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
+def _other_cars(scenario: LoadedScenario, parameters: Sequence[GivenValue]) -> Iterator[Diagnostic]:
     """Yield a warning if there is a vehicle file, but instances use defaults for properties of the car.
 
     A ratio of 1 is exempt: it means that angles are those of the road wheels.
     """
     defaults = [
         item
-        for item in (_parameters(units.values()) if scenario.vehicle_file.parameters else ())
+        for item in (parameters if scenario.vehicle_file.parameters else ())
         if item.name in OF_CAR and item.origin == "default" and item.value != 1
     ]
     if defaults:
@@ -333,14 +349,17 @@ def _other_cars(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iter
         yield _warning("vehicle-incomplete", f"{first.instance}.{first.name}", says, float(first.value))
 
 
-def _slips(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
+def _slips(
+    scenario: LoadedScenario, parameters: Sequence[GivenValue], given: Sequence[GivenValue]
+) -> Iterator[Diagnostic]:
     """Yield a warning for every number that was probably meant in another unit."""
-    for item in _parameters(units.values()):
+    for item in parameters:
+        if item.origin == "default" or not isinstance(item.value, float) or abs(item.value) <= LEAST_SLIP:
+            continue
         spec = scenario.units[item.instance].parameters.get(item.name)
         raw = scenario.vehicle_file.parameters.get(item.name) if spec is None else spec
         facts = [getattr(scenario, name) for name, fact in FACTS.items() if item.name in fact.parameters]
-        with_unit = any(isinstance(number, str) for number in (raw, *facts))
-        if item.origin == "default" or with_unit or not isinstance(item.value, float):
+        if any(isinstance(number, str) for number in (raw, *facts)):  # they name their unit
             continue
         for unit, largest, meant, factor in SLIPS:
             if item.variable.unit == unit and abs(item.value) > largest:
@@ -349,7 +368,7 @@ def _slips(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[
                     f"{factor * item.value:.4g} {meant}; did you mean '{item.value:g} {meant}'?"
                 )
                 yield _warning("unit-suspicious", f"{item.instance}.{item.name}", says, item.value)
-    for item in _constants(units.values()):
+    for item in given:
         if item.name in FACTS["friction"].inputs and isinstance(item.value, float) and item.value > 2.0:
             place = f"{item.instance}.{item.name}"
             number = f"{item.value:g}"

@@ -12,6 +12,7 @@ import pytest
 
 from orchestrator.errors import Diagnostic, Location, ModelDescriptionError, WiringError, YawbenchError
 from orchestrator.plan import Instance, Override, Plan, ValueOrigin, Wire
+from orchestrator.planner import Planner
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
@@ -147,6 +148,45 @@ def test_every_input_has_exactly_one_source() -> None:
 def test_the_scenario_as_run_can_be_written_as_json() -> None:
     made = plan(swaps=["controller=controller_off"])
     assert json.loads(json.dumps(made.scenario))["units"]["controller"]["fmu"] == "controller_off"
+
+
+OF_ONE_PLANNER: list[dict[str, Any]] = [
+    {},
+    {"settings": ["plant.mass=1600"]},
+    {"settings": ["plant.mass=-1"]},
+    {"settings": ["driver.amplitude=0.1", "controller.gain=2"]},
+    {"settings": ["inputs.friction*=0.3"]},
+    {"settings": ["inputs.plant.steer_angle=0.1"]},
+    {"settings": ["inputs.tyre.friction_fl=0.2"]},
+    {"settings": ["inputs.frictoin=0.2"]},
+    {"settings": ["friction=0.3"]},
+    {"settings": ["speed=250"]},
+    {"settings": ["controller.step_size=4 ms"]},
+    {"settings": ["controller.step_size=1.5 ms"]},
+    {"swaps": ["controller=controller_off"]},
+    {"swaps": ["controller=controller_off"], "settings": ["controller.gain=1"]},
+    {"swaps": ["controller=controller_of"]},
+    {"faults": ["controller.yaw_rate: offset 0.1 from 1 s"]},
+    {"faults": ["plant.yaw_rate: freeze from 9 s; plant.yaw_rat: freeze"]},
+    {"stop_time": 0.001},
+    {"stop_time": 0.0015},
+]
+
+
+def test_a_plan_is_the_same_whatever_its_planner_has_planned_before() -> None:
+    path, planner = scenario(), Planner()
+
+    def outcome(by: Planner, options: dict[str, Any]) -> str:
+        try:
+            return repr(by.plan(by.load(path, changed(**options))))
+        except YawbenchError as error:
+            return repr(error.diagnostics)
+
+    fresh = [outcome(Planner(), options) for options in OF_ONE_PLANNER]
+    assert len({*fresh}) == len(fresh)
+    for _ in range(2):
+        assert [outcome(planner, options) for options in OF_ONE_PLANNER] == fresh
+    assert [outcome(planner, options) for options in reversed(OF_ONE_PLANNER)] == fresh[::-1]
 
 
 # Where FMUs are
