@@ -6,8 +6,10 @@ import textwrap
 from dataclasses import replace
 from pathlib import Path
 
+from orchestrator.experiments.ranking_tables import gains_sentence, gains_table
 from orchestrator.experiments.tables import Table
 from orchestrator.experiments.threat_runs import ThreatResult, published_result
+from orchestrator.experiments.threat_scores import compared_gains, scored
 from orchestrator.experiments.threats import load_threats
 from orchestrator.pages import threats_page
 
@@ -20,9 +22,10 @@ BEGIN, END = "<!-- written by docs.generate.threat_tables -->", "<!-- end of tab
 def tables_text(result: ThreatResult) -> str:
     """Return all tables as Markdown, under headings of their own."""
     threats = result.threats
-    scores = threats_page.scored(result)
+    scores = scored(result)
     order = scores.order()
     parts = [
+        _wrapped(threats_page.answer(result, scores)),
         _text(threats_page.main_table(result, scores)),
         "Highest levels survived:",
         _text(threats_page.levels_table(result, order)),
@@ -31,13 +34,16 @@ def tables_text(result: ThreatResult) -> str:
         "### Orders without a threat or a car",
         _text(threats_page.orders_table(result, order)),
     ]
-    gains = threats_page.compared_gains(result)
+    gains = compared_gains(result)
     if gains:
         parts += [
             "### Gains and laws",
-            threats_page.gains_sentence(gains),
-            _text(threats_page.gains_table(gains)),
+            _wrapped(gains_sentence(gains)),
+            _text(gains_table(result, gains)),
         ]
+    others = [name for name in threats.spec.settings if threats_page.is_compared(result, name)]
+    if others:
+        parts += ["### What settings change", _text(threats_page.settings_table(result, others))]
     for name, spec in threats.spec.settings.items():
         if threats_page.is_compared(result, name):
             parts += [f"### Setting: {spec.title}", _text(threats_page.setting_table(result, name))]
@@ -53,8 +59,11 @@ def _text(table: Table) -> str:
         f"|{'|'.join('---:' if table.is_number(k) else '---' for k in range(len(table.headings)))}|",
         *(f"| {' | '.join(cell.replace(chr(10), '; ') for cell in row)} |" for row in table.text()),
     ]
-    notes = ["\n".join(textwrap.wrap(note, 118, break_on_hyphens=False)) for note in table.notes]
-    return "\n\n".join(["\n".join(lines), *notes])
+    return "\n\n".join(["\n".join(lines), *map(_wrapped, table.notes)])
+
+
+def _wrapped(text: str) -> str:
+    return "\n".join(textwrap.wrap(text, 118, break_on_hyphens=False))
 
 
 def page_with_tables() -> str:

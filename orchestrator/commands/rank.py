@@ -128,11 +128,11 @@ def _rank_by_threats(
     """Search the levels that entries survive; write tables and page."""
     from ..experiments.tables import records_in, to_csv
     from ..experiments.threat_runs import run_threats, table_of_levels, table_of_quantities
-    from ..experiments.threat_scores import table_of_scores
+    from ..experiments.threat_scores import scored, table_of_scores
     from ..experiments.threats import load_threats
     from ..files import write_whole
     from ..pages.report import PAGE
-    from ..pages.threats_page import main_table, scored, threats_page
+    from ..pages.threats_page import main_table, threats_page
     from ..results.run_folder import default_folder
 
     threats = load_threats(file, more=more, quick=quick)

@@ -13,12 +13,14 @@ from ..metrics.run_metrics import MetricValue
 from .jobs import STEP_TIME
 from .ranking_scores import Digits, EntryScore, RankingCell, deciding_digits
 from .tables import Cell, Column, Table, column
+from .threat_scores import ComparedGains, GainsAndLaws
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .confidence import ConfidenceInterval
     from .ranking_scores import RankingResult
+    from .threat_runs import ThreatResult
 
 
 COLOURS = {"passed": "#BFE5D8", "spun": "#F7E3A1", "failed": "#F6CDB4", "missing": "#FFFFFF"}
@@ -305,3 +307,64 @@ def columns_of_runs(ranked: RankingResult) -> Table:
             _text("key", (run.job and run.job.key for run in runs)),
         ]
     )
+
+
+def gains_table(result: ThreatResult, compared: ComparedGains) -> Table:
+    """Return the table of spreads, in per cent of a threat's range, a group of laws per pair of columns."""
+    threats = result.threats
+    parts = {
+        "between laws, tuned": [gains.laws for gains in compared.groups.values()],
+        "between seeds of the search, within a law": [gains.seeds for gains in compared.groups.values()],
+        "between the studies' and tuned gains, within a law": [g.gains for g in compared.groups.values()],
+        "between laws, means of both gains": [gains.between for gains in compared.groups.values()],
+        "the third less the fourth": [gains.difference for gains in compared.groups.values()],
+    }
+    rows = []
+    for words, spreads in parts.items():
+        cells = []
+        for spread in spreads:
+            low, high = (100 * x for x in spread.bounds)
+            cells += [f"{100 * spread.value:.1f}", f"{low:.1f} to {high:.1f}"]
+        rows.append([words, *cells])
+    ratios = []
+    for gains in compared.groups.values():
+        ratios += [
+            f"{gains.ratio.value:.1f}",
+            f"{gains.ratio.bounds.low:.1f} to {gains.ratio.bounds.high:.1f}",
+        ]
+    rows.append(["ratio of the first to the second", *ratios])
+    headings = ["standard deviation of the mean level, % of a range"]
+    for title in compared.groups:
+        headings += [title, "95 % interval"]
+    searched = threats.threats_in(compared.setting), threats.cars_in(compared.setting)
+    notes = [
+        f"Threats: {', '.join(searched[0])}; cars: {', '.join(searched[1])}; {compared.seeds} seeds of the "
+        "search. Intervals of a bootstrap over laws, threats and cars, in blocks; that of the ratio by the F "
+        "distribution, for laws and seeds as samples of normal distributions on these threats and cars. The "
+        "first two are components of variance."
+    ]
+    return Table("", headings, [*rows], notes, {*range(1, len(headings))})
+
+
+def gains_sentence(compared: ComparedGains) -> str:
+    """Return whether gains matter more than laws, and laws more than the luck of their search."""
+    return " ".join(_gains_of_group(title, gains) for title, gains in compared.groups.items())
+
+
+def _gains_of_group(title: str, gains: GainsAndLaws) -> str:
+    low, high = gains.difference.bounds
+    if low > 0.0:
+        verdict = "gains matter more than laws: the interval of the difference is above zero"
+    elif high < 0.0:
+        verdict = "laws matter more than gains: the interval of the difference is below zero"
+    else:
+        verdict = (
+            "whether gains matter more than laws is undecided: the interval of the difference holds zero"
+        )
+    ratio, luck = gains.ratio, "as much as luck may make them"
+    if ratio.bounds.low > 1.0:
+        luck = "more than by luck"
+    elif ratio.bounds.high < 1.0:
+        luck = "less than by luck"
+    times = f"{ratio.value:.1f} times ({ratio.bounds.low:.1f} to {ratio.bounds.high:.1f})"
+    return f"Among {title}, {verdict}; tuned alike, laws vary {times} as much as seeds of the search, {luck}."

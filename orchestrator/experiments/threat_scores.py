@@ -19,14 +19,21 @@ Mean ranks are a second order, which knows nothing of distances.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from .confidence import DRAWS, Bounds, bootstrap, percentile_bounds
+from . import judged_schema
+from .confidence import DRAWS, LEVEL, Bounds, bootstrap, percentile_bounds
 from .tables import Table, column
+from .threat_runs import ThreatResult
+from .threats import REFERENCE
+
+FEWEST = 3
+"""Laws of which a spread is taken; chosen: fewer say nothing about laws."""
 
 
 def mean_positions(positions: np.ndarray) -> np.ndarray:
@@ -132,13 +139,11 @@ def score_table(
 
 def rank_correlation(table: ScoreTable, other: ScoreTable, reference: str) -> float:
     """Return Spearman's rank correlation of the scores of entries in both tables; NaN for less than 3."""
-    from scipy.stats import spearmanr
-
     first, second = ({row.entry: row.score for row in scores.scores} for scores in (table, other))
     both = [entry for entry in first if entry in second and entry != reference]
-    if len(both) < 3:
-        return float("nan")
-    return float(spearmanr([first[entry] for entry in both], [second[entry] for entry in both]).statistic)
+    scores = [first[entry] for entry in both], [second[entry] for entry in both]
+    correlation = judged_schema.rank_correlation(*scores) if len(both) > 2 else None
+    return math.nan if correlation is None else correlation
 
 
 def table_of_scores(table: ScoreTable) -> Table:
@@ -184,8 +189,32 @@ def orders_without(
     return orders
 
 
+class Moves(NamedTuple):
+    """How an order differs from another one of the same entries."""
+
+    correlation: float  # Spearman's, of the places; without control, which is last in both
+    moved: int  # entries whose place changes
+    farthest: str  # the entry that moves farthest
+    before: int  # its place
+    after: int
+
+
+def moves_between(before: Sequence[str], after: Sequence[str], reference: str) -> Moves:
+    """Compare two orders of the same entries; `reference`: the entry without control."""
+    places = {entry: (before.index(entry) + 1, after.index(entry) + 1) for entry in before}
+    farthest = max(before, key=lambda entry: abs(places[entry][1] - places[entry][0]))
+    of_laws = [place for entry, place in places.items() if entry != reference]
+    correlation = judged_schema.rank_correlation(*zip(*of_laws, strict=True)) if len(of_laws) > 2 else None
+    return Moves(
+        math.nan if correlation is None else correlation,
+        sum(old != new for old, new in places.values()),
+        farthest,
+        *places[farthest],
+    )
+
+
 class Spread(NamedTuple):
-    """A standard deviation of mean positions, with its interval."""
+    """A standard deviation of mean positions, or a ratio of two, with its interval."""
 
     value: float
     bounds: Bounds
@@ -196,32 +225,33 @@ class GainsAndLaws:
     """How far gains and laws spread the mean positions apart.
 
     `laws`, `seeds`: of laws tuned with several seeds, the standard deviation between laws and that of the
-    luck of the search within them, components of variance. `gains`: between authors' and tuned gains of a
-    law; `between`: between the means of laws over both. `difference`: gains - between; gains matter more than
-    laws if its interval is above 0.
+    luck of the search within them, components of variance; `ratio`: laws / seeds. `gains`: between authors'
+    and tuned gains of a law; `between`: between the means of laws over both. `difference`: gains - between;
+    gains matter more than laws if its interval is above 0.
     """
 
     laws: Spread
     seeds: Spread
+    ratio: Spread
     gains: Spread
     between: Spread
     difference: Spread
 
 
 def gains_and_laws(tuned: np.ndarray, authors: np.ndarray) -> GainsAndLaws:
-    """Compare spreads by the bootstrap over laws, threats and cars.
+    """Compare spreads of laws, seeds of their search, and gains.
 
     Args:
         tuned: positions of law, seed, threat, car.
         authors: positions of law, threat, car, with the authors' gains.
 
-    Intervals draw threats and cars, and laws, which are a sample of those that could be compared.
+    Intervals are of a bootstrap over threats, cars, and laws, which are a sample of those that could be
+    compared. That of `ratio` is exact for normally distributed laws and seeds on these threats and cars.
     """
     laws, seeds = tuned.shape[:2]
 
     def spreads(some: np.ndarray, threats: np.ndarray, cars: np.ndarray) -> list[float]:
-        chosen = tuned[some][:, :, threats][:, :, :, cars]
-        of_seeds = mean_positions(chosen.reshape(-1, *chosen.shape[2:])).reshape(len(some), seeds)
+        of_seeds = _means_of_seeds(tuned[some][:, :, threats][:, :, :, cars])
         own = mean_positions(authors[some][:, threats][:, :, cars])
         means = of_seeds.mean(axis=1)
         within = float(of_seeds.var(axis=1, ddof=1).mean())
@@ -233,6 +263,113 @@ def gains_and_laws(tuned: np.ndarray, authors: np.ndarray) -> GainsAndLaws:
     sizes = (laws, *tuned.shape[2:])
     whole = spreads(*(np.arange(n) for n in sizes))
     draws = percentile_bounds(bootstrap(spreads, sizes))
-    return GainsAndLaws(
-        *(Spread(float(x), Bounds(*map(float, b))) for x, b in zip(whole, draws.T, strict=True))
+    of_laws, of_seeds, *of_gains = (
+        Spread(float(x), Bounds(*map(float, b))) for x, b in zip(whole, draws.T, strict=True)
     )
+    return GainsAndLaws(of_laws, of_seeds, ratio_of_spreads(_means_of_seeds(tuned)), *of_gains)
+
+
+def _means_of_seeds(tuned: np.ndarray) -> np.ndarray:
+    """Return the mean position per law and seed."""
+    return mean_positions(tuned.reshape(-1, *tuned.shape[2:])).reshape(tuned.shape[:2])
+
+
+def ratio_of_spreads(groups: np.ndarray) -> Spread:
+    """Return the standard deviation between groups over that within them, with its interval.
+
+    Components of variance of a balanced one-way analysis: F is the mean square between groups over that
+    within, (1 + n ratio^2) times a number that follows the F distribution.
+
+    Args:
+        groups: n numbers of each; shape (groups, n).
+
+    Source: S. R. Searle, G. Casella, C. E. McCulloch, Variance Components, Wiley 1992.
+    """
+    from scipy.stats import f
+
+    number, n = groups.shape
+    within = float(groups.var(axis=1, ddof=1).mean())
+    if within == 0.0:
+        return Spread(math.inf, Bounds(math.inf, math.inf))
+    observed = n * float(groups.mean(axis=1).var(ddof=1)) / within
+    tail = 0.5 * (1.0 - LEVEL)
+    quantiles = f.ppf([1.0 - tail, tail], number - 1, number * (n - 1))
+    value, low, high = (math.sqrt(max(0.0, observed / q - 1.0) / n) for q in (1.0, *map(float, quantiles)))
+    return Spread(value, Bounds(low, high))
+
+
+def scored(result: ThreatResult, setting: str = "") -> ScoreTable:
+    """Return the scores of a setting, by default the main one."""
+    setting = setting or result.threats.main
+    entries = result.complete[setting]
+    return score_table(entries, result.positions(setting, entries), REFERENCE)
+
+
+@dataclass(frozen=True)
+class ComparedSetting:
+    """A setting beside the main one.
+
+    Attributes:
+        table: its scores.
+        main: those of the main setting on the same threats and cars; None if it does not have them all.
+        moved: mean difference of its positions from those of the main setting.
+    """
+
+    table: ScoreTable
+    main: ScoreTable | None
+    moved: float
+
+
+def compared_setting(result: ThreatResult, setting: str) -> ComparedSetting:
+    """Return a setting with the main one on the same threats and cars."""
+    threats = result.threats
+    entries = [entry for entry in result.complete[setting] if entry in result.complete[threats.main]]
+    if not entries or not {*threats.threats_in(setting)} <= {*threats.threats_in(threats.main)}:
+        return ComparedSetting(scored(result, setting), None, 0.0)
+    mains = result.positions(threats.main, entries, like=setting)
+    moved = float(np.nanmean(result.positions(setting, entries) - mains))
+    return ComparedSetting(scored(result, setting), score_table(entries, mains, REFERENCE), moved)
+
+
+@dataclass(frozen=True)
+class ComparedGains:
+    """Gains and laws by a setting whose laws were tuned with several seeds.
+
+    Attributes:
+        setting: its name.
+        seeds: how many of each law.
+        groups: title of a group of laws -> spreads; all laws first.
+    """
+
+    setting: str
+    seeds: int
+    groups: dict[str, GainsAndLaws]
+
+
+def compared_gains(result: ThreatResult) -> ComparedGains | None:
+    """Compare gains and laws by the setting with seeds; None if there is none with all levels."""
+    threats = result.threats
+    setting = next((name for name, described in threats.spec.settings.items() if described.seeds), None)
+    if setting is None:
+        return None
+    spec, entries = threats.spec.settings[setting], threats.ranking.entries
+    tuned = {
+        name: [
+            other
+            for other in result.complete[setting]
+            if entries[other][0].fmu == entries[name][0].fmu and entries[other][0].gains == "tuned"
+        ]
+        for name in result.complete[threats.main]
+        if entries[name][0].gains == "authors"
+    }
+    laws = {name: others for name, others in tuned.items() if len(others) == 1 + len(spec.seeds)}
+    groups = {f"all {len(laws)} laws": [*laws], **spec.groups}
+    compared = {
+        title: gains_and_laws(
+            np.array([result.positions(setting, laws[name]) for name in names]),
+            result.positions(threats.main, names, like=setting),
+        )
+        for title, names in groups.items()
+        if len(names) >= FEWEST and {*names} <= {*laws}
+    }
+    return ComparedGains(setting, 1 + len(spec.seeds), compared) if compared else None

@@ -114,6 +114,10 @@ class SettingSpec(OverrideSpec):
         None, description="Entries that it is for; default: all"
     )
     seeds: dict[str, str] = Field({}, description="Seed -> file with entries of the same laws, tuned again")
+    groups: dict[str, list[str]] = Field(
+        {},
+        description="With `seeds`: title -> laws also compared alone, by their entries with authors' gains",
+    )
     threats: list[str] = Field([], description="Default: all")
     cars: list[str] = Field([], description="Default: all")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,16 +11,19 @@ from typing import Any
 import numpy as np
 
 from ..experiments.confidence import Bounds
+from ..experiments.ranking_tables import gains_sentence, gains_table
 from ..experiments.tables import Table
 from ..experiments.threat_runs import ThreatResult
 from ..experiments.threat_scores import (
-    GainsAndLaws,
+    Moves,
     ScoreTable,
-    Spread,
-    gains_and_laws,
+    compared_gains,
+    compared_setting,
+    moves_between,
     orders_without,
     rank_correlation,
     score_table,
+    scored,
 )
 from ..experiments.threats import LANE_CHANGE, REFERENCE, LoadedThreats, SearchPlace, ThreatSpec
 from ..figures.style import digits_of, shown_unit
@@ -34,6 +37,8 @@ RULE = (
     "Place: one more than the entries whose whole interval lies above, never better than that of a higher "
     "score. Order by rank: by the mean rank."
 )
+GROUPS = 8
+"""Intervals that lie apart, from which on scores are said to tell entries apart; chosen."""
 
 
 def titles_of(result: ThreatResult) -> dict[str, str]:
@@ -44,13 +49,6 @@ def titles_of(result: ThreatResult) -> dict[str, str]:
 def interval_text(bounds: Bounds) -> str:
     """Return an interval of scores."""
     return f"{bounds.low:.0f} to {bounds.high:.0f}"
-
-
-def scored(result: ThreatResult, setting: str = "") -> ScoreTable:
-    """Return the scores of a setting, by default the main one."""
-    setting = setting or result.threats.main
-    entries = result.complete[setting]
-    return score_table(entries, result.positions(setting, entries), REFERENCE)
 
 
 def main_table(result: ThreatResult, table: ScoreTable) -> Table:
@@ -67,22 +65,46 @@ def main_table(result: ThreatResult, table: ScoreTable) -> Table:
     return Table(
         f"Scores: {result.threats.spec.settings[result.threats.main].title}",
         ["place", "controller", "score", "95 % interval", "mean rank", "order by rank"],
-        [*rows], [RULE, told_apart(table)], {0, 2, 4, 5},
+        [*rows], [RULE, _other_order(titles, table), told_apart(table)], {0, 2, 4, 5},
     )  # fmt: skip
 
 
-def answer(result: ThreatResult, table: ScoreTable) -> str:
-    """Return the result in a sentence: who shares the first place, and how many pairs are told apart."""
-    titles = titles_of(result)
-    first = [titles[score.entry] for score in table.scores if score.place == 1]
-    who = (
-        f"{first[0]} is first"
-        if len(first) == 1
-        else f"{len(first)} share the first place, as their intervals overlap; {first[0]} has the best score"
-    )
+def _other_order(titles: Mapping[str, str], table: ScoreTable) -> str:
+    """Describe how far the order by the mean rank differs from that by the score."""
+    by_rank = [score.entry for score in sorted(table.scores, key=lambda score: score.by_rank)]
+    moves = moves_between(table.order(), by_rank, REFERENCE)
     return (
-        f"Of {counted(len(table.scores), 'controller')}, {who}. Of {table.pairs} pairs, {table.told_apart} "
-        "can be told apart."
+        f"The order by the mean rank differs for {counted(moves.moved, 'entry', 'entries')}"
+        f"{f', most for {_moved(titles, moves)}' if moves.moved else ''} (Spearman's rank correlation "
+        f"{moves.correlation:.2f})."
+    )
+
+
+def _moved(titles: Mapping[str, str], moves: Moves) -> str:
+    return f"{titles[moves.farthest]}, {moves.before} to {moves.after}" if moves.moved else "none"
+
+
+def answer(result: ThreatResult, table: ScoreTable) -> str:
+    """Return the result in sentences: who shares the first place, and how far scores tell entries apart."""
+    titles = titles_of(result)
+    first = [score for score in table.scores if score.place == 1]
+    if len(first) == 1:
+        who = f"{titles[first[0].entry]} is first"
+    else:
+        who = (
+            f"{len(first)} share the first place with scores from {first[-1].score:.0f} to "
+            f"{first[0].score:.0f}, as their intervals overlap; {titles[first[0].entry]} has the best score"
+        )
+    apart = f"{table.groups} of their 95 % intervals lie apart from each other"
+    if table.groups < GROUPS:
+        width = float(np.median([score.bounds.high - score.bounds.low for score in table.scores]))
+        apart = (
+            f"Scores alone hardly tell them apart: an interval is {width:.0f} points wide (median), and no "
+            f"more than {apart}"
+        )
+    return (
+        f"Of {counted(len(table.scores), 'controller')}, {who}. {apart}. As all face the same threats, the "
+        f"difference of two is surer: its sign is clear in {table.told_apart} of {table.pairs} pairs."
     )
 
 
@@ -177,101 +199,69 @@ def orders_table(result: ThreatResult, entries: Sequence[str]) -> Table:
     """Return the orders without each threat and each car."""
     threats, titles = result.threats, titles_of(result)
     names = {"threat": threats.threats_in(threats.main), "car": threats.cars_in(threats.main)}
-    table = Table("", ["without", "first", "entries that move", "farthest move", "order"], numbers={2})
-    whole = [*entries]
+    headings = ["without", "first", "rank correlation", "entries that move", "farthest move", "order"]
+    table = Table("", headings, numbers={2, 3})
     entries_of_main = result.complete[threats.main]
     for (word, k), order in orders_without(
         entries_of_main, result.positions(threats.main, entries_of_main), REFERENCE
     ).items():
-        moves = {entry: order.index(entry) - whole.index(entry) for entry in whole}
-        far = max(moves, key=lambda entry: abs(moves[entry]))
-        moved = f"{titles[far]}, {whole.index(far) + 1} to {order.index(far) + 1}" if moves[far] else "none"
+        moves = moves_between(entries, order, REFERENCE)
         table.rows.append([
-            f"{word} {names[word][k]}", titles[order[0]], str(sum(map(bool, moves.values()))), moved,
-            " > ".join(titles[entry] for entry in order),
+            f"{word} {names[word][k]}", titles[order[0]], f"{moves.correlation:.2f}", str(moves.moved),
+            _moved(titles, moves), " > ".join(titles[entry] for entry in order),
         ])  # fmt: skip
+    return table
+
+
+def settings_table(result: ThreatResult, settings: Sequence[str]) -> Table:
+    """Return what each setting changes in levels and order against the main one."""
+    threats, titles = result.threats, titles_of(result)
+    headings = [
+        "setting", "threats", "cars", "entries", "levels move [% of a range]", "rank correlation",
+        "entries that move", "farthest move", "first", "first in main",
+    ]  # fmt: skip
+    table = Table("", headings, numbers={3, 4, 5, 6})
+    for setting in settings:
+        compared = compared_setting(result, setting)
+        if compared.main is None or threats.spec.settings[setting].seeds:  # the same levels, and more entries
+            continue
+        before, moved = compared.main.order(), round(100 * compared.moved, 1) + 0.0  # no -0.0
+        after = [entry for entry in compared.table.order() if entry in before]
+        moves = moves_between(before, after, REFERENCE)
+        table.rows.append([
+            threats.spec.settings[setting].title, ", ".join(threats.threats_in(setting)),
+            ", ".join(threats.cars_in(setting)), str(len(before)), f"{moved:+.1f}",
+            f"{moves.correlation:.2f}", str(moves.moved), _moved(titles, moves),
+            titles[after[0]], titles[before[0]],
+        ])  # fmt: skip
+    table.notes.append(
+        "Each setting against the main one on the same threats, cars and entries. Levels move: mean "
+        "difference; above 0, more is survived. Rank correlation: Spearman's, without no control."
+    )
     return table
 
 
 def setting_table(result: ThreatResult, setting: str) -> Table:
     """Return the scores of another setting, beside those of the main one on the same threats and cars."""
     threats, titles = result.threats, titles_of(result)
-    spec = threats.spec.settings[setting]
-    entries = result.complete[setting]
-    table = scored(result, setting)
-    comparable = {*threats.threats_in(setting)} <= {*threats.threats_in(threats.main)}
-    both = [entry for entry in entries if entry in result.complete[threats.main]] if comparable else []
-    of_main, order, moved = {}, [], ""
-    if both:
-        mains = result.positions(threats.main, both, like=setting)
-        main = score_table(both, mains, REFERENCE)
-        of_main, order = {score.entry: score for score in main.scores}, main.order()
-        gain = np.nanmean(result.positions(setting, both) - mains)
-        moved = f"Levels lie {100 * gain:+.1f} % of a range from those of the main setting, on average. "
+    compared = compared_setting(result, setting)
+    of_main, order = {}, []
+    if compared.main:
+        of_main, order = {score.entry: score for score in compared.main.scores}, compared.main.order()
     rows = [
         [
             str(score.place), titles[score.entry], f"{score.score:.1f}", interval_text(score.bounds),
             f"{of_main[score.entry].score:.1f}" if score.entry in of_main else None,
             str(order.index(score.entry) + 1) if score.entry in of_main else None,
         ]
-        for score in table.scores
+        for score in compared.table.scores
     ]  # fmt: skip
     about = (
         f"Threats: {', '.join(threats.threats_in(setting))}; cars: {', '.join(threats.cars_in(setting))}. "
-        f"{moved}{told_apart(table)}"
+        f"{told_apart(compared.table)}"
     )
     headings = ["place", "controller", "score", "95 % interval", "main score, same threats", "main order"]
-    return Table(spec.title, headings, [*rows], [about], {0, 2, 4, 5})
-
-
-def compared_gains(result: ThreatResult) -> GainsAndLaws | None:
-    """Compare gains and laws by the setting with seeds; None if there is none with all levels."""
-    threats = result.threats
-    setting = next((name for name, described in threats.spec.settings.items() if described.seeds), None)
-    if setting is None:
-        return None
-    entries, complete = threats.ranking.entries, result.complete[setting]
-    authors = {spec.fmu: name for name, (spec, _) in entries.items() if spec.gains == "authors"}
-    laws: dict[str, list[str]] = {}
-    for name in complete:
-        if entries[name][0].gains == "tuned":
-            laws.setdefault(entries[name][0].fmu, []).append(name)
-    most = 1 + len(threats.spec.settings[setting].seeds)
-    whole = {fmu: names for fmu, names in laws.items() if len(names) == most and fmu in authors}
-    if len(whole) < 3:
-        return None
-    tuned = np.array([result.positions(setting, names) for names in whole.values()])
-    own = result.positions(threats.main, [authors[fmu] for fmu in whole], like=setting)
-    return gains_and_laws(tuned, own)
-
-
-def gains_table(gains: GainsAndLaws) -> Table:
-    """Return the table of spreads, in per cent of a threat's range."""
-
-    def row(words: str, spread: Spread) -> list[str]:
-        low, high = (100 * x for x in spread.bounds)
-        return [words, f"{100 * spread.value:.1f}", f"{low:.1f} to {high:.1f}"]
-
-    rows = [
-        row("between laws, tuned", gains.laws),
-        row("between seeds of the search, within a law", gains.seeds),
-        row("between authors' and tuned gains, within a law", gains.gains),
-        row("between laws, means of both gains", gains.between),
-        row("the third less the fourth", gains.difference),
-    ]
-    return Table(
-        "", ["standard deviation of the mean level, % of a range", "", "95 % interval"], [*rows], [], {1}
-    )
-
-
-def gains_sentence(gains: GainsAndLaws) -> str:
-    """Return whether gains matter more than laws."""
-    low, high = gains.difference.bounds
-    if low > 0.0:
-        return "Gains matter more than laws: the interval of the difference is above zero."
-    if high < 0.0:
-        return "Laws matter more than gains: the interval of the difference is below zero."
-    return "Whether gains matter more than laws is undecided: the interval of the difference holds zero."
+    return Table(threats.spec.settings[setting].title, headings, [*rows], [about], {0, 2, 4, 5})
 
 
 @dataclass(frozen=True)
@@ -431,8 +421,9 @@ def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command:
         main=main_table(result, table),
         levels=levels_table(result, order),
         orders=orders_table(result, order),
+        moves=settings_table(result, others),
         settings=[setting_table(result, name) for name in others],
-        gains=gains_table(gains) if gains else None,
+        gains=gains_table(result, gains) if gains else None,
         sentence=gains_sentence(gains) if gains else "",
         overview=overview(result, table),
         disciplines=[discipline_table(result, discipline) for discipline in disciplines(result)],

@@ -12,16 +12,21 @@ from orchestrator.errors import ScenarioError
 from orchestrator.experiments.execution import side_by_side
 from orchestrator.experiments.threat_runs import RESOLUTION, Attempt, Survived, ThreatResult, _search
 from orchestrator.experiments.threat_scores import (
+    compared_gains,
+    compared_setting,
     gains_and_laws,
     groups_of,
     mean_positions,
     mean_ranks,
+    moves_between,
     orders_without,
     rank_correlation,
+    ratio_of_spreads,
     score_table,
+    scored,
 )
 from orchestrator.experiments.threats import LoadedThreats, QuantitySpec, ThreatSpec, load_threats
-from orchestrator.pages.threats_page import car_tables, discipline_table, disciplines, overview, scored
+from orchestrator.pages.threats_page import car_tables, discipline_table, disciplines, overview
 from orchestrator.scenario.find_and_load import SHIPPED
 from tests.checkout import ROOT
 from tests.commands import status_of
@@ -197,6 +202,69 @@ def test_spreads_of_gains_and_laws_are_recovered():
     assert found.laws.bounds.low < 0.05 < found.laws.bounds.high
 
 
+def test_intervals_of_the_ratio_of_laws_to_seeds_hold_it_as_often_as_they_say():
+    chance, ratio = np.random.default_rng(5), 2.0
+    held = []
+    for _ in range(2000):
+        groups = chance.normal(0.0, ratio, (10, 1)) + chance.normal(0.0, 1.0, (10, 5))
+        bounds = ratio_of_spreads(groups).bounds
+        held.append(bounds.low <= ratio <= bounds.high)
+    assert np.mean(held) == pytest.approx(0.95, abs=0.015)  # three standard errors
+    alike = [ratio_of_spreads(chance.normal(0.0, 1.0, (10, 5))).bounds.low == 0.0 for _ in range(2000)]
+    assert np.mean(alike) == pytest.approx(0.975, abs=0.011)
+
+
+def test_orders_are_compared_by_the_entries_that_move():
+    moves = moves_between(["a", "b", "c", "d", "none"], ["b", "c", "a", "d", "none"], "none")
+    assert (moves.moved, moves.farthest, moves.before, moves.after) == (3, "a", 1, 3)
+    assert moves.correlation == pytest.approx(1 - 6 * (4 + 1 + 1) / (4 * 15))
+    assert moves_between(["a", "none"], ["a", "none"], "none").moved == 0
+
+
+def levels_of(threats: LoadedThreats, position) -> ThreatResult:
+    survived = {place: Survived(position(place), "") for place in threats.searches()}
+    return ThreatResult(threats, {}, survived, {})
+
+
+def test_a_setting_is_compared_with_the_main_one_on_its_own_threats_and_cars(shipped):
+    def position(place):
+        skill = sorted(shipped.ranking.entries).index(place.entry) / 1000
+        shift = {"bound_15": -0.05, "unguarded": -2 * skill}.get(place.setting, 0.0)
+        return 0.5 + skill + shift
+
+    result = levels_of(shipped, position)
+    stricter = compared_setting(result, "bound_15")
+    assert stricter.moved == pytest.approx(-0.05)
+    assert stricter.main is not None
+    assert stricter.table.order() == stricter.main.order()
+    turned = compared_setting(result, "unguarded")
+    assert turned.main is not None
+    moves = moves_between(turned.main.order(), turned.table.order(), "none")
+    assert moves.correlation == pytest.approx(-1.0)
+
+
+def test_gains_are_compared_among_all_laws_and_among_groups_of_them(shipped):
+    chance = np.random.default_rng(6)
+    of_laws: dict[str, float] = {}
+    own: dict[str, float] = {}
+
+    def position(place):
+        spec = shipped.ranking.entries[place.entry][0]
+        law = of_laws.setdefault(spec.fmu, chance.normal(0.0, 0.01))
+        gain = own.setdefault(place.entry, chance.normal(0.0, 0.002))
+        return 0.5 + law + gain + (0.1 if spec.gains == "tuned" else 0.0)
+
+    compared = compared_gains(levels_of(shipped, position))
+    assert compared is not None
+    assert compared.seeds == 5
+    assert [*compared.groups] == ["all 10 laws", *shipped.spec.settings["seeds"].groups]
+    for gains in compared.groups.values():
+        assert gains.gains.value == pytest.approx(0.1 / math.sqrt(2), rel=0.05)
+        assert gains.seeds.value == pytest.approx(0.002, rel=0.3)
+        assert gains.ratio.bounds.low > 1.0
+        assert gains.difference.bounds.low > 0.0
+
+
 SMALL = f"""
 title: small
 ranking: ranking.yaml
@@ -246,14 +314,17 @@ def rows(file):
     return list(csv.DictReader(file.open(encoding="utf-8")))
 
 
-def test_two_entries_face_a_threat_twice_with_the_same_table(tmp_path, capsys):
+def test_two_runs_from_nothing_give_the_same_tables(tmp_path, capsys, monkeypatch):
+    """Each with an empty cache and its own number of processes."""
     (tmp_path / "ranking.yaml").write_text(RANKING)
     (tmp_path / "threats.yaml").write_text(SMALL)
-    for out in ("first", "second"):
-        status = status_of("rank", tmp_path / "threats.yaml", "--out", tmp_path / out, "--jobs", 1)
+    for out, jobs in (("first", 1), ("second", 2)):
+        monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / f"cache of {out}"))
+        status = status_of("rank", tmp_path / "threats.yaml", "--out", tmp_path / out, "--jobs", jobs)
         assert status == 0, capsys.readouterr().err
-    first, second = ((tmp_path / out / "levels.csv").read_text() for out in ("first", "second"))
-    assert first == second
+    for file in ("levels.csv", "scores.csv", "quantities.csv", "report.html"):
+        first, second = ((tmp_path / out / file).read_bytes() for out in ("first", "second"))
+        assert first.replace(b"/first", b"") == second.replace(b"/second", b""), file
     levels = {one["entry"]: one for one in rows(tmp_path / "first" / "levels.csv")}
     assert levels["none"]["end"] == "easy"
     assert levels["fuzzy_pid"]["end"] == ""

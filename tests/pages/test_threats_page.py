@@ -9,8 +9,9 @@ from lxml import html
 
 from docs.generate.threat_tables import FILE
 from orchestrator.experiments.threat_runs import published_result
+from orchestrator.experiments.threat_scores import scored
 from orchestrator.experiments.threats import load_threats
-from orchestrator.pages.threats_page import scored, threats_page
+from orchestrator.pages.threats_page import threats_page
 
 from .browser import DESK, Browser
 from .flaws import inaccessible, open_all
@@ -52,4 +53,5 @@ def test_every_level_is_on_the_page_and_counts_are_those_of_its_tables(published
     first = sum(score.place == 1 for score in scores.scores)
     answer = tree.xpath("string(//p[@class='said'])")
     assert answer.startswith(f"Of {len(entries)} controllers, {first} share the first place")
-    assert f"Of {scores.pairs} pairs, {scores.told_apart} can be told apart" in answer
+    assert f"its sign is clear in {scores.told_apart} of {scores.pairs} pairs" in answer
+    assert f"no more than {scores.groups} of their 95 % intervals lie apart" in answer
