@@ -66,6 +66,7 @@ if TYPE_CHECKING:
     from ._ranking import Ranking, rank
     from ._run import Run, measured
     from ._scenario import Scenario, load
+    from ._tuning import Tuning, tune
     from ._validate import validate
     from ._view import View, view
 
@@ -92,6 +93,7 @@ __all__ = [
     "ScenarioError",
     "SimulationError",
     "TestQuantity",
+    "Tuning",
     "Validation",
     "Verdict",
     "View",
@@ -109,6 +111,7 @@ __all__ = [
     "parameter",
     "rank",
     "signal",
+    "tune",
     "validate",
     "view",
 ]
@@ -130,6 +133,7 @@ _MODULES = {
     "yawbench._open": ("RecordedRuns", "open"),
     "yawbench._run": ("Run", "measured"),
     "yawbench._scenario": ("Scenario", "load"),
+    "yawbench._tuning": ("Tuning", "tune"),
     "yawbench._validate": ("validate",),
     "yawbench._view": ("View", "view"),
 }

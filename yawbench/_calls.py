@@ -12,6 +12,7 @@ from orchestrator.fmu.binary import NATIVE
 from orchestrator.master.fmi import open_instance
 from orchestrator.master.process_state import Log
 from orchestrator.plan import Instance
+from orchestrator.planner import Planner
 
 from ._controller import PythonComponent
 
@@ -26,6 +27,12 @@ def opener_of(programs: Mapping[Path, PythonComponent]) -> Callable[[Instance, L
         )
 
     return opener
+
+
+def planner_of(programs: Mapping[Path, PythonComponent]) -> Planner:
+    """Return a planner that builds FMUs silently if out of date and knows the plain Python components."""
+    opened = {path: program.as_now() for path, program in programs.items()}
+    return Planner(build=True, report=lambda text: None, opened=opened)
 
 
 def _in_python(unit: Instance) -> bool:

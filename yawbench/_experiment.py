@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -13,7 +13,7 @@ from orchestrator.errors import Diagnostic, Location, ScenarioError
 from orchestrator.experiments.experiment import LoadedExperiment as Design
 from orchestrator.experiments.experiment import NamedRun
 from orchestrator.experiments.figures import draw_over_axes
-from orchestrator.experiments.jobs import Job, measured
+from orchestrator.experiments.jobs import Job, Outcome, measured
 from orchestrator.experiments.judged_schema import si_number, text_of
 from orchestrator.experiments.outcome import ExperimentResult
 from orchestrator.experiments.planning import metrics_of, plan_experiment
@@ -31,7 +31,8 @@ from orchestrator.scenario.validation import Model, validate
 from orchestrator.scenario.yaml_lines import Document, scalar
 
 from . import arguments
-from ._calls import make_all
+from ._calls import make_all, planner_of
+from ._controller import PythonComponent
 from ._dataset import dataset
 from ._progress import bar
 from ._run import Run, shown_in_notebooks
@@ -96,19 +97,19 @@ def experiment(
                 changed = replace(changed, programs=swapped.programs)
             specs[name] = {"variants": variants}
         else:
-            specs[name] = {"vary": name, **_values(name, [level for _, level in pairs])}
+            specs[name] = {"vary": name, **numbers_of(name, [level for _, level in pairs])}
     wanted = arguments.texts(metrics, "metrics")
     spec = {
         "scenario": base.path.name,
         "axes": specs,
         "metrics": {metric: {"metric": metric} for metric in wanted},
     }
-    checked = _checked(ExperimentSpec, {"title": base.title or base.path.stem, **spec})
+    design = checked(ExperimentSpec, {"title": base.title or base.path.stem, **spec})
     run = NamedRun("", "", "", base.path, ())
-    return Experiment(changed, Design(base.path, checked, {"": run}, (), changed.changes))
+    return Experiment(changed, Design(base.path, design, {"": run}, (), changed.changes))
 
 
-def _checked(model: type[Model], fields: dict[str, Any]) -> Model:
+def checked(model: type[Model], fields: dict[str, Any]) -> Model:
     """Validate data against a schema; all errors are raised together."""
     document = Document(Path(), fields)
     made = validate(model, document)
@@ -119,7 +120,7 @@ def _checked(model: type[Model], fields: dict[str, Any]) -> Model:
     return made
 
 
-def _values(name: str, items: Iterable[Any]) -> dict[str, Any]:
+def numbers_of(name: str, items: Iterable[Any]) -> dict[str, Any]:
     """Return the levels of an axis as numbers in a common unit."""
     with arguments.as_scenario_errors():
         levels = [arguments.scalar(level, f"{name}[{k}]") for k, level in enumerate(items)]
@@ -184,24 +185,41 @@ class Experiment:
         keep = arguments.flag(keep, "keep")
         progress = None if progress is None else arguments.flag(progress, "progress")
         with bar(self.design.spec.title, len(self), wanted=progress) as shown:
-            planner = self.base._planner()
-            planned = plan_experiment(self.design, self.base.path.parent, planner=planner)
-            metrics = metrics_of(planned.experiment)
-            outcomes = make_all(
-                planned.jobs,
-                self.base.programs,
-                workers=workers,
-                done=lambda outcome: shown.advance(),
-                run=_in_memory,
+            findings, outcomes = executed(
+                self.design, self.base.programs, workers=workers, done=lambda outcome: shown.advance()
             )
-        records = [measured(outcome.value, metrics) if outcome.ok else outcome.record for outcome in outcomes]
         runs = [Run(outcome.value) if outcome.ok else None for outcome in outcomes] if keep else None
-        findings = ExperimentResult(planned.experiment, records, {}, planned)
+        planned = findings.planned
+        assert planned is not None
         diagnostics = [entry for job in planned.jobs if job.plan for entry in job.plan.diagnostics]
         if warning := findings.remarkable():
             diagnostics.append(Diagnostic("runs-with-warnings", warning, "warning"))
         warn(self.design.spec.title, diagnostics)
         return Runs(findings, runs)
+
+
+def executed(
+    design: Design,
+    programs: Mapping[Path, PythonComponent],
+    *,
+    workers: int | None,
+    done: Callable[[Outcome], None],
+) -> tuple[ExperimentResult, list[Outcome]]:
+    """Plan all runs of an experiment and make them in memory; return its result, and every outcome.
+
+    Args:
+        design: the experiment.
+        programs: Python components by their made-up paths.
+        workers, done: see `make_all`.
+
+    Raises:
+        YawbenchError: a run cannot start; none has been made.
+    """
+    planned = plan_experiment(design, design.path.parent, planner=planner_of(programs))
+    metrics = metrics_of(planned.experiment)
+    outcomes = make_all(planned.jobs, programs, workers=workers, done=done, run=_in_memory)
+    records = [measured(outcome.value, metrics) if outcome.ok else outcome.record for outcome in outcomes]
+    return ExperimentResult(planned.experiment, records, {}, planned), outcomes
 
 
 def _in_memory(job: Job, opener: OpenInstance = open_instance) -> Results:
@@ -320,7 +338,7 @@ class Runs:
             **places,
             **chosen,
         }
-        return shown_in_notebooks(draw_over_axes(self.findings, _checked(FigureSpec, settings)))
+        return shown_in_notebooks(draw_over_axes(self.findings, checked(FigureSpec, settings)))
 
     def _limit(self, name: str, value: float | str | None, metric: str) -> Value | None:
         """Return a value on the metric's scale as plain Python."""
@@ -339,7 +357,7 @@ class Runs:
             raise ScenarioError(
                 f"only: there is no axis {axis!r}{hint(axis, spec.axes, lead='axes')}", code="axis-unknown"
             )
-        wanted = _values(name, arguments.items(levels, name, "a list of levels"))["values"]
+        wanted = numbers_of(name, arguments.items(levels, name, "a list of levels"))["values"]
         known = [text_of(level) for level in spec.axes[axis].variants or spec.axes[axis].values or ()]
         unknown = [text_of(level) for level in wanted if text_of(level) not in known]
         if unknown or not wanted:

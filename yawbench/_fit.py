@@ -54,6 +54,9 @@ class Fit:
 
     result: FitResult
 
+    def __post_init__(self) -> None:
+        arguments.instance(self.result, "result", FitResult, "yawbench.fit")
+
     @property
     def verdict(self) -> str:
         """Whether the scenario's car is better than a fitted single track, in words."""

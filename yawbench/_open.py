@@ -78,6 +78,13 @@ class RecordedRuns:
     folder: Path
     files: Mapping[str, Path]
 
+    def __post_init__(self) -> None:
+        arguments.instance(self.folder, "folder", Path, "pathlib.Path")
+        wanted = "a mapping of names to paths of tables"
+        files = arguments.mapping(self.files, "files", wanted)
+        if not all(arguments.is_a(file, Path) for file in files.values()):
+            arguments.refuse("files", wanted, self.files)
+
     @property
     def table(self) -> pd.DataFrame:
         """The main table, whose `attrs["units"]` holds the units.

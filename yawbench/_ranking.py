@@ -24,12 +24,11 @@ from orchestrator.experiments.ranking_tables import (
 )
 from orchestrator.experiments.tables import to_pandas
 from orchestrator.messages import hint
-from orchestrator.planner import Planner
 from orchestrator.results.run_folder import writing
 from orchestrator.scenario import find_and_load
 
 from . import arguments
-from ._calls import make_all
+from ._calls import make_all, planner_of
 from ._controller import Controller, ControllerLike, PythonComponent
 from ._progress import bar
 from ._run import shown_in_notebooks
@@ -102,8 +101,7 @@ def rank(
     loaded = replace(loaded, entries=kept)
     with contextlib.ExitStack() as stack:
         shown = stack.enter_context(bar(loaded.spec.title, wanted=progress))
-        opened = {path: program.as_now() for path, program in programs.items()}
-        planner = Planner(build=True, report=lambda text: None, opened=opened)
+        planner = planner_of(programs)
         folder = Path(kept_in or stack.enter_context(tempfile.TemporaryDirectory()))
         stack.enter_context(writing(folder))
 
@@ -152,7 +150,8 @@ def _entry(controller: Any, name: str) -> tuple[str, EntrySpec, PythonComponent 
         controller = _object_of(controller)
     program = PythonComponent(controller, unit=CONTROLLER, role=CONTROLLER, label=name)
     words = name or program.path.stem
-    return words, _spec(words, str(program.path), program.parameters), program
+    sampled = {} if program.step_size is None else {"step_size": program.step_size}
+    return words, _spec(words, str(program.path), {**program.parameters, **sampled}), program
 
 
 def _object_of(kind: type) -> object:

@@ -33,7 +33,7 @@ from vocabulary.roles import role_of
 from vocabulary.vehicle import CAR
 
 from . import arguments
-from ._calls import opener_of
+from ._calls import opener_of, planner_of
 from ._controller import ControllerLike, PythonComponent
 from ._progress import bar
 from ._run import Run
@@ -239,7 +239,7 @@ class Scenario:
             YawbenchError: an FMU is missing, a component whose source has changed cannot be built, or
                 the instances cannot be connected.
         """
-        plan = self._planner().plan(self.loaded)
+        plan = planner_of(self.programs).plan(self.loaded)
         notes = tuple(
             Diagnostic(
                 "instance-in-python",
@@ -251,11 +251,6 @@ class Scenario:
             if unit.fmu.path in self.programs
         )
         return replace(plan, diagnostics=plan.diagnostics + notes)
-
-    def _planner(self) -> Planner:
-        """Return a planner that builds FMUs silently if out of date and knows the plain Python components."""
-        opened = {path: program.as_now() for path, program in self.programs.items()}
-        return Planner(build=True, report=lambda text: None, opened=opened)
 
     def run(self, *, progress: Callable[[int, int], None] | bool | None = None) -> Run:
         """Run the scenario in this process and return its results; nothing is written.

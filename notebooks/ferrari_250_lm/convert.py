@@ -47,6 +47,8 @@ source: "Revs Program at Stanford, from {repository}"
 licence: "MIT (the repository); terms of the recording not found"
 date: 2014-02-22
 """
+FAILED = 1
+"""Exit status of `yawbench validate` for a signal outside its band."""
 ESTIMATORS = ("observer", "kinematic")
 
 
@@ -94,7 +96,7 @@ def convert(recording: Path, folder: Path) -> None:
 
 
 def run(folder: Path) -> None:
-    """Fit the cars, validate the better one, score the estimators."""
+    """Fit the cars, validate the better one, score the estimators; end if a command cannot work."""
     for fit in ("fit_dugoff", "fit_magic_formula"):
         _yawbench("fit", folder / f"{fit}.yaml", "--out", folder / fit)
     text = (folder / "dugoff.yaml").read_text(encoding="utf-8")
@@ -108,7 +110,9 @@ def run(folder: Path) -> None:
 
 
 def _yawbench(*arguments: object) -> None:
-    subprocess.run([sys.executable, "-m", "yawbench", *map(str, arguments)], check=False)
+    done = subprocess.run([sys.executable, "-m", "yawbench", *map(str, arguments)], check=False)
+    if done.returncode not in (0, FAILED):
+        sys.exit(done.returncode)
 
 
 def score(folder: Path) -> None:

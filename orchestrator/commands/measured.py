@@ -145,6 +145,7 @@ def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
     from ..experiments.fit import load_fit
     from ..experiments.fit_result import make_fit
     from ..files import write_whole
+    from ..measured.estimate import CONVERGED
     from ..pages.fit_page import fit_page, parameter_table, score_table
     from ..planner import Planner
     from ..results.run_folder import default_folder
@@ -163,6 +164,9 @@ def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
     write_whole(folder / "vehicle.yaml", vehicle_text(result, folder, planner))
     output.answer(folder=folder, fit=result.data)
     print_tables([*map(parameter_table, result.models), score_table(result)])
+    for model in result.models:
+        if model.estimate.message != CONVERGED:
+            say(f"note: {model.title}: the search ended early: {model.estimate.message} (most_sets)")
     write_whole(folder / "fit.html", fit_page(result))
     say(f"Written: {folder / 'fit.json'}, vehicle.yaml, fit.html")
 

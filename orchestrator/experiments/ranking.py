@@ -97,7 +97,9 @@ class EntrySpec(StrictModel):
 
     title: str = Field(min_length=1, description="Title in tables")
     fmu: str = Field(min_length=1, description="Name of the FMU, or a path relative to the file")
-    parameters: dict[str, Scalar] = Field({}, description="Parameter -> value; default: those of the FMU")
+    parameters: dict[str, Scalar] = Field(
+        {}, description="Parameter, or step_size, -> value; default: those of the FMU"
+    )
     source: str = Field(min_length=1, description="Source of the controller and its gains")
     gains: Literal["authors", "tuned"] = Field("authors", description="Who chose the gains")
 

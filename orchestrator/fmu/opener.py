@@ -120,7 +120,8 @@ class Opener:
         """Return the names of the FMUs that can be used beside a folder, with those that can be built."""
         names = {path.stem for place in (folder, *further_folders()) for path in place.glob("*.fmu")}
         names |= packaged_components().keys()
-        if self.build and folder.resolve() == HOME:
+        names |= {path.stem for path in HOME.glob("*.fmu")}
+        if self.build:
             from fmus.build import find_recipes
 
             names |= find_recipes().keys()
@@ -173,6 +174,9 @@ def find_fmu(fmu: str, *, scenario: Path, fmus: Path, opener: Opener, build: boo
             return opener.bring(place.absolute() / archive.name, build=build)
     if component := packaged(fmu):
         return opener.bring_packaged(component)
+    own = opener.bring(HOME / archive.name, build=build)
+    if os.path.isfile(own):
+        return own
     names = opener.names(fmus)
     if not names:
         raise ModelDescriptionError(

@@ -1,4 +1,4 @@
-"""Sources of FMUs beyond the folder `fmus`: folders of the environment, then installed packages.
+"""Sources of FMUs beyond a folder `fmus`: folders of the environment, then installed packages.
 
 `YAWBENCH_FMUS` names folders of FMUs, separated as in PATH. Packages provide components by an entry point of
 the group `yawbench.components`, whose value is a package with folders of roles:
@@ -7,7 +7,7 @@ the group `yawbench.components`, whose value is a package with folders of roles:
     laws = "my_laws.components"          # my_laws/components/controllers/follow.py is controller_follow
 
 They are built into the cache when they are first used, and again when they have changed. The first place
-that has a name counts.
+that has a name counts; the last is the folder of yawbench's own FMUs.
 """
 
 from __future__ import annotations

@@ -55,6 +55,8 @@ FIRST = 1e-3
 """That of a first search with squares, which is faster far from the result; chosen: near enough."""
 
 Kind = Literal["run", "offset", "delay"]
+CONVERGED = "the loss or the parameters no longer change"
+"""Why a search ended that found a minimum."""
 
 
 @dataclass(frozen=True)
@@ -403,7 +405,7 @@ def estimate(residuals: Residuals, *, most_sets: int) -> Estimate:
             raise StartFailed(window.name)
     require_identifiable(residuals.jacobian(start), names)
     best = start, np.inf
-    loss_at_start, message = None, "the loss or the parameters no longer change"
+    loss_at_start, message = None, CONVERGED
 
     def values(point: np.ndarray) -> np.ndarray:
         nonlocal best, loss_at_start

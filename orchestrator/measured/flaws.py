@@ -1,9 +1,10 @@
 """Flaws of recordings, found where signals say the same twice.
 
 The lateral acceleration is that of the motion, a_y = dv_y/dt + r v_x, with v_y = v_x tan(beta). One flaw at a
-time is supposed: a factor or sign of a signal, a lag of the accelerometer, its place or zero point, the zero
-point of the yaw rate. The one that leaves the smallest residual is named if it explains `EXPLAINED` of what
-is left without it; a recording without v_y and sideslip is examined for factors and signs alone.
+time is supposed: a factor or sign of a signal, a lag of the accelerometer or the gyro, the place or zero
+point of the accelerometer, the zero point of the yaw rate. The one that leaves the smallest residual is named
+if it explains `EXPLAINED` of what is left without it; a recording without v_y and sideslip is examined for
+factors and signs alone.
 """
 
 from __future__ import annotations
@@ -22,8 +23,12 @@ FACTORS = {"yaw_rate": 180.0 / np.pi, "acceleration_y": 9.80665, "velocity_x": 3
 """Signal -> factor by which it is wrong if its unit is mistaken: deg for rad, g for m/s2, km/h for m/s."""
 BAND = 3.0
 """Cut-off of the low pass before signals are compared [Hz]. Chosen: cars hardly answer faster."""
-EXPLAINED = 0.5
-"""Part of the residual's power that a flaw must explain. Chosen: noise explains none, a flaw nearly all."""
+EXPLAINED = 0.3
+"""Part of the residual's power that a flaw must explain. Chosen: noise explains up to 0.15; a flaw
+nearly all, unless the drive is smooth."""
+ALIKE = 1.1
+"""Ratio of what two flaws leave below which both are named as possible. Chosen: twice the usual difference of
+a lag of the yaw rate and a place of the accelerometer while the speed changes by a tenth."""
 NEAR = 0.25
 """Relative distance from a factor that still names it. Chosen: the factors lie further apart."""
 SPIKE = 12.0
@@ -37,6 +42,9 @@ EVEN = 0.05
 """Part of the steps that may be uneven. Chosen: single gaps are no uneven sampling."""
 LEAST = {"lag": 0.004, "place": 0.1, "zero of acceleration_y": 0.05, "zero of yaw_rate": 0.002}
 """Least lag [s], distance [m], zero points [m/s2, rad/s] that are named. Chosen: harmless to a comparison."""
+
+CLEAR = 1.01
+"""Ratio by which a lag of the gyro must explain more than all else. Chosen: at one speed, it is a place."""
 
 
 @dataclass(frozen=True)
@@ -117,15 +125,17 @@ def _contradiction(even: Segment) -> Flaw | None:
     side = _lateral_velocity(smooth)
     if (flaw := _steering(smooth, inner)) is not None or side is None:
         return flaw
-    motion = turning + np.gradient(side, even.time)
-    slope = np.gradient(a_y, even.time)
+    a_y_rate, side_rate, r_rate = (np.gradient(x, even.time) for x in (a_y, side, r))
+    name = "velocity_y" if "velocity_y" in smooth else "sideslip"
     return _single(
-        (a_y - motion)[inner],
+        (a_y - turning - side_rate)[inner],
         {
-            ("lag", "acceleration_y"): -slope[inner],
-            ("place", "acceleration_y"): np.gradient(r, even.time)[inner],
+            ("lag", "acceleration_y"): -a_y_rate[inner],
+            ("lag", "yaw_rate"): (v * r_rate)[inner],
+            ("place", "acceleration_y"): r_rate[inner],
             ("zero", "acceleration_y"): np.ones(a_y.size)[inner],
             ("zero", "yaw_rate"): -v[inner],
+            ("sign", name): side_rate[inner],
         },
     )
 
@@ -178,7 +188,7 @@ def _sign(smooth: Mapping[str, np.ndarray], inner: slice) -> Flaw:
     name = "acceleration_y"
     if hand is not None and float(np.sum((hand * smooth["yaw_rate"])[inner])) < 0.0:
         name = "yaw_rate"
-    return Flaw("sign", name, -1.0, "is opposed to the other signals: 'sign: -1'")
+    return Flaw("sign", name, -1.0, _described("sign", name, -1.0))
 
 
 def _steering(smooth: Mapping[str, np.ndarray], inner: slice) -> Flaw | None:
@@ -189,19 +199,45 @@ def _steering(smooth: Mapping[str, np.ndarray], inner: slice) -> Flaw | None:
 
 
 def _single(residual: np.ndarray, effects: Mapping[tuple[str, str], np.ndarray]) -> Flaw | None:
-    """Return the flaw whose effect explains most of a residual, if it explains enough and is large enough."""
+    """Return the flaw whose effect explains most of a residual, if it explains enough and is large enough.
+
+    The text names a second one that explains nearly as much.
+    """
     power = float(np.sum(residual**2))
     sizes = {key: float(np.sum(residual * x) / np.sum(x * x)) for key, x in effects.items()}
-    left = {key: float(np.sum((residual - sizes[key] * x) ** 2)) for key, x in effects.items()}
-    best = min(left, key=left.__getitem__)
-    (kind, name), value = best, sizes[best]
-    least = LEAST[f"{kind} of {name}" if kind == "zero" else kind]
-    if left[best] > (1.0 - EXPLAINED) * power or abs(value) < least:
-        return None
-    unit = MEASURABLE[name].unit
-    words = {
-        "lag": f"lags by {1000.0 * value:.1f} ms: 'delay: {1000.0 * value:.1f} ms'",
-        "place": f"is measured {value:.2f} m ahead of the centre of mass: 'at: {{x: {value:.2f} m}}'",
-        "zero": f"shows {value:.3g} {unit} at zero: 'offset: {value:.3g} {unit}'",
+    left = {
+        key: float(np.sum((residual - sizes[key] * x) ** 2))
+        for key, x in effects.items()
+        if _possible(*key, sizes[key])
     }
-    return Flaw(kind, name, value, words[kind])
+    best = min(left, key=lambda key: left[key] * (CLEAR if key == ("lag", "yaw_rate") else 1.0))
+    (kind, name), value = best, sizes[best]
+    if left[best] > (1.0 - EXPLAINED) * power or abs(value) < _least(kind, name):
+        return None
+    others = [key for key, rest in left.items() if key != best and rest < ALIKE * left[best]]
+    other = min(others, key=left.__getitem__, default=None)
+    instead = f"; or {other[1]} {_described(*other, sizes[other])}" if other else ""
+    value = -1.0 if kind == "sign" else value
+    return Flaw(kind, name, value, _described(kind, name, value) + instead)
+
+
+def _possible(kind: str, name: str, size: float) -> bool:
+    """Return whether a flaw may have an effect of that size: gyros do not lead, turned signs count double."""
+    if kind == "sign":
+        return abs(size / -2.0 - 1.0) < NEAR
+    return not (kind == "lag" and name == "yaw_rate" and size < 0.0)
+
+
+def _least(kind: str, name: str) -> float:
+    return 0.0 if kind == "sign" else LEAST[f"{kind} of {name}" if kind == "zero" else kind]
+
+
+def _described(kind: str, name: str, value: float) -> str:
+    unit = MEASURABLE[name].unit
+    if kind == "sign":
+        return "is opposed to the other signals: 'sign: -1'"
+    if kind == "lag":
+        return f"lags by {1000.0 * value:.1f} ms: 'delay: {1000.0 * value:.1f} ms'"
+    if kind == "place":
+        return f"is measured {value:.2f} m ahead of the centre of mass: 'at: {{x: {value:.2f} m}}'"
+    return f"shows {value:.3g} {unit} at zero: 'offset: {value:.3g} {unit}'"

@@ -148,3 +148,17 @@ def test_the_docs_name_nothing_that_is_not_in_the_repository():
             made_by_reader = ("yaw_follow", "slip_guard", "how_fast", "how_gentle", "yaw_rate.py")
             if not any(word in path for word in made_by_reader) and not path.endswith(".fmu"):
                 assert (ROOT / path).exists(), f"{file.name}: {path}"
+
+
+def test_alerts_of_github_are_boxes_with_titles(site, pages):
+    written = {
+        file.relative_to(ROOT / "docs").with_suffix(".html"): file.read_text("utf-8").count("> [!")
+        for file in (ROOT / "docs").rglob("*.md")
+    }
+    boxed = {path: text_of(site, path).count('class="admonition ') for path in pages}
+    assert sum(written.values()) > 10
+    assert {path: boxed[path] for path in written} == written
+    assert not [
+        path for path in pages if "[!" in re.sub(r"<pre.*?</pre>", "", text_of(site, path), flags=re.DOTALL)
+    ]
+    assert '<p class="admonition-title">What is lost</p>' in text_of(site, "theory/paper_d.html")

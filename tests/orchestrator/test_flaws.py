@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,22 +16,62 @@ from tests.commands import status_of
 from tests.sentences import golden
 
 T = np.arange(0.0, 30.0, 0.01)
+Drive = Callable[[int], tuple[np.ndarray, np.ndarray]]
 
 
-def recording(seed: int) -> dict[str, np.ndarray]:
+@dataclass(frozen=True)
+class Car:
+    """A single-track car whose tyres saturate, SI."""
+
+    mass: float
+    inertia: float
+    a: float
+    b: float
+    front: float
+    rear: float
+    friction: float
+    ratio: float
+
+
+SALOON = Car(1600.0, 2400.0, 1.2, 1.5, 90e3, 110e3, 1e3, 16.0)  # its tyres are linear
+CARS = {
+    "small": Car(950.0, 1100.0, 0.95, 1.45, 55e3, 60e3, 1.0, 18.0),
+    "large": Car(2400.0, 4400.0, 1.55, 1.5, 150e3, 190e3, 0.9, 14.0),
+    "sport": Car(1300.0, 1700.0, 1.3, 1.2, 110e3, 150e3, 1.2, 12.0),
+}
+
+
+def drive(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return hand-wheel angle and speed of two sines."""
+    hand = 0.6 * np.sin((0.8 + 0.1 * seed) * T) + 0.4 * np.sin(2.3 * T + seed)
+    return hand, 22.0 + 4.0 * np.sin(0.2 * T + seed)
+
+
+def lane_changes(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return hand-wheel angle and speed of lane changes of any length to any side."""
+    chance, hand, begin = np.random.default_rng(seed), np.zeros(T.size), 1.0
+    while begin < T[-1] - 5.0:
+        length = chance.uniform(1.5, 3.0)
+        change = (begin < T) & (begin + length > T)
+        size = chance.choice([-1.0, 1.0]) * chance.uniform(0.3, 0.9)
+        hand[change] = size * np.sin(2.0 * np.pi * (T[change] - begin) / length)
+        begin += length + chance.uniform(0.5, 2.0)
+    return hand, 24.0 + 5.0 * np.sin(0.25 * T + seed)
+
+
+def recording(seed: int, car: Car = SALOON, driven: Drive = drive) -> dict[str, np.ndarray]:
     """Return a drive of a single-track car with noise of production sensors, in SI."""
     noise = np.random.default_rng(seed)
-    v = 22.0 + 4.0 * np.sin(0.2 * T + seed)
-    hand = 0.6 * np.sin((0.8 + 0.1 * seed) * T) + 0.4 * np.sin(2.3 * T + seed)
-    m, inertia, a, b, c_f, c_r = 1600.0, 2400.0, 1.2, 1.5, 90e3, 110e3
+    hand, v = driven(seed)
+    most = car.friction * car.mass * 9.81 / (car.a + car.b) * np.array([car.b, car.a])
     v_y = r = 0.0
     found = []
     for k in range(T.size):
-        force_f = -c_f * ((v_y + a * r) / v[k] - hand[k] / 16.0)
-        force_r = -c_r * (v_y - b * r) / v[k]
-        found.append((r, v_y, (force_f + force_r) / m))
-        v_y += 0.01 * ((force_f + force_r) / m - r * v[k])
-        r += 0.01 * (a * force_f - b * force_r) / inertia
+        slips = (v_y + car.a * r) / v[k] - hand[k] / car.ratio, (v_y - car.b * r) / v[k]
+        force_f, force_r = -most * np.tanh(np.array([car.front, car.rear]) * slips / most)
+        found.append((r, v_y, (force_f + force_r) / car.mass))
+        v_y += 0.01 * ((force_f + force_r) / car.mass - r * v[k])
+        r += 0.01 * (car.a * force_f - car.b * force_r) / car.inertia
     r_, v_y_, a_y = np.array(found).T
     return {
         "steering_wheel_angle": hand + noise.normal(0.0, 0.002, T.size),
@@ -63,6 +105,10 @@ def late(signals: dict[str, np.ndarray]) -> None:
     signals["acceleration_y"] = np.interp(T - 0.02, T, signals["acceleration_y"])
 
 
+def late_gyro(signals: dict[str, np.ndarray]) -> None:
+    signals["yaw_rate"] = np.interp(T - 0.02, T, signals["yaw_rate"])
+
+
 def elsewhere(signals: dict[str, np.ndarray]) -> None:
     signals["acceleration_y"] += 0.8 * np.gradient(
         np.convolve(signals["yaw_rate"], np.ones(9) / 9.0, "same"), T
@@ -93,6 +139,8 @@ FLAWS = {
     "9.81": (scaled("acceleration_y", 1.0 / 9.80665), "factor", "acceleration_y", 1.0 / 9.80665, 1e-9),
     "3.6": (scaled("velocity_x", 1.0 / 3.6), "factor", "velocity_x", 1.0 / 3.6, 1e-9),
     "lag": (late, "lag", "acceleration_y", 0.02, 0.001),
+    "lag of the gyro": (late_gyro, "lag", "yaw_rate", 0.02, 0.002),
+    "sign of v_y": (scaled("velocity_y", -1.0), "sign", "velocity_y", -1.0, 0.0),
     "offset": (shifted("acceleration_y", 0.4), "zero", "acceleration_y", 0.4, 0.02),
     "spikes": (spiked, "spikes", "yaw_rate", 3, 0),
     "place": (elsewhere, "place", "acceleration_y", 0.8, 0.1),
@@ -107,6 +155,26 @@ def test_that_flaw_is_named_and_no_other(spoil, kind, name, value, within, seed,
     (flaw,) = flaws_of(write(tmp_path, signals))
     assert (flaw.kind, flaw.signal) == (kind, name)
     assert flaw.value == pytest.approx(value, abs=within)
+
+
+@pytest.mark.parametrize("driven", [drive, lane_changes])
+@pytest.mark.parametrize("car", CARS)
+def test_flaws_of_other_cars_and_drives_are_named_and_no_other(car, driven, tmp_path):
+    whole = recording(7, CARS[car], driven)
+    assert flaws_of(write(tmp_path, whole)) == ()
+    for spoil, kind, name, value, within in FLAWS.values():
+        signals = {key: x.copy() for key, x in whole.items()}
+        spoil(signals)
+        (flaw,) = flaws_of(write(tmp_path, signals))
+        assert (flaw.kind, flaw.signal) == (kind, name)
+        assert flaw.value == pytest.approx(value, abs=max(2.0 * within, 1e-9))
+
+
+def test_at_one_speed_a_late_gyro_and_a_place_are_both_named(tmp_path):
+    signals = recording(3, CARS["sport"], lambda seed: (drive(seed)[0], np.full(T.size, 25.0)))
+    elsewhere(signals)
+    (flaw,) = flaws_of(write(tmp_path, signals))
+    assert golden(flaw.text)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

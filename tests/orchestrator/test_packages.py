@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import shutil
 import sys
 from collections.abc import Callable, Iterator
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.fmu import places
+from orchestrator.fmu.opener import HOME
 from orchestrator.results.reader import Results, load_results
 from tests.sentences import golden
 
@@ -183,3 +185,22 @@ def test_nothing_is_searched_where_every_name_is_in_the_folder(yawbench, monkeyp
 
     monkeypatch.setattr(places, "packaged_components", searched)
     assert yawbench("run", "half.yaml")[0] == 0
+
+
+def test_a_folder_with_a_suppliers_fmu_alone_is_enough(yawbench, tmp_path, fmus):
+    folder = tmp_path / "work" / "fmus"
+    shutil.copy(fmus / "controller_off.fmu", tmp_path / "controller_bought.fmu")
+    shutil.rmtree(folder)
+    folder.mkdir()
+    shutil.move(tmp_path / "controller_bought.fmu", folder)
+    assert yawbench("run", "half.yaml", "--swap", "controller=controller_bought", "--out", "out")[0] == 0
+    used = {fmu.name: fmu.sha256 for fmu in load_results(Path("out")).record.fmus.values()}
+    own = {name: sha256(HOME / f"{name}.fmu") for name in used if name != "controller_bought"}
+    assert used == {**own, "controller_bought": sha256(folder / "controller_bought.fmu")}
+    status, _, told = yawbench("run", "half.yaml", "--swap", "controller=controller_offf")
+    assert status == 2
+    assert "did you mean 'controller_off'? there are: controller_bought, controller_dead_band" in told
+
+
+def sha256(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()

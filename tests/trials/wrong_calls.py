@@ -30,6 +30,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import yawbench as yb
 from orchestrator.messages import unprintable
 
@@ -120,12 +122,18 @@ class Bench:
         return self.experiment.run()
 
     @cached_property
+    def recorded(self) -> yb.RecordedRuns:
+        self.folder = tempfile.TemporaryDirectory()
+        self.run.save(Path(self.folder.name) / "run")
+        return yb.RecordedRuns(Path(self.folder.name), {})
+
+    @cached_property
     def places(self) -> yb.Ranking:
         return yb.rank(against=["none"], conditions=["hard"], quick=True)
 
     def warm(self) -> None:
         """Make everything, so that no call pays for it."""
-        for made in (self.base, self.run, self.experiment, self.runs, self.places):
+        for made in (self.base, self.run, self.experiment, self.runs, self.places, self.recorded):
             repr(made)
 
 
@@ -331,6 +339,44 @@ def _parameters() -> Iterator[Parameter]:
                  **{"inputs": ["driver.steer_angle"], "outputs": ["plant.yaw_rate"], n: x}))  # fmt: skip
     yield of("linearize.discrete", lambda x: yb.linearize(b.base, at=0.01, inputs=[SENTINEL],
              outputs=["plant.yaw_rate"], discrete=x), right=TRUTHS)  # fmt: skip
+    linear = {
+        **dict.fromkeys(("A", "B", "C", "D"), np.zeros((1, 1))), "inputs": {"u": ""}, "outputs": {"y": ""},
+        "states": {"x": ""}, "dt": 0.0, "time": 1.0, "title": "",
+    }  # fmt: skip
+    for name in linear:
+        taken = {"dt": FINITE, "time": FINITE, **{key: {"array of 2 dimensions"} for key in "ABCD"},
+                 **{key: {"dict"} for key in ("inputs", "outputs", "states")}}.get(name, set())  # fmt: skip
+        yield of(f"LinearModel.{name}", lambda x, n=name: yb.LinearModel(**{**linear, n: x}), name,
+                 *(("A", "B", "C", "D") if name in ("inputs", "outputs", "states") else ()),
+                 right=PRINTABLE | EMPTY if name == "title" else set(), may=taken)  # fmt: skip
+    yield of("Fit.result", yb.Fit)
+    yield of("RecordedRuns.folder", lambda x: yb.RecordedRuns(x, {}), right=PATHS,
+             may={"path with a zero", "path of half a character"})  # fmt: skip
+    yield of("RecordedRuns.files", lambda x: yb.RecordedRuns(Path(), x), right={"empty dict"})
+    yield of("RecordedRuns.plot.panels", lambda x: b.recorded.plot(x), "panel")
+    yield of("RecordedRuns.plot.title", lambda x: b.recorded.plot("yaw_rate", title=x),
+             right=PRINTABLE | {"None"})  # fmt: skip
+    yield of("validate.run", lambda x: yb.validate(x, f"{SENTINEL}.yaml"))
+    yield of("validate.file", lambda x: yb.validate(b.run, x), "file", "measurement", "loop.yaml")
+    yield of("validate.bands", lambda x: yb.validate(b.run, f"{SENTINEL}.yaml", bands=x), "bands",
+             "loop.yaml")  # fmt: skip
+    # Tunings.
+    search = {"base": b.base, "ranges": {"driver.amplitude": (0.02, 0.03)}, "objective": SENTINEL}
+    for name, taken in (
+        ("base", set()), ("ranges", set()), ("population", {"numpy uint8"}),
+        ("generations", {"three", "numpy uint8"}), ("seed", {"zero", "three", "numpy uint8", "hostile int"}),
+        ("workers", {"three", "numpy uint8", "None"}), ("progress", {"None", *TRUTHS}),
+    ):  # fmt: skip
+        yield of(f"tune.{name}", lambda x, n=name: yb.tune(**{**search, n: x}), right=taken)
+    yield of("tune.ranges [range]", lambda x: yb.tune(b.base, {"driver.amplitude": x}, SENTINEL), "ranges")
+    yield of("tune.ranges [lowest]", lambda x: yb.tune(b.base, {"driver.amplitude": (x, 1e300)}, SENTINEL),
+             "ranges", may=FINITE)  # fmt: skip
+    unknown = {f"driver.{SENTINEL}": (1, 2)}
+    yield of("tune.objective", lambda x: yb.tune(b.base, unknown, x), "objective")
+    yield of("tune.objective [weight]", lambda x: yb.tune(b.base, unknown, {"peak(sideslip)": x}),
+             "objective", may=FINITE)  # fmt: skip
+    yield of("Tuning.design", lambda x: yb.Tuning(x, None))
+    yield of("Tuning.tuned", lambda x: yb.Tuning(b.experiment.design, x))
     # FMUs of plain Python.
     yield of("export_fmu.controller", lambda x: yb.export_fmu(x, "made.fmu"), "controller", "made",
              may={"lambda", "builtin"})  # fmt: skip
@@ -399,9 +445,10 @@ def b_fault(kind: str, name: str, **more: Any) -> Callable[[Any], Any]:
 def plan_all(axes: Mapping[Any, Any]) -> None:
     """Make an experiment, and plan its runs as `run` does before it makes them."""
     from orchestrator.experiments.planning import plan_experiment
+    from yawbench._calls import planner_of
 
     made = yb.experiment(BENCH.base, axes, metrics="peak(sideslip)")
-    plan_experiment(made.design, made.base.path.parent, planner=made.base._planner())
+    plan_experiment(made.design, made.base.path.parent, planner=planner_of(made.base.programs))
 
 
 def rank(name: str, **more: Any) -> Callable[[Any], Any]:
@@ -422,8 +469,7 @@ UNHASHABLE = {label for label, make in WRONG.items() if not _is_key(make())}
 
 NOT_CALLED = (
     yb.Controller, yb.Diagnostic, yb.Evaluation, yb.Location, yb.MetricValue, yb.Override, yb.Plan,
-    yb.TestQuantity, yb.Validation, yb.Verdict, yb.Fit, yb.LinearModel,
-    yb.RecordedRuns, yb.validate,  # calls need files or take seconds
+    yb.TestQuantity, yb.Validation, yb.Verdict,
 )  # fmt: skip
 """What users write, or only read."""
 

@@ -193,3 +193,17 @@ def test_two_objects_of_a_class_are_ranked_by_their_names(tmp_path):
     assert other.cells["margin"].tolist() == [margins["strong"]]  # not the kept run of the first one
     with refused(yb.ScenarioError, "argument-invalid"):
         yb.rank(both, name="both", against=[], conditions=["hard"], quick=True)
+
+
+def test_the_sampling_time_of_an_object_holds_in_a_ranking(tmp_path):
+    class Slow(Law):
+        step_size = 0.1
+
+    places = yb.rank(
+        {"slow": Slow(1e5), "fast": Law(1e5)}, against=[], conditions=["hard"], quick=True, out=tmp_path
+    )
+    margins = places.cells.set_index("entry")["margin"]
+    assert margins["slow"] != margins["fast"]
+    runs = yb.open(tmp_path).runs.values()
+    sampled = {run.results.record.fmus["controller"].step_size for run in runs}
+    assert sampled == {0.1, 0.005}

@@ -1,0 +1,171 @@
+"""Tunings from Python: the search of the command, and parameters of plain Python."""
+
+from __future__ import annotations
+
+import csv
+import subprocess
+import sys
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import yawbench as yb
+from tests.sentences import refused
+
+SMALL = {"population": 5, "generations": 2}
+ERROR, EFFORT = "rms_error(yaw_rate)", "effort(yaw_moment)"
+TUNING = """
+title: A gain
+runs: [{{name: it, scenario: "{scenario}", swap: {{controller: controller_pid}}, set: {{stop_time: 1.2}}}}]
+metrics: {{error: {{metric: rms_error(yaw_rate)}}}}
+derived: {{cost: {{says: The error, expression: error, of: {{error: {{run: it, metric: error}}}}}}}}
+tuning:
+  objective: cost
+  population: 5
+  generations: 2
+  seed: 3
+  laws: {{PID: {{axes: {{gain: {{vary: controller.yaw_rate_proportional_gain, {range}, spacing: log}}}}}}}}
+"""
+
+
+@pytest.fixture(scope="module")
+def base():
+    return yb.load("fnn_sideslip/25mps").set({"stop_time": 1.2})
+
+
+def follow(yaw_rate_ref, yaw_rate, gain=2e4):
+    return gain * (yaw_rate_ref - yaw_rate)
+
+
+def in_numpy(yaw_rate_ref, yaw_rate, gain=2e4):
+    return float(np.array([gain]) @ np.array([yaw_rate_ref - yaw_rate]))
+
+
+class Law:
+    inputs, outputs = ("yaw_rate_ref", "yaw_rate"), ("yaw_moment",)
+
+    def __init__(self, gain):
+        self.gain = gain
+
+    def output(self, t, u):
+        return self.gain * (u.yaw_rate_ref - u.yaw_rate)
+
+
+@dataclass
+class Data:
+    inputs, outputs = ("yaw_rate_ref", "yaw_rate"), ("yaw_moment",)
+    gain: float = yb.parameter(2e4, "N.m.s/rad", "Moment per yaw-rate error", minimum=0.0)
+
+    def output(self, t, u):
+        return self.gain * (u.yaw_rate_ref - u.yaw_rate)
+
+
+def test_the_trials_are_those_of_the_command(tmp_path):
+    scenario = yb.load("fuzzy_pid/sine").swap(controller="controller_pid")
+    (tmp_path / "tuning.yaml").write_text(TUNING.format(scenario=scenario.path, range="from: 1e4, to: 1e6"))
+    command = [sys.executable, "-m", "yawbench", "tune", str(tmp_path / "tuning.yaml"), "--out", "out"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader((tmp_path / "out" / "trials.csv").open()))
+    target = "controller.yaw_rate_proportional_gain"
+    tuned = yb.tune(scenario.set({"stop_time": 1.2}), {target: (1e4, 1e6, "log")}, ERROR, seed=3, **SMALL)
+    assert tuned.table[target].tolist() == [float(row[target]) for row in rows]
+    assert tuned.table["objective"].tolist() == [float(row["objective"]) for row in rows]
+    assert tuned.table["generation"].tolist() == [1] * 5 + [2] * 5
+
+
+@pytest.mark.parametrize(
+    "law", [follow, in_numpy, Law(2e4), Data()], ids=["function", "numpy", "object", "data"]
+)
+def test_parameters_of_plain_python_are_tuned(base, law):
+    scenario = base.swap(controller=law)
+    tuned = yb.tune(scenario, {"controller.gain": (1e3, 1e5, "log")}, ERROR, **SMALL)
+    gain = tuned.values["controller.gain"]
+    assert tuned.table["controller.gain"].nunique() == 10
+    assert tuned.table["controller.gain"].between(1e3, 1e5).all()
+    assert tuned.objective == tuned.table["objective"].min()
+    assert scenario.set(tuned.values).run().metric(ERROR) == tuned.objective
+    made = (
+        type(law)(gain)
+        if not callable(law)
+        else lambda yaw_rate_ref, yaw_rate: law(yaw_rate_ref, yaw_rate, gain)
+    )
+    assert base.swap(controller=made).run().metric(ERROR) == tuned.objective
+
+
+def test_the_objective_is_a_weighted_sum_averaged_over_scenarios(base):
+    scenarios = [base.swap(controller=Law(1e4)), base.swap(controller=Law(1e4)).set({"speed": "70 km/h"})]
+    weights = {ERROR: 2.0, EFFORT: -1e-6}
+    ranges = {"controller.gain": (1e3, 1e5), "driver.amplitude": ("1 deg", "2 deg")}
+    tuned = yb.tune(scenarios, ranges, weights, **SMALL)
+    assert str(tuned.values["driver.amplitude"]).endswith(" deg")
+    runs = [each.set(tuned.values).run() for each in scenarios]
+    costs = [sum(weight * run.metric(name) for name, weight in weights.items()) for run in runs]
+    assert tuned.objective == pytest.approx(sum(costs) / 2, rel=1e-12)
+    assert tuned.plot().axes[0].get_title("left") == f"2 {ERROR} + -1e-06 {EFFORT}, mean of 2 scenarios"
+
+
+def test_one_seed_gives_one_search(base):
+    scenario, ranges = base.swap(controller=follow), {"controller.gain": (1e3, 1e5)}
+    first, again, other = (
+        yb.tune(scenario, ranges, ERROR, seed=seed, workers=workers, **SMALL).table
+        for seed, workers in ((1, 1), (1, 2), (2, 2))
+    )
+    assert first.equals(again)
+    assert not first.equals(other)
+
+
+def test_trials_that_fail_are_counted_and_lose(base):
+    def fragile(yaw_rate_ref, yaw_rate, gain=2e4):
+        return gain * (yaw_rate_ref - yaw_rate) if gain < 5e4 else 1.0 / (gain - gain)
+
+    ranges = {"controller.gain": (1e3, 1e5)}
+    with pytest.warns(yb.YawbenchWarning, match=r"\d of 10 runs failed: .*ZeroDivisionError"):
+        tuned = yb.tune(base.swap(controller=fragile), ranges, ERROR, **SMALL)
+    assert float(tuned.values["controller.gain"]) < 5e4
+    assert 0 < tuned.table["objective"].isna().sum() < 10
+    with refused(yb.ResultsError, "results-missing"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", yb.YawbenchWarning)
+        yb.tune(base.swap(controller=fragile), {"controller.gain": (6e4, 7e4)}, ERROR, **SMALL)
+
+
+def test_scenarios_with_two_programs_of_a_name_are_refused(base):
+    both = [base.swap(controller=Law(1e4)), base.swap(controller=Law(2e4))]
+    with refused(yb.ScenarioError, "argument-invalid"):
+        yb.tune(both, {"driver.amplitude": (0.01, 0.02)}, ERROR)
+
+
+@pytest.mark.parametrize(
+    "ranges",
+    [
+        {"controller.gain": (2e4, 1e4)},
+        {"controller.gain": (-1e4, 1e4, "log")},
+        {"controller.gain": (1e4, "20 N.m")},
+        {"controller.gain": (1e4, True)},
+        {"controller.gian": (1e4, 2e4)},
+        {"controller": ("controller_off", "controller_pid")},
+        {"stop_time": (-2, -1)},
+    ],
+)
+def test_wrong_ranges_are_refused_before_a_run(base, ranges, monkeypatch):
+    monkeypatch.setattr("yawbench._experiment.make_all", None)
+    with refused(yb.ScenarioError) as error:
+        yb.tune(base.swap(controller=follow), ranges, ERROR)
+    assert next(iter(ranges)).split(".")[0] in str(error.value)
+
+
+def test_what_is_no_metric_is_refused_by_name(base):
+    ranges = {"driver.amplitude": (0.01, 0.02)}
+    for objective in ("rms_eror(yaw_rate)", "peak(nothing)"):
+        with refused(yb.ScenarioError) as error:
+            yb.tune(base, ranges, objective)
+        assert objective in str(error.value) or "rms_eror" in str(error.value)
+
+
+def test_nothing_is_written(base, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    yb.tune(base, {"driver.amplitude": (0.01, 0.02)}, ERROR, population=5, generations=1)
+    assert list(Path().iterdir()) == []

@@ -1,0 +1,281 @@
+"""Tuning of parameters from Python, of plain Python controllers, too."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from orchestrator.errors import Diagnostic, Location, ResultsError, ScenarioError
+from orchestrator.experiments.axes import AxisSpec
+from orchestrator.experiments.experiment import LoadedExperiment as Design
+from orchestrator.experiments.experiment import NamedRun
+from orchestrator.experiments.outcome import ExperimentResult
+from orchestrator.experiments.schema import ExperimentSpec
+from orchestrator.experiments.tables import to_pandas
+from orchestrator.experiments.tuning import Trial, TunedLaw, columns_of, history_figure, search
+from orchestrator.messages import counted, listed, short
+from orchestrator.metrics.run_metrics import metric
+from orchestrator.plan import Value
+
+from . import arguments
+from ._controller import PythonComponent
+from ._experiment import checked, executed, numbers_of
+from ._progress import bar
+from ._run import shown_in_notebooks
+from ._scenario import Scenario, warn
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+OBJECTIVE = "objective"
+"""Name of what is minimized, in the made-up experiment."""
+SPACINGS = ("linear", "log")
+
+
+def tune(
+    base: Scenario | Iterable[Scenario],
+    ranges: Mapping[str, tuple[Any, ...]],
+    objective: str | Mapping[str, float],
+    *,
+    population: int = 8,
+    generations: int = 8,
+    seed: int = 1,
+    workers: int | None = None,
+    progress: bool | None = None,
+) -> Tuning:
+    """Find the parameters of a scenario that minimize an objective, by differential evolution.
+
+    The search is that of `yawbench tune`; nothing is written. Parameters of plain Python are tuned like those
+    of FMUs.
+
+        >>> def follow(yaw_rate_ref, yaw_rate, gain=2e4):
+        ...     return gain * (yaw_rate_ref - yaw_rate)
+        >>> law = base.swap(controller=follow)
+        >>> ranges = {"controller.gain": (1e3, 1e5, "log")}
+        >>> tuned = yb.tune(law, ranges, "rms_error(yaw_rate)", population=5, generations=2)
+        >>> tuned.objective < law.run().metric("rms_error(yaw_rate)")
+        True
+
+    Args:
+        base: the scenario, or several, over which the objective is averaged.
+        ranges: target of `Scenario.set` -> lowest and highest value, in SI or both with the same unit, and
+            "log" if trials are spread by equal factors.
+        objective: a metric, or a mapping of metrics to weights, whose weighted sum is minimized.
+        population: trials of a generation; default as in the proving ground's tuning.
+        generations: number of generations, with the first; default: chosen, as many as trials of each.
+        seed: of the random numbers.
+        workers: number of processes; default: the number of cores. Plain Python that is not native runs here.
+        progress: show a bar; default: in a terminal or a notebook, after two seconds.
+
+    Raises:
+        ScenarioError: a range or the objective is invalid.
+        YawbenchError: a run cannot start.
+        ResultsError: no trial has a value of the objective.
+    """
+    bases = _bases(base)
+    weights = _weights(objective)
+    settings = {
+        "population": arguments.count(population, "population", least=5),
+        "generations": arguments.count(generations, "generations"),
+        "seed": arguments.count(seed, "seed", least=0, most=2**32 - 1),
+        "objective": OBJECTIVE,
+        "laws": {OBJECTIVE: {"axes": _axes(ranges)}},
+    }
+    workers = None if workers is None else arguments.count(workers, "workers")
+    progress = None if progress is None else arguments.flag(progress, "progress")
+    design = _design(bases, weights, settings)
+    programs = _programs(bases)
+    generations_done: list[ExperimentResult] = []
+    total = len(bases) * settings["population"] * settings["generations"]
+    with bar(f"Tune {design.spec.title}", total, wanted=progress) as shown:
+
+        def judged(trials: Design) -> ExperimentResult:
+            findings, _ = executed(trials, programs, workers=workers, done=lambda outcome: shown.advance())
+            generations_done.append(findings)
+            return findings
+
+        (tuned,) = search(design, judged)
+    reasons = [reason for findings in generations_done for reason in findings.failed.values()]
+    if tuned.best.objective is None:
+        why = reasons[0] if reasons else f"no run yields {listed(weights)}"
+        raise ResultsError(f"no trial has a value of the objective: {why}", code="results-missing")
+    _warn(design.spec.title, generations_done, reasons)
+    return Tuning(design, tuned)
+
+
+def _bases(base: Any) -> list[Scenario]:
+    if arguments.is_a(base, Scenario):
+        return [base]
+    bases = arguments.items(base, "base", "what yawbench.load returns, or a list of these")
+    if not bases:
+        raise ValueError("base: must have at least one scenario")
+    return [arguments.instance(each, f"base[{k}]", Scenario, "yawbench.load") for k, each in enumerate(bases)]
+
+
+def _weights(objective: Any) -> dict[str, float]:
+    """Return metric -> weight."""
+    if not arguments.is_a(objective, Mapping):
+        return {arguments.text(objective, "objective"): 1.0}
+    wanted = "a metric, or a mapping of metrics to weights, {'peak(sideslip)': 1.0}"
+    weights = arguments.mapping(objective, "objective", wanted)
+    if not weights:
+        raise ValueError("objective: must have at least one metric")
+    return {name: arguments.number(weight, f"objective[{name!r}]") for name, weight in weights.items()}
+
+
+def _axes(ranges: Any) -> dict[str, Any]:
+    """Return the ranges as axes of a tuning file."""
+    wanted = "a mapping of targets to ranges, {'controller.gain': (1e3, 1e5)}"
+    axes = {}
+    for name, ends in arguments.mapping(ranges, "ranges", wanted).items():
+        place = f"ranges[{name!r}]"
+        parts = arguments.items(ends, place, "lowest and highest value, (1e3, 1e5) or (1e3, 1e5, 'log')")
+        if len(parts) not in (2, 3):
+            arguments.refuse(place, "lowest and highest value, (1e3, 1e5) or (1e3, 1e5, 'log')", ends)
+        spacing = arguments.text(parts[2], f"{place}[2]") if len(parts) == 3 else SPACINGS[0]
+        if spacing not in SPACINGS:
+            raise ValueError(
+                f"{place}[2]: must be {listed(map(repr, SPACINGS), last='or')} (got {short(spacing)})"
+            )
+        given = numbers_of(place, parts[:2])
+        low, high = given.pop("values")
+        axes[name] = {"vary": name, "from": low, "to": high, "spacing": spacing, **given}
+        with _located(place):
+            checked(AxisSpec, axes[name])
+    if not axes:
+        raise ValueError("ranges: must have at least one target")
+    return axes
+
+
+@contextlib.contextmanager
+def _located(argument: str) -> Iterator[None]:
+    """Name the argument in errors about its content."""
+    try:
+        yield
+    except ScenarioError as error:
+        where = Location(target=argument)
+        raise ScenarioError([replace(each, location=where) for each in error.diagnostics]) from None
+
+
+def _design(bases: list[Scenario], weights: Mapping[str, float], settings: dict[str, Any]) -> Design:
+    """Return the tuning as an experiment: a named run per scenario, their mean as the objective."""
+    for name in weights:
+        with _located("objective"):
+            metric(name)
+    runs = {
+        f"s{k}": NamedRun(f"s{k}", each.title, each.title, each.path, each.changes)
+        for k, each in enumerate(bases)
+    }
+    sources = {
+        f"{run}_m{i}": ({"run": run, "metric": name}, weight)
+        for run in runs
+        for i, (name, weight) in enumerate(weights.items())
+    }
+    terms = " + ".join(f"({weight!r}) * {name}" for name, (_, weight) in sources.items())
+    words = " + ".join(name if weight == 1.0 else f"{weight:g} {name}" for name, weight in weights.items())
+    spec = {
+        "title": bases[0].title or bases[0].path.stem,
+        "runs": [{"name": name, "scenario": run.scenario.name} for name, run in runs.items()],
+        "metrics": {name: {"metric": name} for name in weights},
+        "derived": {
+            OBJECTIVE: {
+                "says": words + (f", mean of {len(runs)} scenarios" if len(runs) > 1 else ""),
+                "expression": f"({terms}) / {len(runs)}",
+                "of": {name: source for name, (source, _) in sources.items()},
+            }
+        },
+        "tuning": settings,
+    }
+    return Design(bases[0].path, checked(ExperimentSpec, spec), runs)
+
+
+def _programs(bases: list[Scenario]) -> dict[Path, PythonComponent]:
+    """Return the plain Python of all scenarios; refuses different programs of one name."""
+    programs: dict[Path, PythonComponent] = {}
+    for k, each in enumerate(bases):
+        for path, program in each.programs.items():
+            known = programs.setdefault(path, program)
+            if known.fmu.sha256 != program.fmu.sha256:
+                raise ScenarioError(
+                    f"base[{k}]: has another {path.parent.name} {path.stem!r} than the scenarios before it: "
+                    "swap the same object into all",
+                    code="argument-invalid",
+                )
+    return programs
+
+
+def _warn(title: str, done: list[ExperimentResult], reasons: list[str]) -> None:
+    """Issue what plans of the first trials warn of, and how many trials failed, as one warning."""
+    first = done[0].planned
+    plans = [job.plan for job in first.jobs if job.plan] if first else []
+    diagnostics = list(dict.fromkeys(entry for plan in plans for entry in plan.diagnostics))
+    if reasons:
+        total = sum(len(findings.records) for findings in done)
+        text = f"{len(reasons)} of {counted(total, 'run')} failed: {reasons[0]}"
+        diagnostics.append(Diagnostic("runs-with-warnings", text, "warning"))
+    warn(title, diagnostics)
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """The result of a tuning; made by `tune`.
+
+        >>> ranges = {"driver.amplitude": (0.02, 0.03)}
+        >>> tuned = yb.tune(base, ranges, "peak(sideslip)", population=5, generations=1)
+        >>> base.set(tuned.values).run().metric("peak(sideslip)") == tuned.objective
+        True
+
+    Attributes:
+        design: the experiment that was searched.
+        tuned: all trials.
+    """
+
+    __module__ = "yawbench"
+
+    design: Design
+    tuned: TunedLaw
+
+    def __post_init__(self) -> None:
+        arguments.instance(self.design, "design", Design, "yawbench.tune")
+        arguments.instance(self.tuned, "tuned", TunedLaw, "yawbench.tune")
+
+    @property
+    def best(self) -> Trial:
+        """The trial with the smallest objective."""
+        return self.tuned.best
+
+    @property
+    def objective(self) -> float:
+        """The smallest objective, in SI."""
+        return self.best.cost
+
+    @property
+    def values(self) -> dict[str, Value]:
+        """Target -> value with the smallest objective, as `Scenario.set` takes them."""
+        assert self.design.spec.tuning is not None
+        axes = self.design.spec.tuning.laws[OBJECTIVE].axes
+        units = {target: axis.unit for axis in axes.values() for target in axis.vary}
+        return {
+            str(target): f"{number!r} {units[target]}" if units[target] else number
+            for target, number in self.best.values.items()
+        }
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """One row per trial: generation, objective, values in the units of the ranges."""
+        return to_pandas(columns_of([self.tuned])).drop(columns="law")
+
+    def plot(self) -> Figure:
+        """Return a figure of the smallest objective over the number of trials."""
+        return shown_in_notebooks(history_figure(self.design, [self.tuned], "yawbench.tune"))
+
+    def __repr__(self) -> str:
+        settings = ", ".join(f"{target} {value}" for target, value in self.values.items())
+        return (
+            f"<Tuning: {self.objective:.4g} with {settings}, of {counted(len(self.tuned.trials), 'trial')}>"
+        )
