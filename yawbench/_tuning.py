@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +16,7 @@ from orchestrator.experiments.experiment import NamedRun
 from orchestrator.experiments.outcome import ExperimentResult
 from orchestrator.experiments.schema import ExperimentSpec
 from orchestrator.experiments.tables import to_pandas
-from orchestrator.experiments.tuning import Trial, TunedLaw, columns_of, history_figure, search
+from orchestrator.experiments.tuning import TunedLaw, columns_of, history_figure, search
 from orchestrator.messages import counted, listed, short
 from orchestrator.metrics.run_metrics import metric
 from orchestrator.plan import Value
@@ -39,7 +39,7 @@ SPACINGS = ("linear", "log")
 
 def tune(
     base: Scenario | Iterable[Scenario],
-    ranges: Mapping[str, tuple[Any, ...]],
+    ranges: Mapping[str, Sequence[float | str]],
     objective: str | Mapping[str, float],
     *,
     population: int = 8,
@@ -245,14 +245,9 @@ class Tuning:
         arguments.instance(self.tuned, "tuned", TunedLaw, "yawbench.tune")
 
     @property
-    def best(self) -> Trial:
-        """The trial with the smallest objective."""
-        return self.tuned.best
-
-    @property
     def objective(self) -> float:
         """The smallest objective, in SI."""
-        return self.best.cost
+        return self.tuned.best.cost
 
     @property
     def values(self) -> dict[str, Value]:
@@ -262,7 +257,7 @@ class Tuning:
         units = {target: axis.unit for axis in axes.values() for target in axis.vary}
         return {
             str(target): f"{number!r} {units[target]}" if units[target] else number
-            for target, number in self.best.values.items()
+            for target, number in self.tuned.best.values.items()
         }
 
     @cached_property

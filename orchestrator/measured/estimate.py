@@ -55,8 +55,7 @@ FIRST = 1e-3
 """That of a first search with squares, which is faster far from the result; chosen: near enough."""
 
 Kind = Literal["run", "offset", "delay"]
-CONVERGED = "the loss or the parameters no longer change"
-"""Why a search ended that found a minimum."""
+CONVERGED = "the loss or the parameters no longer change"  # message of a search that found a minimum
 
 
 @dataclass(frozen=True)

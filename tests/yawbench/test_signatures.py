@@ -88,6 +88,7 @@ INSIDE = {
     "Status",
     "Target",
     "TestName",
+    "TunedLaw",
     "Value",
     "VariableSpec",
     "Wire",
