@@ -397,8 +397,7 @@ def estimate(residuals: Residuals, *, most_sets: int) -> Estimate:
 
     parameters = residuals.parameters
     names = [one.name for one in parameters]
-    start = np.array([one.start for one in parameters])
-    low, high = (np.array([getattr(one, side) for one in parameters]) for side in ("low", "high"))
+    start, low, high = (np.array([getattr(p, key) for p in parameters]) for key in ("start", "low", "high"))
     for window, signals in zip(residuals.windows, residuals.simulated([start])[0], strict=True):
         if signals is None:
             raise StartFailed(window.name)
