@@ -79,7 +79,7 @@ def tune(
     """
     bases = _bases(base)
     weights = _weights(objective)
-    settings = {
+    settings: dict[str, Any] = {
         "population": arguments.count(population, "population", least=5),
         "generations": arguments.count(generations, "generations"),
         "seed": arguments.count(seed, "seed", least=0, most=2**32 - 1),
