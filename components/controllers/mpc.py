@@ -62,12 +62,13 @@ class Mpc(Component):
             moves=p.moves,
             steps_per_move=p.steps_per_move,
         )
+        self.place = 0  # the law that is kept has the parameters of before
         self.law_at(p.scheduling_speed)
 
     def law_at(self, speed: float) -> PredictiveLaw:
         """Return the law at the speed of the grid next to `speed` [m/s], which is kept."""
         place = max(round(max(speed, self.p.scheduling_speed) / SPACING), 1)  # at rest there is none
-        if place != getattr(self, "place", None):
+        if place != self.place:
             self.place = place
             dynamics = error_dynamics(self.car, place * SPACING)
             self.law = PredictiveLaw(dynamics, self.p.yaw_inertia, self.weights)

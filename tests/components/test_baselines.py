@@ -156,6 +156,17 @@ def test_the_program_is_scheduled_down_to_the_slowest_speed_it_has_a_car_for():
     assert stand.step(0.005, velocity_x=0.1, yaw_rate=0.5)["yaw_moment"] < 0.0
 
 
+def test_parameters_set_after_outputs_were_read_change_the_law_that_is_kept():
+    at_its_grid_point = {"velocity_x": 6.0, "yaw_rate": 0.1}
+    late = Stand(Mpc, scheduling_speed=6.0)
+    late.set(**at_its_grid_point)
+    before = late.outputs()["yaw_moment"]
+    late.set(yaw_rate_scale=0.01)
+    fresh = Stand(Mpc, scheduling_speed=6.0, yaw_rate_scale=0.01)
+    after = [stand.start(**at_its_grid_point)["yaw_moment"] for stand in (late, fresh)]
+    assert after[0] == after[1] != before
+
+
 def test_what_is_beyond_a_threshold_has_its_sign():
     assert [beyond(x, 2.0) for x in (-3.0, -2.0, 0.0, 2.0, 5.0)] == [-1.0, 0.0, 0.0, 0.0, 3.0]
     assert sideslip_bound(0.9) == pytest.approx(math.radians(10.0), rel=0.02)

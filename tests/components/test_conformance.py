@@ -316,6 +316,22 @@ def test_parameters_arrive_after_the_instance_is_made(component):
 
 
 @every
+def test_outputs_read_before_parameters_are_set_do_not_bind(component):
+    changed = {
+        v.name: next((x for x in (1.01 * v.start, 0.99 * v.start) if within(v, x)), v.start)
+        for v in component.variables
+        if v.causality == "parameter" and v.type == "Real"
+    }
+    stands = Stand(component), Stand(component, **changed)
+    stands[0].set(**some_inputs(component, 0))
+    stands[0].outputs()
+    stands[0].set(**changed)
+    for k, stand in enumerate(stands * 3):
+        (stand.step if k > 1 else stand.start)(*[0.001][: k > 1], **some_inputs(component, k // 2))
+    assert [*map(repr, stands[0].outputs().values())] == [*map(repr, stands[1].outputs().values())]
+
+
+@every
 def test_its_state_goes_through_bytes(component):
     stand = driven(component, steps=3)
     assert pickle.loads(frozen(stand)).keys() == stand.unit._get_fmu_state().keys()
