@@ -1,18 +1,14 @@
-"""Tables and figure of docs/monitors.md from published runs: `python -m docs.generate.monitor_tables`.
+"""Tables of docs/monitors.md and docs/real_signals.md: `python -m docs.generate.monitor_tables`.
 
-Runs of monitor_parity are in scenarios/real_signals/monitor_runs.csv, taken by `--runs TABLE` from the
-table.csv of `yawbench study real_signals/faults`. What monitor_redundancy does is read from the table in
-docs/real_signals.md.
+They come from scenarios/real_signals/monitor_runs.csv, every run of `yawbench study real_signals/faults`,
+which `--runs TABLE` takes from the study's table.csv.
 """
 
 from __future__ import annotations
 
-import argparse
 import csv
 import math
-import re
 import statistics
-import textwrap
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,18 +16,17 @@ from typing import TYPE_CHECKING
 
 from orchestrator.experiments.confidence import share_bounds
 
+from .published import replaced, wrapped, write_pages
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 ROOT = Path(__file__).resolve().parents[2]
 RUNS = ROOT / "scenarios" / "real_signals" / "monitor_runs.csv"
-BEFORE = ROOT / "docs" / "real_signals.md"
 PAGE = ROOT / "docs" / "monitors.md"
+SIDESLIP_PAGE = ROOT / "docs" / "real_signals.md"
 FIGURE = ROOT / "docs" / "monitors"
-BEGIN, END = "<!-- written by docs.generate.monitor_tables -->", "<!-- end of tables -->"
-SEEDS_BEFORE = 10
-"""Of the table in docs/real_signals.md."""
-COLUMNS = ("run", "seed", "found [1]", "after [s]", "blamed [1]", "sideslip [rad]")
+COLUMNS = ("run", "seed", "found [1]", "after [s]", "blamed [1]", "alarm [1]", "sideslip [rad]")
 MONITORS = {"with": "monitor_redundancy", "parity": "monitor_parity"}
 GYRO, ACCELEROMETER, HAND_WHEEL, WHEEL, UNLOCATED = 1, 2, 3, 4, 5
 BLAMED = {GYRO: "gyro", ACCELEROMETER: "a_y", HAND_WHEEL: "hand wheel", WHEEL: "wheel", UNLOCATED: "unclear"}
@@ -69,6 +64,12 @@ OTHERS = {
     "a_y_zero": ("accelerometer: zero", ACCELEROMETER), "hand_wheel": ("hand wheel: frozen", HAND_WHEEL),
     "wheel": ("a wheel speed: zero", WHEEL),
 }  # fmt: skip
+BESIDE = {
+    "none": "nothing is wrong", "wrong_alarm": "healthy, the moment taken away",
+    "brake": "one wheel not braked",
+}  # fmt: skip
+"""Runs of the study without a fault of a sensor."""
+OFF = {"B": "off/lane_change_80kmh", "C": "off/double_lane_change"}
 
 
 @dataclass(frozen=True)
@@ -86,15 +87,16 @@ class Outcome:
 
 
 def outcomes(rows: Iterable[dict[str, str]]) -> dict[str, Outcome]:
-    """Return the outcome of every run of the study, over its seeds."""
+    """Return the outcome of every run of the study, over its seeds; without a monitor nothing is found."""
     groups: dict[str, list[dict[str, str]]] = {}
     for row in rows:
         groups.setdefault(row["run"], []).append(row)
+    found = {name: [row for row in group if float(row["found [1]"] or 0.0)] for name, group in groups.items()}
     return {
         name: Outcome(
             len(group),
-            [float(row["after [s]"]) for row in group if float(row["found [1]"])],
-            [round(float(row["blamed [1]"])) for row in group if float(row["found [1]"])],
+            [float(row["after [s]"]) for row in found[name]],
+            [round(float(row["blamed [1]"])) for row in found[name]],
             [math.degrees(float(row["sideslip [rad]"])) for row in group],
         )
         for name, group in groups.items()
@@ -102,26 +104,9 @@ def outcomes(rows: Iterable[dict[str, str]]) -> dict[str, Outcome]:
 
 
 def published() -> dict[str, Outcome]:
-    """Return the published outcomes of both monitors."""
+    """Return the published outcomes of all runs."""
     with RUNS.open(encoding="utf-8", newline="") as lines:
-        return {**outcomes(csv.DictReader(lines)), **outcomes_before()}
-
-
-ROW = re.compile(r"^\| [BC], (with/\S+) \| (\d\S*) \(.*?\) % \| (\S+).*? \| (\S+).*? \| (\S+)", re.MULTILINE)
-
-
-def outcomes_before() -> dict[str, Outcome]:
-    """Return the outcomes of monitor_redundancy in docs/real_signals.md: shares of ten runs and medians."""
-    before = {}
-    for name, share, after, blamed, sideslip in ROW.findall(BEFORE.read_text(encoding="utf-8")):
-        alarms = round(float(share) / 100 * SEEDS_BEFORE)
-        before[name] = Outcome(
-            SEEDS_BEFORE,
-            [float(after)] * alarms if alarms else [],
-            [round(float(blamed))] * alarms if alarms else [],
-            [float(sideslip)],
-        )
-    return before
+        return outcomes(csv.DictReader(lines))
 
 
 def share_text(count: int, number: int) -> str:
@@ -155,21 +140,20 @@ def rows_of_faults() -> list[tuple[str, str, int]]:
     return [*sized, *((title, name, signal) for name, (title, signal) in OTHERS.items())]
 
 
-def faults_table(results: dict[str, Outcome]) -> str:
-    """Return the table of all faults in paper B's lane change: a fault per row, a group per monitor."""
+def faults_table(results: dict[str, Outcome], paper: str) -> str:
+    """Return the table of the faults in a paper's lane change: a fault per row, a group per monitor."""
     heads = [
         f"{what}, {monitor}"
         for monitor in MONITORS.values()
         for what in ("detected [%]", "after [s]", "blamed")
     ]
-    lines = [f"| from 1.5 s on | {' | '.join(heads)} |", f"|---|{'---:|---:|---|' * len(MONITORS)}"]
+    lines = [f"| {paper}, from 1.5 s on | {' | '.join(heads)} |", f"|---|{'---:|---:|---|' * len(MONITORS)}"]
     for title, name, _ in rows_of_faults():
+        if f"without/{paper}/{name}" not in results:
+            continue
         cells = []
         for key in MONITORS:
-            outcome = results.get(f"{key}/B/{name}")
-            if outcome is None:
-                cells += ["-"] * 3
-                continue
+            outcome = results[f"{key}/{paper}/{name}"]
             cells += [
                 share_text(len(outcome.delays), outcome.number),
                 median_text(outcome.delays, 2),
@@ -182,7 +166,7 @@ def faults_table(results: dict[str, Outcome]) -> str:
 def totals_table(results: dict[str, Outcome]) -> str:
     """Return the table of what the monitors reach over all faults together."""
     lines = ["| over all faults | " + " | ".join(MONITORS.values()) + " |", f"|---|{'---:|' * len(MONITORS)}"]
-    faults = [row for row in rows_of_faults() if f"with/B/{row[1]}" in results]
+    faults = rows_of_faults()
     measures: dict[str, Callable[[Outcome, int], bool]] = {
         "faults found in every run": lambda o, s: len(o.delays) == o.number,
         "faults found in no run": lambda o, s: not o.delays,
@@ -199,42 +183,83 @@ def totals_table(results: dict[str, Outcome]) -> str:
     return "\n".join(lines)
 
 
-def cost_table(results: dict[str, Outcome]) -> str:
-    """Return the table of what a healthy monitor costs: largest sideslip angles, medians."""
+def blind_table(results: dict[str, Outcome]) -> str:
+    """Return the table of the faults that no run or only some runs find, kinds by sizes."""
     lines = [
-        "| largest sideslip angle [deg] | " + " | ".join(MONITORS.values()) + " |",
-        f"|---|{'---:|' * len(MONITORS)}",
+        "| fault | "
+        + " | ".join(f"{word}, {m}" for m in MONITORS.values() for word in ("never found", "in some")),
+        "|---|" + "---|---|" * len(MONITORS),
     ]
-    for paper in "BC":
-        cells = [f"{statistics.median(results[f'{key}/{paper}/none'].sideslip):.2f}" for key in MONITORS]
-        lines.append(f"| {paper}, nothing is wrong | {' | '.join(cells)} |")
+    lines[0] += " |"
+    groups = [
+        (f"{kind.title}{'' if kind.unit == '1' else f' [{kind.unit}]'}",
+         [(f"{size:g}", name) for size, name in zip(kind.sizes, kind.names(), strict=True)])
+        for kind in KINDS
+    ]  # fmt: skip
+    groups += [(title, [("yes", name)]) for name, (title, _) in OTHERS.items()]
+    for title, sizes in groups:
+        cells = []
+        for key in MONITORS:
+            found = {size: results[f"{key}/B/{name}"] for size, name in sizes}
+            never = [size for size, outcome in found.items() if not outcome.delays]
+            some = [size for size, outcome in found.items() if 0 < len(outcome.delays) < outcome.number]
+            cells += [", ".join(never) or "-", ", ".join(some) or "-"]
+        if set(cells) != {"-"}:
+            lines.append(f"| {title} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
-def tables_text(results: dict[str, Outcome]) -> str:
-    """Return all tables as Markdown."""
+def sideslip_table(results: dict[str, Outcome]) -> str:
+    """Return the table of the largest sideslip angles of every run of both papers."""
+    heads = ["without a monitor", *MONITORS.values()]
+    lines = [f"| largest sideslip angle [deg] | {' | '.join(heads)} |", f"|---|{'---:|' * len(heads)}"]
+    titles = {**BESIDE, **{name: title for title, name, _ in rows_of_faults()}}
+    for paper, off in OFF.items():
+        lines.append(f"| {paper}, no control at all | {median_text(results[off].sideslip, 2)} | - | - |")
+        for name, title in titles.items():
+            if f"without/{paper}/{name}" in results:
+                cells = [
+                    median_text(results[f"{key}/{paper}/{name}"].sideslip, 2)
+                    for key in ("without", *MONITORS)
+                ]
+                lines.append(f"| {paper}, {title} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def tables(results: dict[str, Outcome]) -> dict[Path, dict[str, str]]:
+    """Return all tables as Markdown: page -> name -> text."""
     number = results["parity/B/none"].number
+    most = f"{100 * share_bounds(0, number).high:.0f} %"
+    blind = (
+        f"Sizes that no run of {number} finds, and those that some find, in the lane change of paper B (80 "
+        f"km/h, mu 0.3). None of {number} still allows a share of {most} (95 %, Clopper and Pearson)."
+    )
     note = (
-        f"Lane change of paper B, 80 km/h, mu 0.3, {number} seeds of the noise. Detected: share of runs with "
-        "an alarm after the fault, and its 95 % interval of Clopper and Pearson. After: median (range). "
-        "Blamed: at the end, in how many runs; unclear: `monitor_parity` says that it cannot tell. Of "
-        f"`monitor_redundancy` {SEEDS_BEFORE} seeds, with medians of delay and blame."
+        "Lane change of paper B (80 km/h, mu 0.3) and double lane change of paper C (90 km/h, mu 0.4), "
+        f"{number} seeds of the noise. Detected: share of runs with an alarm after the fault, and its 95 % "
+        "interval of Clopper and Pearson. After: median (range). Blamed: at the end, in how many runs; "
+        "unclear: `monitor_parity` says that it cannot tell."
     )
-    return "\n\n".join(
-        [
-            totals_table(results),
-            cost_table(results),
-            faults_table(results),
-            "\n".join(textwrap.wrap(note, 118)),
-        ]
-    )
+    of_faults = [faults_table(results, paper) for paper in OFF]
+    of_detection = [totals_table(results), *of_faults, wrapped(note)]
+    sideslip = f"Medians (ranges) over {number} seeds of the noise, the same with the monitors and without."
+    return {
+        PAGE: {
+            "blind": f"{blind_table(results)}\n\n{wrapped(blind)}",
+            "detection": "\n\n".join(of_detection),
+        },
+        SIDESLIP_PAGE: {"sideslip": f"{sideslip_table(results)}\n\n{wrapped(sideslip)}"},
+    }
 
 
-def page_with_tables() -> str:
-    """Return docs/monitors.md with its tables written anew."""
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    after = rest.partition(END)[2]
-    return f"{before}{BEGIN}\n\n{tables_text(published())}\n\n{END}{after}"
+def pages_with_tables() -> dict[Path, str]:
+    """Return the pages with their tables written anew."""
+    pages = {}
+    for page, texts in tables(published()).items():
+        pages[page] = page.read_text(encoding="utf-8")
+        for name, text in texts.items():
+            pages[page] = replaced(pages[page], name, text)
+    return pages
 
 
 def draw(results: dict[str, Outcome]) -> None:
@@ -250,7 +275,7 @@ def draw(results: dict[str, Outcome]) -> None:
                 _draw_kind(
                     list(axes[:, column]),
                     kind,
-                    [results.get(f"{key}/B/{name}") for name in kind.names()],
+                    [results[f"{key}/B/{name}"] for name in kind.names()],
                     number,
                 )
             axes[0, column].set_title(kind.title, fontsize=9)
@@ -269,12 +294,11 @@ def draw(results: dict[str, Outcome]) -> None:
         save(figure, FIGURE)
 
 
-def _draw_kind(axes: Sequence[Axes], kind: Kind, of_sizes: Sequence[Outcome | None], number: int) -> None:
+def _draw_kind(axes: Sequence[Axes], kind: Kind, known: Sequence[Outcome], number: int) -> None:
     from orchestrator.figures.style import line_style
 
     style = {**line_style(number), "marker": "os"[number], "markersize": 4}
-    pairs = [(size, o) for size, o in zip(kind.sizes, of_sizes, strict=True) if o is not None]
-    sizes, known = [size for size, _ in pairs], [o for _, o in pairs]
+    sizes = kind.sizes
     shares = ([len(o.delays) for o in known], [o.located(kind.signal) for o in known])
     for place, counts in zip((0, 2), shares, strict=True):
         bounds = [share_bounds(count, o.number) for count, o in zip(counts, known, strict=True)]
@@ -286,21 +310,6 @@ def _draw_kind(axes: Sequence[Axes], kind: Kind, of_sizes: Sequence[Outcome | No
     axes[1].plot(sizes, delays, **style)
 
 
-def take_runs(table: Path) -> None:
-    """Write the published runs from the table of a study: those of monitor_parity."""
-    with table.open(encoding="utf-8", newline="") as lines:
-        rows = [row for row in csv.DictReader(lines) if row["run"].startswith("parity/")]
-    with RUNS.open("w", encoding="utf-8", newline="") as out:
-        writer = csv.DictWriter(out, COLUMNS, extrasaction="ignore", lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-
-
 if __name__ == "__main__":
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--runs", type=Path)
-    chosen = options.parse_args()
-    if chosen.runs:
-        take_runs(chosen.runs)
-    PAGE.write_text(page_with_tables(), encoding="utf-8")
+    write_pages(__doc__, RUNS, COLUMNS, pages_with_tables)
     draw(published())

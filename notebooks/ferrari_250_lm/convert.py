@@ -35,6 +35,8 @@ COLUMNS = {
 """Signal -> its file in the recording, without .txt, and its unit."""
 RATE = 100.0
 """Sample rate of the recording [Hz]; its own times have seven digits, so that steps are uneven."""
+PIECE = 10.0
+"""Duration of the pieces that intervals are of [s]; chosen: longer than a bend."""
 HELD_OUT = (300.0, 400.0)
 """Laps that no car is fitted to [s]."""
 TRACK, WHEEL_RADIUS = 1.35, 0.31
@@ -116,7 +118,7 @@ def _yawbench(*arguments: object) -> None:
 
 
 def score(folder: Path) -> None:
-    """Print rms and worst second of the estimators' sideslip, in degrees."""
+    """Print rms, its interval and worst second of the estimators' sideslip, in degrees."""
     import yawbench as yb
 
     measured = yb.measured(folder / "unfiltered.yaml")
@@ -127,8 +129,20 @@ def score(folder: Path) -> None:
             truth = np.interp(estimate.time, measured.time, measured["sideslip"])
             error = np.degrees(estimate["sideslip"] - truth)
             second = np.convolve(error**2, np.ones(round(RATE)) / RATE, "valid")
-            numbers = f"rms {np.sqrt(np.mean(error**2)):.2f}, worst second {np.sqrt(second.max()):.2f}"
-            print(f"{name}, {words}: {numbers} degrees")
+            low, high = rms_bounds(error)
+            print(
+                f"{name}, {words}: rms {np.sqrt(np.mean(error**2)):.2f} ({low:.2f} to {high:.2f}), "
+                f"worst second {np.sqrt(second.max()):.2f} degrees"
+            )
+
+
+def rms_bounds(error: np.ndarray) -> tuple[float, float]:
+    """Return the 95 % interval of an rms, of a bootstrap that draws pieces longer than bends."""
+    samples = round(PIECE * RATE)
+    squares = (error[: error.size // samples * samples] ** 2).reshape(-1, samples).mean(axis=1)
+    drawn = np.random.default_rng(1).integers(squares.size, size=(2000, squares.size))
+    low, high = np.quantile(np.sqrt(squares[drawn].mean(axis=1)), [0.025, 0.975])
+    return float(low), float(high)
 
 
 if __name__ == "__main__":

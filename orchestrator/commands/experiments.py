@@ -55,6 +55,8 @@ def concluded(experiment: LoadedExperiment, execute: Executor, options: RunOptio
 
     if options.quick and experiment.spec.repeats:
         experiment = experiment.short
+    if experiment.quick:
+        say(experiment.quick)
     if experiment.by_options:
         say(f"changed: {changed(experiment.by_options)}")
     try:

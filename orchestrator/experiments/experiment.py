@@ -205,6 +205,8 @@ class LoadedExperiment:
     """Run and point of every case, where not all runs have the same points; empty: all runs at all points."""
     origin: str = "sweep"
     """Origin of the overrides that the axes make."""
+    all_repeats: int = 0
+    """Number of repeats of the file if this is a quick look at a few of them, else 0."""
 
     @property
     def changed(self) -> tuple[Override, ...]:
@@ -249,7 +251,18 @@ class LoadedExperiment:
             else axis
             for name, axis in self.spec.axes.items()
         }
-        return replace(self, spec=self.spec.model_copy(update={"axes": axes}))
+        shortened = replace(self, spec=self.spec.model_copy(update={"axes": axes}))
+        return replace(shortened, all_repeats=self.repeats if shortened.repeats < self.repeats else 0)
+
+    @property
+    def repeats(self) -> int:
+        """The number of repeats; 1 without axes of repeats."""
+        return math.prod(self.spec.axes[name].length or 1 for name in self.spec.repeats)
+
+    @property
+    def quick(self) -> str:
+        """Say that this is a quick look at a few repeats; "" if it is not."""
+        return f"A quick look: {self.repeats} of {self.all_repeats} repeats." if self.all_repeats else ""
 
     @cached_property
     def first_cases(self) -> list[Case]:

@@ -214,6 +214,7 @@ class LoadedThreats:
     spec: ThreatsSpec
     ranking: LoadedRanking
     seeds: dict[str, tuple[str, str]]  # entry of a further seed -> entry of the ranking, seed
+    quick: bool = False  # only the first setting
 
     @property
     def identity(self) -> str:
@@ -322,4 +323,4 @@ def load_threats(
             seeds[own] = name, seed
             title = f"{entry.title}, seed {seed}"
             seeded[own] = entry.model_copy(update={"title": title}), path.parent
-    return LoadedThreats(path, spec, replace(ranking, entries={**ranking.entries, **seeded}), seeds)
+    return LoadedThreats(path, spec, replace(ranking, entries={**ranking.entries, **seeded}), seeds, quick)

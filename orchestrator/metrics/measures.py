@@ -220,6 +220,14 @@ def rms(t: np.ndarray, x: np.ndarray) -> float:
     return math.sqrt(_mean(t, x**2))
 
 
+@measure("max √(1/1 s ∫{x}² dt) over a second", "root mean square of the worst second", "{x}")
+def worst_second(t: np.ndarray, x: np.ndarray) -> float:
+    total = running_integral(t, x**2)
+    begin = t[t <= t[-1] - 1.0]
+    seconds = np.interp(begin + 1.0, t, total) - total[: begin.size]
+    return math.sqrt(max(0.0, float(seconds.max()))) if begin.size else math.nan
+
+
 @measure(
     "√(1/T ∫(Δ{x} / 0.1 s)² dt), {x} in means over 0.1 s",
     "comfort: root mean square of the slope between means over successive 0.1 s",

@@ -5,7 +5,6 @@ A chapter has the verdicts, system, figures, tables and parameters of an experim
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import datetime, timezone
@@ -132,6 +131,7 @@ def chapter(
         "stale": stale,
         "remarkable": findings.remarkable() if spec.axes else "",
         "repeats": repeats(findings),
+        "quick": experiment.quick,
         "command": command,
         "folder": str(folder),
         "settings": settings(findings),
@@ -156,11 +156,10 @@ def repeats(findings: ExperimentResult) -> str:
     spec = findings.spec
     if not spec.repeats:
         return ""
-    number = math.prod(spec.axes[name].length or 1 for name in spec.repeats)
     names = " and ".join(spec.axes[name].says or name for name in spec.repeats)
     sure = f"the interval that contains the true mean with {100 * LEVEL:.0f} % confidence (Student)"
     return (
-        f"Numbers with ± are means over {number} repeats ({names}), with {sure}. "
+        f"Numbers with ± are means over {findings.experiment.repeats} repeats ({names}), with {sure}. "
         "A verdict whose threshold lies inside reads undecided."
     )
 

@@ -416,6 +416,7 @@ def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command:
         source=threats.spec.source,
         notes=[*threats.spec.notes, *threats.ranking.edited],
         matrix=Path(os.path.relpath(matrix, folder)).as_posix() if matrix.is_file() else "",
+        quick=threats.quick,
         answer=answer(result, table),
         published=_published(result, order),
         main=main_table(result, table),

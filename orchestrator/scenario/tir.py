@@ -108,6 +108,8 @@ ALIASES = {
     **{"IP_NOM": "NOMPRES", "IP": "INFLPRES"},
 }
 """Alternative spelling -> key."""
+OF_SIX = {"LKYC": "LGAY", "LKZC": "LGAZ"}
+"""Scaling of camber in sets of MF-Tyre 6 -> that of 5.2 in its place."""
 NEEDED = ("FNOMIN", "PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
 """Required keys: if they are missing or zero, there is no force."""
 
@@ -329,6 +331,11 @@ class _Reading:
         absent = [key for key in relaxation if self._at(key) == 0.0]
         if absent:
             self._say(None, f"no relaxation lengths: {listed(absent)} missing or zero", "warning")
+        for key, instead in OF_SIX.items() if kind < 60 else ():
+            if self._at(key, 1.0) != 1.0:
+                self._warn(
+                    self.entries[key], f"does nothing in sets of {KINDS[kind]}, where {instead} scales camber"
+                )
         if self._at("LMUV") != 0.0:
             self._warn(self.entries["LMUV"], "friction that decays with speed is left out")
         if "UNLOADED_RADIUS" not in self.values:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from lxml import html
 
 from components.sensing.noise import key, normal
 from orchestrator.errors import ScenarioError
@@ -17,6 +18,7 @@ from orchestrator.experiments.planning import plan_experiment
 from orchestrator.experiments.verdict_tables import limit_tables, run_tables, verdict
 from orchestrator.figures.style import shown
 from orchestrator.metrics.run_metrics import MetricValue
+from orchestrator.pages.report import chapter, report_page
 from tests.sentences import golden, texts_of
 
 SCENARIO = """
@@ -157,6 +159,15 @@ def test_a_grid_can_be_drawn_with_a_line_per_column(findings):
 
 def test_in_haste_there_are_fewer_repeats(load):
     assert [len(one.points) for one in (load(), load().short)] == [4, 3]
+    assert (load().quick, load().short.quick) == ("", "A quick look: 3 of 4 repeats.")
+
+
+def test_a_quick_page_says_so_before_anything_else(load, findings, tmp_path):
+    quick = replace(findings, experiment=findings.experiment.short)
+    facts = chapter(quick, command="yawbench study", stale={}, folder=tmp_path, shown_in=tmp_path)
+    tree = html.fromstring(report_page([facts], ""))
+    section = tree.xpath("//section[@class='chapter']")[0]
+    assert section.xpath("string(.//p[1])") == "A quick look: 3 of 4 repeats."
 
 
 @pytest.mark.parametrize(

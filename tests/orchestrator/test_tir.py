@@ -110,6 +110,15 @@ def test_dialects_mean_what_they_say(tmp_path):
     assert (files["Fortran"].values["pex2"], files["Fortran"].values["pex3"]) == (0.015, 0.5)
 
 
+@pytest.mark.parametrize("key, instead", [("LKYG", "LGAY"), ("LKYC", "LGAY"), ("LKZC", "LGAZ")])
+def test_scalings_of_camber_that_a_set_of_5_2_does_not_have_are_named_as_ignored(key, instead, tmp_path):
+    old = read(tmp_path, {"FITTYP": "6", key: "0.5"})
+    sentence = f"{key} does nothing in sets of MF-Tyre 5.2, where {instead} scales camber"
+    assert sum(sentence.removeprefix(f"{key} ") in text and key in text for text in warnings(old)) == 1
+    assert not any("scales camber" in text for text in warnings(read(tmp_path, {"FITTYP": "62", key: "0.5"})))
+    assert not any("scales camber" in text for text in warnings(read(tmp_path, {"FITTYP": "6", key: "1"})))
+
+
 def test_other_spellings_are_the_same_coefficients(tmp_path):
     given = {"LKYG": "0.9", "QPMX1": "0.1", "QPZ1": "0.2", "IP_NOM": "210000"}
     found = read(tmp_path, given, without=["NOMPRES"]).values

@@ -57,25 +57,5 @@ def step_by_step(study: dict[str, Any]) -> list[str]:
     ]
 
 
-def faulty(study: dict[str, Any]) -> list[str]:
-    """Return a row per car and fault: share found, delay, blame, sideslip with and without monitor."""
-    runs = study["runs"]
-    rows = []
-    for car, off in (("B", "lane_change_80kmh"), ("C", "double_lane_change")):
-        rows.append(f"| {car}, no control | - | - | - | - | {_of(runs[f'off/{off}'], 'sideslip', 'rad')} |")
-        for name in (name for name in runs if name.startswith(f"with/{car}/")):
-            held, bare = runs[name], runs[name.replace("with/", "without/", 1)]
-            says = held["label"].rpartition("with the monitor, ")[2]
-            found = f"{_of(held, 'found', '%')} | {_of(held, 'after', 's')} | {_of(held, 'blamed', '')}"
-            slides = f"{_of(held, 'sideslip', 'rad')} | {_of(bare, 'sideslip', 'rad')}"
-            rows.append(f"| {car}, {says} | {found} | {slides} |")
-    return rows
-
-
-def _of(run: dict[str, Any], metric: str, unit: str) -> str:
-    found = run["metrics"].get(metric)
-    return "-" if found is None else _shown(found, unit)
-
-
 def _shown(found: dict[str, Any], unit: str) -> str:
     return shown(found["value"], unit, half=found.get("half", 0.0), between=found.get("between"))

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import csv
+import random
+from pathlib import Path
+
 import pytest
+import yaml
 from scipy.stats import chi2
 
 import yawbench as yb
 from docs.generate import monitor_tables
 from docs.generate.monitor_tables import GYRO, WHEEL, Outcome
+from orchestrator.experiments.experiment import load_experiment
 from tests.commands import status_of
+
+STUDY = monitor_tables.RUNS.parent / "faults.yaml"
 
 
 @pytest.fixture(scope="module")
@@ -17,19 +25,34 @@ def published() -> dict[str, Outcome]:
 
 
 def test_the_tables_of_the_docs_follow_from_the_published_runs():
-    assert monitor_tables.page_with_tables() == monitor_tables.PAGE.read_text(encoding="utf-8")
+    for page, text in monitor_tables.pages_with_tables().items():
+        assert text == page.read_text(encoding="utf-8")
 
 
-def test_monitor_parity_has_every_fault_with_the_same_number_of_seeds(published):
-    names = [name for _, name, _ in monitor_tables.rows_of_faults()]
-    assert {published[f"parity/B/{name}"].number for name in names} == {5}
+def test_every_run_of_the_study_is_published_with_ten_seeds(published):
+    study = load_experiment(STUDY)
+    assert set(published) == set(study.runs)
+    assert {outcome.number for outcome in published.values()} == {10}
+
+
+def test_the_page_names_every_fault_that_no_run_finds_before_anything_else(published):
+    page = monitor_tables.PAGE.read_text(encoding="utf-8")
+    first = next(line for line in page.splitlines() if line.startswith("|"))
+    assert first.startswith("| fault | never found, monitor_redundancy")
+    blind = page.partition("<!-- end of blind -->")[0]
+    (row,) = (line for line in blind.splitlines() if line.startswith("| gyro: bias"))
+    cells = [cell.strip() for cell in row.strip("|").split("|")]
+    sizes = [("0.5", "gyro_bias_0_5"), ("1", "gyro_bias_1"), ("2", "gyro_bias_2"), ("3", "gyro_bias_3")]
+    for cell, key in ((cells[1], "with"), (cells[3], "parity")):
+        never = [size for size, name in sizes if not published[f"{key}/B/{name}"].delays]
+        assert cell.split(", ") == never
 
 
 @pytest.mark.parametrize("fault", ["gyro_bias_2", "gyro_bias_3", "gyro_drift_1", "a_y_bias_1"])
 def test_parity_locates_small_faults_that_redundancy_never_finds(fault, published):
     signal = {name: signal for _, name, signal in monitor_tables.rows_of_faults()}[fault]
     assert published[f"with/B/{fault}"].delays == []
-    assert published[f"parity/B/{fault}"].located(signal) == 5
+    assert published[f"parity/B/{fault}"].located(signal) == 10
 
 
 def test_a_bias_of_5_deg_s_is_no_longer_blamed_on_the_accelerometer(published):
@@ -64,6 +87,29 @@ def test_outcomes_count_alarms_and_whom_they_blame():
     assert (outcome.number, outcome.delays, outcome.blamed) == (2, [0.5], [WHEEL])
     assert (outcome.located(WHEEL), outcome.located(GYRO)) == (1, 0)
     assert outcome.sideslip == pytest.approx([5.7296, 11.4592], abs=1e-4)
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("fault", random.Random(27).sample(monitor_tables.rows_of_faults(), 2))
+def test_published_runs_are_what_runs_come_to(fault, tmp_path: Path):
+    """Drive a fault of the study anew, with two seeds and all monitors."""
+    study = yaml.safe_load(STUDY.read_text(encoding="utf-8"))
+    runs = [entry for entry in study["runs"] if entry["name"].endswith("/B/{fault}")]
+    for entry in runs:
+        entry["for"] = {"fault": {fault[1]: entry["for"]["fault"][fault[1]]}}
+        entry["scenario"] = str(STUDY.parent / entry["scenario"])
+    axis = {**study["axes"]["seed"], "values": [2, 7]}
+    few = {"title": "few", "runs": runs, "axes": {"seed": axis}, "metrics": study["metrics"]}
+    (tmp_path / "few.yaml").write_text(yaml.safe_dump(few, sort_keys=False), encoding="utf-8")
+    assert status_of("study", tmp_path / "few.yaml", "--out", tmp_path / "out") == 0
+    made, known = (
+        {(row["run"], float(row["seed"])): [row[key] for key in monitor_tables.COLUMNS[2:]] for row in rows}
+        for rows in (
+            csv.DictReader(file.open()) for file in (tmp_path / "out" / "table.csv", monitor_tables.RUNS)
+        )
+    )
+    assert len(made) == 6
+    assert {place: known[place] for place in made} == made
 
 
 @pytest.mark.exhaustive

@@ -1,0 +1,105 @@
+"""The table of blind tests in docs/estimators.md: `python -m docs.generate.blind_tables`.
+
+It comes from scenarios/real_signals/blind_runs.csv, every run of
+`yawbench sweep real_signals/blind_estimators`, which `--runs TABLE` takes from the sweep's table.csv.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from orchestrator.experiments.confidence import Bounds, bootstrap, percentile_bounds
+
+from .published import replaced, wrapped, write_pages
+
+ROOT = Path(__file__).resolve().parents[2]
+RUNS = ROOT / "scenarios" / "real_signals" / "blind_runs.csv"
+PAGE = ROOT / "docs" / "estimators.md"
+ESTIMATORS = ("observer", "kinematic")
+RIGHT = "nothing"
+"""The level of the sweep without an error."""
+COLUMNS = (
+    "run", "error", "seed", "observer [rad]", "observer_worst [rad]", "kinematic [rad]",
+    "kinematic_worst [rad]", "sideslip [rad]",
+)  # fmt: skip
+
+Errors = dict[str, np.ndarray]
+"""What the estimators are not told -> array of manoeuvre and seed [deg]."""
+
+
+def published() -> dict[str, Errors]:
+    """Return the numbers of all published runs by their metric."""
+    with RUNS.open(encoding="utf-8", newline="") as lines:
+        rows = list(csv.DictReader(lines))
+    runs, seeds = ([*dict.fromkeys(row[key] for row in rows)] for key in ("run", "seed"))
+    metrics: dict[str, Errors] = {}
+    for row in rows:
+        for name in COLUMNS[3:]:
+            of_errors = metrics.setdefault(name.partition(" ")[0], {})
+            table = of_errors.setdefault(row["error"], np.full((len(runs), len(seeds)), np.nan))
+            table[runs.index(row["run"]), seeds.index(row["seed"])] = math.degrees(float(row[name]))
+    return metrics
+
+
+def mean_bounds(errors: np.ndarray) -> Bounds:
+    """Return the bounds of the mean over manoeuvres and seeds, both drawn in blocks."""
+    samples = bootstrap(lambda manoeuvres, seeds: errors[manoeuvres][:, seeds].mean(), errors.shape)
+    return Bounds(*map(float, percentile_bounds(samples)))
+
+
+def added(errors: Errors) -> Errors:
+    """Return by how much every error is worse than none, run by run."""
+    return {name: table - errors[RIGHT] for name, table in errors.items() if name != RIGHT}
+
+
+def table_text(metrics: Mapping[str, Errors]) -> str:
+    """Return the table as Markdown: an error per row, with mean, interval and worst second."""
+    heads = [
+        f"{name}, {what}" for name in ESTIMATORS for what in ("rms", "more than if told", "worst second")
+    ]
+    lines = [f"| not told | {' | '.join(heads)} |", f"|---|{'---:|' * len(heads)}"]
+    for error in metrics["observer"]:
+        cells = []
+        for name in ESTIMATORS:
+            more = "-" if error == RIGHT else _with_bounds(added(metrics[name])[error], "+")
+            worst = metrics[f"{name}_worst"][error].max()
+            cells += [_with_bounds(metrics[name][error]), more, f"{worst:.2f}°"]
+        lines.append(f"| {error} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _with_bounds(errors: np.ndarray, sign: str = "") -> str:
+    low, high = mean_bounds(errors)
+    return f"{errors.mean():{sign}.2f}° ({low:{sign}.2f} to {high:{sign}.2f})"
+
+
+def worst_sentence(metrics: Mapping[str, Errors]) -> str:
+    """Return which error does most harm to each estimator."""
+    parts = []
+    for name in ESTIMATORS:
+        more = {error: table.mean() for error, table in added(metrics[name]).items()}
+        worst = max(more, key=lambda error: more[error])
+        parts.append(f"{name}: {worst} ({more[worst]:+.2f}° rms)")
+    return f"What harms most: {'; '.join(parts)}."
+
+
+def pages_with_tables() -> dict[Path, str]:
+    """Return the page with its table written anew."""
+    metrics = published()
+    manoeuvres, seeds = metrics["observer"][RIGHT].shape
+    note = (
+        f"Errors of the sideslip angle over whole runs: means over {manoeuvres} manoeuvres and {seeds} seeds "
+        "of the noise, with 95 % intervals of a bootstrap that draws manoeuvres and seeds, in blocks; with "
+        "so few manoeuvres they say little about others. Worst second: the largest rms over a second."
+    )
+    text = "\n\n".join([worst_sentence(metrics), table_text(metrics), wrapped(note)])
+    return {PAGE: replaced(PAGE.read_text(encoding="utf-8"), "blind tests", text)}
+
+
+if __name__ == "__main__":
+    write_pages(__doc__, RUNS, COLUMNS, pages_with_tables)

@@ -1,0 +1,48 @@
+"""Tables in pages that come from published runs, which are taken from the table of an experiment."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import textwrap
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+
+def replaced(page: str, name: str, text: str) -> str:
+    """Return a page with the text between the marks of that name replaced."""
+    begin, end = f"<!-- {name}: written by docs.generate -->", f"<!-- end of {name} -->"
+    before, found, rest = page.partition(begin)
+    if not found or end not in rest:
+        raise ValueError(f"the page has no marks {begin} and {end}")
+    return f"{before}{begin}\n\n{text}\n\n{end}{rest.partition(end)[2]}"
+
+
+def wrapped(text: str) -> str:
+    """Return a paragraph in lines."""
+    return "\n".join(textwrap.wrap(text, 118, break_on_hyphens=False))
+
+
+def write_pages(
+    about: str | None, runs: Path, columns: Sequence[str], pages: Callable[[], dict[Path, str]]
+) -> None:
+    """Write pages anew; with `--runs TABLE`, first the published runs from the table of an experiment.
+
+    Args:
+        about: what the command does.
+        runs: file of the published runs.
+        columns: columns of the table that are published.
+        pages: returns the pages.
+    """
+    options = argparse.ArgumentParser(description=about)
+    options.add_argument("--runs", type=Path, metavar="TABLE")
+    table = options.parse_args().runs
+    if table:
+        with table.open(encoding="utf-8", newline="") as lines:
+            rows = list(csv.DictReader(lines))
+        with runs.open("w", encoding="utf-8", newline="") as out:
+            writer = csv.DictWriter(out, columns, extrasaction="ignore", lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(rows)
+    for page, text in pages().items():
+        page.write_text(text, encoding="utf-8")
