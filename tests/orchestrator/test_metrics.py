@@ -98,6 +98,14 @@ def test_rms_of_a_sine_is_its_amplitude_over_root_two():
     assert measures.rms(T, 3 * SINE) == pytest.approx(3 / math.sqrt(2), rel=1e-9)
 
 
+def test_the_worst_second_is_the_largest_rms_over_a_second():
+    t = np.linspace(0.0, 4.0, 401)
+    pulse = np.where((t >= 2.0) & (t <= 2.5), 3.0, 0.0)
+    assert measures.worst_second(t, pulse) == pytest.approx(3.0 * math.sqrt(0.5), rel=0.02)
+    assert measures.worst_second(t, 2.0 + 0.0 * t) == pytest.approx(2.0)
+    assert math.isnan(measures.worst_second(t[:50], pulse[:50]))
+
+
 def test_phase_area_of_a_sine_is_that_of_its_ellipse_once_per_period():
     rate = 2 * math.pi * np.cos(2 * np.pi * T)
     assert measures.phase_area(T, 0.3 * SINE, 0.3 * rate) == pytest.approx(

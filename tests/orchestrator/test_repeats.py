@@ -91,10 +91,16 @@ def load(tmp_path_factory):
 @pytest.fixture(scope="module")
 def findings(load, fmus, tmp_path_factory):
     """What the study comes to."""
-    loaded = load()
-    planned = plan_experiment(loaded, tmp_path_factory.mktemp("runs"), fmus=fmus, keep=False)
+    findings = findings_of(load(), fmus, tmp_path_factory.mktemp("runs"))
+    assert (
+        len({job.key for job in findings.planned.jobs}) == 2 + 2 * 4
+    )  # what the axis does not change is made once
+    return findings
+
+
+def findings_of(loaded, fmus, folder):
+    planned = plan_experiment(loaded, folder, fmus=fmus, keep=False)
     records = {job.key: run_job(job) for job in {job.key: job for job in planned.jobs}.values()}
-    assert len(records) == 2 + 2 * 4  # what the axis does not change is made once
     return judge_records(planned, records)
 
 
@@ -162,8 +168,8 @@ def test_in_haste_there_are_fewer_repeats(load):
     assert (load().quick, load().short.quick) == ("", "A quick look: 3 of 4 repeats.")
 
 
-def test_a_quick_page_says_so_before_anything_else(load, findings, tmp_path):
-    quick = replace(findings, experiment=findings.experiment.short)
+def test_a_quick_page_says_so_before_anything_else(load, fmus, tmp_path):
+    quick = findings_of(load().short, fmus, tmp_path)
     facts = chapter(quick, command="yawbench study", stale={}, folder=tmp_path, shown_in=tmp_path)
     tree = html.fromstring(report_page([facts], ""))
     section = tree.xpath("//section[@class='chapter']")[0]
