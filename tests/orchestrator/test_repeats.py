@@ -8,6 +8,7 @@ import pytest
 from lxml import html
 
 from components.sensing.noise import key, normal
+from orchestrator.commands.experiments import chapter_of
 from orchestrator.errors import ScenarioError
 from orchestrator.experiments.confidence import interval, share_bounds
 from orchestrator.experiments.experiment import load_experiment
@@ -18,7 +19,7 @@ from orchestrator.experiments.planning import plan_experiment
 from orchestrator.experiments.verdict_tables import limit_tables, run_tables, verdict
 from orchestrator.figures.style import shown
 from orchestrator.metrics.run_metrics import MetricValue
-from orchestrator.pages.report import chapter, report_page
+from orchestrator.pages.report import report_page
 from tests.sentences import golden, texts_of
 
 SCENARIO = """
@@ -170,7 +171,7 @@ def test_in_haste_there_are_fewer_repeats(load):
 
 def test_a_quick_page_says_so_before_anything_else(load, fmus, tmp_path):
     quick = findings_of(load().short, fmus, tmp_path)
-    facts = chapter(quick, command="yawbench study", stale={}, folder=tmp_path, shown_in=tmp_path)
+    facts = chapter_of(quick, tmp_path, "yawbench study", shown_in=tmp_path)
     tree = html.fromstring(report_page([facts], ""))
     section = tree.xpath("//section[@class='chapter']")[0]
     assert section.xpath("string(.//p[1])") == "A quick look: 3 of 4 repeats."
