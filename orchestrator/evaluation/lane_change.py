@@ -22,7 +22,7 @@ import numpy as np
 from vocabulary.lane_change import Lane, lanes_of
 
 from ..figures.style import CHANGED, QUIET, frame, line_style, new_figure
-from ..metrics.verdict import Status, compare, not_judged
+from ..metrics.verdict import Status, apart, compare, not_judged
 from .sine_with_dwell_figures import MARKS
 from .standard_tests import Evaluation, SeriesDriver, SeriesRun, TestSeries, evaluation
 from .trace import Trace, at, first_crossing
@@ -60,7 +60,8 @@ def evaluate_lane_change(judged: Evaluation, trace: Trace) -> None:
     judged.add("overrun", "largest distance beyond the cones", float(over[worst]), "m")
     if over[worst] > TOUCH:
         place = x[worst] - (start if isinstance(start, (int, float)) else 0.0)
-        why = f"{over[worst]:.3f} m beyond the cones, {place:.1f} m after the first cones"
+        far = apart(float(over[worst]), 0.0, decimals=3)
+        why = f"{far} m beyond the cones, {place:.1f} m after the first cones"
         judged.rule(CLEAN, compare(float(over[worst]), "at_most", 0.0, "m", why=why))
     elif instant is None:
         judged.rule(CLEAN, not_judged("the car has not reached the first cones"))

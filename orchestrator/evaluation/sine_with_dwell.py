@@ -38,7 +38,7 @@ import numpy as np
 
 from ..figures.style import shown
 from ..metrics.measures import running_integral
-from ..metrics.verdict import Status, Verdict, compare, not_judged, worst
+from ..metrics.verdict import Status, Verdict, apart, compare, not_judged, worst
 from .standard_tests import (
     Evaluation,
     Limit,
@@ -282,7 +282,8 @@ def _stability(judged: Evaluation, course: DwellCourse) -> None:
         name = f"yaw-rate ratio at COS + {late:.3f} s"
         judged.add(f"ratio_{round(1000 * late)}", name, ratio, "%", "signed, over the second peak")
         if ratio is not None:
-            why = f"{percent(ratio)} of at most {100 * most:g} % at COS + {late:g} s"
+            reached = apart(100 * ratio, 100 * most, decimals=1)
+            why = f"{reached} % of at most {100 * most:g} % at COS + {late:g} s"
             ratios.append(compare(ratio, "at_most", most, "%", why=why))
     if short:
         why = f"the record ends {t[-1] - course.end:.2f} s after completion of steer; "
@@ -314,7 +315,7 @@ def _responsiveness(
         judged.rule(criterion, not_judged(why))
     else:
         least = FAR_HEAVY if trace.mass is not None and trace.mass > HEAVY else FAR
-        why = f"{displacement:.2f} m of at least {least:g} m"
+        why = f"{apart(displacement, least, decimals=2)} m of at least {least:g} m"
         judged.rule(criterion, compare(displacement, "at_least", least, "m", why=why))
         if trace.mass is None:
             judged.report("mass-unknown", f"mass unknown: assumed to be at most {HEAVY:g} kg", "info")
@@ -328,7 +329,8 @@ def _add_beyond(judged: Evaluation, course: DwellCourse, trace: Trace) -> None:
         judged.add("sideslip", "peak sideslip", peak, "rad", "from BOS to the end of the record")
         if peak > SPUN:
             stable = judged.criteria["stability"].status.value
-            why = f"sideslip reaches {math.degrees(peak):.0f} degrees (stability: {stable})"
+            reached = apart(math.degrees(peak), math.degrees(SPUN), decimals=0)
+            why = f"sideslip reaches {reached} degrees (stability: {stable})"
             judged.report("sideslip-large", why)
     else:
         judged.report("sideslip-unknown", "sideslip was not recorded: a spin may pass the ratios undetected")
@@ -337,7 +339,8 @@ def _add_beyond(judged: Evaluation, course: DwellCourse, trace: Trace) -> None:
         judged.add("speed", "speed at BOS", speed, "m/s")
         judged.add("speed_end", "speed at COS", at(trace.time, trace["velocity_x"], course.end), "m/s")
         if abs(speed - SPEED) > SLACK:
-            why = f"{3.6 * speed:.1f} km/h at BOS; 80 +- 2 km/h are required"
+            ends = (3.6 * (SPEED - SLACK), 3.6 * (SPEED + SLACK))
+            why = f"{apart(3.6 * speed, *ends, decimals=1)} km/h at BOS; 80 +- 2 km/h are required"
             for criterion in judged.criteria:
                 judged.rule(criterion, not_judged(why))
 

@@ -38,7 +38,7 @@ from ..files import reads
 from ..measured.measurement import Measurement
 from ..messages import counted, hint
 from ..metrics.measures import words
-from ..metrics.verdict import Verdict, compare, not_judged, worst
+from ..metrics.verdict import Verdict, apart, compare, not_judged, worst
 from ..results.reader import Results
 from ..scenario import find_and_load, yaml_lines
 from ..scenario.quantities import convert
@@ -298,7 +298,9 @@ def _verdict(over: str, tests: Sequence[ComparedTest]) -> Verdict:
     k = int(furthest.distance.argmax())
     distance = float(furthest.distance[k])
     where = f"at {furthest.over[k]:.3g} {SIGNALS[over].unit} of {over}, {furthest.name}"
-    return compare(distance, "at_most", 1.0, why=f"{distance:.2f} of the tolerance {where}")
+    return compare(
+        distance, "at_most", 1.0, why=f"{apart(distance, 1.0, decimals=2)} of the tolerance {where}"
+    )
 
 
 def _conditions(bands: Bands, over: np.ndarray, tests: Sequence[np.ndarray]) -> Iterator[str]:

@@ -24,6 +24,8 @@ _COMPARE: dict[str, Callable[[float, float], bool]] = {
     "at_most": operator.le,
 }
 _UPWARDS = ("above", "at_least")
+ROUNDING, MOST_DECIMALS = 1e-9, 12
+"""Relative difference up to which numbers count as equal, and decimals at most."""
 
 
 class Status(str, Enum):
@@ -109,6 +111,18 @@ def compare(
     status = Status.PASSED if _COMPARE[relation](value, bound) else Status.FAILED
     margin = _relative(_beyond(value, bound, relation in _UPWARDS), abs(bound) or abs(value))
     return Verdict(status, value, bound, relation, unit, margin, half, why)
+
+
+def apart(value: float, *bounds: float, decimals: int) -> str:
+    """Return a number with some decimals, or as many more as make it read differently from its bounds.
+
+    >>> apart(34.8, 35.0, decimals=1), apart(35.02, 35.0, decimals=1), apart(35.0, 35.0, decimals=1)
+    ('34.8', '35.02', '35.0')
+    """
+    near = [bound for bound in bounds if not math.isclose(value, bound, rel_tol=ROUNDING)]
+    while decimals < MOST_DECIMALS and any(round(value, decimals) == round(b, decimals) for b in near):
+        decimals += 1
+    return f"{round(value, decimals) + 0.0:.{decimals}f}"  # never "-0.0"
 
 
 def not_judged(why: str) -> Verdict:

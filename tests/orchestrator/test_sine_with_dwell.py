@@ -16,7 +16,7 @@ from orchestrator.evaluation.standard_tests import TESTS, Evaluation, NotJudged
 from orchestrator.evaluation.steering_tests import G, characteristic_angle, evaluate_slow_steer
 from orchestrator.evaluation.trace import Trace, trace_of
 from orchestrator.figures.style import save
-from orchestrator.metrics.verdict import Status, Verdict, not_judged
+from orchestrator.metrics.verdict import Status, Verdict, apart, not_judged
 from orchestrator.results.measured import load_run
 from tests.commands import status_of
 from tests.sentences import golden, golden_in
@@ -114,6 +114,32 @@ def test_the_limit_of_35_per_cent_decides(width, verdict):
     judged = evaluate_dwell(trace(yaw_rate=yaw_rate), A)
     assert judged.criteria["stability"].status.value == verdict
     assert (judged["ratio_1000"] > 0.35) == (verdict == "failed")
+
+
+def test_a_ratio_that_misses_its_limit_by_little_reads_differently_from_it():
+    low, high = 1.015, 1.025
+    for _ in range(30):
+        width = 0.5 * (low + high)
+        judged = evaluate_dwell(trace(yaw_rate=lambda t, width=width: fall(t, width)), A)
+        ratio = judged["ratio_1000"]
+        if 0.35006 < ratio < 0.35014:
+            break
+        low, high = (width, high) if ratio < 0.3501 else (low, width)
+    stability = judged.criteria["stability"]
+    assert stability.holds is False
+    assert stability.why.startswith("35.01 % of at most 35 % at COS + 1 s")
+
+
+@pytest.mark.parametrize(
+    "value, bounds, decimals, text",
+    [
+        (34.8, [35.0], 1, "34.8"), (35.04, [35.0], 1, "35.04"), (34.9996, [35.0], 1, "34.9996"),
+        (35.0, [35.0], 1, "35.0"), (-0.01, [35.0], 1, "0.0"), (0.0003, [0.0], 3, "0.0003"),
+        (82.04, [78.0, 82.0], 1, "82.04"), (math.inf, [35.0], 1, "inf"),
+    ],
+)  # fmt: skip
+def test_numbers_have_as_many_digits_as_make_them_differ_from_their_bounds(value, bounds, decimals, text):
+    assert apart(value, *bounds, decimals=decimals) == text
 
 
 def test_the_limit_of_20_per_cent_decides_at_1_75_seconds():

@@ -14,6 +14,7 @@ import yawbench as yb
 from docs.generate import monitor_tables
 from docs.generate.monitor_tables import GYRO, WHEEL, Outcome
 from orchestrator.experiments.experiment import load_experiment
+from orchestrator.scenario import yaml_lines
 from tests.commands import status_of
 
 STUDY = monitor_tables.RUNS.parent / "faults.yaml"
@@ -93,7 +94,7 @@ def test_outcomes_count_alarms_and_whom_they_blame():
 @pytest.mark.parametrize("fault", random.Random(27).sample(monitor_tables.rows_of_faults(), 2))
 def test_published_runs_are_what_runs_come_to(fault, tmp_path: Path):
     """Drive a fault of the study anew, with two seeds and all monitors."""
-    study = yaml.safe_load(STUDY.read_text(encoding="utf-8"))
+    study = yaml_lines.read(STUDY, what="study").data
     runs = [entry for entry in study["runs"] if entry["name"].endswith("/B/{fault}")]
     for entry in runs:
         entry["for"] = {"fault": {fault[1]: entry["for"]["fault"][fault[1]]}}
