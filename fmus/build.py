@@ -21,7 +21,7 @@ from typing import Any
 
 from orchestrator.errors import BuildError, Diagnostic
 from orchestrator.files import draft_of, remove_draft
-from orchestrator.fmu.binary import NATIVE, REASON, runs_as
+from orchestrator.fmu.binary import REASON, runs_as
 from orchestrator.workers import Pool
 from vocabulary.roles import ROLES
 
@@ -117,8 +117,8 @@ def build_all(
     report.built.sort(key=chosen.index)
     for name in report.built:
         how = runs_as(out / f"{name}.fmu")
-        if how is not None and how != NATIVE:
-            report.in_python[name] = how.removeprefix("Python: ")
+        if how is not None and not how.native:
+            report.in_python[name] = how.why
     if any(isinstance(known[name], PythonRecipe) for name in report.built):
         report.warning = compile_launcher()[1]
     if components is None and out.is_dir():

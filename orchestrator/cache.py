@@ -169,7 +169,7 @@ def recall(store: str, key: str) -> bytes | None:
 
 
 def keep(store: str, key: str, content: bytes) -> None:
-    """Store `content` under `key`, replacing what was there, in the first folder that can be written.
+    """Store `content` under `key`, replacing an earlier value, in the first folder that can be written.
 
     If none can, nothing is stored: the content will be computed again.
     """
@@ -207,7 +207,7 @@ OF_RESULTS = (
     *("names.py", "plan.py", "coupling.py", "fault_kinds.py"),
     *("scenario", "fmu", "wiring", "master", "results", "tyre_stand.py"),
 )
-"""Modules and packages that determine what a run records; FMUs are hashed separately."""
+"""Modules and packages on which the results of a run depend; FMUs are hashed separately."""
 OF_METRICS = (*OF_RESULTS, "metrics")
 """Those that determine the metrics of a run."""
 OF_TESTS = (*OF_METRICS, "evaluation")
@@ -250,7 +250,7 @@ def with_checksums(content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def changed_since(content: Mapping[str, Any]) -> str:
-    """Describe what was changed in a record since it was written, "" if nothing was.
+    """Describe changes in a record since it was written, "" if there are none.
 
     A record without checksums counts as unchanged; see `has_checksums`.
     """

@@ -196,7 +196,7 @@ def _status(arguments: Sequence[str]) -> int:
 
 
 def _status_of_printing(printed: output.Output, status: int) -> int:
-    """Print what a command has collected for standard output; return the exit status."""
+    """Print a command's output; return the exit status."""
     try:
         printed.print(status)
     except BrokenPipeError:

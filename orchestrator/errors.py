@@ -26,6 +26,7 @@ from typing import Any, Literal
 from .messages import printable
 
 Severity = Literal["error", "warning", "info"]
+"""Severity of a diagnostic."""
 
 
 @dataclass(frozen=True)
@@ -170,7 +171,7 @@ class YawbenchError(Exception):
 
     @property
     def code(self) -> str:
-        """What the first error is about; docs/diagnostics.md lists all codes."""
+        """Code of the first error; docs/diagnostics.md lists all codes."""
         return self.diagnostics[0].code
 
 

@@ -1,4 +1,4 @@
-"""Faults: the kinds that there are, with what each does to a signal, and faults as data.
+"""Faults: their kinds, with the effect of each on a signal, and faults as data.
 
 `KINDS` is all that the program knows of them: files and options are checked against it, help texts and
 documents list it, and the master takes the disturbances from it.
@@ -58,7 +58,7 @@ class Fault:
 
     @property
     def item(self) -> dict[str, float | str]:
-        """The fault as in a file, without its location and what it leaves open."""
+        """The fault as in a file, without its location and default values."""
         times = {"from": self.begin, "until": self.end}
         options = {"kind": self.kind, "value": self.value, "share": self.share, "every": self.every}
         options |= {"seed": self.seed} | {name: t if math.isfinite(t) else None for name, t in times.items()}

@@ -142,7 +142,7 @@ def reading(what: str, path: Path | str, error: type[YawbenchError]) -> Iterator
     """Convert unexpected exceptions while a user's file is read into one message, with the cause chained.
 
     Args:
-        what: what is being read, for the message: "scenario file".
+        what: kind of the file, for the message: "scenario file".
         path: the file, or another description of the location.
         error: type of the exception to raise.
     """
@@ -361,8 +361,8 @@ def refuse_links_within(folder: Path) -> None:
     """
     absolute = Path(os.path.abspath(folder))
     below: list[Path] = []
-    for place in reversed((absolute, *absolute.parents)):
-        if below or lock_note(place) is not None:
-            below.append(place)
-    for place in below[1:]:
-        refuse_link(place)
+    for parent in reversed((absolute, *absolute.parents)):
+        if below or lock_note(parent) is not None:
+            below.append(parent)
+    for parent in below[1:]:
+        refuse_link(parent)

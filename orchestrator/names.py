@@ -86,6 +86,7 @@ TargetKind = Literal[
     "run", "fact", "vehicle_file", "vehicle_parameter", "tyres", "input", "faults", "fmu", "setting",
     "parameter",
 ]  # fmt: skip
+"""Kind of the value that an override addresses."""
 _PREFIXES: dict[str, TargetKind] = {
     VEHICLE: "vehicle_parameter", INPUTS: "input", TYRES: "tyres", FAULTS: "faults",
 }  # fmt: skip
@@ -93,7 +94,7 @@ _PREFIXES: dict[str, TargetKind] = {
 
 @dataclass(frozen=True)
 class Target:
-    """What an override addresses.
+    """The target of an override.
 
     | text | kind | instance | variable |
     |---|---|---|---|

@@ -22,6 +22,7 @@ from .messages import cut
 from .names import SignalName, Target
 
 Value = float | int | bool | str
+"""Value of a variable, a parameter or an override."""
 SENSING = {"sensor": "measurement", "estimator": "estimate"}
 """Role of an instance -> kind of values that its outputs are, as opposed to the truth."""
 
@@ -70,7 +71,7 @@ class Variable:
     alias_of: str | None = None  # of an input: the input of which this is another name (FMI 3.0)
 
     @property
-    def place(self) -> ValueRef:
+    def ref(self) -> ValueRef:
         """Its reference in the FMU. The functions of FMI 2.0 treat an enumeration as an Integer."""
         kind = self.encoding or {"Enumeration": "Integer"}.get(self.type, self.type)
         return ValueRef(kind, self.reference, self.element, self.elements)
@@ -96,6 +97,21 @@ class BuildInfo:
 
 
 @dataclass(frozen=True)
+class RunsAs:
+    """Whether a component in Python runs as native code, and why if it does not."""
+
+    why: str = ""  # it runs in Python; "" if native
+
+    @property
+    def native(self) -> bool:
+        """Whether it was translated to native code, which runs here."""
+        return not self.why
+
+    def __str__(self) -> str:
+        return f"Python: {self.why}" if self.why else "native"
+
+
+@dataclass(frozen=True)
 class Fmu:
     """An FMU unpacked in the cache."""
 
@@ -117,14 +133,14 @@ class Fmu:
     """For PythonFMU: top-level module in resources/ -> hash of its content."""
     refused: dict[str, str] = field(default_factory=dict)
     """Variable that cannot be used -> reason."""
-    flaws: tuple[str, ...] = ()
-    """Violations of the standard in the model description."""
+    violations: tuple[Diagnostic, ...] = ()
+    """Violations of the standard in the model description, as warnings."""
     lacking: tuple[str, ...] = ()
     """Functions of the standard that the library does not export."""
     tolerance: float | None = None
     """Relative tolerance of the default experiment."""
-    runs_as: str | None = None
-    """Of plain Python, which has no archive that says so: "native", or "Python: " and why."""
+    runs_as: RunsAs | None = None
+    """Of plain Python, which has no archive that says so."""
     needs_tool: bool = False
     """Whether it needs the tool that exported it (`needsExecutionTool`)."""
 
@@ -132,10 +148,6 @@ class Fmu:
     def compiled(self) -> bool:
         """Whether the FMU is not written in Python, so that fewer checks and messages are possible."""
         return not self.python_modules
-
-    def violations(self) -> list[str]:
-        """Return a message for every violation of the standard in the model description."""
-        return [f"the model description is not valid FMI {self.fmi}.0: {flaw}" for flaw in self.flaws]
 
     def of(self, causality: str) -> list[Variable]:
         """Return the variables of a causality, in the order of the FMU, without aliases of inputs."""
@@ -384,12 +396,12 @@ def _shared(new: Any, old: Any) -> Any:
     if kind is float:
         return old if new == old and copysign(1.0, new) == copysign(1.0, old) else new
     if kind is dict:
-        found = {
+        values = {
             key: value if value is (other := old.get(key)) else _shared(value, other)
             for key, value in new.items()
         }
-        same = list(new) == list(old) and all(map(is_, found.values(), old.values()))
-        return old if same else found
+        same = list(new) == list(old) and all(map(is_, values.values(), old.values()))
+        return old if same else values
     if issubclass(kind, tuple):
         parts = [*map(_shared, new, old), *new[len(old) :]]
         if len(new) == len(old) and all(map(is_, parts, old)):

@@ -126,7 +126,7 @@ class ServedChild(Child):
 
 
 class ForkRequest(NamedTuple):
-    """What the fork server is asked for: a child that calls `main` of a module."""
+    """Request to the fork server: a child that calls `main` of a module."""
 
     module: str
     preload: tuple[str, ...]  # modules that the server keeps imported

@@ -130,9 +130,9 @@ def put_on_stand(source: str, *, friction: float, fmus: Path | None, build: bool
         YawbenchError: the tyre does not exist or is invalid.
     """
     file = source.lower().endswith(".tir")
-    place = Path(source).parent / "stand"
+    near = Path(source).parent / "stand"
     opener = Opener(build=build)
-    fmu = open_role(FOR_FILES if file else source, "tyre", KNOWN_BY, place=place, fmus=fmus, opener=opener)
+    fmu = open_role(FOR_FILES if file else source, "tyre", KNOWN_BY, near=near, fmus=fmus, opener=opener)
     inputs = [variable.name for variable in fmu.of("input")]
     data = {
         "title": Path(source).name,
@@ -143,11 +143,11 @@ def put_on_stand(source: str, *, friction: float, fmus: Path | None, build: bool
         "inputs": {name: friction if name.startswith("friction") else 0.0 for name in inputs},
         **({"tyres": os.path.abspath(source)} if file else {}),
     }
-    return TyreStand(make_plan(load_scenario(place, data=data), opener=opener))
+    return TyreStand(make_plan(load_scenario(near, data=data), opener=opener))
 
 
 def open_role(
-    fmu: str, role: str, known_by: Iterable[str], *, place: Path, fmus: Path | None, opener: Opener
+    fmu: str, role: str, known_by: Iterable[str], *, near: Path, fmus: Path | None, opener: Opener
 ) -> Fmu:
     """Open an FMU given by path or by its name in a folder, and check its role.
 
@@ -155,7 +155,7 @@ def open_role(
         fmu: path or name.
         role: the role it must have.
         known_by: variables that FMUs of this role have.
-        place: where the search for the folder starts.
+        near: where the search for the folder starts.
         fmus: the folder; None: the nearest.
         opener: opens it.
 
@@ -163,9 +163,9 @@ def open_role(
         YawbenchError: it does not exist, or has another role.
     """
     path = is_path(fmu)
-    folder = Path() if path else fmus or find_folder(place, opener=opener)
+    folder = Path() if path else fmus or find_folder(near, opener=opener)
     name = os.path.abspath(fmu) if path else fmu
-    opened = opener.open(find_fmu(name, scenario=place, fmus=folder, opener=opener))
+    opened = opener.open(find_fmu(name, scenario=near, fmus=folder, opener=opener))
     if missing := [variable for variable in known_by if variable not in opened.variables]:
         raise ScenarioError(f"{fmu}: not a {role} FMU: it has no {listed(missing)}", code="fmu-wrong-kind")
     return opened

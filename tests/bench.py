@@ -24,13 +24,13 @@ from time import perf_counter, perf_counter_ns
 import numpy as np
 
 from fmus.build import HERE as FMUS
-from orchestrator.fmu.binary import NATIVE, runs_as
+from orchestrator.fmu.binary import runs_as
 from orchestrator.interop.second_opinion import MASTERS, installed, second_opinion
 from orchestrator.interrupts import StopFlag
 from orchestrator.master.compiled_loop import WANTED as LOOP
 from orchestrator.master.fmi import open_instance
-from orchestrator.master.master import Master
 from orchestrator.master.process_state import Log
+from orchestrator.master.step_loop import Master
 from orchestrator.master.step_program import Operation
 from orchestrator.plan import Plan
 from orchestrator.scenario.find_and_load import load_scenario
@@ -298,7 +298,11 @@ def ratios(path: Path, *, long: bool) -> None:
 
     print(f"{path}: {processors()} cores; what it is to be at most stands behind each figure\n")
     native = [runs_as(archive) for archive in sorted(FMUS.glob("*.fmu"))]
-    line(f"FMUs of {len(native)} that do not run natively", sum(one != NATIVE for one in native), "3")
+    line(
+        f"FMUs of {len(native)} that do not run natively",
+        sum(not (how and how.native) for how in native),
+        "3",
+    )
     reference = {LOOP: "python", "YAWBENCH_UNITS": "python"}
 
     def bare() -> float:

@@ -7,6 +7,7 @@
 Tests themselves ask for codes, places and numbers. `tests/sentences.json` has the sentences of each test in
 the order in which it asks for them. `pytest --rewrite-sentences PATH...` replaces those of the tests that it
 runs by what the program says now, and removes those of tests that are gone; then review the difference.
+`same_sentences("name")` marks tests whose sentences are the same for all values of a parameter.
 Paths of temporary folders, of the repository and of Python, times and numbers of processes are replaced by
 names.
 """
@@ -43,6 +44,16 @@ def places_of(told: Iterable[Diagnostic]) -> list[tuple[str, str]]:
     return [(one.code, str(one.location)) for one in told]
 
 
+def _key_of(item: pytest.Item) -> str:
+    """Return the key of a test: without the parameters for which all sentences are the same."""
+    mark, call = item.get_closest_marker("same_sentences"), getattr(item, "callspec", None)
+    if mark is None or call is None:
+        return item.nodeid
+    others = [f"{value}" for name, value in call.params.items() if name not in mark.args]
+    name = getattr(item, "originalname", item.name)
+    return f"{item.nodeid.partition('::')[0]}::{name}" + (f"[{'-'.join(others)}]" if others else "")
+
+
 class _Sentences:
     """The sentences of all tests, and those that the current test has asked for."""
 
@@ -71,7 +82,7 @@ class _Sentences:
             (r"(?<![0-9A-Za-z])(?=\w*\d)[0-9a-f]{12}(?![0-9A-Za-z])", "<hash>"),
         ]
         self.volatile = [(re.compile(pattern), name) for pattern, name in names]
-        self.test, self.given = item.nodeid, []
+        self.test, self.given = _key_of(item), []
 
     def end(self) -> None:
         """End a test that has passed: all of its sentences must have been asked for."""
@@ -172,7 +183,7 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Find sentences of tests that are gone: rewriting removes them, a run of all files refuses them."""
-    there = {item.nodeid for item in items}
+    there = {_key_of(item) for item in items}
     parts = {Path(part.partition("::")[0]).as_posix() for part in map(str, config.args) if "::" in part}
     whole = {test.partition("::")[0] for test in there} - parts
     files = {test.partition("::")[0] for test in _sentences.of}

@@ -13,8 +13,8 @@ from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.experiments.execution import left_to_do
 from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.experiment_result import judge_results
 from orchestrator.experiments.jobs import execute
-from orchestrator.experiments.outcome import judge_results
 from orchestrator.experiments.planning import plan_experiment
 from orchestrator.experiments.record import RECORD, write_findings
 

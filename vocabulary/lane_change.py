@@ -61,22 +61,22 @@ def lanes(
         transition_scale: length of the transitions relative to the standard's [1].
         standard: a key of `LENGTHS`.
     """
-    one, two, three, four, five = LENGTHS[standard]
+    entry_length, first_gap, side_length, second_gap, exit_length = LENGTHS[standard]
     w = vehicle_width
     first, second, last = 1.1 * w + 0.25, 1.2 * w + 0.25, 1.3 * w + 0.25
     offset = abs(lane_offset)
     if standard == PART_2:
         second, last, offset = w + 1.0, max(last, 3.0), first + GAP
-    two *= transition_scale
-    four *= transition_scale
+    first_gap *= transition_scale
+    second_gap *= transition_scale
     side = copysign(1.0, lane_offset)
     right = -0.5 * first
     sections = []
     x = track_start
     for length, gap, width, shift in (
-        (one, two, first, 0.0),
-        (three, four, second, offset),
-        (five, 0.0, last, 0.0),
+        (entry_length, first_gap, first, 0.0),
+        (side_length, second_gap, second, offset),
+        (exit_length, 0.0, last, 0.0),
     ):
         border = right + shift
         borders = (side * border, side * (border + width))

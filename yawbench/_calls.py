@@ -8,7 +8,6 @@ from typing import Any
 
 from orchestrator.errors import YawbenchError
 from orchestrator.experiments.jobs import Job, Outcome, execute
-from orchestrator.fmu.binary import NATIVE
 from orchestrator.master.fmi import open_instance
 from orchestrator.master.process_state import Log
 from orchestrator.plan import Instance
@@ -36,7 +35,7 @@ def planner_of(programs: Mapping[Path, PythonComponent]) -> Planner:
 
 
 def _in_python(unit: Instance) -> bool:
-    return unit.fmu.runs_as != NATIVE
+    return not (unit.fmu.runs_as and unit.fmu.runs_as.native)
 
 
 def make_all(

@@ -31,7 +31,7 @@ from orchestrator.fmu.description import describe
 from orchestrator.master.instance import Buffers, ExperimentSetup, Status, StepCalls, nothing_to_do
 from orchestrator.master.process_state import ERROR, OK, Log
 from orchestrator.messages import counted, listed
-from orchestrator.plan import Fmu, Instance, Value, ValueRef
+from orchestrator.plan import Fmu, Instance, RunsAs, Value, ValueRef
 from vocabulary.roles import ROLES
 from vocabulary.wheels import wheels
 
@@ -83,10 +83,10 @@ class Controller(Protocol):
 Controller.__module__ = "yawbench"  # set here because a protocol has no other attributes than its members
 
 Numbers = float | Sequence[float] | np.ndarray
-"""What a program returns: the value of its only output, or one value for each, shape (outputs,)."""
+"""Return value of a program: the value of its only output, or one value for each, shape (outputs,)."""
 
 ControllerLike = str | Path | Callable[..., Numbers] | Controller | type[Component]
-"""What can replace the FMU of an instance: the name or path of an FMU, or plain Python."""
+"""Replacement for the FMU of an instance: the name or path of an FMU, or plain Python."""
 
 
 class PythonComponent:
@@ -129,9 +129,9 @@ class PythonComponent:
         self.fmu: Fmu = replace(described, sha256=digest, generation_tool="Python, no FMU", role=role)
 
     def as_now(self) -> Fmu:
-        """Return its FMU with a native library, if what it is now can be translated, or why it has none."""
+        """Return its FMU in its present state, with a native library or with the reason why it has none."""
         if isinstance(self._translated, str):
-            return replace(self.fmu, runs_as=f"Python: {self._translated}")
+            return replace(self.fmu, runs_as=RunsAs(self._translated))
         return in_native_code(self.component, self._translated, self.fmu, self._xml)
 
     def open(self, unit: Instance, log: Log) -> PythonInstance:
@@ -156,9 +156,9 @@ class PythonInstance:
         return getattr(self.component, "error", None)
 
     def connect(self, buffers: Buffers) -> StepCalls:
-        inputs, input_places, outputs, output_places, time, step = buffers
+        inputs, input_refs, outputs, output_refs, time, step = buffers
         component, status = self.component, self._status
-        into, of = ([place.reference for place in places] for places in (input_places, output_places))
+        into, of = ([ref.reference for ref in refs] for refs in (input_refs, output_refs))
 
         def set_inputs() -> Status:
             component.set_real(into, inputs.tolist())
@@ -176,14 +176,14 @@ class PythonInstance:
     def part(self, kind: str) -> str:
         return kind
 
-    def put(self, places: Sequence[ValueRef], values: Sequence[Value]) -> Status:
-        set_values = getattr(self.component, f"set_{places[0].type.lower()}")
-        set_values([place.reference for place in places], list(values))
+    def put(self, refs: Sequence[ValueRef], values: Sequence[Value]) -> Status:
+        set_values = getattr(self.component, f"set_{refs[0].type.lower()}")
+        set_values([ref.reference for ref in refs], list(values))
         return self._status()
 
-    def fetch(self, places: Sequence[ValueRef]) -> tuple[Status, list[Value]]:
-        get_values = getattr(self.component, f"get_{places[0].type.lower()}")
-        values = get_values([place.reference for place in places])
+    def fetch(self, refs: Sequence[ValueRef]) -> tuple[Status, list[Value]]:
+        get_values = getattr(self.component, f"get_{refs[0].type.lower()}")
+        values = get_values([ref.reference for ref in refs])
         return self._status(), values
 
     def setup(self, experiment: ExperimentSetup) -> Status:

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from orchestrator.errors import Diagnostic, Location, ScenarioError
+from orchestrator.experiments.claim_schema import si_number, text_of
 from orchestrator.experiments.experiment import LoadedExperiment as Design
 from orchestrator.experiments.experiment import NamedRun
+from orchestrator.experiments.experiment_result import ExperimentResult
 from orchestrator.experiments.figures import draw_over_axes
 from orchestrator.experiments.jobs import Job, Outcome, measured
-from orchestrator.experiments.judged_schema import si_number, text_of
-from orchestrator.experiments.outcome import ExperimentResult
 from orchestrator.experiments.planning import metrics_of, plan_experiment
 from orchestrator.experiments.record import columns_of
 from orchestrator.experiments.schema import ExperimentSpec, FigureSpec
@@ -77,14 +77,14 @@ def experiment(
     for name, levels in axes.items():
         with arguments.as_scenario_errors():
             labelled = arguments.is_a(levels, Mapping)
-            if labelled and name not in base.loaded.units:
+            if labelled and name not in base._loaded.units:
                 raise TypeError(f"{name}: must be a list of values; only instances have labelled levels")
             pairs = (
                 list(arguments.mapping(levels, name, "a mapping of labels to levels").items())
                 if labelled
                 else [("", level) for level in arguments.items(levels, name, "a list of levels")]
             )
-        if name in base.loaded.units:
+        if name in base._loaded.units:
             variants = {}
             for label, level in pairs:
                 swapped = changed._swapped({name: level}, label)
@@ -94,7 +94,7 @@ def experiment(
                     raise ScenarioError(f"{name}: two levels have the name {words!r}", code="name-duplicate")
                 settings = {str(change.target): change.value for change in others}
                 variants[words] = {"swap": {name: str(swap.value)}, "set": settings}
-                changed = replace(changed, programs=swapped.programs)
+                changed = replace(changed, _programs=swapped._programs)
             specs[name] = {"variants": variants}
         else:
             specs[name] = {"vary": name, **numbers_of(name, [level for _, level in pairs])}
@@ -154,18 +154,18 @@ class Experiment:
     __module__ = "yawbench"
 
     base: Scenario
-    design: Design
+    _design: Design
 
     def __post_init__(self) -> None:
         arguments.instance(self.base, "base", Scenario, "yawbench.load")
-        arguments.instance(self.design, "design", Design, "yawbench._experiment")
+        arguments.instance(self._design, "design", Design, "yawbench._experiment")
 
     def __len__(self) -> int:
-        return len(self.design.cases)
+        return len(self._design.cases)
 
     def __repr__(self) -> str:
-        over = " and ".join(self.design.spec.axes)
-        return f"<Experiment {self.design.spec.title!r}: {len(self)} runs over {over}>"
+        over = " and ".join(self._design.spec.axes)
+        return f"<Experiment {self._design.spec.title!r}: {len(self)} runs over {over}>"
 
     def run(self, *, workers: int | None = None, keep: bool = True, progress: bool | None = None) -> Runs:
         """Make all runs and return their results; nothing is written.
@@ -184,9 +184,9 @@ class Experiment:
         workers = None if workers is None else arguments.count(workers, "workers")
         keep = arguments.flag(keep, "keep")
         progress = None if progress is None else arguments.flag(progress, "progress")
-        with bar(self.design.spec.title, len(self), wanted=progress) as shown:
+        with bar(self._design.spec.title, len(self), wanted=progress) as shown:
             findings, outcomes = executed(
-                self.design, self.base.programs, workers=workers, done=lambda outcome: shown.advance()
+                self._design, self.base._programs, workers=workers, done=lambda outcome: shown.advance()
             )
         runs = [Run(outcome.value) if outcome.ok else None for outcome in outcomes] if keep else None
         planned = findings.planned
@@ -194,7 +194,7 @@ class Experiment:
         diagnostics = [entry for job in planned.jobs if job.plan for entry in job.plan.diagnostics]
         if warning := findings.remarkable():
             diagnostics.append(Diagnostic("runs-with-warnings", warning, "warning"))
-        warn(self.design.spec.title, diagnostics)
+        warn(self._design.spec.title, diagnostics)
         return Runs(findings, runs)
 
 
@@ -242,11 +242,11 @@ class Runs:
 
     __module__ = "yawbench"
 
-    findings: ExperimentResult
+    _findings: ExperimentResult
     runs: list[Run | None] | None = None
 
     def __post_init__(self) -> None:
-        arguments.instance(self.findings, "findings", ExperimentResult, "Experiment.run")
+        arguments.instance(self._findings, "findings", ExperimentResult, "Experiment.run")
         if self.runs is not None and not (
             type(self.runs) is list and all(run is None or arguments.is_a(run, Run) for run in self.runs)
         ):
@@ -255,7 +255,7 @@ class Runs:
     @cached_property
     def table(self) -> pd.DataFrame:
         """One row per run: axes, status, reason, metrics, key; `attrs["units"]` holds the units."""
-        return to_pandas(columns_of(self.findings))
+        return to_pandas(columns_of(self._findings))
 
     def to_xarray(self) -> xr.Dataset:
         """Return all columns of all runs over the axes and time; `attrs["units"]` of each has its unit.
@@ -265,7 +265,7 @@ class Runs:
         Raises:
             ResultsError: results were not kept, or the runs have different times.
         """
-        return dataset(self.findings.spec.title, self.table, list(self.findings.spec.axes), self.runs or ())
+        return dataset(self._findings.spec.title, self.table, list(self._findings.spec.axes), self.runs or ())
 
     def plot(
         self,
@@ -301,7 +301,7 @@ class Runs:
             ScenarioError: an axis or metric is unknown, or an axis is not used.
             ResultsError: no run has a value.
         """
-        spec = self.findings.spec
+        spec = self._findings.spec
         metric, x = arguments.text(metric, "metric"), arguments.text(x, "x")
         y, lines, panels = (
             arguments.text(axis, name, empty=True)
@@ -338,7 +338,7 @@ class Runs:
             **places,
             **chosen,
         }
-        return shown_in_notebooks(draw_over_axes(self.findings, checked(FigureSpec, settings)))
+        return shown_in_notebooks(draw_over_axes(self._findings, checked(FigureSpec, settings)))
 
     def _limit(self, name: str, value: float | str | None, metric: str) -> Value | None:
         """Return a value on the metric's scale as plain Python."""
@@ -352,7 +352,7 @@ class Runs:
 
     def _levels_of(self, axis: str, levels: Any) -> list[Any]:
         """Return the levels of an axis that a figure is restricted to."""
-        spec, name = self.findings.spec, f"only[{axis!r}]"
+        spec, name = self._findings.spec, f"only[{axis!r}]"
         if axis not in spec.axes:
             raise ScenarioError(
                 f"only: there is no axis {axis!r}{hint(axis, spec.axes, lead='axes')}", code="axis-unknown"
@@ -366,7 +366,7 @@ class Runs:
         return list(wanted)
 
     def __repr__(self) -> str:
-        result, warning = self.findings, self.findings.remarkable()
+        result, warning = self._findings, self._findings.remarkable()
         noted = f"; {warning}" if warning else ""
         return f"<Runs {result.spec.title!r}: {len(result.records)} runs, {len(result.failed)} failed{noted}>"
 

@@ -234,29 +234,29 @@ class _Form:
         own = _parameters.of_function(program)
         first, named = getattr(program, "args", ()), getattr(program, "keywords", {})
         inputs = [v.name for v in self.known.variables if v.causality == "input"]
-        given = [literal(value, f"argument {k + 1} of {self.called}") for k, value in enumerate(first)]
-        given += [f"{name}=u[{k}]" for k, name in enumerate(inputs)]
-        given += ["t=t"] if "t" in inspect.signature(program).parameters else []
-        given += [f"{x}={literal(value, x)}" for x, value in named.items() if x not in own.values]
-        given += [f"{x}={self._value(x, value)}" for x, value in own.values.items()]
-        call = f"\n    def output(self, t, u):\n        result = program({', '.join(given)})\n"
+        passed = [literal(value, f"argument {k + 1} of {self.called}") for k, value in enumerate(first)]
+        passed += [f"{name}=u[{k}]" for k, name in enumerate(inputs)]
+        passed += ["t=t"] if "t" in inspect.signature(program).parameters else []
+        passed += [f"{x}={literal(value, x)}" for x, value in named.items() if x not in own.values]
+        passed += [f"{x}={self._value(x, value)}" for x, value in own.values.items()]
+        call = f"\n    def output(self, t, u):\n        result = program({', '.join(passed)})\n"
         return self._head(own) + call + RESULT + self._unitless(own)
 
     def of_object(self, program: Any) -> str:
         """Return a component that makes an object and calls its methods."""
         names = [v.name for v in self.known.variables if v.causality != "parameter"]
         own = _parameters.of_object(program, names)
-        given = [f"{x}={literal(value, x)}" for x, value in own.fixed.items()]
-        given += [f"{x}={self._value(x, v)}" for x, v in own.values.items() if x not in own.attributes]
+        passed = [f"{x}={literal(value, x)}" for x, value in own.fixed.items()]
+        passed += [f"{x}={self._value(x, v)}" for x, v in own.values.items() if x not in own.attributes]
         attributes = [f"        made.{x} = {self._value(x, own.values[x])}\n" for x in sorted(own.attributes)]
-        made = f"        made = program({', '.join(given)})\n"
+        made = f"        made = program({', '.join(passed)})\n"
         if not own.values:  # as it is, however it came to be
             held = [(x, literal(value, f"{self.called}.{x}")) for x, value in vars(program).items()]
             made = "        made = program.__new__(program)\n"
             attributes = [f"        made.{x} = {text}\n" for x, text in held]
         elif self.exact:
             made = "        made = program.__new__(program)\n"
-            attributes += [f"        made.__init__({', '.join(given)})\n"]
+            attributes += [f"        made.__init__({', '.join(passed)})\n"]
         parts = ["\n    def configure(self):\n", made, *attributes, "        self.program = made\n"]
         if hasattr(program, "start"):
             parts.append("\n    def start(self, t, u):\n        self.program.start(t, Inputs(*u))\n")
@@ -306,23 +306,23 @@ def _difference(known: PythonComponent, texts: dict[str, str], module: Parts) ->
         outputs = [i for i, v in enumerate(variables) if v.causality == "output"]
         walk = random_inputs(variables, made.fmu_name)
         rows = [next(walk) for _ in range(STEPS)]
-        for told, kind, refs, values, steps in _settings(variables):
+        for setting, kind, refs, values, steps in _settings(variables):
             answers = []
             for component in (type("Known", (known.component,), {}), made):
                 unit = Twin(component, Path(stage.folder))
                 if refs:
                     unit.set(kind, refs, values)
                 answers.append(list(_outputs(unit, inputs, outputs, rows[:steps])))
-            for k, (one, other) in enumerate(zip(*answers, strict=False)):
-                if one != other:
-                    return f"{told} at t = {k * STEP:.3f} s, {_shown(one)} and {_shown(other)}"
+            for k, (expected, actual) in enumerate(zip(*answers, strict=False)):
+                if expected != actual:
+                    return f"{setting} at t = {k * STEP:.3f} s, {_shown(expected)} and {_shown(actual)}"
             if len(answers[0]) != len(answers[1]):
-                return f"{told}, only one of them ends early"
+                return f"{setting}, only one of them ends early"
     return ""
 
 
 def _settings(variables: Sequence[Any]) -> Iterator[tuple[str, str, list[int], list[Any], int]]:
-    """Yield what a program is compared with: text, and type, reference and value of a parameter; steps."""
+    """Yield the settings of a comparison: label; type, references and values of parameters; steps."""
     other: dict[str, Callable[[Any], Any]] = {
         "Real": lambda x: 1.25 * x + 0.01,
         "Integer": lambda x: x + 1,

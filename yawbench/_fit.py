@@ -52,27 +52,27 @@ class Fit:
 
     __module__ = "yawbench"
 
-    result: FitResult
+    _result: FitResult
 
     def __post_init__(self) -> None:
-        arguments.instance(self.result, "result", FitResult, "yawbench.fit")
+        arguments.instance(self._result, "result", FitResult, "yawbench.fit")
 
     @property
     def verdict(self) -> str:
         """Whether the scenario's car is better than a fitted single track, in words."""
-        return self.result.verdict
+        return self._result.verdict
 
     @property
     def values(self) -> dict[str, float]:
         """Free parameter -> fitted value in SI."""
-        return self.result.scenario.estimate.values
+        return self._result.scenario.estimate.values
 
     @property
     def parameters(self) -> pd.DataFrame:
         """The parameters of both models: value, interval (low, high) of 95 %, start, unit."""
         import pandas as pd
 
-        rows = [row for model in self.result.models for row in _rows(model)]
+        rows = [row for model in self._result.models for row in _rows(model)]
         return pd.DataFrame(rows).set_index(["model", "parameter"])
 
     @property
@@ -81,13 +81,13 @@ class Fit:
         import pandas as pd
 
         keys = ["model", "part", "signal"]
-        rows = [dict(zip(keys, key, strict=True)) | vars(score) for key, score in self.result.scores.items()]
+        rows = [dict(zip(keys, key, strict=True)) | vars(score) for key, score in self._result.scores.items()]
         return pd.DataFrame(rows).set_index(keys)
 
     @property
     def data(self) -> dict[str, Any]:
         """All numbers, as in fit.json."""
-        return self.result.data
+        return self._result.data
 
     def __repr__(self) -> str:
         return f"<Fit of {len(self.values)} parameters: {self.verdict}>"

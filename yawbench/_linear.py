@@ -176,25 +176,25 @@ class _Sampled:
 
 def _differences(point: OperatingPoint) -> _Sampled:
     """Return the sampled model at an operating point, by central differences."""
-    shown = [point.place_of(name) for name in point.outputs]
-    places = list(dict.fromkeys((*shown, *point.reached())))
-    f, g = np.empty((len(places), len(places))), np.empty((len(places), len(point.inputs)))
-    for j, (place, x) in enumerate(zip(places, point.values(places).tolist(), strict=True)):
-        size = point.size(place, x)
+    shown = [point.key_of(name) for name in point.outputs]
+    keys = list(dict.fromkeys((*shown, *point.reached())))
+    f, g = np.empty((len(keys), len(keys))), np.empty((len(keys), len(point.inputs)))
+    for j, (key, x) in enumerate(zip(keys, point.values(keys).tolist(), strict=True)):
+        size = point.size(key, x)
         high, low = x + size, x - size
-        difference = point.after(places, displaced={place: high}, added={})
-        difference -= point.after(places, displaced={place: low}, added={})
+        difference = point.after(keys, displaced={key: high}, added={})
+        difference -= point.after(keys, displaced={key: low}, added={})
         f[:, j] = difference / (high - low)
     for j, (name, unit) in enumerate(point.inputs.items()):
         size = LARGE.get(unit, SMALL)
-        difference = point.after(places, displaced={}, added={name: size})
-        difference -= point.after(places, displaced={}, added={name: -size})
+        difference = point.after(keys, displaced={}, added={name: size})
+        difference -= point.after(keys, displaced={}, added={name: -size})
         g[:, j] = difference / (2.0 * size)
     signals = point.signals
-    names = [signals[at] if isinstance(at, int) and at in signals else (point.name(at), "") for at in places]
+    names = [signals[at] if isinstance(at, int) and at in signals else (point.name(at), "") for at in keys]
     preferences = [
         REQUESTED if at in shown else SIGNAL if at in signals else EARLIER if isinstance(at, int) else VALUE
-        for at in places
+        for at in keys
     ]
     return _Sampled(f, g, names, np.array(preferences), list(range(len(shown))))
 

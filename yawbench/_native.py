@@ -22,19 +22,19 @@ import vocabulary
 from components.fmi.component import Component
 from orchestrator.errors import YawbenchError
 from orchestrator.fmu.archive import open_fmu
-from orchestrator.fmu.binary import NATIVE, REASON, WANTED, binary_of, python_wanted
-from orchestrator.plan import Fmu
+from orchestrator.fmu.binary import PYTHON_WANTED, REASON, binary_of, python_wanted
+from orchestrator.plan import Fmu, RunsAs
 
 from ._parameters import ProgramParameters
 
 LIMIT = 20
 """Processor time [s] that the gate may take, while a run waits; chosen: a short law takes one."""
 PLAIN = (bool, int, float, str, type(None))
-"""Types of what an object may hold before its first step."""
+"""Types of values that an object may hold before its first step."""
 
 
 def _values(result: Any) -> Any:
-    """Return what a law returns as a sequence; True and False are refused, as in Python."""
+    """Return the value of a law as a sequence; True and False are refused, as in Python."""
     values = result if isinstance(result, (tuple, list)) else (result,)
     for value in values:
         if isinstance(value, bool):
@@ -140,7 +140,7 @@ def in_native_code(component: type[Component], translated: type[Component], fmu:
         xml: its model description.
     """
     if python_wanted():
-        return replace(fmu, runs_as=f"Python: {WANTED} asks for it")
+        return replace(fmu, runs_as=PYTHON_WANTED)
     from fmus.native.build import NATIVE_LIBRARY, native  # here, because most scenarios need none of it
 
     functions = (function for cls in translated.__mro__ for function in _functions(cls))
@@ -160,7 +160,7 @@ def in_native_code(component: type[Component], translated: type[Component], fmu:
             limit=LIMIT,
         )
         if made.why_not:
-            return replace(fmu, runs_as=f"Python: {made.why_not}")
+            return replace(fmu, runs_as=RunsAs(made.why_not))
         archive = Path(folder, f"{fmu.sha256}.fmu")
         library = made.files[f"binaries/linux64/{NATIVE_LIBRARY}"]
         archive.write_bytes(
@@ -171,8 +171,8 @@ def in_native_code(component: type[Component], translated: type[Component], fmu:
         try:
             unpacked = open_fmu(archive).directory
         except YawbenchError as error:
-            return replace(fmu, runs_as=f"Python: {error}")
-    return replace(fmu, directory=unpacked, runs_as=NATIVE)
+            return replace(fmu, runs_as=RunsAs(str(error)))
+    return replace(fmu, directory=unpacked, runs_as=RunsAs())
 
 
 def zipped(files: dict[str, bytes]) -> bytes:

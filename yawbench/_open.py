@@ -13,7 +13,7 @@ from orchestrator.errors import ResultsError
 from orchestrator.messages import counted, listed
 from orchestrator.results.file_formats import RESULTS_FILE
 from orchestrator.results.reader import found_runs, load_results
-from orchestrator.results.run_folder import PART, RUN_FILE
+from orchestrator.results.run_folder import PART, RUN_FILE, RunStatus
 
 from . import arguments
 from ._dataset import dataset
@@ -108,20 +108,20 @@ class RecordedRuns:
     def runs(self) -> dict[str, Run]:
         """All completed runs whose results are kept, by their folders within this one."""
         try:
-            found = found_runs(self.folder)
+            runs = found_runs(self.folder)
         except ResultsError:  # a command may keep metrics only
             return {}
-        done = [run.folder for run in found if run.status == "completed"]
+        done = [run.folder for run in runs if run.status is RunStatus.COMPLETED]
         return {folder.relative_to(self.folder).as_posix(): Run(load_results(folder)) for folder in done}
 
     def to_xarray(self) -> xr.Dataset:
         """Return all columns of all runs over the axes, or the names of the runs, and time.
 
-        Each has its unit in `attrs["units"]`. What is missing is NaN.
+        Each has its unit in `attrs["units"]`. Missing values are NaN.
 
         Raises:
-            ResultsError: it is no folder of an experiment, no results were kept, or the runs have different
-                times.
+            ResultsError: it is not the folder of an experiment, no results were kept, or the times of runs
+                differ.
         """
         table = self.tables.get("table")
         if table is None or not {STATUS, "key", "run"} <= set(table.columns):

@@ -19,8 +19,8 @@ from fmus.build import find_components
 from fmus.build_stamp import read_stamp
 from orchestrator.errors import Diagnostic, Location, ScenarioError, SimulationError
 from orchestrator.interrupts import StopFlag
-from orchestrator.master.master import Master
 from orchestrator.master.process_state import OK, WARNING, Log
+from orchestrator.master.step_loop import Master
 from orchestrator.master.step_program import SeriesFeed
 from orchestrator.messages import hint, short
 from orchestrator.names import SignalName
@@ -51,7 +51,7 @@ class Inside(NamedTuple):
         ).lstrip(".")
 
 
-Place = int | Inside
+StateKey = int | Inside
 """Where a value of the state is: an index of the signal pool, or inside a component."""
 
 
@@ -112,44 +112,44 @@ class OperatingPoint:
         ]
         self._start = self._state()
 
-    def place_of(self, signal: str) -> Place:
-        """Return the place of a signal."""
+    def key_of(self, signal: str) -> StateKey:
+        """Return the key of a signal."""
         return self._pool.index[_pair(signal)]
 
-    def size(self, place: Place, value: float) -> float:
+    def size(self, key: StateKey, value: float) -> float:
         """Return by how much a value is displaced."""
-        unit = self.signals.get(place, ("", ""))[1] if isinstance(place, int) else ""
+        unit = self.signals.get(key, ("", ""))[1] if isinstance(key, int) else ""
         return LARGE.get(unit, SMALL * max(1.0, abs(value)))
 
-    def values(self, places: Sequence[Place]) -> np.ndarray:
-        """Return values of the state, shape (places,)."""
+    def values(self, keys: Sequence[StateKey]) -> np.ndarray:
+        """Return values of the state, shape (keys,)."""
         states, pool, _ = self._start
-        return _read(places, states, pool)
+        return _read(keys, states, pool)
 
     def after(
-        self, places: Sequence[Place], *, displaced: Mapping[Place, float], added: Mapping[str, float]
+        self, keys: Sequence[StateKey], *, displaced: Mapping[StateKey, float], added: Mapping[str, float]
     ) -> np.ndarray:
-        """Return values after a step from the point, shape (places,).
+        """Return values after a step from the point, shape (keys,).
 
         Args:
-            places: of the values.
-            displaced: place -> the value of the state to step from.
+            keys: of the values.
+            displaced: key -> the value of the state to step from.
             added: input -> what is added during the step.
         """
         states, pool, others = self._start
         changed, signals = dict(states), pool.copy()
-        for place, value in displaced.items():
-            if isinstance(place, int):
-                signals[place] = value
+        for key, value in displaced.items():
+            if isinstance(key, int):
+                signals[key] = value
             else:
-                changed[place.instance] = _with(changed[place.instance], place.path, value)
+                changed[key.instance] = _with(changed[key.instance], key.path, value)
         self._restore((changed, signals, others))
         self._step(added)
         after = {name: unit.component.__dict__ for name, unit in self._running.items()}
-        return _read(places, after, self._pool.pool)
+        return _read(keys, after, self._pool.pool)
 
-    def reached(self) -> list[Place]:
-        """Return the places of all values that the inputs affect, sooner or later.
+    def reached(self) -> list[StateKey]:
+        """Return the keys of all values that the inputs affect, sooner or later.
 
         A signal that is an input is not among them: at every step, its value is that of the input.
         """
@@ -157,7 +157,7 @@ class OperatingPoint:
         changing = len(self._pool.pool) - 1 - len(self._pool.inputs)
         runs: list[dict[str, float]] = [{}]
         runs += [{n: way * LARGE.get(u, SMALL)} for n, u in self.inputs.items() for way in (1.0, -1.0)]
-        states, reached, quiet = [self._start] * len(runs), dict[Place, None](), 0
+        states, reached, quiet = [self._start] * len(runs), dict[StateKey, None](), 0
         while quiet < QUIET:
             before = len(reached)
             for i, added in enumerate(runs):
@@ -168,18 +168,18 @@ class OperatingPoint:
             for leaves, pool, _ in states[1:]:
                 moved = np.flatnonzero(pool[:changing] != states[0][1][:changing]).tolist()
                 reached |= dict.fromkeys(at for at in moved if at not in held)
-                reached |= {place: None for place, x in _leaves(leaves) if x != undisturbed.get(place)}
+                reached |= {key: None for key, x in _leaves(leaves) if x != undisturbed.get(key)}
             quiet = quiet + 1 if len(reached) == before else 0
         there = dict(_leaves(self._start[0]))
-        return [place for place in reached if isinstance(place, int) or place in there]
+        return [key for key in reached if isinstance(key, int) or key in there]
 
-    def name(self, place: Place) -> str:
+    def name(self, key: StateKey) -> str:
         """Return the name of a value for people."""
-        if isinstance(place, Inside):
-            return str(place)
-        if place in self.signals:
-            return self.signals[place][0]
-        return f"earlier sample {place}"
+        if isinstance(key, Inside):
+            return str(key)
+        if key in self.signals:
+            return self.signals[key][0]
+        return f"earlier sample {key}"
 
     def _refusal(self, code: str, text: str) -> ScenarioError:
         return ScenarioError(Diagnostic(code, text, location=Location(self._file)))
@@ -189,7 +189,7 @@ class OperatingPoint:
         known = find_components()
         components = {}
         for unit in self._plan.instances:
-            if (program := scenario.programs.get(unit.fmu.path)) is None:
+            if (program := scenario._programs.get(unit.fmu.path)) is None:
                 stamp = read_stamp(unit.fmu.path)
                 if unit.fmu.name not in known or stamp is None or not stamp.is_component:
                     text = (
@@ -302,8 +302,8 @@ def _items(value: Any) -> Iterable[tuple[Any, Any]]:
     return [(name, getattr(value, name)) for name in names if hasattr(value, name)]
 
 
-def _read(places: Sequence[Place], states: Mapping[str, Any], pool: np.ndarray) -> np.ndarray:
-    return np.array([pool[at] if isinstance(at, int) else _at(states[at.instance], at.path) for at in places])
+def _read(keys: Sequence[StateKey], states: Mapping[str, Any], pool: np.ndarray) -> np.ndarray:
+    return np.array([pool[at] if isinstance(at, int) else _at(states[at.instance], at.path) for at in keys])
 
 
 def _at(value: Any, path: tuple[Any, ...]) -> float:

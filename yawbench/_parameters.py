@@ -1,4 +1,4 @@
-"""Parameters of plain Python: the default values of a function, and what an object was made with.
+"""Parameters of plain Python: default values of functions, and constructor arguments of objects.
 
 An object has a parameter for every argument of its constructor that it keeps under its own name, as in
 scikit-learn, and for every number in the body of its class. Another value makes the object anew, so that
@@ -41,7 +41,7 @@ class ProgramParameters:
     Attributes:
         values: name -> value in Python.
         declared: name -> what `parameter` returned, in the same order.
-        fixed: arguments of the constructor that are no parameters.
+        fixed: arguments of the constructor that are not parameters.
         attributes: names of those that are attributes of the class.
         unitless: names of those without a declared unit.
     """
@@ -84,7 +84,7 @@ def of_object(program: Any, signals: Sequence[str]) -> ProgramParameters:
 
     Args:
         program: the object.
-        signals: names of its inputs and outputs, which are no parameters.
+        signals: names of its inputs and outputs, which are not parameters.
     """
     cls = type(program)
     try:
@@ -95,7 +95,7 @@ def of_object(program: Any, signals: Sequence[str]) -> ProgramParameters:
     kept = {p.name: getattr(program, p.name) for p in named if hasattr(program, p.name)}
     fields = {f.name: f for f in dataclasses.fields(cls)} if dataclasses.is_dataclass(cls) else {}
     unfit = DECLARATIONS.union(signals)
-    found = {
+    own = {
         p.name: (
             kept[p.name],
             p.annotation,
@@ -111,7 +111,7 @@ def of_object(program: Any, signals: Sequence[str]) -> ProgramParameters:
             for name, value in vars(base).items()
             if type(value) in PLAIN and not name.startswith("_") and name not in unfit and name not in kept
         }
-    made = _declared(found | attributes)
+    made = _declared(own | attributes)
     if not made.values:
         return made
     fixed = {name: value for name, value in kept.items() if name not in made.values}
@@ -128,17 +128,17 @@ def of_object(program: Any, signals: Sequence[str]) -> ProgramParameters:
 def made_anew(program: Any, parameters: ProgramParameters, values: Mapping[str, Any]) -> Any:
     """Return an object like a program, made with other values of its parameters."""
     cls: Any = type(program)
-    given = {
+    keywords = {
         name: copy.deepcopy(value)
         for name, value in {**parameters.fixed, **values}.items()
         if name not in parameters.attributes
     }
-    made = cls.__new__(cls) if cls.__new__ is object.__new__ else cls.__new__(cls, **given)
+    made = cls.__new__(cls) if cls.__new__ is object.__new__ else cls.__new__(cls, **keywords)
     for name in parameters.attributes:  # before the constructor, which may derive something from them
         if values[name] is not getattr(cls, name):
             object.__setattr__(made, name, values[name])
     if _has_own(cls):
-        made.__init__(**given)
+        made.__init__(**keywords)
     return made
 
 
@@ -157,7 +157,7 @@ def brought_along(program: Any, component: type[Component]) -> dict[str, Value]:
 
 
 def text_of(program: Any) -> bytes:
-    """Return a program's source text and what it holds, as far as Python knows it, to tell programs apart."""
+    """Return a program's source text and state, as far as Python knows them, to distinguish programs."""
     functions = [program] if inspect.isfunction(program) else []
     for cls in type(program).__mro__[:-1] if hasattr(program, "output") else ():
         functions += [member for member in vars(cls).values() if inspect.isfunction(member)]
@@ -185,14 +185,14 @@ def _has_own(cls: type) -> bool:
     return cls.__init__ is not object.__init__  # type: ignore[misc]
 
 
-def _declared(found: Mapping[str, tuple[Any, Any, VariableSpec | None]]) -> ProgramParameters:
+def _declared(candidates: Mapping[str, tuple[Any, Any, VariableSpec | None]]) -> ProgramParameters:
     """Return the parameters among values; others are left as they are.
 
     Args:
-        found: name -> value, annotation, and what was declared by `yawbench.parameter`, if anything.
+        candidates: name -> value, annotation, and what was declared by `yawbench.parameter`, if anything.
     """
     values, declared, unitless = {}, {}, set()
-    for name, (value, annotation, spec) in found.items():
+    for name, (value, annotation, spec) in candidates.items():
         start = arguments.plain(value)
         if type(start) not in PLAIN or (type(start) is float and not math.isfinite(start)):
             continue
@@ -217,7 +217,7 @@ def _is_named(annotation: Any, name: str) -> bool:
 
 
 def _as_written(written: Any, value: Any) -> Any:
-    """Return the value of a run; what is whole in Python stays whole where it can."""
+    """Return the value of a run; integers stay integers where possible."""
     plain = arguments.plain(written)
     if type(value) in (bool, str):
         return written if plain == value else value

@@ -1,6 +1,6 @@
 """A progress bar for calls that take long, in terminals and notebooks.
 
-It appears after `DELAY`, and nothing is left of it at the end. Where nobody would see it (output to a file,
+It appears after `DELAY`, and nothing is left of it at the end. Where it would not be seen (output to a file,
 tests, worker processes) no thread is started. `YAWBENCH_PROGRESS=off` shows none.
 """
 
@@ -68,7 +68,7 @@ class Bar:
 
 @contextlib.contextmanager
 def bar(title: str, total: int | None = None, *, wanted: bool | None = None) -> Iterator[Bar]:
-    """Show a bar while the block runs, if it runs long and somebody is there to see it.
+    """Show a bar while the block runs, if it runs long and output goes to a terminal or notebook.
 
     Args:
         title: what is done.
@@ -96,7 +96,7 @@ def bar(title: str, total: int | None = None, *, wanted: bool | None = None) -> 
 
 
 def _console(*, always: bool = False) -> Console | None:
-    """Return where bars are shown, None if nobody would see them."""
+    """Return where bars are shown, None if they would not be seen."""
     in_terminal = sys.stderr is not None and sys.stderr.isatty()
     if not always and (os.environ.get(SWITCH) == "off" or not (in_terminal or "IPython" in sys.modules)):
         return None

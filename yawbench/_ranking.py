@@ -39,12 +39,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-Ranked = ControllerLike | type[Controller]
-"""Controllers that can be ranked: replacements of an FMU, or classes of such objects."""
-
-
 def rank(
-    controller: Ranked | Mapping[str, Ranked] | None = None,
+    controller: ControllerLike
+    | type[Controller]
+    | Mapping[str, ControllerLike | type[Controller]]
+    | None = None,
     *,
     name: str = "",
     against: Iterable[str] | None = None,
@@ -178,20 +177,20 @@ class Ranking:
 
     __module__ = "yawbench"
 
-    ranked: RankingResult
+    _ranked: RankingResult
 
     def __post_init__(self) -> None:
-        arguments.instance(self.ranked, "ranked", RankingResult, "yawbench.rank")
+        arguments.instance(self._ranked, "ranked", RankingResult, "yawbench.rank")
 
     @cached_property
     def table(self) -> pd.DataFrame:
         """One row per controller, the best first; `attrs["units"]` holds the units."""
-        return to_pandas(columns_of_entries(self.ranked))
+        return to_pandas(columns_of_entries(self._ranked))
 
     @cached_property
     def cells(self) -> pd.DataFrame:
         """One row per controller and condition."""
-        return to_pandas(columns_of_cells(self.ranked))
+        return to_pandas(columns_of_cells(self._ranked))
 
     def place(self, name: str) -> int | None:
         """Return the rank of an entry, from 1; None if runs of it are missing.
@@ -200,7 +199,7 @@ class Ranking:
             ScenarioError: the entry is unknown.
         """
         name = arguments.text(name, "name of an entry")
-        places = {score.entry: score.place for score in self.ranked.scores}
+        places = {score.entry: score.place for score in self._ranked.scores}
         if name not in places:
             raise ScenarioError(
                 f"there is no entry {name!r}{hint(name, places, lead='known')}", code="entry-unknown"
@@ -220,12 +219,12 @@ class Ranking:
                 f"kind: there is no figure {chosen!r}{hint(chosen, drawn, lead='known')}",
                 code="figure-unknown",
             )
-        return shown_in_notebooks(drawn[chosen](self.ranked, "yawbench.rank"))
+        return shown_in_notebooks(drawn[chosen](self._ranked, "yawbench.rank"))
 
     def __repr__(self) -> str:
-        rows, columns = self.ranked.scores, self.ranked.ranking.conditions
+        rows, columns = self._ranked.scores, self._ranked.ranking.conditions
         return f"<Ranking of {len(rows)} controllers in {len(columns)} conditions>"
 
     def _repr_html_(self) -> str:
-        shown = self.table[["place", "title", "passed", "spun", "share", "margin", "sideslip"]]
+        shown = self.table[["place", "title", "passed", "spun", "share", "headroom", "sideslip"]]
         return str(shown.to_html(index=False, na_rep=""))

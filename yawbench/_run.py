@@ -18,7 +18,7 @@ from orchestrator.evaluation.trace import trace_of
 from orchestrator.messages import hint, short
 from orchestrator.metrics.run_metrics import STANDARD, MetricValue, evaluate, evaluate_all, metric, why_none
 from orchestrator.plan import Override
-from orchestrator.results.measured import filtered_alike, measured_results
+from orchestrator.results.measurement_results import filtered_alike, measured_results
 from orchestrator.results.reader import Results
 
 from . import arguments
@@ -241,9 +241,9 @@ class Run:
         """
         from orchestrator.results.recorder import write_results
 
-        place = arguments.path(folder, "folder")
-        write_results(self.results, place, format=arguments.text(format, "format"))
-        return place
+        path = arguments.path(folder, "folder")
+        write_results(self.results, path, format=arguments.text(format, "format"))
+        return path
 
     def __repr__(self) -> str:
         noted = "".join(f"; {text}" for text in warnings_in(self.diagnostics))

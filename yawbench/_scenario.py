@@ -26,8 +26,9 @@ from orchestrator.messages import hint, short
 from orchestrator.names import Target
 from orchestrator.plan import Instance, Override, Plan, Value
 from orchestrator.planner import Planner
-from orchestrator.scenario import find_and_load, scenario_schema
+from orchestrator.scenario import find_and_load
 from orchestrator.scenario.overrides import faults_at, setting
+from orchestrator.scenario.schema import LoadedScenario
 from orchestrator.wiring.context import FACTS
 from vocabulary.roles import role_of
 from vocabulary.vehicle import CAR
@@ -53,7 +54,7 @@ def load(source: str | Path) -> Scenario:
         ScenarioError: the scenario does not exist or is invalid.
     """
     scenario = Scenario(find_and_load.find(arguments.path(source, "source"), "a scenario").absolute())
-    scenario.loaded  # noqa: B018 - raises now if it is invalid
+    scenario._loaded  # noqa: B018 - raises now if it is invalid
     return scenario
 
 
@@ -75,7 +76,7 @@ class Scenario:
 
     path: Path
     changes: tuple[Override, ...] = ()
-    programs: Mapping[Path, PythonComponent] = field(default_factory=dict, repr=False)
+    _programs: Mapping[Path, PythonComponent] = field(default_factory=dict, repr=False)
     """Components in plain Python, by their made-up paths."""
 
     def __post_init__(self) -> None:
@@ -85,8 +86,8 @@ class Scenario:
             arguments.is_a(change, Override) for change in self.changes
         ):
             arguments.refuse("changes", "changes as `set`, `swap` and `fault` make them", self.changes)
-        if not arguments.is_a(self.programs, dict):
-            arguments.refuse("programs", "programs as `swap` makes them", self.programs)
+        if not arguments.is_a(self._programs, dict):
+            arguments.refuse("programs", "programs as `swap` makes them", self._programs)
 
     def swap(
         self, replacements: Mapping[str, ControllerLike] | None = None, /, **units: ControllerLike
@@ -116,8 +117,8 @@ class Scenario:
 
     def _swapped(self, units: Mapping[str, ControllerLike], label: str = "") -> Scenario:
         """Return the scenario with instances replaced; plain Python is known by the label, if any."""
-        existing = self.loaded.units
-        changes, programs = [*self._unswapped(units).changes], dict(self.programs)
+        existing = self._loaded.units
+        changes, programs = [*self._unswapped(units).changes], dict(self._programs)
         for unit, wanted in units.items():
             if unit not in existing:
                 text = f"there is no unit {short(unit)}{hint(unit, existing, lead='units')}"
@@ -125,7 +126,7 @@ class Scenario:
             if arguments.names_file(wanted):
                 changes.append(Override(Target.of_instance(unit), fmu_of(wanted, unit), "swap"))
                 continue
-            role = role_of(unit, Path(self.loaded.replaced.get(unit, existing[unit].fmu)).stem)
+            role = role_of(unit, Path(self._loaded.replaced.get(unit, existing[unit].fmu)).stem)
             program = PythonComponent(wanted, unit=unit, role=role, label=label)
             programs[program.path] = program
             changes.append(Override(Target.of_instance(unit), str(program.path), "swap"))
@@ -133,11 +134,11 @@ class Scenario:
                 step_size = Target.of_instance(unit, "step_size")
                 changes.append(Override(step_size, program.step_size, "swap"))
             changes += self._kept(unit, program)
-        return replace(self, changes=tuple(changes), programs=programs)
+        return replace(self, changes=tuple(changes), _programs=programs)
 
     def _kept(self, unit: str, program: PythonComponent) -> Iterator[Override]:
         """Yield overrides with a program's own values for parameters that the scenario would set."""
-        loaded, facts = self.loaded, [name for fact in FACTS.values() for name in fact.parameters]
+        loaded, facts = self._loaded, [name for fact in FACTS.values() for name in fact.parameters]
         by_scenario = {*CAR, *facts, *loaded.vehicle_file.parameters, *loaded.units[unit].parameters}
         requested = {change.target for change in self.changes if change.origin == "set"}
         for name, value in program.parameters.items():
@@ -179,7 +180,7 @@ class Scenario:
             plain = {targets[name]: _plain(targets[name], value) for name, value in entries.items()}
         changed = [setting(target, value, "set") for target, value in plain.items()]
         scenario = replace(self, changes=(*self.changes, *changed))
-        scenario.loaded  # noqa: B018 - raises now if it is invalid
+        scenario._loaded  # noqa: B018 - raises now if it is invalid
         return scenario
 
     def fault(
@@ -224,11 +225,11 @@ class Scenario:
         both = FaultList((*(earlier.faults if earlier else ()), *new.faults))
         others = [change for change in self.changes if change is not earlier]
         scenario = replace(self, changes=(*others, replace(new, value=both)))
-        scenario.loaded  # noqa: B018 - raises now if it is invalid
+        scenario._loaded  # noqa: B018 - raises now if it is invalid
         return scenario
 
     @cached_property
-    def loaded(self) -> scenario_schema.LoadedScenario:
+    def _loaded(self) -> LoadedScenario:
         """The validated scenario with all overrides applied; the file is read once."""
         return Planner().load(self.path, self.changes)
 
@@ -239,7 +240,7 @@ class Scenario:
             YawbenchError: an FMU is missing, a component whose source has changed cannot be built, or
                 the instances cannot be connected.
         """
-        plan = planner_of(self.programs).plan(self.loaded)
+        plan = planner_of(self._programs).plan(self._loaded)
         notes = tuple(
             Diagnostic(
                 "instance-in-python",
@@ -248,7 +249,7 @@ class Scenario:
                 "info",
             )
             for unit in plan.instances
-            if unit.fmu.path in self.programs
+            if unit.fmu.path in self._programs
         )
         return replace(plan, diagnostics=plan.diagnostics + notes)
 
@@ -268,7 +269,7 @@ class Scenario:
         if wanted is not None and type(wanted) is not bool:
             wanted, called = False, arguments.function(progress, "progress", "done", "total")
         opened: list[Any] = []
-        make = opener_of(self.programs)
+        make = opener_of(self._programs)
 
         def opener(unit: Instance, log: Log, corrupted: set[Path]) -> Any:
             opened.append(make(unit, log, corrupted))
@@ -294,7 +295,7 @@ class Scenario:
     def _in_python(self, plan: Plan) -> Plan:
         """Return a plan in which plain Python runs as Python."""
         units = [
-            replace(unit, fmu=self.programs[unit.fmu.path].fmu) if unit.fmu.path in self.programs else unit
+            replace(unit, fmu=self._programs[unit.fmu.path].fmu) if unit.fmu.path in self._programs else unit
             for unit in plan.instances
         ]
         return replace(plan, instances=tuple(units))
@@ -302,7 +303,7 @@ class Scenario:
     @property
     def title(self) -> str:
         """The scenario's title."""
-        return self.loaded.title
+        return self._loaded.title
 
     def _repr_html_(self) -> str:
         plan = self.plan()

@@ -13,7 +13,7 @@ from orchestrator.errors import Diagnostic, Location, ResultsError, ScenarioErro
 from orchestrator.experiments.axes import AxisSpec
 from orchestrator.experiments.experiment import LoadedExperiment as Design
 from orchestrator.experiments.experiment import NamedRun
-from orchestrator.experiments.outcome import ExperimentResult
+from orchestrator.experiments.experiment_result import ExperimentResult
 from orchestrator.experiments.schema import ExperimentSpec
 from orchestrator.experiments.tables import to_pandas
 from orchestrator.experiments.tuning import TunedLaw, columns_of, history_figure, search
@@ -142,9 +142,9 @@ def _axes(ranges: Any) -> dict[str, Any]:
             raise ValueError(
                 f"{place}[2]: must be {listed(map(repr, SPACINGS), last='or')} (got {short(spacing)})"
             )
-        given = numbers_of(place, parts[:2])
-        low, high = given.pop("values")
-        axes[name] = {"vary": name, "from": low, "to": high, "spacing": spacing, **given}
+        numbers = numbers_of(place, parts[:2])
+        low, high = numbers.pop("values")
+        axes[name] = {"vary": name, "from": low, "to": high, "spacing": spacing, **numbers}
         with _located(place):
             checked(AxisSpec, axes[name])
     if not axes:
@@ -198,7 +198,7 @@ def _programs(bases: list[Scenario]) -> dict[Path, PythonComponent]:
     """Return the plain Python of all scenarios; refuses different programs of one name."""
     programs: dict[Path, PythonComponent] = {}
     for k, each in enumerate(bases):
-        for path, program in each.programs.items():
+        for path, program in each._programs.items():
             known = programs.setdefault(path, program)
             if known.fmu.sha256 != program.fmu.sha256:
                 raise ScenarioError(
@@ -225,52 +225,48 @@ def _warn(title: str, done: list[ExperimentResult], reasons: list[str]) -> None:
 class Tuning:
     """The result of a tuning; made by `tune`.
 
-        >>> ranges = {"driver.amplitude": (0.02, 0.03)}
-        >>> tuned = yb.tune(base, ranges, "peak(sideslip)", population=5, generations=1)
-        >>> base.set(tuned.values).run().metric("peak(sideslip)") == tuned.objective
-        True
-
-    Attributes:
-        design: the experiment that was searched.
-        tuned: all trials.
+    >>> ranges = {"driver.amplitude": (0.02, 0.03)}
+    >>> tuned = yb.tune(base, ranges, "peak(sideslip)", population=5, generations=1)
+    >>> base.set(tuned.values).run().metric("peak(sideslip)") == tuned.objective
+    True
     """
 
     __module__ = "yawbench"
 
-    design: Design
-    tuned: TunedLaw
+    _design: Design
+    _tuned: TunedLaw
 
     def __post_init__(self) -> None:
-        arguments.instance(self.design, "design", Design, "yawbench.tune")
-        arguments.instance(self.tuned, "tuned", TunedLaw, "yawbench.tune")
+        arguments.instance(self._design, "design", Design, "yawbench.tune")
+        arguments.instance(self._tuned, "tuned", TunedLaw, "yawbench.tune")
 
     @property
     def objective(self) -> float:
         """The smallest objective, in SI."""
-        return self.tuned.best.cost
+        return self._tuned.best.cost
 
     @property
     def values(self) -> dict[str, Value]:
         """Target -> value with the smallest objective, as `Scenario.set` takes them."""
-        assert self.design.spec.tuning is not None
-        axes = self.design.spec.tuning.laws[OBJECTIVE].axes
+        assert self._design.spec.tuning is not None
+        axes = self._design.spec.tuning.laws[OBJECTIVE].axes
         units = {target: axis.unit for axis in axes.values() for target in axis.vary}
         return {
             str(target): f"{number!r} {units[target]}" if units[target] else number
-            for target, number in self.tuned.best.values.items()
+            for target, number in self._tuned.best.values.items()
         }
 
     @cached_property
     def table(self) -> pd.DataFrame:
         """One row per trial: generation, objective, values in the units of the ranges."""
-        return to_pandas(columns_of([self.tuned])).drop(columns="law")
+        return to_pandas(columns_of([self._tuned])).drop(columns="law")
 
     def plot(self) -> Figure:
         """Return a figure of the smallest objective over the number of trials."""
-        return shown_in_notebooks(history_figure(self.design, [self.tuned], "yawbench.tune"))
+        return shown_in_notebooks(history_figure(self._design, [self._tuned], "yawbench.tune"))
 
     def __repr__(self) -> str:
         settings = ", ".join(f"{target} {value}" for target, value in self.values.items())
         return (
-            f"<Tuning: {self.objective:.4g} with {settings}, of {counted(len(self.tuned.trials), 'trial')}>"
+            f"<Tuning: {self.objective:.4g} with {settings}, of {counted(len(self._tuned.trials), 'trial')}>"
         )

@@ -28,6 +28,6 @@ def validate(run: Run, file: str | Path, *, bands: str | Path = BANDS) -> Valida
         ResultsError: the signal over which the others are plotted was not recorded.
     """
     simulated = arguments.instance(run, "run", Run, "Scenario.run")
-    place = arguments.path(file, "file")
+    path = arguments.path(file, "file")
     tolerances = load_bands(arguments.path(bands, "bands"))
-    return compare_run(simulated.results, load_measurement(place), tolerances)
+    return compare_run(simulated.results, load_measurement(path), tolerances)

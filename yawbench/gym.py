@@ -117,7 +117,7 @@ class SineWithDwell(gymnasium.Env[Observation, np.ndarray]):
         if not names:
             raise ValueError("signals: must not be empty")
         self._hand = _Hand(tuple(dict.fromkeys((*names, "sideslip"))))
-        self._places = [self._hand.inputs.index(name) for name in names]
+        self._indices = [self._hand.inputs.index(name) for name in names]
         self._sideslip = self._hand.inputs.index("sideslip")
         self._scenario = load(scenario).swap(controller=self._hand)
         self._plans: dict[float, Plan] = {}
@@ -166,22 +166,22 @@ class SineWithDwell(gymnasium.Env[Observation, np.ndarray]):
     def _drive(self, plan: Plan) -> None:
         """Make a run in a thread of its own: it waits in the controller for every action."""
         try:
-            self._hand.asked.put(simulate_in_memory(plan, opener=opener_of(self._scenario.programs)))
+            self._hand.requests.put(simulate_in_memory(plan, opener=opener_of(self._scenario._programs)))
         except BaseException as error:  # also that it was abandoned
-            self._hand.asked.put(error)
+            self._hand.requests.put(error)
 
     def _next(self) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Wait for the next sample, or for the end of the run."""
-        asked = self._hand.asked.get()
-        if isinstance(asked, BaseException):
+        request = self._hand.requests.get()
+        if isinstance(request, BaseException):
             self._thread = None
-            raise asked
-        if isinstance(asked, Results):
+            raise request
+        if isinstance(request, Results):
             self._thread = None
-            reward, info = self._judged(asked)
+            reward, info = self._judged(request)
             return self._last, reward, True, False, info
-        self._last = np.array([asked[place] for place in self._places])
-        if abs(asked[self._sideslip]) > SPUN:
+        self._last = np.array([request[index] for index in self._indices])
+        if abs(request[self._sideslip]) > SPUN:
             self._abandon()
             return self._last, WORST, True, False, {"passed": False}
         return self._last, 0.0, False, False, {}
@@ -200,8 +200,8 @@ class SineWithDwell(gymnasium.Env[Observation, np.ndarray]):
         if self._thread is not None:
             self._hand.answers.put(None)
             self._thread.join()
-            while not self._hand.asked.empty():
-                self._hand.asked.get()
+            while not self._hand.requests.empty():
+                self._hand.requests.get()
             self._thread = None
 
 
@@ -216,7 +216,7 @@ class _Hand:
 
     def __init__(self, inputs: tuple[str, ...]) -> None:
         self.inputs = inputs
-        self.asked: SimpleQueue[Sequence[float] | Results | BaseException] = SimpleQueue()
+        self.requests: SimpleQueue[Sequence[float] | Results | BaseException] = SimpleQueue()
         self.answers: SimpleQueue[float | None] = SimpleQueue()
         self._began = -math.inf
 
@@ -229,7 +229,7 @@ class _Hand:
     def output(self, t: float, u: Sequence[float]) -> float:
         if t <= self._began:
             return 0.0
-        self.asked.put(u)
+        self.requests.put(u)
         answer = self.answers.get()
         if answer is None:
             raise _Abandoned
@@ -237,7 +237,7 @@ class _Hand:
 
 
 class _PolicyController:
-    """A policy as a controller: what an environment asks it, a run asks it too."""
+    """A policy as a controller: runs call it as the environment does."""
 
     outputs = ("yaw_moment",)
 

@@ -1,1 +1,1 @@
-"""Actuators: what stands between a torque asked for and the torque at the wheel."""
+"""Actuators: from the requested torque to the torque at the wheel."""

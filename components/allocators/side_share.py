@@ -1,6 +1,6 @@
 """Turn the yaw moment into one force per side, split between front and rear in fixed parts.
 
-The law stands in `control_laws.side_forces`; the driver's force: `control_laws.allocator`.
+The law is in `control_laws.side_forces`; the driver's force: `control_laws.allocator`.
 
 Source: paper B, equations (25)-(28).
 """

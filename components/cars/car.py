@@ -101,7 +101,7 @@ class Car(Component):
     loads: Four
     pull: Pull = LEVEL
     of_plane: ClassVar[slice | None]
-    """Where those of road and wind stand among the inputs; None: nowhere."""
+    """Indices of the inputs of road and wind; None: there are none."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)

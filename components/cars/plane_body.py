@@ -26,7 +26,7 @@ _GAUSS = 0.5 - 0.5 / 3.0**0.5
 
 
 class Geometry(Protocol):
-    """Where the wheels of a car stand: a, b and d [m], as the parameters of every car say it."""
+    """Positions of a car's wheels: a, b and d [m], as in the parameters of every car."""
 
     @property
     def cg_to_front_axle(self) -> float: ...

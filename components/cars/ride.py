@@ -32,7 +32,7 @@ inertia, D that of the sprung mass, E = B - D; eta = theta + I_xz / A counts fro
     (I_z - I_xz^2 / A + A eta^2 - D theta^2 + E phi^2) dr - A eta ddphi + E phi ddtheta
               = M + (A - E) dphi dtheta - 2 r ((A eta - D theta) dtheta + E phi dphi)     (11)
 
-Without damping the energy changes only by the work of the contact forces. The derivation stands in
+Without damping the energy changes only by the work of the contact forces. The derivation is in
 docs/plant_fourteen_dof.md.
 """
 

@@ -32,7 +32,7 @@ class SingleTrackCar:
 
     @classmethod
     def of(cls, p: Any, yaw_inertia: float = 1.0) -> SingleTrackCar:
-        """Return the car of these parameters; its yaw inertia is no matter in a steady turn."""
+        """Return the car of these parameters; its yaw inertia does not matter in a steady turn."""
         return cls(
             p.mass,
             yaw_inertia,

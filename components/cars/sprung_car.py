@@ -61,7 +61,9 @@ def ride_of(p: FourteenDofParameters) -> Ride:
     offset = 2.0 * (m_r * p.cg_to_rear_axle - m_f * p.cg_to_front_axle) / m_s  # of the sprung mass, forward
     a, b = p.cg_to_front_axle - offset, p.cg_to_rear_axle + offset
     if min(a, b) <= 0.0:
-        raise ValueError("the sprung mass must stand between the axles: correct front_unsprung_share or mass")
+        raise ValueError(
+            "the centre of the sprung mass must lie between the axles: correct front_unsprung_share or mass"
+        )
     arms = m_s * (h_s - h) ** 2 + unsprung * (h - h_u) ** 2
     wheels = (
         2.0 * m_f * (p.cg_to_front_axle**2 + t * t)

@@ -1,7 +1,7 @@
-"""The base of allocators: what gives the yaw moment by longitudinal forces, and the driver's force on top.
+"""The base of allocators: longitudinal forces that give the yaw moment, added to the driver's force.
 
-The driver's force is equal left and right on each axle, as from one pedal, and is no part of the moment asked
-for: with steered front wheels it turns the car by itself, as it does without any control.
+The driver's force is equal left and right on each axle, as from one pedal, and is not part of the requested
+moment: with steered front wheels it turns the car by itself, as it does without any control.
 """
 
 from dataclasses import dataclass

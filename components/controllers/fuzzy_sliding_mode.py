@@ -1,6 +1,6 @@
 """Fuzzy sliding-mode yaw-moment control: the gains of the reaching law follow steering and friction.
 
-The law stands in `control_laws.sliding_surface`, here always with the saturation of equation (24). A Mamdani
+The law is in `control_laws.sliding_surface`, here always with the saturation of equation (24). A Mamdani
 system with five sets per variable sets eps and k_d from |delta| and mu by one table for both: small
 gains on a slippery road and going straight, where a strong law only shakes the car, large ones in a
 sharp turn on a good road. The centroid spans about 0.08 to 0.92 of each gain's range.

@@ -1,6 +1,6 @@
 """Sliding-mode yaw-moment control with constant gains, the baseline of paper B.
 
-The law stands in `control_laws.sliding_surface`. Its switching function is the sign, as in the paper's
+The law is in `control_laws.sliding_surface`. Its switching function is the sign, as in the paper's
 baseline, or the saturation of equation (24) with the same constant gains: the second shows how
 much of the fuzzy controller's calm the boundary layer alone achieves.
 

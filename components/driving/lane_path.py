@@ -82,9 +82,9 @@ class LanePath:
         self.bends = [bend * value for value in program.solved()]  # y'' at the knots
         self.slopes, self.places = [0.0], [0.0]  # y' and y there
         h = self.spacing
-        for one, other in pairwise(self.bends):
-            self.places.append(self.places[-1] + h * self.slopes[-1] + h * h * (one / 3.0 + other / 6.0))
-            self.slopes.append(self.slopes[-1] + 0.5 * h * (one + other))
+        for bend, next_bend in pairwise(self.bends):
+            self.places.append(self.places[-1] + h * self.slopes[-1] + h * h * (bend / 3.0 + next_bend / 6.0))
+            self.slopes.append(self.slopes[-1] + 0.5 * h * (bend + next_bend))
 
     def __call__(self, x: float) -> float:
         """Return y [m] at `x` [m]."""
@@ -147,10 +147,10 @@ class _Basis:
         count = INTERVALS + 1
         self.bends = [[1.0 if i == k else 0.0 for i in range(count)] for k in range(count)]
         self.slopes, self.places = [[0.0] * count], [[0.0] * count]
-        for one, other in pairwise(self.bends):
-            rows = zip(self.places[-1], self.slopes[-1], one, other, strict=True)
+        for bend, next_bend in pairwise(self.bends):
+            rows = zip(self.places[-1], self.slopes[-1], bend, next_bend, strict=True)
             self.places.append([y + h * slope + h * h * (c / 3.0 + d / 6.0) for y, slope, c, d in rows])
-            rows = zip(self.places[-1], self.slopes[-1], one, other, strict=True)
+            rows = zip(self.places[-1], self.slopes[-1], bend, next_bend, strict=True)
             self.slopes.append([slope + 0.5 * h * (c + d) for _, slope, c, d in rows])
 
     def place(self, x: float, s: float, slip: float) -> list[float]:
@@ -158,12 +158,12 @@ class _Basis:
         k = min(max(int(x / self.spacing), 0), INTERVALS - 1)
         t = x - k * self.spacing
         row = []
-        for y, slope, one, other in zip(
+        for y, slope, bend, next_bend in zip(
             self.places[k], self.slopes[k], self.bends[k], self.bends[k + 1], strict=True
         ):
-            steeper = (other - one) / self.spacing
-            there = y + t * (slope + t * (0.5 * one + t * steeper / 6.0))
-            turned = slope + t * (one + 0.5 * t * steeper) - slip * (one + t * steeper)
+            steeper = (next_bend - bend) / self.spacing
+            there = y + t * (slope + t * (0.5 * bend + t * steeper / 6.0))
+            turned = slope + t * (bend + 0.5 * t * steeper) - slip * (bend + t * steeper)
             row.append(there + s * turned)
         return row
 

@@ -23,7 +23,7 @@ TRACK_OUTPUTS = (
         text="How far the car's outline is beyond the cones, 0 inside",
     ),
 )
-"""What a driver tells of his way through the track."""
+"""Outputs of a driver about the way through the track."""
 
 
 class Outline(NamedTuple):

@@ -1,4 +1,4 @@
-"""Reference speed: what a car's wheels and its longitudinal accelerometer say of v_x together.
+"""Reference speed: v_x from the wheel speeds and the longitudinal accelerometer.
 
     dv_x/dt = a_x + r v_y                                                               (1)
     v_i     = (w_i R / (1 + kappa) - (v_y + x_i r) sin(delta_i)) / cos(delta_i) + y_i r,

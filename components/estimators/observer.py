@@ -1,6 +1,6 @@
 """Observer of sideslip and friction: a Kalman filter on a single track whose axles saturate.
 
-The filter stands in `estimation.single_track_filter`, with its equations and its guards; zero points, roll
+The filter is in `estimation.single_track_filter`, with its equations and its guards; zero points, roll
 compensation, speed, slips and loads in `estimation.estimator`. Friction begins at `initial_friction`, best
 low: upwards it is learned at once, from the acceleration that there is; it stays where tyres are not used.
 

@@ -2,7 +2,7 @@
 
     said    x(t_k) from t_k + latency until the next is said,      t_k = t_0 + k sample_time
 
-Where it stands in place of an estimator, all that is left of estimation is that it takes time; what another
+In place of an estimator, it keeps only the delay of estimation; what another
 then does worse is the other's error. With sample time and latency zero a run is that with the truth itself.
 Friction is not a signal of the car: it comes as `friction_true`, from a road or as a constant.
 
@@ -22,7 +22,7 @@ from ..sensing.channel import Channel, ChannelSpec
 
 KNOWN = (*NAMES, "friction")
 NEEDED = ("velocity_x", "sideslip")
-"""What every car tells; what it does not tell of the others counts as zero."""
+"""Signals that every car has; others count as zero if the car lacks them."""
 
 
 @dataclass(frozen=True)

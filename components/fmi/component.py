@@ -21,7 +21,7 @@ What PythonFMU 0.7.0 makes necessary, and is done here once for all:
   is escaped.
 * `get_real` and `set_real` look all values up in one list; per-variable getters cost three times
   as much. All inputs set, or all outputs read, at once is one slice.
-* Until initialization ends, state and outputs are computed when somebody asks for them, so inputs
+* Until initialization ends, state and outputs are computed when they are read, so inputs
   may be set in any order before that.
 * The resource folder is taken off `sys.path` again, so a process that makes many instances does
   not search ever more folders.

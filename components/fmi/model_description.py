@@ -31,7 +31,7 @@ def to_xml(
 ) -> Element:
     """Return the element `fmiModelDescription`; value references are positions in `variables`.
 
-    `needsExecutionTool` is false: Python, which the process needs, is no tool in the sense of the
+    `needsExecutionTool` is false: Python, which the process needs, is not a tool in the sense of the
     standard, and some hosts load nothing that says true. `credits` are attributes that may be empty.
 
     `InitialUnknowns` carry no list of dependencies, which by FMI 2.0.4, section 2.2.8, means

@@ -63,14 +63,14 @@ def signal(
         name: spelled-out snake_case; `*` stands for the four wheels.
         unit: one of `units.UNITS`; must agree with the dictionary for a name that is in it.
         description: one line; the dictionary's text if left out.
-        start: value of an input before anybody sets it.
+        start: value of an input until it is set.
         minimum, maximum: limits written into the model description; the dictionary's if left out.
         depends_on: of an output, the inputs it depends on directly at the same instant. A `*`
             there means the same wheel if the output's own name has one, else all four.
         optional: of an input, that the unit does its work at the start value if nothing drives it.
 
     Raises:
-        DeclarationError: unknown name without unit and text, a name that is no lower-case
+        DeclarationError: unknown name without unit and text, a name that is not lower-case
             identifier, unknown unit, or a unit that contradicts the dictionary.
     """
     _check("signal", "name", name, str)
@@ -143,7 +143,7 @@ def _names(what: str, argument: str, value: Iterable[str]) -> tuple[str, ...]:
 
 
 def _shown(text: str | None) -> str:
-    """Return a text as it stands in a message, cut if long."""
+    """Return a text for a message, cut if long."""
     return repr(text if text is None or len(text) <= 60 else f"{text[:57]}...")
 
 
@@ -221,7 +221,7 @@ def of_car(
     minimum: float | None = None,
     maximum: float | None = None,
 ) -> Any:
-    """Declare a parameter whose name, unit, meaning and least value stand in `vocabulary.vehicle`.
+    """Declare a parameter whose name, unit, meaning and least value are in `vocabulary.vehicle`.
 
         >>> @dataclass(frozen=True)
         ... class Parameters:
@@ -249,7 +249,7 @@ def like(
 
 
 def parameter_class(module: str, name: str, declared: Mapping[str, Any], bases: tuple[type, ...] = ()) -> Any:
-    """Return a dataclass of parameters that stand in a table.
+    """Return a dataclass of the parameters in a table.
 
     Args:
         module, name: of the class, so that its values can be kept in an FMU's state.

@@ -70,8 +70,8 @@ def tracking_gains(
             for row, g in zip(phi, gamma, strict=True)
         ]
         p = [
-            [x + y for x, y in zip(one, other, strict=True)]
-            for one, other in zip(aim, product(across, product(p, closed)), strict=True)
+            [x + y for x, y in zip(row, addend, strict=True)]
+            for row, addend in zip(aim, product(across, product(p, closed)), strict=True)
         ]
         if max(abs(x - y) for x, y in zip(before, gains, strict=True)) <= STILL * max(map(abs, gains)):
             break
@@ -84,10 +84,10 @@ def tracking_gains(
     return gains, ahead
 
 
-def product(one: Sequence[Sequence[float]], other: Sequence[Sequence[float]]) -> Rows:
+def product(left: Sequence[Sequence[float]], right: Sequence[Sequence[float]]) -> Rows:
     """Return the product of two matrices."""
-    columns = list(zip(*other, strict=True))
-    return [[dot(row, column) for column in columns] for row in one]
+    columns = list(zip(*right, strict=True))
+    return [[dot(row, column) for column in columns] for row in left]
 
 
 def _applied(matrix: Sequence[Sequence[float]], vector: Sequence[float]) -> list[float]:

@@ -24,9 +24,9 @@ CLOSE = 1e-10
 """Of the largest multiplier, by which none may have moved. Chosen: far below a sensor's resolution."""
 
 
-def dot(one: Sequence[float], other: Sequence[float]) -> float:
+def dot(a: Sequence[float], b: Sequence[float]) -> float:
     """Return the sum of the products of two rows of numbers."""
-    total: float = sum(map(mul, one, other))
+    total: float = sum(map(mul, a, b))
     return total
 
 

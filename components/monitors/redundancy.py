@@ -1,4 +1,4 @@
-"""Monitor of gyro, accelerometer, hand wheel and wheel speeds by what they say of each other.
+"""Monitor of gyro, accelerometer, hand wheel and wheel speeds by comparing what they imply about each other.
 
 Wheels say how fast the car goes, three signals how fast it turns:
 
@@ -17,7 +17,7 @@ A signal is taken for faulty
     the wheel whose speed is off the median by the share `wheel_share`                                    (4)
 
 where (3) and (4) must last for `lasting`. (0) and (1) are about gyro and accelerometer alone: a driver may
-jerk or hold the wheel. What was found last stands in the output `fault`. If control needs the signal
+jerk or hold the wheel. The output `fault` is the last fault found. If control needs the signal
 (`uses_*`), the yaw moment fades to zero within `fade_time`, for good, and nothing more is looked for: no
 control is the law that needs no signal. If it does not, the signal bears no more witness, for good, and the
 others are watched on without it: (1) asks those that are left, (2) and (3) need both gyro and accelerometer,
@@ -183,24 +183,24 @@ class Redundancy(Component):
                 for rolls, off, w in zip(self.rolling, self.off, wheels, strict=True)
             ]
         jumps = abs(r - self.last[0]), abs(a_y - self.last[1]) / max(v, SLOW)
-        found = self._judged(t + h, (r, a_y), rates, jumps)
-        if found:
-            self._lose(found)
+        fault = self._judged(t + h, (r, a_y), rates, jumps)
+        if fault:
+            self._lose(fault)
         self.last = (r, a_y)
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...]:
         return self.share * u[-1], self.fault, self.implied
 
-    def _lose(self, found: float) -> None:
+    def _lose(self, fault: float) -> None:
         """Believe a signal no more."""
-        self.fault = found
-        if found == WHEEL:
+        self.fault = fault
+        if fault == WHEEL:
             self.rolling = [
                 rolls and off <= self.p.lasting for rolls, off in zip(self.rolling, self.off, strict=True)
             ]
             self.off = [0.0] * 4
             return
-        self.lost = [lost or found == name for lost, name in zip(self.lost, SIGNALS, strict=True)]
+        self.lost = [lost or fault == name for lost, name in zip(self.lost, SIGNALS, strict=True)]
         self.implied = self.contradicted = 0.0
 
     @staticmethod

@@ -24,7 +24,7 @@ xi m dv_x with xi = 1.04, which would double the mass (here the excess alone, 0:
 numbers the wheels fl, fr, rr, rl.
 
 How it couples, and why nothing but the front wheels' slip depends directly on an input: as in
-`plants.seven_dof`. The equations stand in `cars.rolling_body`. How they are solved over a step with
+`plants.seven_dof`. The equations are in `cars.rolling_body`. How they are solved over a step with
 held forces: roll exactly (`mathematics.oscillator`), so any roll stiffness goes with any step, plane
 motion by `cars.plane_body`, wheels by `cars.wheel_spin`.
 """

@@ -41,7 +41,7 @@ EVERYWHERE = 1e6
 
 @dataclass(frozen=True)
 class PatchworkParameters:
-    """Of the road, the wind, and where the car's wheels stand."""
+    """Of the road, the wind, and the positions of the car's wheels."""
 
     base_friction: float = parameter(
         0.9, "1", "Friction coefficient where there is no patch", "chosen: dry asphalt", minimum=0.0
@@ -138,12 +138,12 @@ class Patchwork(Component):
             raise ValueError("road_slope and road_bank together are steeper than 45 degrees")
 
     def start(self, t: float, u: list[float]) -> None:
-        self.told = mean(self._frictions(u))
-        self.late = Stage(tau=0.0, delay=self.p.friction_delay, value=self.told)
+        self.friction = mean(self._frictions(u))
+        self.late = Stage(tau=0.0, delay=self.p.friction_delay, value=self.friction)
 
     def advance(self, t: float, h: float, u: list[float]) -> None:
-        self.late.advance(t, h, self.told)
-        self.told = mean(self._frictions(u))
+        self.late.advance(t, h, self.friction)
+        self.friction = mean(self._frictions(u))
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...]:
         p = self.p

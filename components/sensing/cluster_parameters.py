@@ -32,23 +32,23 @@ CHANNELS = {
 }
 """Signal, without `_*` for four wheels -> how it is measured."""
 
-Given = Mapping[str, Mapping[str, tuple[float, str]]]
+Figures = Mapping[str, Mapping[str, tuple[float, str]]]
 """Channel -> figure -> value in SI units, and where it comes from."""
 
 NONE = "chosen: none"
 
 
-def parameters_of(module: str, name: str, given: Given, *, common: Mapping[str, Any]) -> type:
-    """Return a dataclass of parameters: the figures of every channel, those not given without effect.
+def parameters_of(module: str, name: str, by_channel: Figures, *, common: Mapping[str, Any]) -> type:
+    """Return a dataclass of parameters: the figures of every channel, those that it lacks without effect.
 
     Args:
         module, name: of the class.
-        given: the figures that a kind of cluster has.
+        by_channel: the figures that a kind of cluster has.
         common: name -> parameter of the whole cluster; those of `COMMON` that are left out are added.
     """
     fields: dict[str, Any] = {**COMMON, **common}
     for channel, (unit, rate_unit, text) in CHANNELS.items():
-        figures = given.get(channel, {})
+        figures = by_channel.get(channel, {})
         for figure, (unit_of_it, what, least) in _FIGURES.items():
             default, source = figures.get(figure, (getattr(ChannelSpec(), figure), NONE))
             fields[f"{channel}_{figure}"] = parameter(

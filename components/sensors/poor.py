@@ -5,12 +5,12 @@ The cluster of `sensors.production` with other figures. Noise and slow messages 
 """
 
 from ..fmi.variables import parameter
-from ..sensing.cluster_parameters import Given, parameters_of
+from ..sensing.cluster_parameters import Figures, parameters_of
 from .production import PRODUCTION, Production
 
 _OLD = "eeNews Automotive, 2014: sensors for ESP at that time, 0.4 deg/s and 15 mg rms"
 
-POOR: Given = {
+POOR: Figures = {
     **PRODUCTION,
     "yaw_rate": {
         **PRODUCTION["yaw_rate"],

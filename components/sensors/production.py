@@ -8,7 +8,7 @@
 Each signal takes the way of `sensing.channel`: low pass, gain, bias, drift, noise, range, quantum, latency,
 held from message to message. Accelerometers are fixed to the body, which leans: with roll positive for the
 left side up, pitch for the nose down, and the angles by which a road rises forwards and to the left, (1) is
-what they feel of gravity and acceleration. They stand at the centre of mass. What no unit says (a plant that
+what they feel of gravity and acceleration. They are at the centre of mass. What no unit says (a plant that
 does not roll, a road that is flat) counts as zero.
 
 Inputs are the true values, named `*_true`: `{from: [plant, driver], to: sensor.*_true}`. Outputs have the
@@ -18,7 +18,7 @@ The hand-wheel sensor counts in road-wheel angles: its figures are those at the 
 ratio of 16. Biases are zero here, as after the zero-point learning of a control unit that worked; what
 is left in cars is up to 0.3 deg/s and 0.2 m/s2.
 
-Sources stand at the parameters. `sensors.ideal` and `sensors.poor` are the same with other values.
+Sources are given with the parameters. `sensors.ideal` and `sensors.poor` are the same with other values.
 """
 
 from math import cos, sin
@@ -30,7 +30,7 @@ from vocabulary.wheels import wheels
 from ..fmi.component import Component
 from ..fmi.variables import output, parameter, signal
 from ..sensing.channel import Channel, ChannelSpec
-from ..sensing.cluster_parameters import Given, figures_of, parameters_of
+from ..sensing.cluster_parameters import Figures, figures_of, parameters_of
 from ..sensing.noise import key
 
 _SMI700 = "Bosch, SMI700 product sheet"
@@ -42,7 +42,7 @@ _ACCELEROMETER = {
     "quantum": (0.00196, f"{_SMI700}: 5000 per g"),
 }
 
-PRODUCTION: Given = {
+PRODUCTION: Figures = {
     "yaw_rate": {
         "bandwidth": _CORNER,
         "noise": (0.001745, f"{_SMI700}: 0.1 deg/s"),
@@ -133,8 +133,8 @@ class Production(Component):
         """Return name and figures of every channel, in the order of the outputs."""
         named = []
         for name, figures in self.figures.items():
-            one = f"{name}_*" if name in ("wheel_speed", "brake_pressure") else name
-            named += [(channel, figures) for channel in wheels(one)]
+            pattern = f"{name}_*" if name in ("wheel_speed", "brake_pressure") else name
+            named += [(channel, figures) for channel in wheels(pattern)]
         return named
 
     def _felt(self, u: list[float]) -> list[float]:

@@ -42,7 +42,7 @@ def _one(description: str) -> Any:
 
 @dataclass(frozen=True)
 class _General:
-    """What is no coefficient of the tyre."""
+    """Parameters that are not coefficients of the tyre."""
 
     nominal_load: float = parameter(4000.0, "N", "Nominal load F_z0", _BOOK, minimum=1.0)
     unloaded_radius: float = parameter(0.313, "m", "Unloaded radius R_0", _BOOK, minimum=0.01)

@@ -1,6 +1,6 @@
 """The Magic Formula of MF-Tyre 6.1, 6.2 and 5.2: forces and moments of one wheel from its slips.
 
-The equations stand in `tyres/magic_formula_62.py`; numbers in brackets are those of the book, H. B. Pacejka,
+The equations are in `tyres/magic_formula_62.py`; numbers in brackets are those of the book, H. B. Pacejka,
 Tyre and Vehicle Dynamics, 3rd ed. 2012, section 4.3.2.
 
 What depends on the set and the pressure alone is worked out once per wheel (`longitudinal_set`,

@@ -260,7 +260,7 @@ def of_axle(p: Any, axle: str) -> Callable[[str], float]:
 
 @dataclass(frozen=True)
 class _General:
-    """What is no coefficient of a tyre."""
+    """Parameters that are not coefficients of a tyre."""
 
     reference_friction: float = parameter(
         1.0,

@@ -1,4 +1,4 @@
-"""Wheel torque by sliding-mode slip control, with the curve of the tyre it is told of.
+"""Wheel torque by sliding-mode slip control, with the curve of a known tyre.
 
 The law is described in `control_laws.slip_control`. It needs the tyre's F_x(kappa) at the present slip
 angle, load and friction; this unit evaluates the very functions that the tyre units evaluate, so no table is

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from . import commands, evidence, metrics, schemas, signals, units, vehicles
+from . import commands, evidence, library, metrics, schemas, signals, units, vehicles
 
 DOCS = Path(__file__).resolve().parents[1]
 PAGES: dict[str, Callable[[], str]] = {
@@ -21,6 +21,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "reference/signals.md": signals.page,
     "reference/units.md": units.page,
     "reference/metrics.md": metrics.page,
+    "reference/library.md": library.page,
     "trust.md": evidence.page,
     "reference/vehicles.md": vehicles.page,
 }

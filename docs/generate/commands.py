@@ -13,7 +13,7 @@ from orchestrator.cli import _application
 from .text import NOTE, cell, code, plain, table
 
 _KIND = re.compile(r" <(?:path|str|text|list\[\w+\])>$")
-"""What typer says of an argument's type; `<python|c>`, its choices, stays."""
+"""Type of an argument as typer prints it, which is removed; choices such as `<python|c>` are kept."""
 
 
 def page() -> str:

@@ -17,7 +17,7 @@ from orchestrator.experiments import schema as experiment
 from orchestrator.experiments import threats as threats
 from orchestrator.fault_kinds import KINDS, FaultLocation
 from orchestrator.names import SignalName, Target
-from orchestrator.scenario import scenario_schema as scenario
+from orchestrator.scenario import schema as scenario
 
 from .text import NOTE, cell, code, docstring, table
 

@@ -9,7 +9,7 @@ NOTE = "*This page is generated from the program: `python -m docs.generate` writ
 
 
 def plain(text: str) -> str:
-    """Return text as Markdown that shows it as it is; what stands in backticks stays code."""
+    """Return text as Markdown that shows it as it is; text in backticks stays code."""
     parts = re.split(r"(`[^`]*`)", text)
     return "".join(part if part.startswith("`") else _escaped(part) for part in parts)
 

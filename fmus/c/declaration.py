@@ -53,7 +53,7 @@ def read_declaration(xml: bytes, name: str, role: Role) -> tuple[ElementTree.Ele
         elif element.get("valueReference") != str(i):
             problems.append(f"{DESCRIPTION}: {own} must have the value reference {i}: they count from 0")
         elif not (own.isidentifier() and own.isascii()):
-            problems.append(f"{DESCRIPTION}: {own!r} can be no name in C; use letters, digits and _")
+            problems.append(f"{DESCRIPTION}: {own!r} is not a valid name in C; use letters, digits and _")
         else:
             variables.append(_variable(element, real))
     problems += [f"{DESCRIPTION}: {problem}" for problem in missing_signals(role, variables)]

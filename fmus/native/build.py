@@ -111,7 +111,7 @@ def native(
         home, others: where its functions are (see `Sources`).
         source: its file, as a comment names it.
         guid: of the FMU.
-        resources: folder that an instance is told of.
+        resources: folder passed to an instance.
         translated: a class for the translator that gives the same; default: the component.
         hurry: leave it for later if it took longer than `LONGEST` the last time.
         limit: processor time [s] that the gate may take.

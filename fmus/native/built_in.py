@@ -213,7 +213,7 @@ class BuiltIn(Looping):
         if "key" in named or not items or not all(map(is_number, items)):
             if all(map(self._is_constant, items)) and "key" not in named:
                 return (max if op == ">" else min)(items)
-            raise Refused("an extreme of what are no numbers")
+            raise Refused("min or max of values that are not numbers")
         best = items[0]
         for item in items[1:]:
             if not isinstance(best, ir.Var) and not isinstance(item, ir.Var):
@@ -226,7 +226,7 @@ class BuiltIn(Looping):
     def _python_sum(self, values: Any, start: Any = 0) -> Any:
         items = self.items(values)
         if not all(map(is_number, (*items, start))):
-            raise Refused("a sum of what are no numbers")
+            raise Refused("a sum of values that are not numbers")
         return self.total(items, start)
 
     def _python_any(self, values: Any) -> Any:

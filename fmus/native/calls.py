@@ -33,7 +33,7 @@ class Calling(BuiltIn):
 
     def _call(self, node: ast.Call) -> Any:
         if isinstance(node.func, ast.Name) and node.func.id == "super":
-            raise Refused("super() that is no part of a call of a method")
+            raise Refused("super() outside a call of a method")
         function = self._called(node.func)
         args = self.values(node.args)
         named: dict[str, Any] = {}

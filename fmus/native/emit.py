@@ -20,7 +20,7 @@ _WORDS = {
     "xor_word": "^",
     "right_word": ">>",
 }
-_INLINE = {"fabs", "copysign", "sqrt"}  # exact, whoever computes them
+_INLINE = {"fabs", "copysign", "sqrt"}  # exact in every implementation
 _SIGNATURES = {
     "configure": "const Variables *v, Configured *c",
     "start": "const Variables *v, const Configured *c, State *s, List *lists, double t",

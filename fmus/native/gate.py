@@ -3,7 +3,7 @@
 Both are taken through 2,000 steps at each of three step lengths, with inputs in their usual ranges, a
 hundredth and three times of them; with every value of parameters that have choices, with parameters moved;
 through reset, a second start, states saved, restored and serialized; through parameters out of range and
-inputs that are no numbers. Values, statuses and sentences must be the same. NaN is NaN, whatever its sign.
+inputs that are not finite. Values, statuses and sentences must be the same. NaN is NaN, whatever its sign.
 """
 
 from __future__ import annotations
@@ -54,19 +54,19 @@ class Native:
     def __init__(self, library: Path, guid: str) -> None:
         self.library = ctypes.CDLL(str(library))
         self.library.fmi2Instantiate.restype = c_void_p
-        self.said: list[str] = []
+        self.messages: list[str] = []
         self._callbacks = _Callbacks(_LOGGER(self._log))
         call = self.library.fmi2Instantiate
         made = call(b"gate", c_int(1), guid.encode(), None, byref(self._callbacks), c_int(0), c_int(0))
         if made is None:
-            raise Difference(f"the native unit does not start: {'; '.join(self.said)}")
+            raise Difference(f"the native unit does not start: {'; '.join(self.messages)}")
         self.instance = c_void_p(made)
 
     def _log(self, environment: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:
-        self.said.append(text.decode("utf-8", "replace").replace("%%", "%"))
+        self.messages.append(text.decode("utf-8", "replace").replace("%%", "%"))
 
     def _answer(self, status: int, values: bytes = b"") -> Answer:
-        messages, self.said = self.said, []
+        messages, self.messages = self.messages, []
         return status == 0, messages, values
 
     def reset(self) -> Answer:
@@ -121,8 +121,8 @@ class Twin:
     """The component itself."""
 
     def __init__(self, component: type[Any], resources: Path) -> None:
-        self.said: list[str] = []
-        messages = self.said
+        self.messages: list[str] = []
+        messages = self.messages
 
         def log(
             unit: Any, text: str, status: int = 0, category: str | None = None, debug: object = None
@@ -135,8 +135,8 @@ class Twin:
         self.unit = self._make()
 
     def _answer(self, succeeded: Any = True, values: Sequence[float] = ()) -> Answer:
-        messages = list(self.said)
-        self.said.clear()
+        messages = list(self.messages)
+        self.messages.clear()
         return succeeded is not False and not messages, messages, struct.pack(f"{len(values)}d", *values)
 
     def reset(self) -> Answer:
@@ -180,13 +180,13 @@ class _Beside:
             c: [i for i, v in enumerate(variables) if v.causality == c]
             for c in ("input", "output", "parameter")
         }
-        self.told = ""
+        self.label = ""
 
     def call(self, what: str, *args: Any) -> bool:
         """Call both and return whether they succeeded."""
         native, python = getattr(self.native, what)(*args), getattr(self.twin, what)(*args)
         if native[0] != python[0] or native[1] != python[1] or not _same(native[2], python[2]):
-            raise Difference(f"{self.told}{what}{_shown(args)}: {self._apart(native, python)}")
+            raise Difference(f"{self.label}{what}{_shown(args)}: {self._apart(native, python)}")
         return native[0]  # type: ignore[no-any-return]
 
     def _apart(self, native: Answer, python: Answer) -> str:
@@ -280,19 +280,19 @@ def compare(library: Path, guid: str, component: type[Any], resources: Path, ste
         return None
 
     for h in LENGTHS:
-        beside.told = f"steps of {h:g} s: "
+        beside.label = f"steps of {h:g} s: "
         if beside.start(unchanged, 0.0, first):
             t = beside.steps(steps, h, inputs, 0.0)
             _restored(beside, inputs, h, t)
     settings = list(_choices(beside, variables))
     few = max(FEWEST, min(FEW, IN_ALL // max(len(settings), 1)))
     for label, choose in settings:
-        beside.told = f"{label}: "
+        beside.label = f"{label}: "
         if beside.start(choose, 0.25, next(inputs)):
             beside.steps(few, random.Random(label).choice(LENGTHS), inputs, 0.25)
     for i in beside.of["input"]:
         for value in (math.nan, math.inf, -math.inf, 1e300, -0.0):
-            beside.told = f"{variables[i].name} = {value}: "
+            beside.label = f"{variables[i].name} = {value}: "
             if beside.start(unchanged, 0.0, first):
                 t = beside.steps(3, 0.001, inputs, 0.0)
                 beside.call("set", "Real", [i], [value])

@@ -115,7 +115,7 @@ class Looping(Execution):
                 continue
             value, _ = part
             if ir.type_of(value) != ir.INT:
-                raise Refused("the bytes of a number that is no integer")
+                raise Refused("the bytes of a number that is not an integer")
             count = self.new(ir.INT)
             self.out.append(ir.Digits(count, value))
 

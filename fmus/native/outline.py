@@ -105,7 +105,7 @@ class Outlining(Calling):
             return None
         form, results, value = path.value
         if any(map(_is_of_list, ir.every(path.out))):
-            return None  # lists of the state are no numbers
+            return None  # lists of the state are not numbers
         if (
             sum(1 for _ in ir.every(path.out)) < SHORTEST
             or len(results) > MOST_RESULTS

@@ -194,7 +194,7 @@ class _Specialising:
         after = self._numbers(state, me, machine)
         if widening.grew or any(x is not leaf for x, leaf in zip(after, leaves, strict=True)):
             raise Refused("output() changes what the unit keeps", self._line_of("output"))
-        outputs = self.given
+        outputs = self.returned
         if isinstance(outputs, Union) or not isinstance(outputs, (tuple, List)):
             raise Refused("output() returns what has several forms", self._line_of("output"))
         values = machine.items(outputs)
@@ -212,7 +212,7 @@ class _Specialising:
         machine = Outlining(self.sources, fixed, self.libraries[method == "configure"])
         machine.facts.domains |= self.domains
         machine.choosers |= set(self.domains)
-        self.given = machine.call(machine.attribute(me, method), list(args), {})
+        self.returned = machine.call(machine.attribute(me, method), list(args), {})
         return me, machine
 
     def _shape(self, me: Instance, fixed: set[ir.Var]) -> Shape:

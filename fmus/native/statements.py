@@ -1,6 +1,6 @@
 """Statements of a component: effects, control flow, loops of known and unknown length.
 
-How a function goes on stands in a place of its frame, `EXIT`: it is joined like any other value where two
+How a function continues is a value of its frame, `EXIT`, which is joined like any other where two
 paths join, so returns, breaks and continues on one path need nothing of their own.
 """
 
@@ -75,7 +75,7 @@ class Execution(Operating):
             self.dispatched("_do_", node)
         except (Promote, Refused, Unreachable):
             raise
-        except Exception as error:  # something that nobody has thought of yet
+        except Exception as error:  # unforeseen: the component stays in Python
             self.at(node)
             raise Refused(f"not translated: {type(error).__name__}: {error}", self.where()) from error
 

@@ -46,7 +46,7 @@ class _Any:
 
 
 ANY = _Any()
-"""A value that nobody looks at."""
+"""A value that is never used."""
 
 
 _numbers = itertools.count()

@@ -47,27 +47,27 @@ def check(scenario: ScenarioFile, options: RunOptions, all_: All = False) -> Non
     for diagnostic in notes:
         say(f"note: {diagnostic}")
     for unit in plan.instances:
-        for violation in unit.fmu.violations():
-            say(f"warning: {unit.name}: {violation}")
+        for violation in unit.fmu.violations:
+            say(f"{violation.severity}: {unit.name}: {violation}")
 
 
 def _hidden(plan: Plan) -> list[Diagnostic]:
     """Return warnings of FMUs of packages that others hide, which a run does not look for."""
-    from ..fmu.places import hidden
+    from ..fmu.search_path import hidden
 
-    found = [
+    warnings = [
         warning
         for unit in plan.instances
         for warning in hidden([unit.fmu.path.stem], unit.fmu.path.parent, packages=True)
     ]
-    return [warning for warning in dict.fromkeys(found) if warning not in plan.diagnostics]
+    return [warning for warning in dict.fromkeys(warnings) if warning not in plan.diagnostics]
 
 
 PLANNED = (
     "title", "algorithm", "step_size", "start_time", "stop_time", "evaluation_order", "units", "fmus",
     "connections", "faults", "changes", "scenario",
 )  # fmt: skip
-"""What run.json says of the plan, beside what came of it."""
+"""Keys of run.json that describe the plan; others describe the run."""
 
 
 def _data_of(plan: Plan) -> dict[str, object]:
@@ -75,8 +75,9 @@ def _data_of(plan: Plan) -> dict[str, object]:
     from datetime import datetime, timezone
 
     from ..results.freshness import run_record
+    from ..results.run_folder import RunStatus
 
-    record = run_record(plan, status="planned", started=datetime.now(timezone.utc)).content()
+    record = run_record(plan, status=RunStatus.PLANNED, started=datetime.now(timezone.utc)).content()
     return {key: record[key] for key in PLANNED if key in record}
 
 
@@ -293,10 +294,10 @@ def _wire_rows(plan: Plan) -> Iterable[tuple[str, str, str, str]]:
     for (source, target), wires in _grouped(((w.source, w.target), w) for w in plan.wires).items():
         shown = []
         examples = {name: w for w in reversed(wires) for name in (w.input, star(w.input))}
-        for given, name in fold_wires([(w.output, w.input) for w in wires]):
+        for end, name in fold_wires([(w.output, w.input) for w in wires]):
             example = examples[name]
             of, measure = units[source][example.output].unit, units[target][example.input].unit
-            ends = given if given == name else f"{given} → {name}"
+            ends = end if end == name else f"{end} → {name}"
             if example.converts:
                 measure = f"{of or '?'} → {measure or '?'}: {_scaled(example)}"
             shown.append(f"{ends} [{measure}]" if measure else ends)

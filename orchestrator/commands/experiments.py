@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..experiments.dry_run import Forecast, Pace
     from ..experiments.execution import Executor
     from ..experiments.experiment import LoadedExperiment
-    from ..experiments.outcome import Each, ExperimentResult
+    from ..experiments.experiment_result import Each, ExperimentResult
     from ..experiments.planning import PlannedExperiment
     from ..figures.style import LabelledRun
     from ..pages.viewer import View
@@ -48,8 +48,8 @@ def conduct(
 def concluded(experiment: LoadedExperiment, execute: Executor, options: RunOptions) -> ExperimentResult:
     """Return the result of an experiment, drawn and written; see `conduct`."""
     from ..errors import YawbenchError
+    from ..experiments.experiment_result import judge_results, kept_cases
     from ..experiments.figures import draw_all
-    from ..experiments.outcome import judge_results, kept_cases
     from ..experiments.record import write_findings
     from ..messages import changed
 

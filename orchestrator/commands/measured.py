@@ -1,4 +1,4 @@
-"""`yawbench measured`, `fit` and `validate`: flaws of recordings; runs fitted to and compared with them."""
+"""`yawbench measured`, `fit` and `validate`: examine recordings, fit runs to them, compare runs with them."""
 
 from __future__ import annotations
 
@@ -34,41 +34,47 @@ FigureFile = Annotated[
     Path | None, typer.Option("--out", metavar="FILE.svg", help="Figure of all signals to write.")
 ]
 SETS = "sets"
-"""Subfolder of what sets of values gave, until the fit has ended."""
+"""Subfolder with the simulated signals of each set of values, until the fit has ended."""
 
 
 def measured(action: MeasuredAction, file: MeasurementFile, out: FigureFile = None) -> None:
-    """Examine a recording: signals, flaws, what a fit can find.
+    """Examine a recording: signals, flaws, which parameters a fit can identify.
 
-    Names spikes, uneven, repeated and restarting time, and what contradicts the motion of a rigid car: signs,
-    factors of mistaken units, lag, place and zero points of sensors, a speed other than that of the position.
-    The table of effects tells which parameters of a car the recording shows. Exit status 1 if there is any
-    flaw.
+    Flaws are spikes, times that are uneven, repeated or restart, and signals that contradict the motion of a
+    rigid car: wrong signs, mistaken units, lag, position and zero points of sensors, a speed that does not
+    match the recorded position. The table of effects shows which parameters of a car the recording
+    determines. Exit status 1 if there is any flaw.
     """
     from ..experiments.tables import Cell, Table
-    from ..measured.flaws import flaws_of
+    from ..measured.flaws import FlawKind, flaws_of
     from ..measured.measurement import load_measurement
 
     flaws = flaws_of(file)
-    if not any(flaw.kind == "refused" for flaw in flaws):
+    if not any(flaw.kind is FlawKind.REFUSED for flaw in flaws):
         measurement = load_measurement(file)
         say(f"{measurement.title}; {measurement.origin or 'source and licence not stated'}")
         rows: list[Sequence[Cell]] = [
-            (one.name, f"{one.time[0]:.6g}", f"{one.time[-1]:.6g}", f"{one.rate:.4g}", ", ".join(one.signals))
-            for one in measurement.segments
+            (
+                segment.name,
+                f"{segment.time[0]:.6g}",
+                f"{segment.time[-1]:.6g}",
+                f"{segment.rate:.4g}",
+                ", ".join(segment.signals),
+            )
+            for segment in measurement.segments
         ]
         tables = [Table("Segments", ["segment", "from [s]", "to [s]", "rate [Hz]", "signals"], rows)]
         if not flaws:
             try:
                 tables.append(effects_table(measurement))
             except ValueError as error:
-                say(f"note: what a fit can identify is not known: {error}")
+                say(f"note: cannot tell which parameters a fit can identify: {error}")
         print_tables(tables)
         if out is not None:
             draw_measurement(file, measurement, out)
     output.answer(
         flaws=[
-            {"kind": flaw.kind, "signal": flaw.signal, "value": flaw.value, "text": flaw.text}
+            {"kind": flaw.kind.value, "signal": flaw.signal, "value": flaw.value, "text": flaw.text}
             for flaw in flaws
         ]
     )
@@ -76,11 +82,11 @@ def measured(action: MeasuredAction, file: MeasurementFile, out: FigureFile = No
         say(f"{flaw.signal}: {flaw.text}" if flaw.signal else flaw.text)
     if flaws:
         raise typer.Exit(1)
-    say("no flaw found")
+    say("no flaws")
 
 
 def effects_table(measurement: Measurement) -> Table:
-    """Return the table of what a fit to a measurement can identify.
+    """Return the table of parameters that a fit to a measurement can identify.
 
     Raises:
         ValueError: steering, speed, mass or axles are not known.
@@ -113,7 +119,7 @@ def draw_measurement(file: Path, measurement: Measurement, out: Path) -> None:
     from ..errors import ScenarioError
     from ..figures.plots import draw
     from ..figures.style import KINDS, LabelledRun, save
-    from ..results.measured import filtered_alike, measured_results, segments_of
+    from ..results.measurement_results import filtered_alike, measured_results, segments_of
 
     if out.suffix[1:] not in KINDS:
         raise ScenarioError(
@@ -134,11 +140,11 @@ def draw_measurement(file: Path, measurement: Measurement, out: Path) -> None:
 def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
     """Fit parameters of a scenario to a measured car.
 
-    Prints the parameters with their intervals, and the differences on training and held-out windows beside
+    Prints the parameters with their intervals, and the differences on training and held-out windows next to
     those of a single track with Fiala tyres, fitted to the same windows. Writes fit.json, vehicle.yaml (the
-    vehicle file with the fitted values) and fit.html (all of it, with the histories). Parameters that cannot
+    vehicle file with the fitted values) and fit.html (the same with time histories). Parameters that cannot
     be identified are refused. Without --out, results go to results/<folder of the fit file>/<its name>. An
-    interrupted fit goes on where it was.
+    interrupted fit resumes where it stopped.
     """
     import json
 
@@ -193,19 +199,21 @@ def vehicle_text(result: FitResult, folder: Path, planner: Planner) -> str:
     if tyres:
         lines.append(f"tyres: {json.dumps(tyres)}")
     fitted = {
-        Target.parse(one.name).variable: one
-        for one in model.parameters
-        if not one.name.startswith(f"{MEASURED}.")
-        and Target.parse(one.name).kind in ("vehicle_parameter", "parameter")
+        Target.parse(parameter.name).variable: parameter
+        for parameter in model.parameters
+        if not parameter.name.startswith(f"{MEASURED}.")
+        and Target.parse(parameter.name).kind in ("vehicle_parameter", "parameter")
     }
     lines.append("parameters:")
     for name, value in scenario.vehicle_file.parameters.items():
         if name not in fitted:
             lines.append(f"  {name}: {json.dumps(value)}")
-    for name, one in fitted.items():
-        interval = intervals[one.name]
+    for name, parameter in fitted.items():
+        interval = intervals[parameter.name]
         bounds = f"95 % {interval[0]:.4g} to {interval[1]:.4g}" if interval else "no interval"
-        lines.append(f"  {name}: {model.estimate.values[one.name]:.6g}  # {one.unit}; fitted, {bounds}")
+        lines.append(
+            f"  {name}: {model.estimate.values[parameter.name]:.6g}  # {parameter.unit}; fitted, {bounds}"
+        )
     return "\n".join(lines) + "\n"
 
 
@@ -215,10 +223,10 @@ def validate(
 ) -> None:
     """Compare steady-state runs with measurements, by bands.
 
-    Prints a verdict per signal: the largest distance of a measured point from the cross plot, over the
-    tolerance. Draws the cross plots and writes validation.json. The measurement's low pass acts on the run,
-    too. Without --out, both go to the folder of the run. Exit status 1 if a signal lies outside its band, or
-    none could be judged.
+    Prints a verdict per signal: the largest distance of a measured point from the cross plot, relative to the
+    tolerance. Draws the cross plots and writes validation.json. The measurement's low pass is applied to the
+    run, too. Without --out, both go to the folder of the run. Exit status 1 if a signal lies outside its
+    band, or none could be judged.
     """
     import json
 
@@ -226,24 +234,24 @@ def validate(
     from ..figures.style import save
     from ..files import write_whole
     from ..measured.measurement import load_measurement
-    from ..results.measured import load_run
+    from ..results.measurement_results import load_run
     from .results import recorded
 
     tolerances = load_bands(bands)
     measurement = load_measurement(measured)
     (folder,) = recorded([scenario], options)
     validation = compare_run(load_run(folder), measurement, tolerances)
-    place = options.out or folder
-    drawing = save(validation.plot(), place / "validation")
+    out = options.out or folder
+    drawing = save(validation.plot(), out / "validation")
     write_whole(
-        place / "validation.json", json.dumps(validation.as_data(), indent=1, ensure_ascii=False) + "\n"
+        out / "validation.json", json.dumps(validation.as_data(), indent=1, ensure_ascii=False) + "\n"
     )
-    output.answer(folder=place, validation=validation.as_data())
+    output.answer(folder=out, validation=validation.as_data())
     output.note((*measurement.notes, *validation.diagnostics))
     print_tables([validation_table(validation)])
     for diagnostic in (*measurement.notes, *validation.diagnostics):
         say(f"{'note' if diagnostic.severity == 'info' else 'warning'}: {diagnostic}")
-    say(", ".join([str(place / "validation.json"), *(path.name for path in drawing)]))
+    say(", ".join([str(out / "validation.json"), *(path.name for path in drawing)]))
     if not validation.holds:
         raise typer.Exit(1)
 

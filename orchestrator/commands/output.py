@@ -1,8 +1,8 @@
 """Standard output of commands: tables for people, tables in LaTeX, or one JSON object.
 
-The option `--json` or `--latex` decides; with them nothing else reaches standard output, whoever prints it,
-FMUs included: it goes to standard error. Commands print their tables with `progress.print_tables` and hand
-what programs want to know to `answer` and `note`, whatever the form.
+The option `--json` or `--latex` decides; with them, any other output, also of libraries and FMUs, goes to
+standard error. Commands print their tables with `progress.print_tables` and pass data for programs to
+`answer` and `note`, whatever the form.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Output:
     diagnostics: dict[Diagnostic, None] = field(default_factory=dict)
 
     def print(self, status: int) -> None:
-        """Print what was collected; `status`: the exit status."""
+        """Print the collected output; `status`: the exit status."""
         if self.form != "text":
             print(self._text(status), end="", flush=True)
 
@@ -117,7 +117,7 @@ def _stdout_to_stderr() -> Iterator[None]:
         place, target = sys.stdout.fileno(), sys.stderr.fileno()
         sys.stdout.flush()
         kept = os.dup(place)
-    except (OSError, ValueError):  # one of them is no file
+    except (OSError, ValueError):  # a stream without a file
         with contextlib.redirect_stdout(sys.stderr):
             yield
         return

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..experiments.execution import Executor
+    from ..experiments.experiment_result import Each
     from ..experiments.jobs import Job, Outcome
-    from ..experiments.outcome import Each
     from ..experiments.planning import PlannedExperiment
     from ..experiments.tables import Table
     from .options import RunOptions

@@ -15,7 +15,7 @@ from .progress import executor_of, hold, pooled, print_tables, say, stoppable
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from ..experiments.outcome import Each
+    from ..experiments.experiment_result import Each
     from ..experiments.ranking import EntrySpec
     from ..experiments.ranking_scores import RankingResult
 

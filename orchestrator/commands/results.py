@@ -45,7 +45,7 @@ def recorded(sources: Sequence[Path], options: RunOptions) -> list[Path]:
     from ..fmu.opener import stale_fmus
     from ..planner import Planner
     from ..results.freshness import staleness
-    from ..results.measured import is_measurement, segments_of
+    from ..results.measurement_results import is_measurement, segments_of
     from ..results.run_folder import default_folder
     from ..scenario import find_and_load
     from ..scenario.find_and_load import MEASUREMENT
@@ -109,7 +109,7 @@ def labels_of(folders: Sequence[Path], labels: Sequence[str] | None) -> list[str
 
 def folder_of_all(folders: Sequence[Path]) -> Path:
     """Return the folder for figures of all runs: that of a single run, else their common parent."""
-    from ..results.measured import is_measurement
+    from ..results.measurement_results import is_measurement
     from ..results.run_folder import below_results
 
     if not (own := [folder for folder in folders if not is_measurement(folder)]):
@@ -156,7 +156,7 @@ def with_segments(folders: Sequence[Path], measured: Sequence[Path] | None) -> l
     Raises:
         ResultsError: a file does not exist.
     """
-    from ..results.measured import segments_of
+    from ..results.measurement_results import segments_of
 
     return [*folders, *(segment for file in measured or () for segment in segments_of(file))]
 
@@ -171,7 +171,7 @@ def read_runs(places: Sequence[Path], start: float, *, thin: bool = False) -> li
     Raises:
         ResultsError, ScenarioError: one of them cannot be read.
     """
-    from ..results.measured import filtered_alike, is_measurement, load_run
+    from ..results.measurement_results import filtered_alike, is_measurement, load_run
 
     thin = thin and not any(map(is_measurement, places))
     return filtered_alike([load_run(place, thin=thin, start=start) for place in places])
@@ -223,7 +223,7 @@ def _settings(style: str | None, size: str | None) -> Any:
     settings = dict(STYLES[style]) if style else {}
     if size is not None:
         match = _SIZE.fullmatch(size)
-        sides = [float(one) / _INCH[match[3]] for one in match.groups()[:2]] if match else []
+        sides = [float(length) / _INCH[match[3]] for length in match.groups()[:2]] if match else []
         if not match or not all(0.5 <= side <= LARGEST_SIZE for side in sides):
             raise ScenarioError(
                 f"--size {size}: write width x height, such as 88x60mm, of 0.5 to {LARGEST_SIZE:g} inches",
@@ -398,15 +398,15 @@ def serve(
 ) -> None:
     """Show results in the browser; run scenarios by sliders.
 
-    The address that is printed works on this machine only, until Ctrl-C. It has a random token; whoever has
-    it can read the files below the folder and make runs.
+    The printed address works on this machine only, until Ctrl-C. It has a random token; anyone who has it can
+    read the files below the folder and make runs.
     """
     import webbrowser
     from contextlib import closing
 
     from ..errors import ResultsError
-    from ..pages.bench import Bench
     from ..pages.server import ResultsServer
+    from ..pages.sliders import Bench
     from .progress import say
 
     with closing(Bench(build=options.build)) as bench:
@@ -434,7 +434,7 @@ def salvage(folders: Folders) -> None:
     instead. Incomplete Parquet and MDF files cannot be recovered.
     """
     from ..messages import counted
-    from ..results.reader import lost_format, salvage
+    from ..results.salvage import lost_format, salvage
     from .progress import say
 
     for folder in folders:

@@ -216,7 +216,7 @@ def compare(
 def labelled_recordings(measured: Sequence[Path] | None, begin: str) -> list[LabelledRun]:
     """Return the segments of measurement files, as runs that begin at a time of theirs."""
     from ..figures.style import LabelledRun
-    from ..results.measured import load_run
+    from ..results.measurement_results import load_run
 
     places, start = with_segments((), measured), start_of(begin)
     labels = distinct(places) if places else []
@@ -312,12 +312,14 @@ def converge(
         raise typer.Exit(1)
 
 
-One = Annotated[Path, typer.Argument(help="Results folder, or measurement file.", metavar="RUN")]
-Other = Annotated[Path, typer.Argument(help="What to compare it with, likewise.", metavar="RUN")]
+FirstRun = Annotated[Path, typer.Argument(help="Results folder, or measurement file.", metavar="RUN")]
+SecondRun = Annotated[
+    Path, typer.Argument(help="Results folder or measurement file to compare with.", metavar="RUN")
+]
 
 
-def diff(one: One, other: Other, begin: MeasuredFrom = "0 s") -> None:
-    """Show what differs between two runs.
+def diff(first_run: FirstRun, second_run: SecondRun, begin: MeasuredFrom = "0 s") -> None:
+    """Show the differences between two runs.
 
     First the inputs: scenario, parameters, FMUs, connections, program versions. Then the results, signal
     by signal: when they start to differ, when the difference becomes visible (1 % of the signal's
@@ -326,11 +328,11 @@ def diff(one: One, other: Other, begin: MeasuredFrom = "0 s") -> None:
     from ..pages.comparison import differences, differences_table, divergence, partings_table
     from .results import distinct, read_runs, start_of
 
-    first, second = read_runs([one, other], start_of(begin))
+    first, second = read_runs([first_run, second_run], start_of(begin))
     inputs, parted = differences(first.record, second.record), divergence(first, second)
     output.answer(
         identical=not (inputs or parted.partings or parted.notes),
-        inputs=[{"name": name, "first": one, "second": other} for name, one, other in inputs],
+        inputs=[{"name": name, "first": ours, "second": theirs} for name, ours, theirs in inputs],
         signals=[
             {
                 "signal": parting.signal,
@@ -344,7 +346,7 @@ def diff(one: One, other: Other, begin: MeasuredFrom = "0 s") -> None:
         ],
     )
     if inputs:
-        print_tables([differences_table(inputs, *distinct([one, other]))])
+        print_tables([differences_table(inputs, *distinct([first_run, second_run]))])
     if parted.partings or parted.notes:
         print_tables([partings_table(parted, first, second)])
     if not (inputs or parted.partings or parted.notes):

@@ -12,8 +12,8 @@ from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema
 
 MODELS = {
-    "scenario": "scenario.scenario_schema:ScenarioSpec",
-    "vehicle": "scenario.scenario_schema:Vehicle",
+    "scenario": "scenario.schema:ScenarioSpec",
+    "vehicle": "scenario.schema:Vehicle",
     "experiment": "experiments.schema:ExperimentSpec",
     "ranking": "experiments.ranking:RankingSpec",
     "entries": "experiments.ranking:EntriesSpec",

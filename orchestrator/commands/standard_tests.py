@@ -217,7 +217,7 @@ def evaluate(
     if nothing could be judged.
     """
     from ..evaluation.trace import trace_of
-    from ..results.measured import load_run
+    from ..results.measurement_results import load_run
     from ..results.run_folder import below_results
     from .progress import say
     from .results import distinct, folder_of_all
@@ -319,16 +319,16 @@ def _refuse_mapping(mapping: Path, sources: Sequence[Path], test: str) -> None:
 def _runs(source: Path) -> list[Path]:
     """Return the folders of the runs in and below a folder, or the segments of a measurement file."""
     from ..errors import ResultsError
-    from ..results.measured import segments_of
-    from ..results.reader import UNREADABLE, found_runs
-    from ..results.run_folder import COMPLETED
+    from ..results.measurement_results import segments_of
+    from ..results.reader import found_runs
+    from ..results.run_folder import RunStatus
     from .progress import say
 
     if not source.is_dir():
         return segments_of(source)
     runs = found_runs(source)
-    completed = [run.folder for run in runs if run.status == COMPLETED]
-    unreadable = [run.problem for run in runs if run.status == UNREADABLE]
+    completed = [run.folder for run in runs if run.status is RunStatus.COMPLETED]
+    unreadable = [run.problem for run in runs if run.status is RunStatus.UNREADABLE]
     if not completed:
         raise ResultsError(unreadable or f"{source}: contains no completed run", code="runs-missing")
     for problem in unreadable:
@@ -362,7 +362,7 @@ def _angle(text: str | None, slow_steer: list[Path] | None, test: StandardTest) 
     from ..evaluation.steering_tests import characteristic_angle, evaluate_slow_steer
     from ..evaluation.trace import trace_of
     from ..messages import counted
-    from ..results.measured import load_run
+    from ..results.measurement_results import load_run
     from .progress import say
 
     if text and slow_steer:

@@ -63,7 +63,7 @@ def vehicle(
     from ..planner import Planner
     from ..results.run_folder import below_results
     from ..scenario import find_and_load, yaml_lines
-    from ..scenario.scenario_schema import Vehicle
+    from ..scenario.schema import Vehicle
     from ..scenario.validation import validate
     from ..vehicles.handling import TestTrack, draw_cars, fitting_plant, handling_of
     from ..wiring.warnings import suspicious_vehicle
@@ -94,7 +94,7 @@ def _tables(cars: list[Handling]) -> list[Table]:
 
     from vocabulary.roles import without_role
 
-    from ..evaluation.steering_tests import LEVELS, G
+    from ..evaluation.steering_tests import ACCELERATIONS, G
     from ..experiments.tables import Table
     from ..vehicles.handling import SPEEDS
 
@@ -115,7 +115,7 @@ def _tables(cars: list[Handling]) -> list[Table]:
     ):
         whole.rows.append([label, *values])
     turn = Table("Understeer gradient at 80 km/h", ["lateral acceleration", *names], numbers=numbers)
-    for a_y in (0.0, *LEVELS):
+    for a_y in (0.0, *ACCELERATIONS):
         label = f"{a_y:g} m/s²" if a_y else "linear range"
         turn.rows.append([label, *(_with_unit(car.steering.get(a_y), per_g, "°/g") for car in cars)])
     over_speed: list[tuple[str, Callable[[Handling, float], Cell]]] = [

@@ -59,9 +59,9 @@ def evaluate_lane_change(judged: Evaluation, trace: Trace) -> None:
     worst = int(np.argmax(over))
     judged.add("overrun", "largest distance beyond the cones", float(over[worst]), "m")
     if over[worst] > TOUCH:
-        place = x[worst] - (start if isinstance(start, (int, float)) else 0.0)
+        distance = x[worst] - (start if isinstance(start, (int, float)) else 0.0)
         far = apart(float(over[worst]), 0.0, decimals=3)
-        why = f"{far} m beyond the cones, {place:.1f} m after the first cones"
+        why = f"{far} m beyond the cones, {distance:.1f} m after the first cones"
         judged.rule(CLEAN, compare(float(over[worst]), "at_most", 0.0, "m", why=why))
     elif instant is None:
         judged.rule(CLEAN, not_judged("the car has not reached the first cones"))
@@ -169,9 +169,11 @@ def _from_above(axes: Axes, trace: Trace, track: list[Lane], start: float) -> No
     axes.plot(x, y, **line_style(0))
     axes.set_title("From above [m]; the scale across is larger")
     for lane in track:
-        places = np.linspace(lane.start, lane.end, 2 + round((lane.end - lane.start) / 4.0)) - start
+        distances = np.linspace(lane.start, lane.end, 2 + round((lane.end - lane.start) / 4.0)) - start
         for border in (lane.right, lane.left):
-            axes.plot(places, np.full_like(places, border), "^", color=CHANGED, markersize=3.5, zorder=4)
+            axes.plot(
+                distances, np.full_like(distances, border), "^", color=CHANGED, markersize=3.5, zorder=4
+            )
     known = [trace.facts.get(name) for name in ("cg_to_front_end", "cg_to_rear_end", "vehicle_width")]
     if "yaw_angle" not in trace or not all(isinstance(value, (int, float)) for value in known):
         return

@@ -66,8 +66,8 @@ def _verdicts(judged: Evaluation) -> str:
     return ", ".join(f"{name} {verdict.status.value}" for name, verdict in judged.criteria.items())
 
 
-def _label(axes: Axes, x: float, y: float, text: str, place: tuple[float, float], **more: Any) -> None:
-    axes.annotate(text, (x, y), place, textcoords="offset points", fontsize=8, annotation_clip=True, **more)
+def _label(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float], **more: Any) -> None:
+    axes.annotate(text, (x, y), offset, textcoords="offset points", fontsize=8, annotation_clip=True, **more)
 
 
 def _hand_wheel(axes: Axes, course: DwellCourse) -> None:

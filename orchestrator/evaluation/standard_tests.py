@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 P = ParamSpec("P")
 Mark = tuple[float, str]
-"""An instant [s] and what it is."""
+"""An instant [s] and its description."""
 Limit = tuple[str, float, str]
-"""A signal, a level in SI units, and what it is."""
+"""A signal, a bound in SI units, and its description."""
 
 
 @dataclass(frozen=True)
@@ -237,8 +237,8 @@ class StandardTest:
         return figure
 
 
-def _named(place: str) -> Any:
-    return resolve_name(f"{__package__}.{place}")
+def _named(path: str) -> Any:
+    return resolve_name(f"{__package__}.{path}")
 
 
 TestName = Literal[

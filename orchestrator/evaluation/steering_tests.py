@@ -63,7 +63,7 @@ from .trace import SLOWEST, Trace, at, first_crossing, opposed, prepared, refuse
 
 FIT_RANGE = (0.5, 2.0)
 """Range of lateral acceleration of the cubic fit [m/s2]."""
-LEVELS, HALF = (3.0, 4.0, 5.0, 6.0), 0.5
+ACCELERATIONS, HALF = (3.0, 4.0, 5.0, 6.0), 0.5
 """Lateral accelerations of the local gradients, and half the width of their windows [m/s2]."""
 FEWEST = 20
 """Least number of samples in a window."""
@@ -99,8 +99,14 @@ def evaluate_understeer(judged: Evaluation, trace: Trace) -> None:
         speed = math.sqrt((front + rear) / gradient)
         judged.add("characteristic_speed", "characteristic speed", speed, "m/s", "sqrt(L / K_us)")
     reading = f"straight line over {2 * HALF:g} m/s2"
-    for level, local in slopes.items():
-        judged.add(f"gradient_{level:g}", f"understeer gradient at {level:g} m/s2", local, UNIT, reading)
+    for acceleration, local in slopes.items():
+        judged.add(
+            f"gradient_{acceleration:g}",
+            f"understeer gradient at {acceleration:g} m/s2",
+            local,
+            UNIT,
+            reading,
+        )
     judged.add("largest", "largest lateral acceleration", float(a_y.max()), "m/s2")
 
 
@@ -121,13 +127,15 @@ def gradients(a_y: np.ndarray, extra: np.ndarray) -> dict[float, float | None]:
         terms = np.column_stack([a_y[inside] ** power for power in powers])
         return float(np.linalg.lstsq(terms, extra[inside], rcond=None)[0][0])
 
-    local = {level: slope(level - HALF, level + HALF, 1, 0) for level in LEVELS}
+    local = {
+        acceleration: slope(acceleration - HALF, acceleration + HALF, 1, 0) for acceleration in ACCELERATIONS
+    }
     return {0.0: slope(*FIT_RANGE, 1, 0, 3), **local}
 
 
 G = 9.80665
 """Standard gravity [m/s2]."""
-SLOW_STEER_LEVEL, SLOW_STEER_WINDOW = 0.3 * G, (0.1 * G, 0.375 * G)
+SLOW_STEER_ACCELERATION, SLOW_STEER_WINDOW = 0.3 * G, (0.1 * G, 0.375 * G)
 """Lateral acceleration of A, and the window of the regression [m/s2]."""
 
 
@@ -153,7 +161,7 @@ def evaluate_slow_steer(judged: Evaluation, trace: Trace) -> None:
             f"{end - begin} samples between {SLOW_STEER_WINDOW[0] / G:g} and {SLOW_STEER_WINDOW[1] / G:g} g"
         )
     slope, intercept = np.polyfit(a_y[begin:end], delta[begin:end], 1)
-    magnitude = math.radians(round(math.degrees(intercept + slope * SLOW_STEER_LEVEL), 1))
+    magnitude = math.radians(round(math.degrees(intercept + slope * SLOW_STEER_ACCELERATION), 1))
     reading = "straight line through 0.1 to 0.375 g, rounded to 0.1 degrees"
     judged.add("angle", "hand-wheel angle at 0.3 g", side * magnitude, "rad", reading)
     judged.add("slope", "hand-wheel angle per lateral acceleration", slope, "rad.s2/m", "of that line")
@@ -180,7 +188,7 @@ def characteristic_angle(judged: Sequence[Evaluation]) -> float:
 
 STEADY = 1.0
 """Time at the end of the record over which steady values are averaged [s]."""
-STEP_LEVEL = 0.9
+STEP_SHARE = 0.9
 """Fraction of the steady value at which the response time ends."""
 SETTLED = 0.02
 """Largest range of a steady signal, relative to its mean; chosen."""
@@ -221,7 +229,7 @@ def evaluate_step(judged: Evaluation, trace: Trace) -> None:
                 "response-not-steady",
                 f"the {name} is not steady at the end: {100 * np.ptp(x[end]) / abs(steady):.1f} %",
             )
-        answered = first_crossing(t, x, STEP_LEVEL * steady, float(t[0])) if steady > 0 else None
+        answered = first_crossing(t, x, STEP_SHARE * steady, float(t[0])) if steady > 0 else None
         judged.add(f"{key}_response", f"response time of the {name}", _since(answered, zero), "s", "to 90 %")
         largest = int(np.argmax(x))
         judged.add(f"{key}_peak", f"peak time of the {name}", float(t[largest]) - zero, "s")

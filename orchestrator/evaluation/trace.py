@@ -69,18 +69,18 @@ def running_mean(x: np.ndarray, width: float, rate: float) -> np.ndarray:
     return np.asarray((total[last] - total[first]) / (last - first))
 
 
-def first_crossing(time: np.ndarray, x: np.ndarray, level: float, after: float) -> float | None:
-    """Return the first instant [s] from `after` on at which x has risen to `level`; None if it never does.
+def first_crossing(time: np.ndarray, x: np.ndarray, threshold: float, after: float) -> float | None:
+    """Return the first instant [s] from `after` on at which x has risen to `threshold`, None if never.
 
     x is interpolated linearly between samples.
     """
-    reached = np.flatnonzero((x >= level) & (time >= after))
+    reached = np.flatnonzero((x >= threshold) & (time >= after))
     if not reached.size:
         return None
     k = int(reached[0])
-    if k == 0 or x[k - 1] >= level:
+    if k == 0 or x[k - 1] >= threshold:
         return max(float(time[k - 1]) if k else float(time[0]), after)
-    share = (level - x[k - 1]) / (x[k] - x[k - 1])
+    share = (threshold - x[k - 1]) / (x[k] - x[k - 1])
     return max(float(time[k - 1] + share * (time[k] - time[k - 1])), after)
 
 

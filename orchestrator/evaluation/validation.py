@@ -135,7 +135,7 @@ def load_bands(name: str | Path) -> Bands:
     spec = validate(BandsSpec, document)
     if spec is None or document.errors:
         raise ScenarioError(document.sorted_errors())
-    tolerances = {name: _tolerance(document, name, given) for name, given in spec.bands.items()}
+    tolerances = {name: _tolerance(document, name, tolerance) for name, tolerance in spec.bands.items()}
     if spec.over not in tolerances:
         document.report(("over",), f"{spec.over} has no tolerance; add it to 'bands'", "key-missing")
     if document.errors:
@@ -144,7 +144,7 @@ def load_bands(name: str | Path) -> Bands:
 
 
 def _tolerance(document: Document, signal: str, spec: ToleranceSpec) -> Tolerance:
-    """Return a tolerance in SI; report what is wrong with it."""
+    """Return a tolerance in SI; report its errors."""
 
     def si(key: str, value: float | str, unit: str) -> float:
         try:
@@ -304,7 +304,7 @@ def _verdict(over: str, tests: Sequence[ComparedTest]) -> Verdict:
 
 
 def _conditions(bands: Bands, over: np.ndarray, tests: Sequence[np.ndarray]) -> Iterator[str]:
-    """Yield what the comparison lacks."""
+    """Yield warnings about what the comparison lacks."""
     if len(tests) < LEAST_TESTS:
         yield f"{counted(len(tests), 'test')} of the car; ISO 19364, as cited, asks for {LEAST_TESTS} or more"
     wanted = float(np.abs(over).max())

@@ -23,10 +23,10 @@ from ..plan import Override, Value
 from ..scenario import overrides, yaml_lines
 from ..scenario.fault_schema import FaultSpec, by_location
 from ..scenario.quantities import parse_unit
-from ..scenario.scenario_schema import AlgorithmName, Scalar
+from ..scenario.schema import AlgorithmName, Scalar
 from ..scenario.validation import StrictModel, Time, exactly_one
-from .judged_schema import LEVELS as VALUES
-from .judged_schema import Number, Patterns, is_finite, text_of
+from .claim_schema import LEVELS as VALUES
+from .claim_schema import Number, Patterns, is_finite, text_of
 
 if TYPE_CHECKING:
     from .schema import ExperimentSpec
@@ -93,7 +93,7 @@ class OverrideSpec(StrictModel):
     swap: dict[str, str] = Field({}, description="Unit -> FMU, a name or a path")
     set: dict[TargetText, Scalar] = Field({}, description="unit.parameter -> value")
     vehicle: str | None = Field(None, description="Vehicle file, relative to this file")
-    faults: list[FaultSpec] = Field([], description="In place of the scenario's at these places")
+    faults: list[FaultSpec] = Field([], description="In place of the scenario's at these locations")
     stop_time: Time | None = Field(None, description="In place of the scenario's")
     step_size: Time | None = Field(None, description="In place of the scenario's")
     algorithm: AlgorithmName | None = Field(None, description="In place of the scenario's")
@@ -267,7 +267,7 @@ class RegionSpec(StrictModel):
         16,
         ge=10,
         le=10_000,
-        description="Of a Latin hypercube over all open values; so many are added at once",
+        description="Of a Latin hypercube over all open values; the number that is added at once",
     )
     most: int = Field(128, ge=10, le=10_000, description="Points after which a claim stays undecided")
     seed: int = Field(1, ge=0, description="Of the Latin hypercube")
@@ -357,14 +357,15 @@ def latin_hypercube(axes: Sequence[AxisSpec], runs: int, seed: int) -> list[Desi
 
 
 def extended_hypercube(axes: Sequence[AxisSpec], runs: int, most: int, seed: int) -> list[DesignPoint]:
-    """Return a Latin hypercube of `runs` points followed by more, see `places_of_hypercube`."""
-    places = places_of_hypercube(len(axes), runs, most, seed)
+    """Return a Latin hypercube of `runs` points followed by more, see `hypercube`."""
+    positions = hypercube(len(axes), runs, most, seed)
     return [
-        tuple(level_at(axis, float(place)) for axis, place in zip(axes, row, strict=True)) for row in places
+        tuple(level_at(axis, float(position)) for axis, position in zip(axes, row, strict=True))
+        for row in positions
     ]
 
 
-def places_of_hypercube(axes: int, runs: int, most: int, seed: int) -> np.ndarray:
+def hypercube(axes: int, runs: int, most: int, seed: int) -> np.ndarray:
     """Return relative positions, 0 to 1, of a Latin hypercube that is extended: an array of (most, axes).
 
     The first `runs` rows are a Latin hypercube, and so are the first 2, 4, 8 ... times as many: when each
@@ -374,26 +375,26 @@ def places_of_hypercube(axes: int, runs: int, most: int, seed: int) -> np.ndarra
     """
     generator = np.random.Generator(np.random.PCG64(seed))
     draws = [(generator.permutation(runs) + generator.random(runs)) / runs for _ in range(axes)]
-    places = np.stack(draws, axis=1)
-    while len(places) < most:
-        parts = 2 * len(places)
-        free = [np.setdiff1d(np.arange(parts), (column * parts).astype(int)) for column in places.T]
+    positions = np.stack(draws, axis=1)
+    while len(positions) < most:
+        parts = 2 * len(positions)
+        free = [np.setdiff1d(np.arange(parts), (column * parts).astype(int)) for column in positions.T]
         more = [(generator.permutation(halves) + generator.random(len(halves))) / parts for halves in free]
-        places = np.concatenate([places, np.stack(more, axis=1)])
-    return places[:most]
+        positions = np.concatenate([positions, np.stack(more, axis=1)])
+    return positions[:most]
 
 
-def level_at(axis: AxisSpec, place: float) -> Level:
+def level_at(axis: AxisSpec, position: float) -> Level:
     """Return the level at a relative position, 0 to 1, along an axis."""
     if axis.variants or axis.values is not None or axis.count is not None:
         levels = levels_of(axis)
-        return levels[min(int(place * len(levels)), len(levels) - 1)]
+        return levels[min(int(position * len(levels)), len(levels) - 1)]
     assert axis.start is not None
     assert axis.end is not None
     if axis.spacing == "log":
-        size = math.exp((1 - place) * math.log(abs(axis.start)) + place * math.log(abs(axis.end)))
+        size = math.exp((1 - position) * math.log(abs(axis.start)) + position * math.log(abs(axis.end)))
         return _level(math.copysign(size, axis.start))
-    return _level((1 - place) * axis.start + place * axis.end)
+    return _level((1 - position) * axis.start + position * axis.end)
 
 
 def changes_at(axis: AxisSpec, level: Level, folder: Path, origin: str = "sweep") -> list[Override]:

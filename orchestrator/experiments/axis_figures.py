@@ -22,10 +22,10 @@ from ..metrics.measures import variable_of, words
 from ..metrics.run_metrics import MetricValue, metric
 from ..names import Target
 from .axes import RUN, Level, names_of
+from .claim_schema import si_number, text_of
 from .experiment import Case
+from .experiment_result import ExperimentResult, limits_of
 from .grids import cells
-from .judged_schema import si_number, text_of
-from .outcome import ExperimentResult, limits_of
 from .schema import FigureSpec
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ class Drawing:
         raise NotImplementedError
 
     def finish(self, figure: Figure, drawn: Sequence[Axes]) -> None:
-        """Set what all panels share."""
+        """Set the ranges that all panels share."""
 
     def panels(self) -> list[tuple[str, list[Case]]]:
         """Return the heading and the runs of each panel."""
@@ -111,7 +111,7 @@ class Drawing:
         """Return the levels of an axis that occur among the runs, in order."""
         return list(dict.fromkeys(self.at(run, axis) for run in self.runs))
 
-    def place(self, level: Level, axis: str) -> float:
+    def coordinate(self, level: Level, axis: str) -> float:
         """Return the coordinate of a level: its number, or for names 0, 1, 2, ..."""
         if self.numeric(axis):
             return float(level.value)
@@ -150,7 +150,7 @@ class Drawing:
 
 
 def _in_words(target: Target) -> str:
-    """Return what an override target addresses, in words."""
+    """Return an override target in words."""
     of_signal = target.kind in ("input", "faults")
     name = variable_of(target.variable) if of_signal else target.variable or str(target)
     return words(name.replace("*", ""))
@@ -254,7 +254,7 @@ class CurveDrawing(MetricDrawing):
                 style["linestyle"] = ""
             self.draw_line(
                 axes,
-                ((self.place(self.at(run, self.spec.x), self.spec.x), self.value(run)) for run in mine),
+                ((self.coordinate(self.at(run, self.spec.x), self.spec.x), self.value(run)) for run in mine),
                 style,
             )
         self.draw_mark(axes)
@@ -386,16 +386,16 @@ class LimitDrawing(Drawing):
         ends = []
         for (level, style), hatch in zip(self.lines(), cycle(HATCHES), strict=False):
             mine = [limit for limit in limits if level is None or limit.others[self.spec.lines] == level]
-            placed = {self.place(limit.others[self.spec.x], self.spec.x): limit for limit in mine}
-            x = sorted(placed)
-            low = [self._smallest if (last := placed[at].largest) is None else last for at in x]
-            high = [self._largest if (first := placed[at].beyond) is None else first for at in x]
+            at_coordinate = {self.coordinate(limit.others[self.spec.x], self.spec.x): limit for limit in mine}
+            x = sorted(at_coordinate)
+            low = [self._smallest if (last := at_coordinate[at].largest) is None else last for at in x]
+            high = [self._largest if (first := at_coordinate[at].beyond) is None else first for at in x]
             axes.fill_between(x, low, high, color=style["color"], alpha=0.16, linewidth=0.0, hatch=hatch)
             axes.plot(x, low, **style)
             for at, end in zip(x, low, strict=True):
-                if placed[at].beyond is None:
+                if at_coordinate[at].beyond is None:
                     ends.append((at, end, "^", style["color"], "all values tried hold"))
-                if placed[at].largest is None:
+                if at_coordinate[at].largest is None:
                     ends.append((at, end, "v", style["color"], "none holds"))
         axes.fill_between(
             [], [], color=QUIET, alpha=0.25, linewidth=0.0, label="up to the first value that fails"
@@ -406,5 +406,5 @@ class LimitDrawing(Drawing):
         self.scale_x(axes)
 
     def finish(self, figure: Figure, drawn: Sequence[Axes]) -> None:
-        margin = 0.06 * (self._largest - self._smallest) or 1.0
-        drawn[0].set_ylim(self._smallest - margin, self._largest + margin)
+        border = 0.06 * (self._largest - self._smallest) or 1.0
+        drawn[0].set_ylim(self._smallest - border, self._largest + border)

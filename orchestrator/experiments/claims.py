@@ -17,9 +17,8 @@ from ..errors import ScenarioError
 from ..figures.style import DIGITS, digits_apart, digits_of, shown
 from ..metrics.run_metrics import MetricValue
 from ..metrics.verdict import Status, Verdict, compare, worst
-from .confidence import Bounds
-from .judged_schema import Assertion, Claim, Condition, MetricReference, si_number
-from .sequential import Decision, SequentialTest
+from .claim_schema import Assertion, Claim, Condition, MetricReference, si_number
+from .confidence import Bounds, Decision, SequentialTest
 
 ONE_IN = 10
 """A verdict is robust if it flips in less than one tenth of a region. Chosen: fewer are exceptions that can

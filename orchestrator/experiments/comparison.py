@@ -33,9 +33,9 @@ from ..plan import Value as Plain
 from ..results.reader import Results
 from ..scenario.find_and_load import load_scenario
 from ..scenario.overrides import is_path, swap_of
+from .claim_schema import text_of
 from .experiment import LoadedExperiment, NamedRun, experiment_of
-from .judged_schema import text_of
-from .outcome import ExperimentResult
+from .experiment_result import ExperimentResult
 from .tables import Cell, Table, column, marked, remarks
 
 if TYPE_CHECKING:

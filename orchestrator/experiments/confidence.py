@@ -1,4 +1,4 @@
-"""Confidence intervals: of means over repeats, of shares, and of any statistic by the bootstrap.
+"""Confidence intervals of means over repeats, of shares and of any statistic; sequential tests of shares.
 
 Means over repeats with different seeds (`interval`):
 
@@ -10,7 +10,8 @@ assumption, harmless to a mean of ten unless there are outliers; with outliers t
 interval is wide.
 
 Shares, k of n (`share_bounds`): the shares p at which k or more, and k or fewer, of n have the probability
-(1 - level) / 2, quantiles of the beta distribution. They contain the true share at least as often as stated.
+(1 - confidence) / 2, quantiles of the beta distribution. They contain the true share at least as often as
+stated.
 
 Other statistics (`bootstrap`): the statistic of resamples drawn with replacement. Data with several factors,
 such as cars and tests, are resampled in blocks: levels of each factor are drawn, whole rows and columns
@@ -25,15 +26,17 @@ E. S. Pearson, The use of confidence or fiducial limits illustrated in the case 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from functools import cache, cached_property
+from itertools import accumulate
+from typing import Any, NamedTuple
 
-if TYPE_CHECKING:
-    import numpy as np
+import numpy as np
 
-LEVEL = 0.95
-"""Confidence level: share of intervals that contain the true mean; chosen: the usual one."""
+CONFIDENCE = 0.95
+"""Share of intervals that contain the true mean; chosen: the usual one."""
 DRAWS = 2000
 """Resamples of a bootstrap. Chosen: bounds of 95 % then repeat within a few per cent of their distance."""
 
@@ -52,7 +55,7 @@ class Bounds(NamedTuple):
     high: float
 
 
-def interval(numbers: Sequence[float], level: float = LEVEL) -> ConfidenceInterval | None:
+def interval(numbers: Sequence[float], confidence: float = CONFIDENCE) -> ConfidenceInterval | None:
     """Return the mean over repeats with its confidence interval; None without numbers, or if one is NaN.
 
     The interval has no width for a single number, for equal numbers, and where the mean is infinite.
@@ -66,21 +69,21 @@ def interval(numbers: Sequence[float], level: float = LEVEL) -> ConfidenceInterv
     if not math.isfinite(mean):
         return None if math.isnan(mean) else ConfidenceInterval(mean, 0.0)
     spread = math.sqrt(math.fsum((x - mean) ** 2 for x in numbers) / (n - 1))
-    return ConfidenceInterval(mean, _quantile(n - 1, level) * spread / math.sqrt(n))
+    return ConfidenceInterval(mean, _quantile(n - 1, confidence) * spread / math.sqrt(n))
 
 
 @cache
-def _quantile(degrees: int, level: float) -> float:
-    """Return the quantile of Student's distribution that leaves (1 - level) / 2 in each tail."""
+def _quantile(degrees: int, confidence: float) -> float:
+    """Return the quantile of Student's distribution that leaves (1 - confidence) / 2 in each tail."""
     from scipy.special import stdtrit  # what scipy.stats.t uses, without its slow import
 
-    return float(stdtrit(degrees, 0.5 + level / 2))
+    return float(stdtrit(degrees, 0.5 + confidence / 2))
 
 
-def share_bounds(count: int, number: int, level: float = LEVEL) -> Bounds:
+def share_bounds(count: int, number: int, confidence: float = CONFIDENCE) -> Bounds:
     """Return the Clopper-Pearson interval of a share, count of number.
 
-    Each bound by itself is one-sided at (1 + level) / 2: for 95 % one-sided, take a level of 90 %.
+    Each bound by itself is one-sided at (1 + confidence) / 2: for 95 % one-sided, take a confidence of 90 %.
 
     Raises:
         ValueError: the count is not between 0 and the number, or the number is 0.
@@ -92,7 +95,7 @@ def share_bounds(count: int, number: int, level: float = LEVEL) -> Bounds:
 
     if not 0 <= count <= number or not number:
         raise ValueError(f"a share needs a count between 0 and its number (got {count} of {number})")
-    tail = 0.5 * (1.0 - level)
+    tail = 0.5 * (1.0 - confidence)
     low = float(betaincinv(count, number - count + 1, tail)) if count else 0.0
     high = float(betaincinv(count + 1, number - count, 1.0 - tail)) if count < number else 1.0
     return Bounds(low, high)
@@ -109,15 +112,132 @@ def bootstrap(
         draws: resamples.
         seed: of the random numbers, so that the same data give the same intervals.
     """
-    import numpy as np
-
     chance = np.random.default_rng(seed)
     return np.array([statistic(*(chance.integers(n, size=n) for n in sizes)) for _ in range(draws)])
 
 
-def percentile_bounds(samples: np.ndarray, level: float = LEVEL) -> np.ndarray:
-    """Return the quantiles that leave (1 - level) / 2 of resamples in each tail: two rows, low and high."""
-    import numpy as np
-
-    bounds: np.ndarray = np.quantile(samples, [0.5 - 0.5 * level, 0.5 + 0.5 * level], axis=0)
+def percentile_bounds(samples: np.ndarray, confidence: float = CONFIDENCE) -> np.ndarray:
+    """Return the quantiles that leave (1 - confidence) / 2 of resamples in each tail: low and high rows."""
+    bounds: np.ndarray = np.quantile(samples, [0.5 - 0.5 * confidence, 0.5 + 0.5 * confidence], axis=0)
     return bounds
+
+
+class Decision(Enum):
+    """State of the test of a share."""
+
+    BELOW = "below"
+    ABOVE = "above"
+    OPEN = "open"
+
+
+@dataclass(frozen=True)
+class SequentialTest:
+    """Test of a share while points are added, until it is known to be below or above a limit.
+
+    A count that is looked at repeatedly crosses the bound of a single look more often than that bound
+    admits. Here the error of each side, (1 - confidence) / 2, is spent over the looks in proportion to
+    their points, and the boundary of each look is computed exactly, by the recursion of the binomial
+    distribution over the counts that have crossed no earlier boundary:
+
+        f_0(0) = 1,   f_j(k) = sum_i g_(j-1)(i) B(k - i; n_j - n_(j-1), p),   g_j = f_j between its boundaries
+
+    with p at the limit. The interval of the share has the same error and agrees with the decision. Its
+    bounds are the shares at which an outcome as low (as high) as the observed one has the probability (1
+    - confidence) / 2, where an outcome is the lower (higher), the earlier it crosses the lower (upper)
+    boundary. With a single look this is the Clopper-Pearson interval.
+
+    Sources: K. K. G. Lan, D. L. DeMets, Discrete sequential boundaries for clinical trials, Biometrika 70
+    (1983) 659-663. P. Armitage, C. K. McPherson, B. C. Rowe, Repeated significance tests on accumulating
+    data, Journal of the Royal Statistical Society A 132 (1969) 235-244. C. Jennison, B. W. Turnbull,
+    Group Sequential Methods, Chapman and Hall (2000), chapters 8 and 12.
+
+    Args:
+        looks: ascending numbers of points at which the count is compared with the boundaries.
+        limit: of the share.
+        confidence: of both sides together.
+    """
+
+    looks: tuple[int, ...]
+    limit: float
+    confidence: float = CONFIDENCE
+
+    @property
+    def tail(self) -> float:
+        """Probability of a wrong decision on one side, at the limit."""
+        return 0.5 * (1.0 - self.confidence)
+
+    @cached_property
+    def boundaries(self) -> tuple[tuple[int, int], ...]:
+        """For each look the largest count that decides "below", the smallest that decides "above"."""
+        alive, before, made = np.ones(1), 0, list[tuple[int, int]]()
+        spent_low = spent_high = 0.0
+        for look in self.looks:
+            alive = _with_more(alive, look - before, self.limit)
+            before, spendable = look, self.tail * look / self.looks[-1]
+            low = int(np.count_nonzero(spent_low + np.cumsum(alive) <= spendable)) - 1
+            high = look + 1 - int(np.count_nonzero(spent_high + np.cumsum(alive[::-1]) <= spendable))
+            spent_low += float(alive[: low + 1].sum())
+            spent_high += float(alive[high:].sum())
+            made.append((low, high))
+            alive = _within(alive, low, high)
+        return tuple(made)
+
+    def decision(self, count: int, number: int) -> Decision:
+        """Return the decision by a count at a number of points; open between looks."""
+        if number not in self.looks:
+            return Decision.OPEN
+        low, high = self.boundaries[self.looks.index(number)]
+        return Decision.BELOW if count <= low else Decision.ABOVE if count >= high else Decision.OPEN
+
+    def stop(self, outcomes: Iterable[bool]) -> int | None:
+        """Return the number of points after which to stop; None if there are too few to tell."""
+        for number, count in enumerate(accumulate(map(int, outcomes)), start=1):
+            if number == self.looks[-1] or self.decision(count, number) is not Decision.OPEN:
+                return number
+        return None
+
+    def bounds(self, count: int, number: int) -> Bounds:
+        """Return the interval of the share after a count that has crossed no boundary at earlier looks.
+
+        Raises:
+            ValueError: the number of points is not that of a look, or the count is not between 0 and it.
+        """
+        if number not in self.looks or not 0 <= count <= number:
+            raise ValueError(f"needs a count at a look, after {self.looks} points (got {count} of {number})")
+        return _bounds(self, count, number)
+
+    def _tails(self, share: float, count: int, number: int) -> tuple[float, float]:
+        """Return the probabilities of outcomes as low and as high as a count at a look."""
+        alive, before, low, high = np.ones(1), 0, 0.0, 0.0
+        for look, (few, many) in zip(self.looks, self.boundaries, strict=True):
+            alive = _with_more(alive, look - before, share)
+            if look == number:
+                break
+            before = look
+            low += float(alive[: few + 1].sum())
+            high += float(alive[many:].sum())
+            alive = _within(alive, few, many)
+        return low + float(alive[: count + 1].sum()), high + float(alive[count:].sum())
+
+
+@cache
+def _bounds(test: SequentialTest, count: int, number: int) -> Bounds:
+    from scipy.optimize import brentq
+
+    def bound(side: int) -> float:
+        return float(brentq(lambda share: test._tails(share, count, number)[side] - test.tail, 0.0, 1.0))
+
+    return Bounds(bound(1) if count else 0.0, bound(0) if count < number else 1.0)
+
+
+def _with_more(alive: np.ndarray, points: int, share: float) -> np.ndarray:
+    """Return the distribution of counts after more points."""
+    from scipy.stats import binom
+
+    return np.convolve(alive, binom.pmf(np.arange(points + 1), points, share))
+
+
+def _within(alive: np.ndarray, low: int, high: int) -> np.ndarray:
+    """Return the distribution of counts that cross no boundary."""
+    counts = np.arange(len(alive))
+    return np.where((counts > low) & (counts < high), alive, 0.0)

@@ -26,9 +26,9 @@ from ..results.run_folder import RUN_FILE
 from .axes import VariantSpec
 from .execution import Executor, left_to_do
 from .experiment import LoadedExperiment
+from .experiment_result import judge_records
 from .jobs import Job
 from .journal import records_in
-from .outcome import judge_records
 from .planning import PlannedExperiment
 from .ranking import LoadedRanking, angle_experiment, angles_of, dwell_experiment
 from .region import RegionCell, plan_region
@@ -70,7 +70,7 @@ class Forecast:
     notes: list[str] = field(default_factory=list)
 
     def add(self, runs: Span, seconds: float, size: float) -> None:
-        """Add runs that take so many seconds and bytes each."""
+        """Add runs with the seconds and bytes that each takes."""
         self.left = self.left.plus(*runs)
         self.seconds = self.seconds.plus(runs.least * seconds, runs.most * seconds)
         self.size = self.size.plus(runs.least * size, runs.most * size)
@@ -135,7 +135,7 @@ def of_experiment(
     quick: bool = False,
     keep: bool = False,
 ) -> Forecast:
-    """Return what a study or a sweep would take.
+    """Return the cost of a study or a sweep.
 
     Args:
         experiment: as loaded.
@@ -198,7 +198,7 @@ def _add_region(forecast: Forecast, planned: PlannedExperiment, execute: Executo
 
 
 def of_tuning(experiment: LoadedExperiment, execute: Executor, pace: Pace) -> Forecast:
-    """Return what a tuning would take; its trials depend on each other, so finished ones are only counted.
+    """Return the cost of a tuning; its trials depend on each other, so finished ones are only counted.
 
     Raises:
         YawbenchError: a run cannot start.
@@ -224,7 +224,7 @@ def of_tuning(experiment: LoadedExperiment, execute: Executor, pace: Pace) -> Fo
 def of_ranking(
     ranking: LoadedRanking, execute: Executor, pace: Pace, *, only: Collection[str] = ()
 ) -> Forecast:
-    """Return what a ranking would take; where A is not measured yet, the amplitudes are those of `ASSUMED`.
+    """Return the cost of a ranking; where A is not measured yet, the amplitudes are those of `ASSUMED`.
 
     Raises:
         YawbenchError: a run cannot start.
@@ -267,7 +267,7 @@ def of_threats(
     only: Collection[str] = (),
     chosen: Collection[str] = (),
 ) -> Forecast:
-    """Return what a ranking by threats would take: bounds, as each search ends where the car is lost.
+    """Return the cost of a ranking by threats as bounds, since each search ends where the car is lost.
 
     Raises:
         YawbenchError: a run cannot start.

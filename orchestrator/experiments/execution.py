@@ -26,6 +26,7 @@ from ..results.freshness import altered, staleness
 from ..results.run_folder import RUN_FILE
 from ..workers import Pool
 from .experiment import Case, LoadedExperiment, NamedRun
+from .experiment_result import Each, ExperimentResult, judge_records, judge_results
 from .jobs import (
     Job,
     MeasuredRun,
@@ -38,7 +39,6 @@ from .jobs import (
     ready,
 )
 from .journal import Journal
-from .outcome import Each, ExperimentResult, judge_records, judge_results
 from .planning import PlannedExperiment, plan_experiment
 
 T = TypeVar("T")
@@ -56,7 +56,7 @@ class Display(Protocol):
         return nullcontext(lambda done: None)
 
     def planned(self, planned: PlannedExperiment) -> None:
-        """Show what is remarkable about plans."""
+        """Show the diagnostics of plans."""
 
     def running(
         self, title: str, jobs: Sequence[Job], left: Sequence[Job], *, journaled: bool
@@ -205,7 +205,7 @@ def _has_results(job: Job, record: MeasuredRun) -> bool:
 
 
 Search = Generator[V, bool, T]
-"""A search for a limit: yields values, is sent whether each of them passes, and returns what it has found."""
+"""A search for a limit: yields values, is sent whether each of them passes, and returns its result."""
 
 
 def highest_passing(
@@ -246,7 +246,7 @@ def highest_passing(
 def side_by_side(
     searches: Mapping[K, Search[V, T]], passing: Callable[[dict[K, V]], Mapping[K, bool]]
 ) -> dict[K, T]:
-    """Run searches in rounds, so that the runs of a round are one experiment; return what each has found.
+    """Run searches in rounds, each a single experiment; return the result of each search.
 
     Args:
         searches: name -> search.

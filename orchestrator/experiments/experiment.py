@@ -25,8 +25,8 @@ from ..scenario import overrides, yaml_lines
 from ..scenario.validation import validate
 from ..scenario.yaml_lines import Document, KeyPath
 from .axes import DesignAxisSpec, DesignPoint, changes_at, changes_of_file, points
+from .claim_schema import Claim, DerivedSpec
 from .jobs import TestRequest
-from .judged_schema import Claim, DerivedSpec
 from .names_check import check_axes, check_names
 from .schema import ChoiceSpec, ExperimentSpec, RunSpec
 

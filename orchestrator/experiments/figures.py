@@ -15,7 +15,7 @@ from ..figures.style import ROW, LabelledRun, frame, literal, new_figure, save
 from ..messages import changed, counted
 from .axis_figures import FAILED, Drawing
 from .experiment import FIGURES
-from .outcome import Each, ExperimentResult
+from .experiment_result import Each, ExperimentResult
 from .schema import FigureSpec
 
 if TYPE_CHECKING:

@@ -48,7 +48,7 @@ from ..planner import Planner
 from ..results.freshness import key_of
 from ..scenario import yaml_lines
 from ..scenario.quantities import convert, gain_and_offset, measure_of
-from ..scenario.scenario_schema import Scalar, SeriesSpec
+from ..scenario.schema import Scalar, SeriesSpec
 from ..scenario.validation import Instant, StrictModel, Time, validate
 from ..scenario.yaml_lines import Document
 from ..workers import Pool
@@ -106,7 +106,7 @@ class FitSpec(StrictModel):
 
 @dataclass(frozen=True)
 class FitWindow:
-    """A window, and the segment that it is cut from: filtered for what is compared, raw for inputs."""
+    """A window, and the segment that it is cut from: filtered for comparison, unfiltered for inputs."""
 
     window: Window
     filtered: Segment
@@ -229,7 +229,7 @@ def _refuse_overlaps(document: Document, spec: FitSpec) -> None:
 
 @dataclass(frozen=True)
 class WindowJob(Job):
-    """A run of a window, with what is returned of it."""
+    """A run of a window, with the signals to return."""
 
     times: np.ndarray = field(default_factory=lambda: np.zeros(0))
     wanted: tuple[tuple[str, str], ...] = ()  # (compared signal, column)
@@ -313,16 +313,16 @@ class ScenarioModel:
     def __call__(self, sets: Sequence[Mapping[str, float]]) -> list[list[Simulated]]:
         """Run all windows for sets of values; see `measured.estimate.Model`."""
         simulated: list[list[Simulated]] = [[None] * len(self.windows) for _ in sets]
-        jobs, places = [], []
+        jobs, windows_of = [], []
         for number, values in enumerate(sets):
             for k in range(len(self.windows)):
                 try:
                     jobs.append(self._job(k, values))
-                    places.append((number, k))
+                    windows_of.append((number, k))
                 except YawbenchError as error:  # noqa: PERF203 - a value is out of range
                     self.failure = text_of(error.diagnostics)
         outcomes = execute(jobs, run=run_window, pool=self.pool) if jobs else []
-        for (number, k), outcome in zip(places, outcomes, strict=True):
+        for (number, k), outcome in zip(windows_of, outcomes, strict=True):
             simulated[number][k] = outcome.value
             self.failure = outcome.reason or self.failure
         return simulated

@@ -23,7 +23,7 @@ from vocabulary.signals import SIGNALS
 
 from ..errors import ScenarioError, code_of
 from ..measured.estimate import (
-    LEVEL,
+    CONFIDENCE,
     Estimate,
     NotIdentifiable,
     Parameter,
@@ -60,7 +60,7 @@ class Score:
 
 @dataclass(frozen=True)
 class FittedModel:
-    """A model with its estimate, and what it simulates in the windows of each part."""
+    """A model with its estimate and its simulated signals in the windows of each part."""
 
     title: str
     parameters: Sequence[Parameter]
@@ -153,7 +153,7 @@ class FitResult:
                 }
                 for parameter in model.parameters
             },
-            "level": LEVEL,
+            "confidence": CONFIDENCE,
             "pieces": fitted.pieces,
             "condition": fitted.identifiability.condition,
             "weakest": fitted.identifiability.weakest,

@@ -7,8 +7,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from ..figures.style import digits_of, shown
+from .claim_schema import GridSpec, rank_correlation
 from .claims import MetricTable
-from .judged_schema import GridSpec, rank_correlation
 from .tables import Cell, Column, Table
 
 

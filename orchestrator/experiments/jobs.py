@@ -32,11 +32,12 @@ from ..plan import Override, Plan
 from ..planner import Planner
 from ..results.freshness import key_of
 from ..results.reader import Results, load_results
+from ..results.run_folder import RunStatus
 from ..workers import Finished, Pool, retire
 
 if TYPE_CHECKING:
     from ..master.run_loop import OpenInstance
-    from ..scenario.scenario_schema import LoadedScenario
+    from ..scenario.schema import LoadedScenario
 
 MANY = 10
 """Errors shown; the rest are only counted."""
@@ -294,7 +295,7 @@ def read_back(folder: Path, run: str | None = None) -> Results | str:
         return str(error)
     if run is not None and results.record.id != run:
         return f"{folder}: holds the results of another run than the one just made"
-    if results.record.status == "completed":
+    if results.record.status is RunStatus.COMPLETED:
         return results
     failed = results.record.error
     return f"{folder}: this run ended early: {failed.message if failed else 'no reason recorded'}"

@@ -215,7 +215,7 @@ class Journal:
 def records_in(folder: Path) -> dict[str, MeasuredRun]:
     """Return key -> record of the finished runs in a results folder, without changing it; damaged lines less.
 
-    The folder may be missing, and nobody needs to have it locked.
+    The folder may be missing, and it need not be locked.
     """
     try:
         lines, _ = _whole_lines((folder / FILE).read_bytes())
@@ -242,7 +242,7 @@ def _content(line: bytes) -> dict[str, Any]:
     try:
         content = json.loads(line)
     except (ValueError, RecursionError):
-        raise ValueError("is no JSON") from None
+        raise ValueError("is not JSON") from None
     if not isinstance(content, dict):
         raise ValueError("is not a JSON object")
     return content

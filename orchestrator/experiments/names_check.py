@@ -10,8 +10,8 @@ from ..messages import hint
 from ..names import Target
 from ..scenario.yaml_lines import Document, KeyPath
 from .axes import RUN, levels_of, names_of
+from .claim_schema import MetricReference, text_of
 from .grids import cells
-from .judged_schema import MetricReference, text_of
 from .schema import ExperimentSpec, FigureSpec
 
 if TYPE_CHECKING:
@@ -202,7 +202,7 @@ def _check_places(spec: ExperimentSpec, document: Document, i: int, figure: Figu
         of = spec.limits[figure.limit].of
         if of in used:
             document.report(
-                ("figures", i), f"{of!r} is what the limit {figure.limit!r} is of", "figure-invalid"
+                ("figures", i), f"{of!r} is the axis of the limit {figure.limit!r}", "figure-invalid"
             )
         used.add(of)
     left = [

@@ -18,9 +18,9 @@ from ..scenario import quantities
 from ..scenario.yaml_lines import dotted
 from ..wiring.context import FACTS
 from .axes import AxisSpec, Level
+from .claim_schema import MetricReference, MetricSpec, si_number
 from .experiment import RUNS, Case, LoadedExperiment, NamedRun
 from .jobs import Job, MetricRequests, keyed, ready
-from .judged_schema import MetricReference, MetricSpec, si_number
 
 
 @dataclass(frozen=True)
@@ -148,15 +148,15 @@ def _metric_units(experiment: LoadedExperiment, made_up: list[Results]) -> dict[
         units_of_metric = (unit_in(results, metric(spec.metric)) for results in made_up)
         unit = next((unit for unit in units_of_metric if unit is not None), None)
         if unit is None:
-            place = f"{experiment.path}: metrics.{key}"
-            errors.append(f"{place}: no run records the signals of {spec.metric}")
+            location = f"{experiment.path}: metrics.{key}"
+            errors.append(f"{location}: no run records the signals of {spec.metric}")
         else:
             units[key] = unit
-    for place, unit, bound in _bounds(experiment, units):
+    for location, unit, bound in _bounds(experiment, units):
         try:
             si_number(bound, unit)
         except ValueError as error:  # noqa: PERF203 - all errors are collected
-            errors.append(f"{experiment.path}: {place}: {error}")
+            errors.append(f"{experiment.path}: {location}: {error}")
     if errors:
         raise ScenarioError(errors, code="metric-unavailable")
     return units

@@ -45,13 +45,13 @@ from ..metrics.run_metrics import TimeWindow
 from ..names import Target
 from ..plan import Override, Plan
 from ..scenario import overrides, yaml_lines
-from ..scenario.scenario_schema import Scalar
+from ..scenario.schema import Scalar
 from ..scenario.validation import StrictModel, Time, validate
 from .axes import DesignAxisSpec, Level, OverrideSpec, VariantSpec, axis_of_levels, changes_of_file
+from .claim_schema import text_of
 from .execution import Executor
 from .experiment import LoadedExperiment, NamedRun, experiment_of
-from .judged_schema import text_of
-from .outcome import ExperimentResult
+from .experiment_result import ExperimentResult
 from .standard_test_runs import slow_steer_amplitude
 
 CONTROLLER = "controller"
@@ -86,7 +86,7 @@ class ConditionSpec(OverrideSpec):
 
     @field_validator("repeats")
     @classmethod
-    def _one_place(cls, levels: dict[str, list[Scalar]]) -> dict[str, list[Scalar]]:
+    def _one_target(cls, levels: dict[str, list[Scalar]]) -> dict[str, list[Scalar]]:
         if len(levels) > 1 or not all(levels.values()):
             raise ValueError("repeats: one unit.parameter with its values")
         return levels
@@ -117,7 +117,7 @@ class EntriesSpec(StrictModel):
 
     @property
     def edited(self) -> str:
-        """Describes what was edited since `yawbench tune` wrote the file; "" if nothing was."""
+        """Note on edits since `yawbench tune` wrote the file; "" if there are none."""
         if self.checksums:
             words = what_changed(self.content, self.checksums)
             return f"{words} since `yawbench tune` wrote it" if words else ""

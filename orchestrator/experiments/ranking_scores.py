@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -25,8 +26,8 @@ from ..figures.style import digits_apart
 from ..plan import Value
 from .confidence import ConfidenceInterval, interval
 from .execution import Executor
+from .experiment_result import ExperimentResult
 from .jobs import STEP_TIME, Job, MeasuredRun
-from .outcome import ExperimentResult
 from .ranking import (
     CONTROLLER,
     RECORDED,
@@ -40,7 +41,17 @@ from .ranking import (
 UNHELD = 1.0
 """Yaw-rate ratio without a second peak after the reversal: the car keeps turning as before."""
 WORST = -100.0
-"""Lower bound of the stability margin, in percentage points; chosen: such a car is lost."""
+"""Lower bound of the headroom, in percentage points; chosen: such a car is lost."""
+
+
+class RankedState(str, Enum):
+    """State of a ranked run, or of all runs of a cell."""
+
+    PASSED = "passed"
+    SPUN = "spun"  # the regulation's criteria are met, beyond 20 degrees of sideslip
+    FAILED = "failed"
+    BROKEN_OFF = "broken off"  # of a run: an error ended it
+    MISSING = "missing"
 
 
 @dataclass(frozen=True)
@@ -67,7 +78,7 @@ class RankedRun:
         return self.job.out if self.job and self.job.keep else None
 
     def __getitem__(self, key: str) -> float | None:
-        if key in ("margin", "speed_lost"):
+        if key in ("headroom", "speed_lost"):
             value: float | None = getattr(self, key)
             return value
         measured = self.record.values.get(key) if self.record else None
@@ -98,7 +109,7 @@ class RankedRun:
         return self.met and not self.spun
 
     @property
-    def margin(self) -> float | None:
+    def headroom(self) -> float | None:
         """Percentage points by which both ratios stay below their limits; None if the run is missing."""
         if self.record is None:
             return None
@@ -113,13 +124,13 @@ class RankedRun:
         return None if first is None or last is None else first - last
 
     @property
-    def verdict(self) -> str:
-        """One-word verdict; of a failed run with the reason."""
+    def state(self) -> RankedState:
+        """Whether it passed, and if not, why."""
         if self.record is None:
-            return "missing"
+            return RankedState.MISSING
         if not self.record.ok:
-            return f"broken off: {self.record.reason}"
-        return "passed" if self.passed else "spun" if self.met else "failed"
+            return RankedState.BROKEN_OFF
+        return _state(self.passed, self.met)
 
 
 @dataclass(frozen=True)
@@ -141,22 +152,22 @@ class RankingCell:
         return all(run.passed for run in self.runs)
 
     @property
-    def state(self) -> str:
-        """`passed`; `spun`: the criteria are met, beyond 20 degrees of sideslip; `failed`; `missing`."""
+    def state(self) -> RankedState:
+        """The state of all runs together; runs that broke off count as failed."""
         if self.missing:
-            return "missing"
-        return "passed" if self.passed else "spun" if all(run.met for run in self.runs) else "failed"
+            return RankedState.MISSING
+        return _state(self.passed, all(run.met for run in self.runs))
 
     @property
     def worst(self) -> RankedRun:
-        """The run that says most of the cell: one that fails before one that passes, of least margin."""
+        """The worst run of the cell: failed before passed, then the one with the least headroom."""
 
         def rank(run: RankedRun) -> tuple[bool, bool, float, float]:
-            margin, slip = run["margin"], run["sideslip"]
+            headroom, slip = run["headroom"], run["sideslip"]
             return (
                 run.passed,
                 run.met,
-                WORST if margin is None else margin,
+                WORST if headroom is None else headroom,
                 -(math.pi if slip is None else slip),
             )
 
@@ -175,9 +186,9 @@ class RankingCell:
         return interval([number([run for run in self.runs if run.repeat == r]) for r in repeats])
 
     @cached_property
-    def margin(self) -> ConfidenceInterval | None:
-        """Smallest stability margin of all runs, in percentage points; over repeats the mean."""
-        return self._over_repeats(lambda runs: min(_known(runs, "margin", WORST)))
+    def headroom(self) -> ConfidenceInterval | None:
+        """Smallest headroom of all runs, in percentage points; over repeats the mean."""
+        return self._over_repeats(lambda runs: min(_known(runs, "headroom", WORST)))
 
     @cached_property
     def sideslip(self) -> ConfidenceInterval | None:
@@ -191,12 +202,16 @@ class RankingCell:
         return min((x for run in required if (x := run["displacement"]) is not None), default=None)
 
     def number(self, key: str) -> float | None:
-        """Return the margin, the sideslip, or the mean of another metric over all runs that have it."""
-        if key in ("margin", "sideslip"):
+        """Return the headroom, the sideslip, or the mean of another metric over all runs that have it."""
+        if key in ("headroom", "sideslip"):
             over: ConfidenceInterval | None = getattr(self, key)
             return over.mean if over else None
         known = [x for run in self.runs if (x := run[key]) is not None]
         return sum(known) / len(known) if known else None
+
+
+def _state(passed: bool, met: bool) -> RankedState:
+    return RankedState.PASSED if passed else RankedState.SPUN if met else RankedState.FAILED
 
 
 def _known(runs: Sequence[RankedRun], key: str, lost: float) -> Iterator[float]:
@@ -216,11 +231,11 @@ class EntryScore:
     @property
     def missing(self) -> int:
         """The number of conditions with missing runs."""
-        return sum(cell.state == "missing" for cell in self.cells.values())
+        return sum(cell.state is RankedState.MISSING for cell in self.cells.values())
 
-    def count(self, state: str) -> int:
+    def count(self, state: RankedState) -> int:
         """Return the number of conditions with a state."""
-        return sum(cell.state == state for cell in self.cells.values())
+        return sum(cell.state is state for cell in self.cells.values())
 
     @property
     def share(self) -> float:
@@ -243,7 +258,11 @@ class EntryScore:
     def order(self) -> tuple[float, float, float]:
         """Sort key of the ranking, best first."""
         slip = self.mean("sideslip")
-        return (-self.count("passed"), -round(self.share, 9), math.inf if slip is None else round(slip, 9))
+        return (
+            -self.count(RankedState.PASSED),
+            -round(self.share, 9),
+            math.inf if slip is None else round(slip, 9),
+        )
 
 
 def scores_of(ranking: LoadedRanking, runs: Iterable[RankedRun]) -> list[EntryScore]:

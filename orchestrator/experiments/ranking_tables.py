@@ -11,7 +11,7 @@ from ..evaluation.sine_with_dwell import percent
 from ..figures.style import QUIET, digits_of, frame, literal, new_figure, shown
 from ..metrics.run_metrics import MetricValue
 from .jobs import STEP_TIME
-from .ranking_scores import Digits, EntryScore, RankingCell, deciding_digits
+from .ranking_scores import Digits, EntryScore, RankedRun, RankedState, RankingCell, deciding_digits
 from .tables import Cell, Column, Table, column
 from .threat_scores import ComparedGains, GainsAndLaws
 
@@ -23,7 +23,12 @@ if TYPE_CHECKING:
     from .threat_runs import ThreatResult
 
 
-COLOURS = {"passed": "#BFE5D8", "spun": "#F7E3A1", "failed": "#F6CDB4", "missing": "#FFFFFF"}
+COLOURS = {
+    RankedState.PASSED: "#BFE5D8",
+    RankedState.SPUN: "#F7E3A1",
+    RankedState.FAILED: "#F6CDB4",
+    RankedState.MISSING: "#FFFFFF",
+}
 """Colours of cells, which their text also tells apart."""
 TUNED = {"authors": ("o", "#0072B2"), "tuned": ("D", "#D55E00")}
 ROW = 0.235
@@ -32,12 +37,18 @@ ROW = 0.235
 
 def sign_of(cell: RankingCell) -> str:
     """Return the text of a cell: a check mark, a dash, or how many of its runs passed."""
-    if cell.state == "missing":
+    if cell.state is RankedState.MISSING:
         return "–"
-    if cell.state == "passed":
+    if cell.state is RankedState.PASSED:
         return "✓"
     passed = sum(run.passed for run in cell.runs)
     return f"{passed}/{len(cell.runs)}"
+
+
+def state_words(run: RankedRun) -> str:
+    """Return the state of a run as text, with the reason if it broke off."""
+    broken = run.state is RankedState.BROKEN_OFF and run.record
+    return f"{run.state.value}: {broken.reason}" if broken else run.state.value
 
 
 def place_words(score: EntryScore) -> str:
@@ -63,7 +74,9 @@ def draw_matrix(ranked: RankingResult, note: str) -> Figure:
                 axes.add_patch(Rectangle((k, i), 1, 1, facecolor=colour, edgecolor="white", linewidth=1.2))
                 axes.text(k + 0.5, i + 0.52, sign_of(cell), ha="center", va="center", fontsize=7.5)
             axes.text(-0.15, i + 0.52, literal(score.spec.title), va="center", ha="right", fontsize=8.5)
-            counted = f"{score.count('passed')} of {wide}" if score.place else f"{score.missing} missing"
+            counted = (
+                f"{score.count(RankedState.PASSED)} of {wide}" if score.place else f"{score.missing} missing"
+            )
             share = shown(score.share, "%", digits=digits.share) if score.place else ""
             for (x, side, _), text in zip(beside, (place_words(score), counted, share), strict=True):
                 weight = "bold" if x < 0 else "normal"
@@ -75,9 +88,11 @@ def draw_matrix(ranked: RankingResult, note: str) -> Figure:
         axes.set(xlim=(-5.5, wide + 2.2), ylim=(len(rows) + 0.1, -4.2))
         axes.set_axis_off()
         handles = [
-            Patch(facecolor=COLOURS["passed"], label="passed: all runs pass"),
-            Patch(facecolor=COLOURS["spun"], label="spun: criteria met, but more than 20° of sideslip"),
-            Patch(facecolor=COLOURS["failed"], label="failed; runs that pass of all"),
+            Patch(facecolor=COLOURS[RankedState.PASSED], label="passed: all runs pass"),
+            Patch(
+                facecolor=COLOURS[RankedState.SPUN], label="spun: criteria met, but more than 20° of sideslip"
+            ),
+            Patch(facecolor=COLOURS[RankedState.FAILED], label="failed; runs that pass of all"),
         ]
         frame(figure, ROW * (len(rows) + 4.3), handles, ranked.ranking.spec.title, note)
     return figure
@@ -94,7 +109,7 @@ def draw_pareto(ranked: RankingResult, note: str) -> Figure:
     every = [
         (1e-3 * x, y, score)
         for score in ranked.scores
-        if (x := score.mean("intervention")) is not None and (y := score.mean("margin")) is not None
+        if (x := score.mean("intervention")) is not None and (y := score.mean("headroom")) is not None
     ]
     points = [point for point in every if point[2].mean("effort")]
     left_out = [f"{score.spec.title}: {y:.0f} points" for _, y, score in every if not score.mean("effort")]
@@ -124,7 +139,7 @@ def draw_pareto(ranked: RankingResult, note: str) -> Figure:
         for _, _, score in front:
             axes.plot([], [], " ", label=f"{score.place}  {score.spec.title}")
         axes.set_xlabel("Intervention: ∫|torque| dt of the wheel that gets most, once steered, mean [kN·m·s]")
-        axes.set_title("Stability margin: points of per cent below the limits, least of each condition, mean")
+        axes.set_title("Headroom: percentage points below the limits, least of each condition, mean")
         handles = {str(line.get_label()): line for line in axes.get_lines()}
         title = "Stability over intervention; numbers are places"
         frame(figure, 4.9, list(handles.values()), title, " · ".join([*left_out, note]))
@@ -142,7 +157,7 @@ RULE = (
     "most 20° of sideslip; a condition is passed if all of its runs pass."
 )
 UNITS = {
-    "margin": "points", "sideslip": "rad", "speed_lost": "m/s", "intervention": "N.m.s", "effort": "N.m.s",
+    "headroom": "points", "sideslip": "rad", "speed_lost": "m/s", "intervention": "N.m.s", "effort": "N.m.s",
     "chatter": "N.m/s",
 }  # fmt: skip
 """Numbers of a cell -> unit; controllers have their means over conditions."""
@@ -180,8 +195,8 @@ def row_of(score: EntryScore, digits: Digits) -> dict[str, Cell]:
         "place": place_words(score),
         "controller": score.spec.title,
         "gains": score.spec.gains,
-        "passed": str(score.count("passed")),
-        "spun": str(score.count("spun")),
+        "passed": str(score.count(RankedState.PASSED)),
+        "spun": str(score.count(RankedState.SPUN)),
         "runs": shown(score.share, "%", digits=digits.share),
         **means,
         "time per step": words_of(score.step_time, "s"),
@@ -198,7 +213,7 @@ def table_of(ranked: RankingResult, *left_out: str) -> Table:
     digits = deciding_digits(ranked.scores)
     rows = [row_of(score, digits) for score in ranked.scores]
     kept = [heading for heading in rows[0] if heading not in left_out]
-    texts = ("place", "passed", "spun", "runs", "margin", "sideslip", "time per step")
+    texts = ("place", "passed", "spun", "runs", "headroom", "sideslip", "time per step")
     numbers = {kept.index(heading) for heading in texts if heading in kept}
     cells = [[row[heading] for heading in kept] for row in rows]
     return Table(ranked.ranking.spec.title, kept, [*cells], [RULE], numbers)
@@ -218,7 +233,7 @@ def runs_table(cell: RankingCell) -> Table:
             "COS + 1 s": _ratio(run["ratio_1000"]),
             "COS + 1.75 s": _ratio(run["ratio_1750"]),
             **{k.replace("_", " "): words_of(run[k], unit) for k, unit in units.items() if k != "effort"},
-            "verdict": run.verdict,
+            "verdict": state_words(run),
         }
         for run in cell.runs
     ]  # fmt: skip
@@ -253,8 +268,8 @@ def columns_of_entries(ranked: RankingResult) -> Table:
             _text("gains", (score.spec.gains for score in rows)),
             _counts("place", (score.place for score in rows)),
             _counts("conditions", (len(score.cells) for score in rows)),
-            _counts("passed", (score.count("passed") for score in rows)),
-            _counts("spun", (score.count("spun") for score in rows)),
+            _counts("passed", (score.count(RankedState.PASSED) for score in rows)),
+            _counts("spun", (score.count(RankedState.SPUN) for score in rows)),
             _counts("missing", (score.missing for score in rows)),
             _numbers("share", "1", (None if score.missing else score.share for score in rows)),
             *(_numbers(key, unit, [score.mean(key) for score in rows]) for key, unit in UNITS.items()),
@@ -269,7 +284,7 @@ def columns_of_cells(ranked: RankingResult) -> Table:
     numbers = []
     for key, unit in {**UNITS, STEP_TIME: "s"}.items():
         numbers.append(_numbers(key, unit, [None if cell.missing else cell.number(key) for cell in cells]))
-        if key in ("margin", "sideslip"):
+        if key in ("headroom", "sideslip"):
             over = [getattr(cell, key) for cell in cells]
             numbers.append(
                 _numbers(f"{key}_half_width", unit, [confidence and confidence.half for confidence in over])
@@ -279,7 +294,7 @@ def columns_of_cells(ranked: RankingResult) -> Table:
         [
             _text("entry", (cell.entry for cell in cells)),
             _text("condition", (cell.condition for cell in cells)),
-            _text("state", (cell.state for cell in cells)),
+            _text("state", (cell.state.value for cell in cells)),
             _counts("runs", (len(cell.runs) for cell in cells)),
             _counts("passed", (sum(run.passed for run in cell.runs) for cell in cells)),
             *numbers[:4],
@@ -302,7 +317,7 @@ def columns_of_runs(ranked: RankingResult) -> Table:
             _text("condition", (run.condition for run in runs)),
             _numbers("amplitude", "rad", (run.amplitude for run in runs)),
             _text("repeat", (run.repeat for run in runs)),
-            _text("verdict", (run.verdict for run in runs)),
+            _text("verdict", (state_words(run) for run in runs)),
             *(_numbers(key, unit, [run[key] for run in runs]) for key, unit in units.items()),
             _text("key", (run.job and run.job.key for run in runs)),
         ]

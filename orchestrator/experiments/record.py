@@ -19,9 +19,9 @@ from ..metrics.measures import si
 from ..metrics.run_metrics import MetricValue, metric
 from ..results.reader import Results
 from ..results.run_folder import LARGEST
+from .claim_schema import si_number, text_of
 from .claims import ClaimResult, Region
-from .judged_schema import si_number, text_of
-from .outcome import ExperimentResult, limits_of
+from .experiment_result import ExperimentResult, limits_of
 from .tables import Table, column, to_csv
 from .verdict_tables import heading, verdict
 

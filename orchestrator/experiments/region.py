@@ -20,14 +20,14 @@ from ..plan import Override
 from ..plan import Value as Given
 from ..planner import Planner
 from .axes import Level, OpenValueSpec, OpenVariantSpec, changes_at, extended_hypercube, levels_of
+from .claim_schema import Claim, MetricReference
 from .claims import ONE_IN, TIMES, ClaimResult, LevelVerdict, OpenValueScan, Region, judge
+from .confidence import Decision, SequentialTest
 from .experiment import RUNS, LoadedExperiment, NamedRun
+from .experiment_result import ExperimentResult, derive
 from .grids import ranked
 from .jobs import Job, MeasuredRun, keyed, ready
-from .judged_schema import Claim, MetricReference
-from .outcome import ExperimentResult, derive
 from .planning import PlannedExperiment, found_at, metrics_of, number_of
-from .sequential import Decision, SequentialTest
 
 ORIGIN = "region"
 """Origin of overrides that open values make."""
@@ -37,7 +37,7 @@ RegionPoint = tuple[tuple[str, Level], ...]
 RegionCell = tuple[str, RegionPoint]
 """A named run, and the open values that change it."""
 RegionKey = tuple[str, int]
-"""(`claims` or `checks`, index) of what is judged."""
+"""(`claims` or `checks`, index) of a claim or check."""
 
 
 class RegionRuns:
@@ -74,8 +74,8 @@ class RegionRuns:
 
     def own_value(self, run: str, target: Target) -> Given | None:
         """Return the value that a target has in a run; None if the run has no such target."""
-        place = found_at(self.plans[run], target)
-        return None if place is None else place[0]
+        addressed = found_at(self.plans[run], target)
+        return None if addressed is None else addressed[0]
 
     def _touches_none(self, name: str) -> str:
         targets = self.open_values[name].targets
@@ -113,11 +113,11 @@ class RegionRuns:
         named = variant.scenario.replace("{scenario}", run.scenario.stem)
         return self.experiment.path.parent / named if named else run.scenario
 
-    def changes(self, name: str, place: RegionPoint) -> tuple[Path, list[Override]]:
+    def changes(self, name: str, point: RegionPoint) -> tuple[Path, list[Override]]:
         """Return the scenario of a run at a point, and the further overrides there."""
         run, changes = self.experiment.runs[name], []
         scenario = run.scenario
-        for key, level in place:
+        for key, level in point:
             open_value = self.open_values[key]
             if open_value.times:
                 for where in open_value.vary:
@@ -129,12 +129,12 @@ class RegionRuns:
             changes += changes_at(open_value, level, self.experiment.path.parent, ORIGIN)
         return scenario, changes
 
-    def cell(self, name: str, place: RegionPoint) -> RegionCell:
+    def cell(self, name: str, point: RegionPoint) -> RegionCell:
         """Return a run at a point, with only those open values that change it there."""
-        if (name, place) not in self._cells:
-            other = (part for part in place if name in self.touched[part[0]] and self._is_other(name, part))
-            self._cells[name, place] = (name, tuple(other))
-        return self._cells[name, place]
+        if (name, point) not in self._cells:
+            other = (part for part in point if name in self.touched[part[0]] and self._is_other(name, part))
+            self._cells[name, point] = (name, tuple(other))
+        return self._cells[name, point]
 
     def _is_other(self, name: str, at: tuple[str, Level]) -> bool:
         """Return whether a level differs from the one chosen in a run."""
@@ -155,8 +155,8 @@ class RegionRuns:
     def unit(self, key: str) -> str:
         """Return the unit of an open value in the runs that it applies to."""
         target = self.open_values[key].vary[0]
-        places = (found_at(self.plans[name], target) for name in self.touched[key])
-        return next((place[1] for place in places if place and place[1]), "")
+        addressed = (found_at(self.plans[name], target) for name in self.touched[key])
+        return next((value[1] for value in addressed if value and value[1]), "")
 
     def own(self, key: str, names: Iterable[str]) -> set[float]:
         """Return the distinct numbers chosen in runs for a numeric open value."""
@@ -215,15 +215,15 @@ class RegionPlan:
     jobs: dict[RegionCell, Job] = field(default_factory=dict)
     verdicts: dict[RegionKey, list[Verdict]] = field(default_factory=dict)
 
-    def cells(self, question: RegionQuestion, places: Iterable[RegionPoint]) -> list[RegionCell]:
+    def cells(self, question: RegionQuestion, points: Iterable[RegionPoint]) -> list[RegionCell]:
         """Return the runs of a claim at points, without those that no open value changes there."""
-        every = (self.runs.cell(run, place) for place in places for run in question.runs)
+        every = (self.runs.cell(run, point) for point in points for run in question.runs)
         return [cell for cell in every if cell[1]]
 
     def along(self, question: RegionQuestion) -> list[RegionCell]:
         """Return the runs of a claim along each open value."""
-        places = [((key, level),) for key, levels in question.lines.items() for level in levels]
-        return self.cells(question, places)
+        points = [((key, level),) for key, levels in question.lines.items() for level in levels]
+        return self.cells(question, points)
 
 
 def plan_region(planned: PlannedExperiment, folder: Path, *, planner: Planner) -> RegionPlan:
@@ -278,16 +278,16 @@ def next_jobs(
             wanted |= dict.fromkeys(plan.along(question))
             wanted |= dict.fromkeys(plan.cells(question, _further_points(plan, key, findings, records)))
     jobs, open_value_of = dict[RegionCell, Job](), dict[str, str]()  # override in words -> open value
-    for name, place in wanted:
-        if (name, place) in plan.jobs:
+    for name, point in wanted:
+        if (name, point) in plan.jobs:
             continue
-        scenario, own = runs.changes(name, place)
-        for key_, level in place:
+        scenario, own = runs.changes(name, point)
+        for key_, level in point:
             open_value_of |= {str(change): key_ for change in runs.changes(name, ((key_, level),))[1]}
-        label = ", ".join([name, *(f"{key_} {level.words}" for key_, level in place)])
+        label = ", ".join([name, *(f"{key_} {level.words}" for key_, level in point)])
         changes = (*runs.jobs[name].changes, *own)
         job = replace(runs.jobs[name], label=label, scenario=scenario, changes=changes, plan=None)
-        jobs[name, place] = replace(job, out=plan.folder / RUNS, keep=False)
+        jobs[name, point] = replace(job, out=plan.folder / RUNS, keep=False)
 
     def about(error: Diagnostic) -> tuple[Hashable, Diagnostic]:
         """Report an error of an open value once, with its key in the file."""
@@ -319,13 +319,13 @@ def _further_points(
         flips = sum(verdict.holds != chosen.verdict.holds for verdict in verdicts)
         if plan.test.decision(flips, len(verdicts)) is not Decision.OPEN or chosen.verdict.holds is None:
             break
-        places = question.points[len(verdicts) : look]
+        points = question.points[len(verdicts) : look]
         if any(
             cell not in plan.jobs or plan.jobs[cell].key not in records
-            for cell in plan.cells(question, places)
+            for cell in plan.cells(question, points)
         ):
-            return places
-        verdicts += [_verdict_at(plan, question, chosen, findings, records, place) for place in places]
+            return points
+        verdicts += [_verdict_at(plan, question, chosen, findings, records, point) for point in points]
     return []
 
 
@@ -385,12 +385,12 @@ def _verdict_at(
     chosen: ClaimResult,
     findings: ExperimentResult,
     records: Mapping[str, MeasuredRun],
-    place: RegionPoint,
+    point: RegionPoint,
 ) -> Verdict:
     """Return the verdict on a claim at a point."""
     values = {}
     for name in question.runs:
-        cell = plan.runs.cell(name, place)
+        cell = plan.runs.cell(name, point)
         record = records[plan.jobs[cell].key] if cell[1] else None
         for key in findings.spec.metrics:
             measured = record and record.values.get(key)
@@ -413,10 +413,10 @@ def _judged(
         open_value = runs.open_values[name]
         judged = []
         for level in levels:
-            place = ((name, level),)
-            if plan.cells(question, [place]):  # otherwise this is the chosen level
+            point = ((name, level),)
+            if plan.cells(question, [point]):  # otherwise this is the chosen level
                 number = runs.number(name, level) if open_value.numeric else None
-                verdict = _verdict_at(plan, question, chosen, findings, records, place)
+                verdict = _verdict_at(plan, question, chosen, findings, records, point)
                 judged.append(LevelVerdict(level.words, number, verdict))
         unit, factor = _shown(runs, name, question.runs) if open_value.numeric else ("", 1.0)
         at = runs.chosen_number(name, question.runs) if open_value.numeric else None

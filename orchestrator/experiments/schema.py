@@ -139,11 +139,11 @@ from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from ..figures.plots import OVERVIEW
 from ..messages import listed
-from ..scenario.scenario_schema import Scalar
+from ..scenario.schema import Scalar
 from ..scenario.validation import OneOf, StrictModel, exactly_one
 from ..scenario.yaml_lines import KeyPath
 from .axes import MOST, AxisSpec, DesignAxisSpec, OverrideSpec, RegionSpec
-from .judged_schema import (
+from .claim_schema import (
     Alternatives,
     Assertion,
     Claim,
@@ -183,7 +183,7 @@ class RunSpec(OverrideSpec):
     name: str = Field(description="Name of the run and of its folder, e.g. 25mps/fnn", min_length=1)
     scenario: str = Field(description="Scenario file, relative to this file", min_length=1)
     for_each: dict[str, Choices] = Field(
-        {}, alias="for", description="Key -> values: a list, or each with its words, or with what it changes"
+        {}, alias="for", description="Key -> values: a list, or each with its label, or with its overrides"
     )
     label: str = Field("", description="Label in legends; default: the name")
     row: str = Field("", description="Label in tables; default: the label")
@@ -236,7 +236,7 @@ class TableSpec(StrictModel):
 
 @dataclass(frozen=True)
 class FigureKind:
-    """A kind of figure: what it shows, and what draws it."""
+    """A kind of figure: the key that it shows, and its drawing function."""
 
     shows: Literal["runs", "metric", "limit", "grid"]  # the key that it needs
     drawing: str = ""  # "module:class" in this package, an `axis_figures.Drawing`; "": runs are overlaid

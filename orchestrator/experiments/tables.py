@@ -286,7 +286,7 @@ def runs_table(runs: Sequence[FoundRun]) -> Table:
         scenario = "/".join([*file.parts[-2:-1], file.stem])
         cells: list[Cell] = [
             str(run.folder), _local(run.record.started), scenario or None,
-            changed(run.record.overrides) or None, run.status, *(_peak(run.record, s) for s in PEAKS),
+            changed(run.record.overrides) or None, run.status.value, *(_peak(run.record, s) for s in PEAKS),
         ]  # fmt: skip
         table.rows.append(cells)
     table.notes = [f"{run.folder}: {_one_line(run.problem)}" for run in runs if run.problem]
@@ -367,7 +367,9 @@ def fmus_table(fmus: Sequence[Fmu], errors: Sequence[Diagnostic]) -> Table:
 def units_table(fmus: Sequence[Fmu]) -> Table:
     """Return a table of how FMUs that were built here run: natively, or in Python and why."""
     table = Table("", ["FMU", "runs as"])
-    table.rows += [[fmu.name, runs_as(fmu.path)] for fmu in fmus]
+    for fmu in fmus:
+        how = runs_as(fmu.path)
+        table.rows.append([fmu.name, str(how) if how else None])
     return table
 
 
@@ -404,7 +406,7 @@ def recorded_table(plan: Plan) -> Table:
 
 def metrics_table() -> Table:
     """Return a table of all measures of a signal x."""
-    table = Table("", ["metric", "what it is", "", "unit", "needs"])
+    table = Table("", ["metric", "meaning", "", "unit", "needs"])
     for measure in measures():
         table.rows.append(
             [f"{measure.name}(x)", measure.definition, measure.formula, measure.unit, measure.needs or None]

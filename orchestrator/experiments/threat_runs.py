@@ -128,7 +128,7 @@ def _survives(
         met = run["clean"] == 1.0
     else:  # by the ratios, which are not judged at other speeds than the regulation's
         responds = not spec.dry or not run.responsiveness_asked or run["responsiveness"] == 1.0
-        met = responds and (run.margin or 0.0) >= 0.0
+        met = responds and (run.headroom or 0.0) >= 0.0
     return met and (run["sideslip"] or 0.0) <= bound
 
 
@@ -383,7 +383,7 @@ def run_threats(
 
 
 def published_result(threats: LoadedThreats) -> ThreatResult:
-    """Return what a threat file has published, of what it still searches and drives.
+    """Return the published results of a threat file, without threats and disciplines it no longer has.
 
     Raises:
         ScenarioError: a table cannot be read.

@@ -26,8 +26,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import judged_schema
-from .confidence import DRAWS, LEVEL, Bounds, bootstrap, percentile_bounds
+from . import claim_schema
+from .confidence import CONFIDENCE, DRAWS, Bounds, bootstrap, percentile_bounds
 from .tables import Table, column
 from .threat_runs import ThreatResult
 from .threats import REFERENCE
@@ -142,7 +142,7 @@ def rank_correlation(table: ScoreTable, other: ScoreTable, reference: str) -> fl
     first, second = ({row.entry: row.score for row in scores.scores} for scores in (table, other))
     both = [entry for entry in first if entry in second and entry != reference]
     scores = [first[entry] for entry in both], [second[entry] for entry in both]
-    correlation = judged_schema.rank_correlation(*scores) if len(both) > 2 else None
+    correlation = claim_schema.rank_correlation(*scores) if len(both) > 2 else None
     return math.nan if correlation is None else correlation
 
 
@@ -204,7 +204,7 @@ def moves_between(before: Sequence[str], after: Sequence[str], reference: str) -
     places = {entry: (before.index(entry) + 1, after.index(entry) + 1) for entry in before}
     farthest = max(before, key=lambda entry: abs(places[entry][1] - places[entry][0]))
     of_laws = [place for entry, place in places.items() if entry != reference]
-    correlation = judged_schema.rank_correlation(*zip(*of_laws, strict=True)) if len(of_laws) > 2 else None
+    correlation = claim_schema.rank_correlation(*zip(*of_laws, strict=True)) if len(of_laws) > 2 else None
     return Moves(
         math.nan if correlation is None else correlation,
         sum(old != new for old, new in places.values()),
@@ -292,7 +292,7 @@ def ratio_of_spreads(groups: np.ndarray) -> Spread:
     if within == 0.0:
         return Spread(math.inf, Bounds(math.inf, math.inf))
     observed = n * float(groups.mean(axis=1).var(ddof=1)) / within
-    tail = 0.5 * (1.0 - LEVEL)
+    tail = 0.5 * (1.0 - CONFIDENCE)
     quantiles = f.ppf([1.0 - tail, tail], number - 1, number * (n - 1))
     value, low, high = (math.sqrt(max(0.0, observed / q - 1.0) / n) for q in (1.0, *map(float, quantiles)))
     return Spread(value, Bounds(low, high))

@@ -46,7 +46,7 @@ from ..messages import hint
 from ..names import Target
 from ..plan import Override
 from ..scenario import yaml_lines
-from ..scenario.scenario_schema import Scalar
+from ..scenario.schema import Scalar
 from ..scenario.validation import StrictModel, validate
 from .axes import OverrideSpec, TargetText
 from .ranking import EntriesSpec, EntrySpec, LoadedRanking, load_ranking

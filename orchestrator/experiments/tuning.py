@@ -26,7 +26,7 @@ from ..names import Target
 from .axes import DesignAxisSpec, OverrideSpec, VariantSpec, level_at
 from .claims import MetricTable
 from .experiment import LoadedExperiment
-from .outcome import ExperimentResult, derive
+from .experiment_result import ExperimentResult, derive
 from .tables import Table, column
 
 if TYPE_CHECKING:
@@ -112,9 +112,9 @@ def search(experiment: LoadedExperiment, judged: JudgeExperiment) -> list[TunedL
     for name, law in tuning.laws.items():
         axes, trials = law.axes.values(), list[Trial]()
 
-        def costs(places: Any, name: str = name, law: LawSpec = law, trials: list[Trial] = trials) -> Any:
-            values = [_values(law, column) for column in np.asarray(places).T]
-            tried = [_changes(law, place) for place in values]
+        def costs(positions: Any, name: str = name, law: LawSpec = law, trials: list[Trial] = trials) -> Any:
+            values = [_values(law, column) for column in np.asarray(positions).T]
+            tried = [_changes(law, point) for point in values]
             findings = judged(
                 trials_of(experiment, {f"{name}, {k + 1}": changes for k, changes in enumerate(tried)})
             )
@@ -144,7 +144,7 @@ def best_of(experiment: LoadedExperiment, tuned_laws: Sequence[TunedLaw]) -> Loa
 
 def _fixed(experiment: LoadedExperiment, judged: JudgeExperiment) -> MetricTable:
     """Return the metrics of the runs without a tuned law."""
-    left = trials_of(experiment, {"as they stand": VariantSpec.model_validate({})}, driven=False)
+    left = trials_of(experiment, {"untuned": VariantSpec.model_validate({})}, driven=False)
     return judged(left).values if left.runs else {}
 
 
@@ -159,11 +159,11 @@ def trials_of(
     return replace(experiment, spec=experiment.spec.model_copy(update=changed), runs=runs)
 
 
-def _values(law: LawSpec, places: Sequence[float]) -> dict[Target, float]:
+def _values(law: LawSpec, positions: Sequence[float]) -> dict[Target, float]:
     """Return target -> value at a point of the unit cube."""
     values: dict[Target, float] = {}
-    for axis, place in zip(law.axes.values(), places, strict=True):
-        number = float(f"{level_at(axis, float(place)).value:.{DIGITS}g}")
+    for axis, position in zip(law.axes.values(), positions, strict=True):
+        number = float(f"{level_at(axis, float(position)).value:.{DIGITS}g}")
         values.update(dict.fromkeys(axis.vary, number))
     return values
 

@@ -16,13 +16,13 @@ from ..messages import changed
 from ..metrics.run_metrics import MetricValue, metric
 from ..metrics.verdict import Status, Verdict
 from .axes import levels_of
+from .claim_schema import GridSpec, MetricReference, MetricSpec, si_number
 from .claims import ClaimResult
 from .confidence import Bounds
 from .experiment import NamedRun
+from .experiment_result import ExperimentResult, limit_table
 from .grids import cells, grid_tables, side_by_side
 from .jobs import NOT_MADE
-from .judged_schema import GridSpec, MetricReference, MetricSpec, si_number
-from .outcome import ExperimentResult, limit_table
 from .schema import TableSpec
 from .tables import Cell, Column, Table, marked, remarks
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import ResultsError
 from ..messages import changed_each
+from ..results.run_folder import RunStatus
 from .panels import SPAN, Panel, in_legend, shown_by, spans_of
 from .style import (
     NARROW,
@@ -152,6 +153,7 @@ def provenance(runs: Sequence[LabelledRun]) -> str:
     parts += [*algorithms, *(f"step {digits_of(1000 * step)} ms" for step in steps)]
     fmus = dict.fromkeys(f"{fmu.name} {fmu.sha256[:8]}" for record in records for fmu in record.fmus.values())
     parts += [f"FMUs: {', '.join(fmus)}"] if fmus else []
-    unfinished = [r.label for r in runs if r.results.ended or r.results.record.status != "completed"]
+    completed = RunStatus.COMPLETED
+    unfinished = [r.label for r in runs if r.results.ended or r.results.record.status is not completed]
     parts += [f"ended early: {', '.join(unfinished)}"] if unfinished else []
     return " · ".join(parts)

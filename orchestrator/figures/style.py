@@ -22,7 +22,7 @@ from ..errors import ResultsError
 from ..files import reason, write_whole
 from ..messages import cut, printable
 from ..metrics.measures import si_of, symbol, variable_of
-from ..results.measured import MeasuredResults
+from ..results.measurement_results import MeasuredResults
 from ..results.reader import Results
 
 if TYPE_CHECKING:
@@ -148,7 +148,7 @@ def own_size() -> tuple[float, float] | None:
 
 @contextmanager
 def new_figure() -> Iterator[Figure]:
-    """Context that yields an empty figure; what is drawn within it has the common style."""
+    """Context that yields an empty figure; drawing within it uses the common style."""
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

@@ -39,7 +39,7 @@ from ..plan import Fmu
 from . import description as fmu_description
 from .binary import binary_problem
 
-FORMAT = 8
+FORMAT = 9
 """Format version of cache entries; part of their names, so versions of this program can share a cache."""
 
 _FILE_TIME = 946_684_800
@@ -70,10 +70,10 @@ def open_fmu(path: Path | str, *, validate: bool = True) -> Fmu:
         except OSError as error:
             problem = problem or ModelDescriptionError(_no_room(path, folder, error), code="cache-unwritable")
             continue
-        if validate and fmu.flaws:
-            more = f" (and {len(fmu.flaws) - 1} more)" if len(fmu.flaws) > 1 else ""
+        if validate and fmu.violations:
+            more = f" (and {len(fmu.violations) - 1} more)" if len(fmu.violations) > 1 else ""
             way = "; 'validate: false' for the unit (--set UNIT.validate=false) makes it a warning"
-            raise ModelDescriptionError(f"{fmu.path}: {fmu.violations()[0].rstrip('.')}{more}{way}")
+            raise ModelDescriptionError(f"{fmu.path}: {fmu.violations[0].message.rstrip('.')}{more}{way}")
         if wrong := binary_problem(fmu):
             raise ModelDescriptionError(f"{fmu.path}: {wrong}")
         return fmu

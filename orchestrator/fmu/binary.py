@@ -11,7 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from ..messages import listed, short
-from ..plan import Fmu
+from ..plan import Fmu, RunsAs
 
 _ALWAYS = ("EnterInitializationMode", "ExitInitializationMode", "DoStep", "FreeInstance")
 CORE = {
@@ -92,7 +92,9 @@ REASON = "extra/org.yawbench.native/native.txt"
 """Path in an archive of why it has no native library; empty if it has one."""
 WANTED = "YAWBENCH_UNITS"
 """Environment variable: `python` asks for units in Python at run time."""
-NATIVE = "native"
+
+
+PYTHON_WANTED = RunsAs(f"{WANTED} asks for it")
 
 
 def python_wanted() -> bool:
@@ -100,8 +102,8 @@ def python_wanted() -> bool:
     return os.environ.get(WANTED) == "python"
 
 
-def runs_as(archive: Path) -> str | None:
-    """Return "native", or "Python: " and why; None for an FMU that was not built from Python here."""
+def runs_as(archive: Path) -> RunsAs | None:
+    """Return how an FMU that was built from Python here runs, None for any other."""
     try:
         reason = _reason(str(archive), os.stat(archive).st_mtime_ns)
     except OSError:
@@ -109,10 +111,10 @@ def runs_as(archive: Path) -> str | None:
     if reason is None:
         return None
     if reason:
-        return f"Python: {reason}"
+        return RunsAs(reason)
     if python_wanted():
-        return f"Python: {WANTED} asks for it"
-    return NATIVE if sys.platform == "linux" else "Python: the native library is for Linux"
+        return PYTHON_WANTED
+    return RunsAs() if sys.platform == "linux" else RunsAs("the native library is for Linux")
 
 
 def is_native(directory: Path) -> bool:

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from ..errors import ModelDescriptionError
+from ..errors import Diagnostic, ModelDescriptionError
 from ..messages import short
 from ..plan import Fmu, UnitDefinition, Value, Variable
 from .binary import INTEGERS, binary_of, lacking
@@ -98,8 +98,8 @@ def element_names(name: str, shape: tuple[int, ...]) -> list[str]:
     """Return the names of an array's elements, row by row and counted from 1; for a scalar, its name."""
     if not shape:
         return [name]
-    places = itertools.product(*(range(1, n + 1) for n in shape))
-    return [f"{name}[{','.join(map(str, place))}]" for place in places]
+    indices = itertools.product(*(range(1, n + 1) for n in shape))
+    return [f"{name}[{','.join(map(str, index))}]" for index in indices]
 
 
 def _reason(v: Any) -> str | None:
@@ -246,7 +246,7 @@ SUPPORTED = "supported are FMI 2.0 and 3.0 for co-simulation"
 def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
     """Read the model description of the archive `raw` with the content `files`; the caller sets `directory`.
 
-    An invalid model description is read nevertheless if possible; its errors are listed in `flaws`.
+    An invalid model description is read nevertheless if possible; its errors are listed in `violations`.
 
     Raises:
         ModelDescriptionError: it is missing, malformed, unusable, or of a kind that is not supported.
@@ -260,19 +260,19 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
 
     from fmpy.model_description import ValidationError, read_model_description
 
-    flaws: list[str] = []
+    violations: list[str] = []
     try:
         try:
             description = read_model_description(io.BytesIO(raw))
         except ValidationError as error:
-            flaws = [_one_line(flaw) for flaw in error.problems]
+            violations = [_one_line(violation) for violation in error.problems]
             description = read_model_description(io.BytesIO(raw), validate=False)
         variables, refused = scalars(description, root)
     except Exception as error:  # fmpy raises whatever its parsing meets
         reason = _one_line(error) or type(error).__name__
         unforeseen = isinstance(error, LookupError | TypeError | AttributeError | NameError)
-        if flaws:
-            reason = f"it is not valid FMI {fmi}.0: {flaws[0].rstrip('.')}" + f" ({reason})" * (
+        if violations:
+            reason = f"it is not valid FMI {fmi}.0: {violations[0].rstrip('.')}" + f" ({reason})" * (
                 not unforeseen
             )
         elif unforeseen:
@@ -296,7 +296,10 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
         python_modules=_python_modules(files),
         fmi=fmi,
         refused=refused,
-        flaws=tuple(flaws),
+        violations=tuple(
+            Diagnostic("fmu-invalid", f"the model description is not valid FMI {fmi}.0: {text}", "warning")
+            for text in violations
+        ),
         lacking=lacking(files.get(binary_of(fmi, identifier)), fmi),
         tolerance=_tolerance(experiment),
         needs_tool=kind.needsExecutionTool,
@@ -316,8 +319,8 @@ def _dangling(root: ElementTree.Element, fmi: int) -> str | None:
         what, own, among = "value reference", "valueReference", "no variable has it"
         rates = [(e, "derivative") for e in variables]
     unknowns = root.findall("ModelStructure//Unknown") if fmi == 2 else root.findall("ModelStructure/*")
-    places = [(e, key) for e in unknowns for key in (own, "dependencies")]
-    for element, key in (*places, *rates):
+    uses = [(e, key) for e in unknowns for key in (own, "dependencies")]
+    for element, key in (*uses, *rates):
         for number in (element.get(key) or "").split():
             if number.isdecimal() and number.lstrip("0") not in known and number not in known:
                 return f"{key} of {element.tag} names {what} {short(number)}, but {among}"
@@ -380,7 +383,8 @@ def _python_modules(files: Mapping[str, bytes]) -> dict[str, str]:
 def to_record(fmu: Fmu) -> dict[str, Any]:
     """Return the description as JSON-ready data, without the paths of archive and folder."""
     record = {key: value for key, value in asdict(fmu).items() if key not in ("name", "path", "directory")}
-    return {**record, "variables": list(record["variables"].values())}
+    violations = [violation.record() for violation in fmu.violations]
+    return {**record, "violations": violations, "variables": list(record["variables"].values())}
 
 
 def from_record(record: dict[str, Any], *, path: Path, directory: Path) -> Fmu:
@@ -392,6 +396,7 @@ def from_record(record: dict[str, Any], *, path: Path, directory: Path) -> Fmu:
         if (unit := v.get("definition")) is not None:
             v["definition"] = UnitDefinition(tuple(unit["powers"]), unit["factor"], unit["offset"])
         variables[v["name"]] = Variable(**v)
-    tuples = {key: tuple(record[key]) for key in ("flaws", "lacking", "host_packages")}
-    fields = {**record, **tuples, "variables": variables}
+    tuples = {key: tuple(record[key]) for key in ("lacking", "host_packages")}
+    violations = tuple(map(Diagnostic.of, record["violations"]))
+    fields = {**record, **tuples, "violations": violations, "variables": variables}
     return Fmu(name=path.stem, path=path, directory=directory, **fields)

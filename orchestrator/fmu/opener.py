@@ -19,7 +19,7 @@ from ..messages import closest, listed, printable, short
 from ..plan import BuildInfo, Fmu
 from ..scenario.overrides import is_path
 from .archive import open_fmu
-from .places import PackagedComponent, further_folders, packaged, packaged_components
+from .search_path import PackagedComponent, further_folders, packaged, packaged_components
 
 if TYPE_CHECKING:
     from fmus.upkeep import FmuUpdater
@@ -58,7 +58,7 @@ class Opener:
         self._built: dict[Path, BuildInfo | None] = {}
         self.folders: dict[tuple[Path, Path], Path] = {}
         """Folder of a scenario, working directory -> what `find_folder` has returned."""
-        self.found: dict[Hashable, Fmu] = {}
+        self.opened_as: dict[Hashable, Fmu] = {}
         """What scenarios name, and where from -> the opened FMU."""
 
     @cached_property

@@ -42,8 +42,8 @@ import numpy as np
 from ..interrupts import StopFlag
 from ..master.fmi import open_instance
 from ..master.instance import FmuInstance
-from ..master.master import Master
 from ..master.process_state import Log
+from ..master.step_loop import Master
 from ..names import SignalName
 from ..plan import Override
 from ..planner import Planner

@@ -45,10 +45,10 @@ from .fmi import open_instance
 from .instance import CtypesInstance
 from .ipc import FmuProcess, LogRelay, error_record, rebuilt
 from .isolation import Isolation
-from .master import WORDS, EndRequested, Master
 from .process_state import MASTER, WARNING, Log, flush_output
 from .run_loop import OpenInstance, RunLoop, RunProgress
 from .signal_pool import InstanceSlot
+from .step_loop import WORDS, EndRequested, Master
 
 ROWS, PROGRESS, ENDED, WHERE = 0x90, 0x91, 0x92, 0x93
 """First bytes of records from the child: a block of rows, progress, end of the run, current instance."""

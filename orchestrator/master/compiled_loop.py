@@ -32,7 +32,7 @@ Kind = IntEnum(
     "END CALL COPY BLEND CONVERT SERIES EXCHANGE_2 EXCHANGE_3 STEP_2 STEP_3",
     start=0,
 )
-"""What an operation does; CALL: what only Python can do."""
+"""Kinds of operations; CALL: only Python can do it."""
 Answer = IntEnum("Answer", "FINISHED INTERRUPTED PYTHON STATUS NOT_FINITE COPIED PAUSED", start=0)
 """Why a walk returned: STATUS, a call that is to be looked at; COPIED, this is a copy made by `fork`."""
 

@@ -101,7 +101,7 @@ def _put(slot: InstanceSlot, requested: Mapping[str, Value], what: str, check: S
     others = (v for v in variables.values() if v.reference in arrays) if arrays else ()
     values = {v.name: v.start for v in others if v.start is not None} | dict(requested)
     for chosen in by_type(variables[name] for name in values):
-        status = slot.fmu_instance.put([v.place for v in chosen], [values[v.name] for v in chosen])
+        status = slot.fmu_instance.put([v.ref for v in chosen], [values[v.name] for v in chosen])
         check(slot.name, what, status)
 
 
@@ -151,7 +151,7 @@ def _read_back(
     """Yield variables of one type, the status of reading them, and those that differ: name, read, set."""
     for chosen in by_type(slot.instance.fmu.variables[name] for name in requested):
         with log.muted():
-            raw, values = slot.fmu_instance.fetch([v.place for v in chosen])
+            raw, values = slot.fmu_instance.fetch([v.ref for v in chosen])
         status = known(raw)
         if status >= FATAL:
             check(slot.name, "reading back what was set", status)
@@ -218,12 +218,12 @@ def _renew_others(
         if value is None or value == old:
             continue
         signals.others[s.name, variable.name] = value
-        changed.add(variable.place[:2])
+        changed.add(variable.ref[:2])
         if wire is not None:
             text = f"{wire.source}.{wire.output} -> {s.name}.{variable.name}"
             moving.append(UnsettledWire(text, "" if old is None else old, value))
     if changed:  # all elements of an array are set together
-        names = [v.name for v, _ in s.other_inputs if v.place[:2] in changed and v.name in values]
+        names = [v.name for v, _ in s.other_inputs if v.ref[:2] in changed and v.name in values]
         _put(s, {name: values[name] for name in names}, "setting inputs", check)
     return bool(changed)
 

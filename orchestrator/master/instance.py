@@ -84,10 +84,10 @@ class FmuInstance(Protocol):
     def part(self, kind: str) -> str:
         """Return the kind of call (set, step, get) that failed when one of `kind` did not return OK."""
 
-    def put(self, places: Sequence[ValueRef], values: Sequence[Value]) -> Status:
+    def put(self, refs: Sequence[ValueRef], values: Sequence[Value]) -> Status:
         """Set variables of one type; of an array, all elements."""
 
-    def fetch(self, places: Sequence[ValueRef]) -> tuple[Status, list[Value]]:
+    def fetch(self, refs: Sequence[ValueRef]) -> tuple[Status, list[Value]]:
         """Return the status and the values of variables of one type."""
 
     def setup(self, experiment: ExperimentSetup) -> Status:
@@ -213,21 +213,21 @@ class CtypesInstance(FmuInstance, ABC):
         function = ctypes.cast(self._library[self.prefix + name], ctypes.c_void_p).value
         return {"function": function, "instance": self._component}
 
-    def _calls(self, verb: str, values: np.ndarray, places: Sequence[ValueRef]) -> Callable[[], Status]:
+    def _calls(self, verb: str, values: np.ndarray, refs: Sequence[ValueRef]) -> Callable[[], Status]:
         """Return the call that sets or gets floating-point values of single or double precision."""
         calls = []
-        for kind in dict.fromkeys(place.type for place in places):
-            where = [i for i, place in enumerate(places) if place.type == kind]
-            calls.append(self._staged(verb, values, [places[i] for i in where], where))
+        for kind in dict.fromkeys(ref.type for ref in refs):
+            where = [i for i, ref in enumerate(refs) if ref.type == kind]
+            calls.append(self._staged(verb, values, [refs[i] for i in where], where))
         if not calls:
             return nothing_to_do
         return calls[0] if len(calls) == 1 else lambda: max(call() for call in calls)
 
     def _staged(
-        self, verb: str, values: np.ndarray, places: Sequence[ValueRef], where: list[int]
+        self, verb: str, values: np.ndarray, refs: Sequence[ValueRef], where: list[int]
     ) -> Callable[[], Status]:
         """Return the call for the values at the buffer's indices `where`, all of one type."""
-        kind, (references, at, count) = places[0].type, _layout(places)
+        kind, (references, at, count) = refs[0].type, _layout(refs)
         if kind == self.real and at == where == list(range(len(values))) and count == len(values):
             straight = (ctypes.c_double * count).from_buffer(values.data)
             call = self._call(verb + kind, references, straight)
@@ -262,13 +262,11 @@ class CtypesInstance(FmuInstance, ABC):
             counts.append(ctypes.c_size_t(len(buffer)))
         return BoundCall(self._function(name), ctypes.c_void_p(self._component), references, *counts)
 
-    def _access(
-        self, verb: str, places: Sequence[ValueRef], values: Sequence[Any]
-    ) -> tuple[Status, list[Any]]:
+    def _access(self, verb: str, refs: Sequence[ValueRef], values: Sequence[Any]) -> tuple[Status, list[Any]]:
         """Set ("Set") or get ("Get") variables of one type; return status and values."""
-        kind, (references, at, count) = places[0].type, _layout(places)
+        kind, (references, at, count) = refs[0].type, _layout(refs)
         if not self._has(verb + kind):
-            return self._impossible(f"the library lacks {self.prefix}{verb}{kind}"), [0] * len(places)
+            return self._impossible(f"the library lacks {self.prefix}{verb}{kind}"), [0] * len(refs)
         buffer = (self.c_types[kind] * count)()
         for i, value in zip(at, values, strict=False):  # empty when getting
             buffer[i] = value
@@ -305,13 +303,13 @@ class CtypesInstance(FmuInstance, ABC):
     def part(self, kind: str) -> str:
         return kind
 
-    def put(self, places: Sequence[ValueRef], values: Sequence[Value]) -> Status:
+    def put(self, refs: Sequence[ValueRef], values: Sequence[Value]) -> Status:
         encoded = [v.encode() if isinstance(v, str) else v for v in values]
-        return self._access("Set", places, encoded)[0]
+        return self._access("Set", refs, encoded)[0]
 
-    def fetch(self, places: Sequence[ValueRef]) -> tuple[Status, list[Value]]:
-        status, values = self._access("Get", places, ())
-        kind = places[0].type
+    def fetch(self, refs: Sequence[ValueRef]) -> tuple[Status, list[Value]]:
+        status, values = self._access("Get", refs, ())
+        kind = refs[0].type
         if kind == "String":
             values = [(text or b"").decode("utf-8", errors="replace") for text in values]
         elif kind == "Boolean":
@@ -351,15 +349,15 @@ class CtypesInstance(FmuInstance, ABC):
         fmpy.freeLibrary(self._library._handle)
 
 
-def _layout(places: Sequence[ValueRef]) -> tuple[Any, list[int], int]:
+def _layout(refs: Sequence[ValueRef]) -> tuple[Any, list[int], int]:
     """Return the distinct value references, each scalar's index among the values, and their number."""
     first: dict[int, int] = {}
     count = 0
-    for place in places:
-        if place.reference not in first:
-            first[place.reference] = count
-            count += place.elements
-    at = [first[place.reference] + place.element for place in places]
+    for ref in refs:
+        if ref.reference not in first:
+            first[ref.reference] = count
+            count += ref.elements
+    at = [first[ref.reference] + ref.element for ref in refs]
     return (ctypes.c_uint * len(first))(*first), at, count
 
 

@@ -215,16 +215,16 @@ class IsolatedInstance:
     def part(self, kind: str) -> str:
         return self._part or kind
 
-    def put(self, places: Sequence[ValueRef], values: Sequence[Value]) -> Status:
+    def put(self, refs: Sequence[ValueRef], values: Sequence[Value]) -> Status:
         status = self._flush() if self._stepping else OK  # inputs are set in the order of the calls
         if status > WARNING:
             return status
-        function = f"{self._prefix}Set{places[0].type}"
-        return max(status, known(self._ask(function, FATAL, "put", list(places), list(values))))
+        function = f"{self._prefix}Set{refs[0].type}"
+        return max(status, known(self._ask(function, FATAL, "put", list(refs), list(values))))
 
-    def fetch(self, places: Sequence[ValueRef]) -> tuple[Status, list[Value]]:
-        failed: tuple[Status, list[Value]] = (FATAL, [0] * len(places))
-        return self._ask(f"{self._prefix}Get{places[0].type}", failed, "fetch", list(places))
+    def fetch(self, refs: Sequence[ValueRef]) -> tuple[Status, list[Value]]:
+        failed: tuple[Status, list[Value]] = (FATAL, [0] * len(refs))
+        return self._ask(f"{self._prefix}Get{refs[0].type}", failed, "fetch", list(refs))
 
     def setup(self, experiment: ExperimentSetup) -> Status:
         return self._ask(f"{self._prefix}SetupExperiment", FATAL, "setup", experiment)

@@ -223,7 +223,7 @@ class ProcessState:
         return _control(_arithmetic()) != _control(self._arithmetic)
 
     def restore(self, unit: str, log: Log) -> None:
-        """Undo what an instance has changed; log a warning the first time."""
+        """Restore state that an instance has changed; log a warning the first time."""
         for what in self._restored():
             if (unit, what) not in self._reported:
                 self._reported.add((unit, what))

@@ -21,8 +21,8 @@ from ..messages import listed
 from ..plan import Instance, Plan, Value
 from ..results.recorder import BLOCK
 from .instance import FmuInstance, Status, StepCalls
-from .master import EndRequested, Master
 from .process_state import MASTER, WARNING, Copies, Log, suspects
+from .step_loop import EndRequested, Master
 
 RunProgress = Callable[[int, int], None]
 """Called a few times a second with the number of communication points completed and their total."""
@@ -88,8 +88,8 @@ class RunLoop:
         """Open the FMUs, initialize them and step to the end."""
         corrupted: set[Path] = set()
         for unit in self.plan.instances:
-            for violation in unit.fmu.violations():
-                self.log.add(unit.name, WARNING, MASTER, violation, self.plan.time(0))
+            for violation in unit.fmu.violations:
+                self.log.add(unit.name, WARNING, MASTER, violation.message, self.plan.time(0))
             self._fmu_instances[unit.name] = opener(unit, self.log, corrupted)
             self._copies.end()
             self._returned.value = time.monotonic()

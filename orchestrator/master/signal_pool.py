@@ -5,7 +5,7 @@ the step before (`before`), samples of fast sources kept for slow instances (`ke
 undriven inputs, and the time. So every value that an input needs, and every row of the results, is one
 indexed read of one array. Instances of period 1 come first: what they need at once is contiguous. Values
 that are not Real live in a separate dictionary, which costs nothing if there are no such wires. If such an
-output feeds a Real input, its samples also stand in the array, behind those of its instance's Real outputs,
+output feeds a Real input, its samples are also in the array, after those of its instance's Real outputs,
 and are coupled as these are.
 
 Faults disturb an instance's outputs after they are read, or its inputs before they are set. An output is
@@ -259,7 +259,7 @@ def by_type(variables: Iterable[Variable]) -> Iterable[list[Variable]]:
     """Group variables by type, so that one FMI call can set or get each group."""
     groups: dict[str, list[Variable]] = {}
     for variable in variables:
-        groups.setdefault(variable.place.type, []).append(variable)
+        groups.setdefault(variable.ref.type, []).append(variable)
     return groups.values()
 
 
@@ -352,12 +352,12 @@ class FaultInjector:
 def faulting(signals: SignalPool, s: InstanceSlot, *, of_output: bool) -> FaultInjector | None:
     """Return the injector for the faults of an instance's outputs or inputs, None if it has none."""
     plan, period = signals.plan, s.instance.period
-    places = {v.name: (i, v) for i, v in enumerate(s.outputs if of_output else s.inputs)}
+    by_name = {v.name: (i, v) for i, v in enumerate(s.outputs if of_output else s.inputs)}
     disturbances = []
     for signal in plan.faults:
-        if (signal.instance, signal.of_output) != (s.name, of_output) or signal.variable not in places:
+        if (signal.instance, signal.of_output) != (s.name, of_output) or signal.variable not in by_name:
             continue
-        i, variable = places[signal.variable]
+        i, variable = by_name[signal.variable]
         ahead, held = 2 * period, variable.discrete
         if not of_output:
             wire = s.wires[i]

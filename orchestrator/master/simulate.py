@@ -27,7 +27,7 @@ from ..results.file_formats import recorder_of
 from ..results.freshness import key_of, run_record
 from ..results.reader import Results
 from ..results.recorder import MemoryRecorder, Recorder
-from ..results.run_folder import COMPLETED, RUNNING
+from ..results.run_folder import RunStatus
 from ..results.run_record import DiagnosticRecord, EndRecord, ErrorRecord, WarningRecord
 from .child_run import ChildRun, can_be_apart
 from .fmi import keeps, open_instance
@@ -150,7 +150,7 @@ class Simulation:
         self.watch = PlausibilityWatch(plan)
         recorder.looks.append(self.watch.look)
         self.log = Log()
-        self.record = run_record(plan, status=RUNNING, started=datetime.now(timezone.utc))
+        self.record = run_record(plan, status=RunStatus.RUNNING, started=datetime.now(timezone.utc))
         self.record.id, self.record.key = uuid.uuid4().hex[:12], key_of(plan)
         self._apart = apart
         self._stop = StopFlag()
@@ -175,7 +175,7 @@ class Simulation:
                 except BaseException as error:
                     self._fail(error)
                     raise
-                self._save(COMPLETED)
+                self._save(RunStatus.COMPLETED)
             finally:
                 self._end()
 
@@ -187,12 +187,13 @@ class Simulation:
         if isinstance(error, SimulationError):
             error.warnings = self.watch.warnings()
         try:
-            self._save("interrupted" if isinstance(error, KeyboardInterrupt) else "failed", error)
+            interrupted = isinstance(error, KeyboardInterrupt)
+            self._save(RunStatus.INTERRUPTED if interrupted else RunStatus.FAILED, error)
         except ResultsError as lost:
             diagnostics += lost.diagnostics
         else:
-            if self.recorder.place is not None:
-                sentence = f"What was recorded until then: {self.recorder.place}"
+            if self.recorder.written_to is not None:
+                sentence = f"What was recorded until then: {self.recorder.written_to}"
                 diagnostics.append(Diagnostic("results-kept", sentence, "info"))
 
     def _abandon(self) -> None:
@@ -203,17 +204,17 @@ class Simulation:
             return
         doing = "while its instances were freed" if self._saved else "inside an instance"
         error = self._stop.interrupted(doing, time=self.log.time.value)
-        if self.recorder.place is None:  # results in memory: the caller's program must go on
+        if self.recorder.written_to is None:  # results in memory: the caller's program must go on
             raise error
         try:
             if not self._saved:
                 self._fail(error)
         finally:
-            place = printable(str(self.recorder.place))
-            print(f"yawbench: {error}; results so far: {place}", file=sys.stderr, flush=True)
+            results = printable(str(self.recorder.written_to))
+            print(f"yawbench: {error}; results so far: {results}", file=sys.stderr, flush=True)
             os._exit(error.exit_status)
 
-    def _save(self, status: str, error: BaseException | None = None) -> None:
+    def _save(self, status: RunStatus, error: BaseException | None = None) -> None:
         """Write the record of the run and put the results in place."""
         self._saving = True
         self._ended_by = getattr(error, "instance", None)

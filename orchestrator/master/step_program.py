@@ -272,9 +272,9 @@ def _acting(s: InstanceSlot, faults: FaultInjector | None, values: np.ndarray) -
 
 def _keeping_outputs(m: SignalPool, s: InstanceSlot) -> Operation:
     """Return the operation that keeps the outputs of an instance's last step."""
-    places = [m.index[s.name, v.name] for v in s.outputs]
-    places += [m.converted[s.name, v.name] for v in s.converted]
-    here = np.array(places, np.intp)
+    slots = [m.index[s.name, v.name] for v in s.outputs]
+    slots += [m.converted[s.name, v.name] for v in s.converted]
+    here = np.array(slots, np.intp)
     data = OperationData(Kind.COPY, len(here), first=here, values=s.samples_before)
     return Operation(s.name, "keep", copying(s.samples, s.samples_before), data)
 
@@ -290,14 +290,14 @@ def _setting(m: SignalPool, s: InstanceSlot) -> list[Operation]:
     if s.driven:
         operations.append(_of_fmu(s, "set", s.calls.set))
     moving = [v for v, wire in s.other_inputs if wire is not None or v.name in s.instance.series]
-    driven = {v.place[:2] for v in moving}  # all elements of an array are set together
+    driven = {v.ref[:2] for v in moving}  # all elements of an array are set together
     wires = {v.name: wire for v, wire in s.other_inputs}
-    for chosen in by_type(v for v, _ in s.other_inputs if v.place[:2] in driven):
-        places, ends = [v.place for v in chosen], [((s.name, v.name), wires[v.name]) for v in chosen]
+    for chosen in by_type(v for v, _ in s.other_inputs if v.ref[:2] in driven):
+        refs, ends = [v.ref for v in chosen], [((s.name, v.name), wires[v.name]) for v in chosen]
 
-        def put(places: list[ValueRef] = places, ends: list[Any] = ends) -> Status:
+        def put(refs: list[ValueRef] = refs, ends: list[Any] = ends) -> Status:
             values = [m.others[key] if wire is None else m.other(wire) for key, wire in ends]
-            return s.fmu_instance.put(places, values)
+            return s.fmu_instance.put(refs, values)
 
         operations.append(Operation(s.name, "set", put))
     return operations
@@ -309,10 +309,10 @@ def getting(m: SignalPool, s: InstanceSlot) -> list[Operation]:
     if s.outputs:
         operations.append(_of_fmu(s, "get", s.calls.get))
     for chosen in by_type(s.other_outputs):
-        places, keys = [v.place for v in chosen], [(s.name, v.name) for v in chosen]
+        refs, keys = [v.ref for v in chosen], [(s.name, v.name) for v in chosen]
 
-        def fetch(places: list[ValueRef] = places, keys: list[tuple[str, str]] = keys) -> Status:
-            status, values = s.fmu_instance.fetch(places)
+        def fetch(refs: list[ValueRef] = refs, keys: list[tuple[str, str]] = keys) -> Status:
+            status, values = s.fmu_instance.fetch(refs)
             m.others.update(zip(keys, values, strict=True))
             return status
 

@@ -1,4 +1,4 @@
-"""Files of columns, as recordings have them: CSV, Parquet and ASAM MDF 4.
+"""Files of recorded columns: CSV, Parquet and ASAM MDF 4.
 
 CSV is separated by `,`, `;`, tab, `|` or spaces, in UTF-8, UTF-16 or Latin-1 (Windows-1252). Its numbers may
 have a decimal comma if the comma does not separate. A header may name a unit, `delta [deg]`, and CSV may have
@@ -196,7 +196,7 @@ def _mdf(raw: bytes) -> _Table:
         raise ValueError("ASAM MDF needs the package asammdf: pip install 'yawbench[mdf]'") from None
     try:
         mdf: Any = asammdf.MDF(io.BytesIO(raw))
-        places = [
+        channels = [
             (group, index, channel.name, channel.unit)
             for group, channels in enumerate(mdf.groups)
             for index, channel in enumerate(channels.channels)
@@ -206,14 +206,14 @@ def _mdf(raw: bytes) -> _Table:
         raise ValueError(f"is not an MDF file, or damaged: {' '.join(str(error).split())}") from None
 
     def signal(at: int) -> Any:
-        group, index, *_ = places[at]
+        group, index, *_ = channels[at]
         return mdf.get(group=group, index=index)
 
     def values(at: int) -> np.ndarray:
         samples = signal(at).samples
         return np.char.decode(samples, "utf-8").astype(object) if samples.dtype.kind == "S" else samples
 
-    headers, units = [name for _, _, name, _ in places], [unit for *_, unit in places]
+    headers, units = [name for _, _, name, _ in channels], [unit for *_, unit in channels]
     return _Table(headers, units, values, times=lambda at: signal(at).timestamps)
 
 
@@ -288,7 +288,7 @@ def _numbers(column: np.ndarray, what: str) -> np.ndarray:
         for row, cell in enumerate(column, start=1):
             try:
                 float(cell)
-            except (TypeError, ValueError):  # noqa: PERF203 - it is the first
+            except (TypeError, ValueError):  # noqa: PERF203 - the first ends the loop
                 raise ValueError(f"{what}: value {row} is not a number ({cell!r})") from None
         raise
     bad = np.flatnonzero(~np.isfinite(numbers))
@@ -298,16 +298,16 @@ def _numbers(column: np.ndarray, what: str) -> np.ndarray:
 
 
 SHARE_OF_SPIKES = 0.01
-"""Fraction of samples that may exceed what cars reach; chosen: accelerometers have spikes."""
+"""Share of samples that may exceed the largest plausible value; chosen: accelerometers have spikes."""
 
 
-def unit_of(name: str, column: str, given: str | None, wanted: str) -> str:
+def unit_of(name: str, column: str, stated: str | None, wanted: str) -> str:
     """Return the unit of a signal's column or of the time column.
 
     Raises:
         ValueError: neither the description nor the file states it; only plain numbers may have none.
     """
-    unit = given or (wanted if wanted == "1" else None)
+    unit = stated or (wanted if wanted == "1" else None)
     if unit is None:
         raise ValueError(
             f"column {column!r} has no unit, such as {listed(spellings(wanted), last='or')}: write "
@@ -317,9 +317,9 @@ def unit_of(name: str, column: str, given: str | None, wanted: str) -> str:
 
 
 def refuse_implausible(
-    name: str, entry: SignalEntry, column: str, given: np.ndarray, values: np.ndarray, unit: str
+    name: str, entry: SignalEntry, column: str, recorded: np.ndarray, values: np.ndarray, unit: str
 ) -> None:
-    """Raise ValueError if a signal has values that no car reaches; suggest the unit that was probably meant.
+    """Raise ValueError if values of a signal are implausible for a car; suggest the unit that was meant.
 
     Args:
         name, entry: the signal.
@@ -331,9 +331,10 @@ def refuse_implausible(
     largest, wanted = entry.largest, entry.unit
     if largest is None or np.mean(np.abs(values) > largest) <= SHARE_OF_SPIKES:
         return
-    number = float(np.quantile(np.abs(given.astype(float)), 1.0 - SHARE_OF_SPIKES))
+    number = float(np.quantile(np.abs(recorded.astype(float)), 1.0 - SHARE_OF_SPIKES))
     likely = meant_unit(number, unit, wanted, lambda value: abs(value) <= largest)
+    value = f"{number:.4g} {unit}" if unit != "1" else f"{number:.4g}"
     raise ValueError(
-        f"column {column!r}: no car reaches {name} of {number:.4g}{f' {unit}' if unit != '1' else ''}, "
+        f"column {column!r}: no car reaches {name} of {value}, "
         f"at most {largest:.4g} {wanted} is allowed{f'; did you mean {likely!r}?' if likely else ''}"
     )

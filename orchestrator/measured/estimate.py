@@ -1,4 +1,4 @@
-"""Least-squares estimates from measured signals: the search, what can be identified, intervals.
+"""Least-squares estimates from measured signals: search, identifiability, intervals.
 
 The residuals are f = (y(t - d) + z - y_m(t)) / e: y simulated, y_m measured, e the expected difference of a
 signal, d and z the measurement's delay and offset if they are free; and one row (p - mean) / deviation per
@@ -7,14 +7,14 @@ prior. The loss is sum rho(f^2), for signals soft_l1, rho(s) = 2 (sqrt(1 + s) - 
 within bounds, scaled by the Jacobian J. Columns of J are differences of simulations; those of delays and
 offsets of compared signals need no simulation.
 
-Samples close in time err alike: a model that is a little wrong is wrong for a whole bend. So rows are taken
-to be independent between pieces of several seconds only, and the covariance of the estimate is
+Errors of samples close in time are correlated: a model that is slightly wrong is wrong for a whole bend. So
+rows are treated as independent only between pieces of several seconds. The covariance of the estimate is
 
     V = B^-1 (sum over pieces g of s_g s_g') B^-1,   B = J' diag(w) J,   s_g = (1 - A_g B^-1)^-1 J_g' psi_g
 
-with psi = f rho', w = rho' + 2 f^2 rho'', and A_g = J_g' diag(w) J_g, the part of B that piece g gives: each
-piece counts as if the estimate were made without it. `(J' J)^-1` times the variance of the residuals would
-take every sample for a measurement of its own, and intervals would be several times too narrow.
+with psi = f rho', w = rho' + 2 f^2 rho'', and A_g = J_g' diag(w) J_g, the contribution of piece g to B: each
+piece is judged by an estimate made without it. `(J' J)^-1` times the variance of the residuals would treat
+every sample as an independent measurement, which makes intervals several times too narrow.
 
 Sources: M. A. Branch, T. F. Coleman, Y. Li, SIAM J. Scientific Computing 21(1), 1999, 1-23 (the search);
 A. C. Cameron, D. L. Miller, A Practitioner's Guide to Cluster-Robust Inference, J. Human Resources 50(2),
@@ -38,13 +38,13 @@ from ..files import write_whole
 PIECE = 5.0
 """Duration of a piece [s]; chosen: longer than a bend, ten times a correlation of 0.5 s."""
 LEAST_PIECES = 5
-"""Pieces that an interval needs; chosen: with fewer, t quantiles exceed 3 and say little."""
+"""Least number of pieces for an interval; chosen: with fewer, t quantiles exceed 3."""
 LARGEST_CONDITION = 1e4
 """Condition beyond which parameters are refused; chosen: 5 to 103 where they can be identified, else 1e5."""
 NAMED = 0.2
 """Share of the largest component from which on components of the weakest direction are named; chosen."""
-LEVEL = 0.95
-"""Of the intervals."""
+CONFIDENCE = 0.95
+"""Confidence of the intervals; chosen: the usual one."""
 DIFFERENCE = 1e-4
 """Relative step of the differences for J; chosen: between rounding and curvature."""
 INFEASIBLE = 1e3
@@ -52,7 +52,7 @@ INFEASIBLE = 1e3
 TOLERANCE = 1e-6
 """Relative change of loss or parameters that ends the search; chosen: far below any interval."""
 FIRST = 1e-3
-"""That of a first search with squares, which is faster far from the result; chosen: near enough."""
+"""Likewise of the first search, with squares alone, which is faster far from the result; chosen."""
 
 Kind = Literal["run", "offset", "delay"]
 CONVERGED = "the loss or the parameters no longer change"  # message of a search that found a minimum
@@ -74,7 +74,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Window:
-    """A stretch of a measurement that is simulated from a start of its own.
+    """A part of a measurement that is simulated from its own initial state.
 
     Attributes:
         name: for messages.
@@ -168,10 +168,10 @@ def covariance(residuals: np.ndarray, jacobian: np.ndarray, pieces: np.ndarray) 
 
 
 def intervals_of(covariance: np.ndarray, pieces: int) -> np.ndarray:
-    """Return half the widths of the intervals of `LEVEL`, shape (parameters,)."""
+    """Return the half widths of the intervals of `CONFIDENCE`, shape (parameters,)."""
     from scipy.stats import t
 
-    widths: np.ndarray = t.ppf(0.5 + LEVEL / 2.0, pieces - 1) * np.sqrt(np.diag(covariance))
+    widths: np.ndarray = t.ppf(0.5 + CONFIDENCE / 2.0, pieces - 1) * np.sqrt(np.diag(covariance))
     return widths
 
 
@@ -202,13 +202,13 @@ class Estimate:
     simulated: list[Simulated]
 
     def intervals(self) -> dict[str, tuple[float, float] | None]:
-        """Return the interval of `LEVEL` of each parameter, None where there is none."""
-        found: dict[str, tuple[float, float] | None] = dict.fromkeys(self.values)
+        """Return the interval of `CONFIDENCE` of each parameter, None where there is none."""
+        intervals: dict[str, tuple[float, float] | None] = dict.fromkeys(self.values)
         if self.covariance is not None:
             inner = [name for name in self.values if name not in self.at_bound]
             for name, half in zip(inner, intervals_of(self.covariance, self.pieces).tolist(), strict=True):
-                found[name] = self.values[name] - half, self.values[name] + half
-        return found
+                intervals[name] = self.values[name] - half, self.values[name] + half
+        return intervals
 
     def correlated(self, least: float = 0.9) -> list[tuple[str, str, float]]:
         """Return the pairs of parameters whose correlation is at least `least`."""
@@ -216,17 +216,17 @@ class Estimate:
             return []
         inner = [name for name in self.values if name not in self.at_bound]
         deviations = np.sqrt(np.diag(self.covariance))
-        found = self.covariance / np.outer(deviations, deviations)
+        correlation = self.covariance / np.outer(deviations, deviations)
         return [
-            (one, two, float(found[i, j]))
-            for i, one in enumerate(inner)
-            for j, two in enumerate(inner[:i])
-            if abs(found[i, j]) >= least
+            (first, second, float(correlation[i, j]))
+            for i, first in enumerate(inner)
+            for j, second in enumerate(inner[:i])
+            if abs(correlation[i, j]) >= least
         ]
 
 
 class StartFailed(ValueError):
-    """The runs of the start values failed in the window that it names."""
+    """The run of the start values failed; the message names the window."""
 
 
 class NotIdentifiable(ValueError):
@@ -247,8 +247,8 @@ class Residuals:
         errors: compared signal -> expected difference.
         settling: time from the start of each window that is not compared [s].
         say: called with a line of progress after simulations.
-        folder: keeps what sets of values gave, so that a search that was interrupted goes on; None: nowhere.
-        identity: of the model and the windows, for what is kept.
+        folder: keeps the simulated signals of sets of values, to resume a search; None: they are not kept.
+        identity: of the model and the windows; part of the names of the kept files.
     """
 
     def __init__(
@@ -266,8 +266,8 @@ class Residuals:
         self.folder, self.identity = folder, identity
         self.say = say
         self.model, self.windows, self.parameters, self.errors = model, windows, parameters, errors
-        self.compared = [one.times >= one.times[0] + settling - 1e-9 for one in windows]
-        self.priors = [(i, *one.prior) for i, one in enumerate(parameters) if one.prior]
+        self.compared = [window.times >= window.times[0] + settling - 1e-9 for window in windows]
+        self.priors = [(i, *parameter.prior) for i, parameter in enumerate(parameters) if parameter.prior]
         pieces, first = [], 0
         for window, compared in zip(windows, self.compared, strict=True):
             times = window.times[compared]
@@ -276,22 +276,22 @@ class Residuals:
             pieces += [own] * len(errors)
             first = int(own[-1]) + 1
         self.pieces = np.concatenate([*pieces, np.full(len(self.priors), -1)])
-        self.runs = [i for i, one in enumerate(parameters) if one.kind == "run"]
+        self.runs = [i for i, parameter in enumerate(parameters) if parameter.kind == "run"]
         self.sets = 0
         self._known: dict[tuple[float, ...], list[Simulated]] = {}
 
     def simulated(self, points: Sequence[np.ndarray]) -> list[list[Simulated]]:
-        """Return the signals in each window at some points; simulate each point once."""
+        """Return the signals in each window at some points; each point is simulated once."""
         keys = [tuple(point[self.runs].tolist()) for point in points]
         new = {key: point for key, point in zip(keys, points, strict=True) if key not in self._known}
         if new:
-            names = [one.name for one in self.parameters]
-            kept = {key: found for key in new if (found := self._kept(key))}
+            names = [parameter.name for parameter in self.parameters]
+            kept = {key: signals for key in new if (signals := self._kept(key))}
             left = [key for key in new if key not in kept]
             sets = [dict(zip(names, new[key].tolist(), strict=True)) for key in left]
-            for key, found in zip(left, self.model(sets) if sets else [], strict=True):
-                kept[key] = found
-                self._keep(key, found)
+            for key, signals in zip(left, self.model(sets) if sets else [], strict=True):
+                kept[key] = signals
+                self._keep(key, signals)
             self._known |= kept
             self.sets += len(new)
             self.say(f"{self.sets} sets of values")
@@ -302,7 +302,7 @@ class Residuals:
         return (self.folder or Path()) / f"{digest[:20]}.npz"
 
     def _kept(self, key: tuple[float, ...]) -> list[Simulated] | None:
-        """Return what a set of values gave before an interruption; None if it is not kept, or unreadable."""
+        """Return the kept signals of a set of values; None if there are none, or they are unreadable."""
         if self.folder is None:
             return None
         try:
@@ -313,10 +313,10 @@ class Residuals:
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
             return None
 
-    def _keep(self, key: tuple[float, ...], found: Sequence[Simulated]) -> None:
-        if self.folder is None or any(one is None for one in found):
+    def _keep(self, key: tuple[float, ...], signals: Sequence[Simulated]) -> None:
+        if self.folder is None or any(window is None for window in signals):
             return
-        content = {f"{k}.{name}": x for k, one in enumerate(found) if one for name, x in one.items()}
+        content = {f"{k}.{name}": x for k, part in enumerate(signals) if part for name, x in part.items()}
         np.savez(stream := io.BytesIO(), allow_pickle=False, **content)
         self.folder.mkdir(parents=True, exist_ok=True)
         write_whole(self._file(key), stream.getvalue())
@@ -339,18 +339,18 @@ class Residuals:
 
     def _moved(self, point: np.ndarray, i: int) -> np.ndarray:
         """Return a point with a parameter moved a little, inwards at a bound."""
-        one = self.parameters[i]
-        step = DIFFERENCE * max(abs(point[i]), 0.01 * (one.high - one.low))
+        parameter = self.parameters[i]
+        step = DIFFERENCE * max(abs(point[i]), 0.01 * (parameter.high - parameter.low))
         moved: np.ndarray = point.copy()
-        moved[i] += step if point[i] + step <= one.high else -step
+        moved[i] += step if point[i] + step <= parameter.high else -step
         return moved
 
     def _rows(self, point: np.ndarray, simulated: Sequence[Simulated]) -> np.ndarray:
         rows = []
         corrections = {
-            (one.kind, one.signal): value
-            for one, value in zip(self.parameters, point, strict=True)
-            if one.kind != "run"
+            (parameter.kind, parameter.signal): value
+            for parameter, value in zip(self.parameters, point, strict=True)
+            if parameter.kind != "run"
         }
         for window, compared, signals in zip(self.windows, self.compared, simulated, strict=True):
             for name, error in self.errors.items():
@@ -396,7 +396,7 @@ def estimate(residuals: Residuals, *, most_sets: int) -> Estimate:
     from scipy.optimize import least_squares
 
     parameters = residuals.parameters
-    names = [one.name for one in parameters]
+    names = [parameter.name for parameter in parameters]
     start, low, high = (np.array([getattr(p, key) for p in parameters]) for key in ("start", "low", "high"))
     for window, signals in zip(residuals.windows, residuals.simulated([start])[0], strict=True):
         if signals is None:
@@ -410,7 +410,7 @@ def estimate(residuals: Residuals, *, most_sets: int) -> Estimate:
         rows = residuals.at(point)
         loss = float(residuals.loss(rows**2)[0].sum())
         loss_at_start = loss if loss_at_start is None else loss_at_start
-        best = min(best, (point.copy(), loss), key=lambda one: one[1])
+        best = min(best, (point.copy(), loss), key=lambda pair: pair[1])
         if residuals.sets >= most_sets:
             raise _Spent
         return rows
@@ -427,11 +427,11 @@ def estimate(residuals: Residuals, *, most_sets: int) -> Estimate:
     point, loss = best
     rows, jacobian = residuals.at(point), residuals.jacobian(point)
     inner = (point > low + 1e-6 * (high - low)) & (point < high - 1e-6 * (high - low))
-    found = require_identifiable(
+    identified = require_identifiable(
         jacobian[:, inner], [n for n, keep in zip(names, inner, strict=True) if keep]
     )
     return Estimate(
-        dict(zip(names, point.tolist(), strict=True)), found,
+        dict(zip(names, point.tolist(), strict=True)), identified,
         int(residuals.pieces.max()) + 1, covariance(rows, jacobian[:, inner], residuals.pieces),
         tuple(name for name, keep in zip(names, inner, strict=True) if not keep),
         residuals.sets, (loss_at_start or loss, loss), message, residuals.simulated([point])[0],
@@ -440,11 +440,11 @@ def estimate(residuals: Residuals, *, most_sets: int) -> Estimate:
 
 def require_identifiable(jacobian: np.ndarray, names: Sequence[str]) -> Identifiability:
     """Return the identifiability of parameters; raise NotIdentifiable if they are refused."""
-    found = identifiability(jacobian, names)
-    if found.refused:
-        raise NotIdentifiable(found)
-    return found
+    identified = identifiability(jacobian, names)
+    if identified.refused:
+        raise NotIdentifiable(identified)
+    return identified
 
 
 class _Spent(Exception):
-    """As many sets of values as allowed have been simulated."""
+    """The allowed number of sets of values has been simulated."""

@@ -21,7 +21,7 @@ own description, unless its signal is a plain number. The value of a signal is
     sign gain (column - offset)    at the time of its row, less its delay
 
 with spikes (values that differ from the median of seven by more than `spikes`) replaced by interpolation,
-then moved from the place of its sensor (`at`: relative to the centre of mass, ISO 8855) to the centre of
+then moved from the position of its sensor (`at`: relative to the centre of mass, ISO 8855) to the centre of
 mass of the rigid body, with angular rates p, q, r as far as they are recorded, then filtered.
 
 The filter is the Butterworth low pass of GTR 8 by default, which has no phase: half of its poles forward and
@@ -63,12 +63,12 @@ from .columns import (
 )
 from .segment import MOVED, POLES, LowPass, Segment, parts_of, resample, to_centre_of_mass, without_spikes
 
-MEASURABLE: dict[str, SignalEntry] = {name: one for key, one in SIGNALS.items() for name in wheels(key)}
+MEASURABLE: dict[str, SignalEntry] = {name: entry for key, entry in SIGNALS.items() for name in wheels(key)}
 """Signals that a measurement may have, those of wheels one by one."""
 ENDINGS = (".yaml", ".yml")
 """Of measurement files."""
 BY_TIME = "time"
-OF_CAR = {name: one.unit for name, one in CAR.items()} | {"friction": "1"}
+OF_CAR = {name: entry.unit for name, entry in CAR.items()} | {"friction": "1"}
 """Known quantities of a car and its road, with their units."""
 OF_TEST = {"action_time": "s"}
 """Values that tests need beside signals and vehicle, with their units."""
@@ -111,8 +111,8 @@ Duration = Annotated[Quantity, WithJsonSchema(text_in_unit("s"))]
 Words = Annotated[str, BeforeValidator(_text, json_schema_input_type=str | int)]
 
 
-class PlaceSpec(StrictModel):
-    """The place of a sensor relative to the centre of mass, vehicle axes of ISO 8855."""
+class PositionSpec(StrictModel):
+    """The position of a sensor relative to the centre of mass, vehicle axes of ISO 8855."""
 
     x: Length = Field("0 m", description="m, forward")
     y: Length = Field("0 m", description="m, to the left")
@@ -126,11 +126,11 @@ class SignalSpec(StrictModel):
     unit: UnitText | None = Field(None, description="Unit of its numbers; default: as the file says")
     sign: Literal[1, -1] = Field(1, description="-1: positive where ISO 8855 is negative")
     gain: float = Field(1.0, description="Factor of its numbers", gt=0)
-    offset: Quantity | None = Field(None, description="What the column shows at zero")
+    offset: Quantity | None = Field(None, description="Its value where the signal is zero")
     delay: Duration | None = Field(None, description="Time by which it lags")
     spikes: Quantity | None = Field(None, description="Values this far from the running median are replaced")
     noise: Quantity | None = Field(None, description="Standard deviation of its noise")
-    at: PlaceSpec | None = Field(None, description="Place of the sensor; default: the centre of mass")
+    at: PositionSpec | None = Field(None, description="Position of the sensor; default: the centre of mass")
 
 
 class TimeSpec(StrictModel):
@@ -162,7 +162,7 @@ AnyTime = Annotated[TimeSpec, BeforeValidator(_column, json_schema_input_type=st
 
 
 class MeasurementSpec(StrictModel):
-    """A file that describes a measurement."""
+    """Content of a measurement file."""
 
     files: list[str] = Field(description="CSV, Parquet or MDF 4, relative to this file", min_length=1)
     segments: SegmentsSpec | None = Field(None, description="Default: a segment per file")
@@ -268,12 +268,12 @@ def load_measurement(path: Path | str, *, filtered: bool = True) -> Measurement:
         raise ScenarioError(document.sorted_errors())
     if filtered and reader.filter:
         low = reader.filter
-        segments = [one.filtered(low) for one in segments]
+        segments = [segment.filtered(low) for segment in segments]
     digest = hashlib.sha256(path.read_bytes() + "".join(reader.hashes).encode()).hexdigest()
     return Measurement(
         path, tuple(segments), spec.car, spec.source, spec.licence, spec.date, reader.vehicle, reader.test,
-        {name: one.noise for name, one in reader.corrections.items() if one.noise}, reader.filter, digest,
-        tuple(reader.notes),
+        {name: correction.noise for name, correction in reader.corrections.items() if correction.noise},
+        reader.filter, digest, tuple(reader.notes),
     )  # fmt: skip
 
 
@@ -285,10 +285,10 @@ class _Reader:
         self.hashes: list[str] = []
         self.notes: list[Diagnostic] = []
         if missing := [key for key in ("car", "source", "licence", "date") if not getattr(spec, key)]:
-            words = f"does not state {listed(missing, last='and')}; reports show whose recording it is"
+            words = f"states no {listed(missing, last='and')}; reports show where a recording comes from"
             where = Location(document.path, 1)
             self.notes.append(Diagnostic("measurement-unattributed", words, "info", where))
-        self.corrections = {name: self._correction(name, one) for name, one in spec.signals.items()}
+        self.corrections = {name: self._correction(name, signal) for name, signal in spec.signals.items()}
         self.vehicle = self._values("vehicle", spec.vehicle, OF_CAR)
         self.test = self._values("test", spec.test, OF_TEST)
         self.filter = self._filter()
@@ -304,10 +304,10 @@ class _Reader:
         return number
 
     def _values(
-        self, group: str, given: Mapping[str, float | str], known: Mapping[str, str]
+        self, group: str, stated: Mapping[str, float | str], known: Mapping[str, str]
     ) -> dict[str, float]:
         values = {}
-        for name, value in given.items():
+        for name, value in stated.items():
             if name not in known:
                 unknown = f"unknown quantity{hint(name, known, lead='known')}"
                 self.document.report((group, name), unknown, "key-unknown")
@@ -320,18 +320,18 @@ class _Reader:
 
     def _correction(self, name: str, spec: SignalSpec) -> _Correction:
         unit, key = MEASURABLE[name].unit, ("signals", name)
-        found: dict[str, Any] = {}
+        numbers: dict[str, Any] = {}
         for part, of_it, above in (
             ("offset", unit, None), ("delay", "s", None), ("spikes", unit, 0.0), ("noise", unit, 0.0)
         ):  # fmt: skip
             if (text := getattr(spec, part)) is not None:
-                found[part] = self._si((*key, part), text, of_it, above=above)
+                numbers[part] = self._si((*key, part), text, of_it, above=above)
         if spec.at is not None:
-            found["at"] = tuple(self._si((*key, "at", axis), getattr(spec.at, axis), "m") for axis in "xyz")
+            numbers["at"] = tuple(self._si((*key, "at", axis), getattr(spec.at, axis), "m") for axis in "xyz")
             if name not in MOVED:
-                what = f"a place matters for {listed(MOVED, last='and')} alone"
+                what = f"a position matters for {listed(MOVED, last='and')} alone"
                 self.document.report((*key, "at"), what)
-        return _Correction(**found)
+        return _Correction(**numbers)
 
     def _filter(self) -> LowPass | None:
         spec = self.spec.filter
@@ -374,7 +374,7 @@ class _Reader:
                 self.document.report(key, f"{called}: {error}", code_of(error, "measurement-time"))
 
     def _read(self, file: ColumnFile, path: str, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return times [s] and values [SI] of a column; reports what is wrong with them."""
+        """Return times [s] and values [SI] of a column; report their errors."""
         spec, time, entry = self.spec.signals[name], self.spec.time, MEASURABLE[name]
         try:
             column: FileColumn = file.column(spec.column, time.column)
@@ -391,7 +391,7 @@ class _Reader:
         return times, spec.sign * values if spec.sign < 0 else values
 
     def _labels(self, file: ColumnFile) -> np.ndarray | None:
-        """Return the value that tells segments apart, a row each; None: time does, if it may restart."""
+        """Return the column whose changes begin segments; None: they begin where time restarts."""
         segments = self.spec.segments
         if segments is None or segments.by == BY_TIME:
             return None
@@ -405,8 +405,8 @@ class _Reader:
         clocks = {}
         for signal, (times, values) in read.items():
             times, values = _increasing(times, values, self.spec.time)
-            one = self.corrections[signal]
-            clocks[signal] = times - one.delay, without_spikes(times, values, one.spikes)
+            correction = self.corrections[signal]
+            clocks[signal] = times - correction.delay, without_spikes(times, values, correction.spikes)
         time = next(iter(clocks.values()))[0] + next(iter(self.corrections.values())).delay
         begin, end = max(t[0] for t, _ in clocks.values()), min(t[-1] for t, _ in clocks.values())
         time = time[(time >= begin) & (time <= end)]
@@ -417,8 +417,10 @@ class _Reader:
             for signal, (t, values) in clocks.items()
         }
         segment = Segment(name, time, signals)
-        places = {signal: one.at for signal, one in self.corrections.items() if any(one.at)}
-        return replace(segment, signals=to_centre_of_mass(segment, places)) if places else segment
+        positions = {
+            signal: correction.at for signal, correction in self.corrections.items() if any(correction.at)
+        }
+        return replace(segment, signals=to_centre_of_mass(segment, positions)) if positions else segment
 
 
 def _increasing(times: np.ndarray, values: np.ndarray, spec: TimeSpec) -> tuple[np.ndarray, np.ndarray]:
@@ -444,5 +446,5 @@ def _increasing(times: np.ndarray, values: np.ndarray, spec: TimeSpec) -> tuple[
             "repeated: mean}' for the mean of such rows",
             code="measurement-time",
         )
-    unique, place, count = np.unique(times, return_inverse=True, return_counts=True)
-    return unique, np.bincount(place, values) / count
+    unique, rows, count = np.unique(times, return_inverse=True, return_counts=True)
+    return unique, np.bincount(rows, values) / count

@@ -1,11 +1,11 @@
-"""Segments of measurements: signals over time, and what is done to them before they are compared.
+"""Segments of measurements: signals over time, their filter, resampling and removal of spikes.
 
 A rigid body's point at (x, y, z) from the centre of mass has, with roll, pitch and yaw rates p, q, r,
 
     v = v_G + omega x (x, y, z)        a = a_G + d omega/dt x (x, y, z) + omega x (omega x (x, y, z))
 
-of which the terms with p and q count where they are recorded. An accelerometer's part of gravity in a roll
-is left in, as all sensors have it.
+where terms with p and q are used if these rates are recorded. The component of gravity that an accelerometer
+measures while the car rolls is not removed, as all sensors measure it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 
-Place = tuple[float, float, float]
+Position = tuple[float, float, float]
 """x, y, z [m] relative to the centre of mass, vehicle axes."""
 POLES = 12
 """Poles of the low pass: GTR 8, "a 12-pole phaseless Butterworth filter", those of both directions."""
@@ -28,7 +28,7 @@ WINDOW = 7
 OF_ROTATION = 6.0
 """Cut-off of the low pass of rates before they are differentiated [Hz]: that of GTR 8 for yaw rates."""
 MOVED = ("velocity_x", "velocity_y", "sideslip", "acceleration_x", "acceleration_y")
-"""Signals that depend on the place of their sensor."""
+"""Signals that depend on the position of their sensor."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def _sections(order: int, cut_off: float, rate: float) -> np.ndarray:
 
 
 def even_grid(time: np.ndarray, step: float | None = None) -> np.ndarray:
-    """Return evenly spaced times, at the median step [s] if the given ones are uneven; shape (rows,)."""
+    """Return evenly spaced times, at their median step [s] if they are uneven; shape (rows,)."""
     steps = np.diff(time)
     wanted = float(np.median(steps)) if step is None else step
     if np.all(np.abs(steps - wanted) <= UNEVEN * max(wanted, 1e-12) + 1e-9):
@@ -68,7 +68,7 @@ def even_grid(time: np.ndarray, step: float | None = None) -> np.ndarray:
 
 
 def resample(grid: np.ndarray, time: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return x interpolated to a grid by a monotone cubic; x itself if the grid is its own time."""
+    """Return x interpolated to a grid by a monotone cubic; x itself if the grid is `time`."""
     if grid is time:
         return x
     from scipy.interpolate import PchipInterpolator
@@ -114,11 +114,11 @@ class Segment:
 
 
 def parts_of(times: np.ndarray, labels: np.ndarray | None) -> Iterator[tuple[str, slice]]:
-    """Yield the segments of a file: a label, "" if there is one alone, and the rows.
+    """Yield label and rows of the segments of a file; the label of a single segment is "".
 
     Args:
         times: of the rows.
-        labels: what tells segments apart, for every row; None: they begin where time goes back.
+        labels: a value per row whose changes begin segments; None: they begin where time goes back.
     """
     apart = np.diff(times) < 0.0 if labels is None else labels[1:] != labels[:-1]
     edges = [0, *(int(cut) + 1 for cut in np.flatnonzero(apart)), len(times)]
@@ -144,19 +144,19 @@ def without_spikes(time: np.ndarray, x: np.ndarray, threshold: float) -> np.ndar
 
 
 def running_median(x: np.ndarray) -> np.ndarray:
-    """Return the median of `WINDOW` samples around each one."""
+    """Return the median of `WINDOW` samples around each sample."""
     from scipy.ndimage import median_filter
 
     return np.asarray(median_filter(x, WINDOW, mode="nearest"))
 
 
-def to_centre_of_mass(segment: Segment, places: Mapping[str, Place]) -> dict[str, np.ndarray]:
-    """Return the signals of a segment, those of sensors at `places` moved to the centre of mass."""
+def to_centre_of_mass(segment: Segment, positions: Mapping[str, Position]) -> dict[str, np.ndarray]:
+    """Return the signals of a segment, those of sensors at `positions` moved to the centre of mass."""
     signals = dict(segment.signals)
     (p, dp), (q, dq), (r, dr) = (
         _rate_and_slope(segment, f"{axis}_rate") for axis in ("roll", "pitch", "yaw")
     )
-    for name, (x, y, z) in places.items():
+    for name, (x, y, z) in positions.items():
         recorded = segment.signals[name]
         if name == "velocity_x":
             signals[name] = recorded - (q * z - r * y)

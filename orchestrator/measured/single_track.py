@@ -1,14 +1,15 @@
-"""A single track with Fiala's tyres, simulated in all windows at once: every fit is compared with its own.
+"""A single track with Fiala's tyres, simulated in all windows at once: the baseline of every fit.
 
     m (dv_y/dt + v_x r) = F_f cos(delta) + F_r,      I_z dr/dt = a F_f cos(delta) - b F_r
     F = -C t + C^2 |t| t / (3 mu F_z) - C^3 t^3 / (27 (mu F_z)^2),  t = tan(alpha),  |t| < 3 mu F_z / C
     F = -mu F_z sign(alpha)                                                           beyond
 
 with steer angle and v_x as measured, static axle loads, and friction mu per axle: five parameters that any
-car has. A model with more of them that is not better on runs it was not fitted to explains nothing more.
+car has. A richer model that is no better on held-out windows explains nothing more.
 
-Driven like a recorded car, with typical values, it tells what a fit can identify (`effects_in`): a parameter
-whose effect on yaw rate and lateral acceleration is below the noise of sensors is not seen in the recording.
+Driven like a recorded car, with typical values, it shows what a fit can identify (`effects_in`): a parameter
+whose effect on yaw rate and lateral acceleration is below the noise of sensors cannot be found from the
+recording.
 
 Source: E. Fiala, Seitenkräfte am rollenden Luftreifen, VDI-Zeitschrift 96, 1954; in this form, with friction,
 J. Pacejka, Tire and Vehicle Dynamics, 3rd edition, 2012, section 3.2.1 (brush model of parabolic pressure).
@@ -34,7 +35,7 @@ LEAST_SPEED = 3.0
 STEP = 0.01
 """Longest step of the integration [s] (Runge-Kutta of fourth order); chosen: stable above `LEAST_SPEED`."""
 CHANGE = 0.1
-"""Relative change of a parameter; chosen: what a fit should tell apart."""
+"""Relative change of a parameter; chosen: a difference that a fit should resolve."""
 DURATION = 10.0
 """Length of a window [s]; chosen: a few bends."""
 MOST = 12
@@ -64,7 +65,7 @@ class SingleTrackWindow:
 
     Attributes:
         window: compared times and signals.
-        times: of the inputs, evenly spaced [s], beyond the window's by a margin for delays.
+        times: of the inputs, evenly spaced [s], beyond the window's, as delays need.
         steer_angle, velocity_x: at these times [rad], [m/s].
         start: v_y [m/s] and r [rad/s] at the window's start.
     """
@@ -92,16 +93,16 @@ class SingleTrack:
     def __call__(self, sets: Sequence[Mapping[str, float]]) -> list[list[Simulated]]:
         """Simulate all windows for sets of values, those of equal length at once; see `estimate.Model`."""
         by_grid: dict[tuple[int, float], list[int]] = {}
-        for i, one in enumerate(self.windows):
-            times = one.window.times
+        for i, inputs in enumerate(self.windows):
+            times = inputs.window.times
             by_grid.setdefault((len(times), round(times[1] - times[0], 9)), []).append(i)
-        found: list[list[Simulated]] = [[None] * len(self.windows) for _ in sets]
+        simulated: list[list[Simulated]] = [[None] * len(self.windows) for _ in sets]
         for alike in by_grid.values():
             kept = self._simulate([self.windows[i] for i in alike], sets)
             for k, (at, i) in enumerate(itertools.product(range(len(sets)), alike)):
                 if np.isfinite(kept[:, :, k]).all():
-                    found[at][i] = dict(zip(SIGNALS, kept[:, :, k], strict=True))
-        return found
+                    simulated[at][i] = dict(zip(SIGNALS, kept[:, :, k], strict=True))
+        return simulated
 
     def _simulate(
         self, windows: Sequence[SingleTrackWindow], sets: Sequence[Mapping[str, float]]
@@ -114,12 +115,12 @@ class SingleTrack:
         since = 0.5 * h * np.arange(2 * n * parts + 3)  # with the middle of each step, and one step more
         columns = len(sets) * len(windows)
         tangent, cosine, speed = (np.empty((len(since), columns)) for _ in range(3))
-        for k, (values, one) in enumerate(itertools.product(sets, windows)):
-            times = one.window.times[0] + since
+        for k, (values, inputs) in enumerate(itertools.product(sets, windows)):
+            times = inputs.window.times[0] + since
             late, offset = (values.get(f"steer_angle.{name}", 0.0) for name in ("delay", "offset"))
-            delta = np.interp(times + late, one.times, one.steer_angle) - offset
+            delta = np.interp(times + late, inputs.times, inputs.steer_angle) - offset
             tangent[:, k], cosine[:, k] = np.tan(delta), np.cos(delta)
-            speed[:, k] = np.interp(times, one.times, one.velocity_x)
+            speed[:, k] = np.interp(times, inputs.times, inputs.velocity_x)
         c_f, c_r, mu_f, mu_r, inertia = (
             np.repeat([values[name] for values in sets], len(windows)) for name in PARAMETERS
         )
@@ -135,9 +136,9 @@ class SingleTrack:
             a_y = (f + q) / self.mass
             return a_y - speed[k] * r, (self.front * f - self.rear * q) / inertia, a_y
 
-        v_y, r = np.tile(np.array([one.start for one in windows]).T, (1, len(sets)))
+        v_y, r = np.tile(np.array([window.start for window in windows]).T, (1, len(sets)))
         kept = np.empty((len(SIGNALS), n + 1, columns))
-        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is no result
+        with np.errstate(over="ignore", invalid="ignore"):  # windows with non-finite values are discarded
             for k in range(n * parts + 1):
                 v_1, r_1, a_y = rates(v_y, r, 2 * k)
                 if k % parts == 0:
@@ -229,7 +230,7 @@ def effects_in(measurement: Measurement) -> list[Effect]:
 
 
 def _friction(measurement: Measurement) -> float:
-    """Return a friction with which the car stays on the road: what it uses, and some more."""
+    """Return a friction with which the car stays on the road: what the recording uses, with a reserve."""
     used = [
         float(np.quantile(np.abs(segment.signals["acceleration_y"]), 0.999)) / G
         for segment in measurement.segments

@@ -97,7 +97,7 @@ class PlausibilityWatch:
             for signal_name in plan.record
             if units[signal_name.instance][signal_name.variable].type == "Real"
         ]
-        place = {column: 1 + k for k, column in enumerate(reals)}
+        index = {column: 1 + k for k, column in enumerate(reals)}
         friction = _highest_friction(plan)
         self._states: list[_CheckState] = []
         for check in (*checks, *_ranges(plan)):
@@ -106,8 +106,8 @@ class PlausibilityWatch:
             scale = 1 / friction if check.over_friction and friction else 1.0
             per_signal = [columns_of(results, signal) for signal in check.signals]
             for columns in zip(*per_signal, strict=False):
-                if all(column in place for column in columns):
-                    self._states.append(_CheckState(check, columns, [place[c] for c in columns], scale))
+                if all(column in index for column in columns):
+                    self._states.append(_CheckState(check, columns, [index[c] for c in columns], scale))
 
     def look(self, rows: np.ndarray) -> None:
         """Check rows: shape (n, 1 + Real columns), time first."""
@@ -123,18 +123,18 @@ class _CheckState:
     """The state of one check: the columns it looks at, and the largest value so far."""
 
     def __init__(
-        self, check: PlausibilityCheck, columns: Sequence[str], places: list[int], scale: float
+        self, check: PlausibilityCheck, columns: Sequence[str], indices: list[int], scale: float
     ) -> None:
         self.check = check
         self.columns = columns
-        self._places = places
+        self._indices = indices
         self._scale = scale
         self._sign = -1.0 if check.below else 1.0
         self._time: float | None = None
         self._most = -math.inf
 
     def look(self, rows: np.ndarray) -> None:
-        x = self._sign * self._scale * self.check.value([rows[:, k] for k in self._places])
+        x = self._sign * self._scale * self.check.value([rows[:, k] for k in self._indices])
         largest = float(np.fmax.reduce(x, initial=-math.inf))
         if largest <= self._sign * self.check.limit:
             return
@@ -173,9 +173,9 @@ def _ranges(plan: Plan) -> Iterator[PlausibilityCheck]:
             if limit is not None:
                 message = "{column} is {value} at {time} s, beyond the {limit} that its model is valid for"
                 # tolerate rounding
-                margin = 1e-9 * max(1.0, abs(limit)) * (-1 if below else 1)
+                rounding = 1e-9 * max(1.0, abs(limit)) * (-1 if below else 1)
                 yield PlausibilityCheck(
-                    "range-left", (f"{unit}.{name}",), itemgetter(0), limit + margin, message, why, below
+                    "range-left", (f"{unit}.{name}",), itemgetter(0), limit + rounding, message, why, below
                 )
 
 

@@ -15,6 +15,7 @@ from enum import Enum
 from typing import Any, Literal
 
 Relation = Literal["above", "at_least", "below", "at_most"]
+"""Relation that a number has to have to its bound."""
 SYMBOLS: dict[str, str] = {"above": ">", "at_least": "≥", "below": "<", "at_most": "≤"}
 """Relation -> its symbol."""
 _COMPARE: dict[str, Callable[[float, float], bool]] = {

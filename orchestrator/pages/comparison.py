@@ -15,7 +15,7 @@ import numpy as np
 
 from vocabulary.wheels import WHEELS
 
-from ..experiments.outcome import ExperimentResult
+from ..experiments.experiment_result import ExperimentResult
 from ..experiments.tables import Table, marked, remarks
 from ..figures.style import LabelledRun, digits_of, shown, shown_unit
 from ..messages import changed, counted, star
@@ -159,7 +159,7 @@ class RecordDifference(NamedTuple):
 
 
 def differences(a: RunRecord, b: RunRecord) -> list[RecordDifference]:
-    """Return what differs between the records of two runs: scenario, instances, wires, versions."""
+    """Return the differences between the records of two runs: scenario, instances, wires, versions."""
     first, second = dict(_facts(a)), dict(_facts(b))
     exchanged = tuple(f"{unit}." for unit in _names(a) if _names(a)[unit] != _names(b).get(unit))
     both = first.keys() & second.keys()
@@ -198,7 +198,7 @@ def _facts(record: RunRecord) -> Iterator[tuple[str, Any]]:
 def differences_table(changes: list[RecordDifference], first: str, second: str) -> Table:
     """Return the table of differences between two records; `first`, `second`: the names of the runs."""
     rows: list[Any] = [[place, _text(a), _text(b)] for place, a, b in changes]
-    return Table("What the runs were made of", ["", first, second], rows)
+    return Table("Inputs of the runs", ["", first, second], rows)
 
 
 def _text(value: Any) -> str | None:

@@ -124,8 +124,8 @@ def _sentence(rows: Sequence[CriterionRow], judged: Sequence[Evaluation]) -> str
 
 
 def _limit_words(limit: Limit) -> str:
-    signal, level, text = limit
-    return f"{words(signal)} {shown(level, SIGNALS[signal].unit)}: {text}"
+    signal, bound, text = limit
+    return f"{words(signal)} {shown(bound, SIGNALS[signal].unit)}: {text}"
 
 
 def results_of(trace: Trace) -> Results:

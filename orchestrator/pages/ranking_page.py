@@ -14,10 +14,17 @@ from ..evaluation.sine_with_dwell import RATIOS, SPUN, course_of
 from ..evaluation.standard_tests import NotJudged
 from ..evaluation.trace import trace_of
 from ..experiments.experiment import FIGURES
+from ..experiments.experiment_result import Each
 from ..experiments.jobs import STEP_TIME
-from ..experiments.outcome import Each
 from ..experiments.ranking import SERIES, EntrySpec
-from ..experiments.ranking_scores import Digits, EntryScore, RankingCell, RankingResult, deciding_digits
+from ..experiments.ranking_scores import (
+    Digits,
+    EntryScore,
+    RankedState,
+    RankingCell,
+    RankingResult,
+    deciding_digits,
+)
 from ..experiments.ranking_tables import (
     RULE,
     UNITS,
@@ -27,6 +34,7 @@ from ..experiments.ranking_tables import (
     runs_table,
     sign_of,
     spread,
+    state_words,
     table_of,
     words_of,
 )
@@ -40,17 +48,17 @@ from .sweep_view import DATA, tidy_sides
 from .viewer import Settings, View, assets, side_file, viewer_frame
 
 STATES = {
-    "passed": "passed",
-    "spun": "criteria met, but the car spun",
-    "failed": "failed",
-    "missing": "runs are missing in this build",
+    RankedState.PASSED: "passed",
+    RankedState.SPUN: "criteria met, but the car spun",
+    RankedState.FAILED: "failed",
+    RankedState.MISSING: "runs are missing in this build",
 }
 SHOWN = ("yaw_rate", "sideslip", "steering_wheel_angle", "yaw_moment", "acceleration_y")
 """Signals of a cell's worst run; chosen: what the test judges and what the controller does."""
 IDLE = "controller_off"
 """FMU of the car without control."""
 OTHERS = ("speed_lost", "intervention", "chatter")
-"""Numbers of a cell shown in addition to margin and sideslip."""
+"""Numbers of a cell shown in addition to headroom and sideslip."""
 
 
 def ranking_page(ranked: RankingResult, folder: Path, command: str, each: Each = map) -> str:
@@ -68,7 +76,9 @@ def ranking_page(ranked: RankingResult, folder: Path, command: str, each: Each =
     wanted = [_side(ranked, score, cell, folder) for score, cell in cells]
     list(each(_write_side, *zip(*wanted, strict=True)))
     tidy_sides(folder, [_id(cell) for _, cell in cells])
-    lost = next((cell for _, cell in cells if cell.state in ("failed", "spun")), cells[0][1])
+    lost = next(
+        (cell for _, cell in cells if cell.state in (RankedState.FAILED, RankedState.SPUN)), cells[0][1]
+    )
     table = table_of(ranked)
     return render(
         "ranking.html.j2",
@@ -108,10 +118,12 @@ def answer(ranked: RankingResult) -> str:
     others = [score for score in placed if score.place != 1][:1]
     others += [score for score in placed if score.spec.fmu == IDLE and score not in (*first, *others)]
     names = listed(score.spec.title for score in first)
-    rest = "".join(f"; {score.spec.title} (place {score.place}) {score.count('passed')}" for score in others)
+    rest = "".join(
+        f"; {score.spec.title} (place {score.place}) {score.count(RankedState.PASSED)}" for score in others
+    )
     return (
         f"Of {counted(len(placed), 'controller')}, the first is {names}: "
-        f"{first[0].count('passed')} of {counted(number, 'condition')} passed{rest}."
+        f"{first[0].count(RankedState.PASSED)} of {counted(number, 'condition')} passed{rest}."
     )
 
 
@@ -129,14 +141,14 @@ def _rows(ranked: RankingResult, digits: Digits) -> list[dict[str, Any]]:
             "place": place_words(score),
             "together": (sharing[score.place] if score.place else 1) if first else 0,
             "title": score.spec.title,
-            "passed": f"{score.count('passed')}/{len(score.cells)}"
+            "passed": f"{score.count(RankedState.PASSED)}/{len(score.cells)}"
             if score.place
             else f"{score.missing} missing",
             "share": row_of(score, digits)["runs"] if score.place else "–",
             "cells": [
                 {
                     "id": _id(cell),
-                    "state": cell.state,
+                    "state": cell.state.value,
                     "words": sign_of(cell),
                 }
                 for cell in score.cells.values()
@@ -156,7 +168,7 @@ def _side(
     condition, worst = ranked.ranking.conditions[cell.condition], cell.worst
     sums = {
         "runs that pass": f"{sum(run.passed for run in cell.runs)} of {len(cell.runs)}",
-        "stability margin": spread(cell.margin, lambda x: f"{x:.1f} points"),
+        "headroom below the limits": spread(cell.headroom, lambda x: f"{x:.1f} points"),
         "peak sideslip": spread(cell.sideslip, lambda x: f"{math.degrees(x):.1f}°"),
         "displacement": _text(cell.displacement, "m"),
         **{key.replace("_", " "): _text(cell.number(key), UNITS[key]) for key in OTHERS},
@@ -168,14 +180,14 @@ def _side(
     shows = worst.results is not None and worst.results.is_dir()
     details = {
         "title": f"{score.spec.title}: {condition.title}",
-        "state": cell.state,
+        "state": cell.state.value,
         "says": STATES[cell.state],
         "sums": [(name, text) for name, text in sums.items() if text is not None],
         "repeats": len({run.repeat for run in cell.runs}),
         "table": runs_table(cell),
         "command": series_command(ranked, cell),
         "again": again_command(ranked, cell, folder),
-        "worst": f"Its worst run: {label}, {worst.verdict}." if shows else "No results of its runs are here.",
+        "worst": f"Its worst run: {label}, {state_words(worst)}." if shows else "Its runs kept no results.",
     }  # fmt: skip
     html = render("ranking_cell.html.j2", cell=details)
     return _id(cell), label, worst.results if shows else None, html, folder / DATA

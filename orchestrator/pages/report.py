@@ -15,11 +15,11 @@ from markupsafe import Markup
 
 from ..errors import ResultsError, ScenarioError
 from ..experiments.claims import ClaimResult
-from ..experiments.confidence import LEVEL
+from ..experiments.confidence import CONFIDENCE
 from ..experiments.experiment import FIGURES
+from ..experiments.experiment_result import Each, ExperimentResult
 from ..experiments.figures import runs_of, title_of
 from ..experiments.jobs import Job
-from ..experiments.outcome import Each, ExperimentResult
 from ..experiments.region import runs_of as runs_of_claim
 from ..experiments.schema import FigureSpec
 from ..experiments.tables import Cell, Table
@@ -45,8 +45,9 @@ from ..metrics.run_metrics import evaluate, metric
 from ..plan import Plan
 from ..planner import Planner
 from ..results.freshness import run_record
-from ..results.measured import filtered_alike
+from ..results.measurement_results import filtered_alike
 from ..results.reader import Results
+from ..results.run_folder import RunStatus
 from ..results.run_record import RunRecord, load_record
 from ..scenario import find_and_load, yaml_lines
 from ..scenario.find_and_load import LoadedScenario
@@ -157,7 +158,7 @@ def repeats(findings: ExperimentResult) -> str:
     if not spec.repeats:
         return ""
     names = " and ".join(spec.axes[name].says or name for name in spec.repeats)
-    sure = f"the interval that contains the true mean with {100 * LEVEL:.0f} % confidence (Student)"
+    sure = f"the interval that contains the true mean with {100 * CONFIDENCE:.0f} % confidence (Student)"
     return (
         f"Numbers with ± are means over {findings.experiment.repeats} repeats ({names}), with {sure}. "
         "A verdict whose threshold lies inside reads undecided."
@@ -169,7 +170,7 @@ def record_of(job: Job, plan: Plan) -> RunRecord:
     try:
         return load_record(job.out)
     except ResultsError:
-        return run_record(plan, status="", started=datetime.now(timezone.utc))
+        return run_record(plan, status=RunStatus.UNKNOWN, started=datetime.now(timezone.utc))
 
 
 def plans_of(findings: ExperimentResult) -> list[tuple[Job, tuple[LoadedScenario, Plan]]]:

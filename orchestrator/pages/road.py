@@ -1,4 +1,4 @@
-"""The road from above: what a viewer draws of a car, its lanes and ground, from signals and parameters."""
+"""The road from above: positions of a car, its lanes and the ground, from signals and parameters."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from vocabulary.wheels import WHEELS
 from ..messages import listed
 from ..metrics.run_metrics import columns_of
 from ..results.reader import Results
+from ..results.run_folder import RunStatus
 
 OVERHANG_FRONT, OVERHANG_REAR = 0.85, 1.0
 """Overhangs beyond the axles [m], if the driver has no dimensions of the car; chosen: a saloon."""
@@ -99,7 +100,7 @@ def notes_of(run: Results, road: Mapping[str, Any] | None) -> list[str]:
         notes.append("friction or vertical loads not recorded: no friction circles")
     if not road["sized"]:
         notes.append("the plant has no dimensions; drawing a mid-size car")
-    if run.record.status not in ("", "completed"):
+    if run.record.status not in (RunStatus.UNKNOWN, RunStatus.COMPLETED):
         notes.append(f"the run failed at {run.time[-1]:.2f} s")
     elif run.ended:
         notes.append(run.ended)

@@ -37,8 +37,8 @@ from ..results.file_formats import FILES
 from ..results.reader import FoundRun, found_runs, load_results
 from ..results.run_folder import RUN_FILE
 from ..scenario import find_and_load
-from .bench import Bench, Superseded, wanted_of
 from .page_parts import render
+from .sliders import Bench, Superseded, wanted_of
 from .viewer import page
 
 LARGEST = 500_000_000
@@ -284,7 +284,7 @@ class Request(BaseHTTPRequestHandler):
 
 
 def pages_below(folder: Path) -> Iterator[str]:
-    """Yield the paths of the HTML pages below a folder that are no links, in alphabetical order."""
+    """Yield the paths of the HTML pages below a folder in alphabetical order, without links."""
     pages = [
         path.relative_to(folder).as_posix()
         for place, _, files in os.walk(folder)

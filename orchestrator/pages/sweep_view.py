@@ -18,10 +18,10 @@ from markupsafe import Markup
 
 from ..errors import ResultsError
 from ..experiments.axes import RUN, Level, changes_at
+from ..experiments.claim_schema import MetricReference, si_number
 from ..experiments.experiment import Case
+from ..experiments.experiment_result import Each, ExperimentResult, limits_of
 from ..experiments.jobs import Job
-from ..experiments.judged_schema import MetricReference, si_number
-from ..experiments.outcome import Each, ExperimentResult, limits_of
 from ..figures.style import LabelledRun, digits_of, shown, shown_unit
 from ..files import write_whole
 from ..messages import counted, listed
@@ -127,7 +127,7 @@ def range_sentence(findings: ExperimentResult) -> str:
     return ""
 
 
-# ---- what the view carries ----
+# ---- data of the view ----
 
 
 def _data(findings: ExperimentResult, sides: Mapping[int, str]) -> dict[str, Any]:
@@ -226,7 +226,7 @@ def _remark(findings: ExperimentResult, case: Case) -> str:
 
 
 def _chosen(findings: ExperimentResult) -> dict[str, Any]:
-    """Return what the view shows at first: axes of the map, its metric, and the limits of metrics."""
+    """Return the initial state of the view: axes of the map, its metric, and the limits of metrics."""
     spec = findings.spec
     limits: dict[str, dict[str, Any]] = {}
     bounds = [
@@ -298,7 +298,7 @@ def tidy_sides(folder: Path, keys: Any) -> None:
 
 
 def side_settings(findings: ExperimentResult) -> Settings:
-    """Return what the viewer of a run shows: the signals of its metrics first, their limits, its metrics."""
+    """Return the settings of a run's viewer: the signals of its metrics first, their limits, its metrics."""
     metrics = {key: metric(spec.metric) for key, spec in findings.spec.metrics.items()}
     signals = dict.fromkeys(variable_of(each.signal) for each in metrics.values() if "*" not in each.signal)
     panels = tuple(dict.fromkeys([*PANELS, *signals]))

@@ -119,8 +119,8 @@ def _published(result: ThreatResult, order: Sequence[str]) -> str:
 def told_apart(table: ScoreTable) -> str:
     """Return how many entries can be told apart, in a sentence."""
     return (
-        f"{table.groups} of {len(table.scores)} intervals lie apart from each other. Of {table.pairs} pairs, "
-        f"{table.told_apart} are told apart by the interval of their difference."
+        f"{table.groups} of {len(table.scores)} intervals do not overlap. Of {table.pairs} pairs, "
+        f"{table.told_apart} differ by the interval of their difference."
     )
 
 

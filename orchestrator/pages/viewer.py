@@ -27,8 +27,9 @@ from ..figures.style import LINES, MEASURED_LINE, LabelledRun, digits_apart, lin
 from ..messages import listed
 from ..metrics.measures import words
 from ..metrics.run_metrics import MetricValue, columns_of, evaluate, metric, reference_of
-from ..results.measured import MeasuredResults
+from ..results.measurement_results import MeasuredResults
 from ..results.reader import Results
+from ..results.run_folder import RunStatus
 from .page_parts import render
 from .road import legend_of, notes_of, road_of
 from .viewer_data import PackedRun, is_numeric, pack
@@ -69,13 +70,13 @@ class View:
 
 @dataclass(frozen=True)
 class Settings:
-    """What a viewer has beside its runs.
+    """Settings of a viewer.
 
     Attributes:
         views: to choose from; the first is shown at first.
         metrics: those in the table of runs.
         marks: instants [s] with a text, as vertical lines.
-        limits: signal, level in SI units and a text, as horizontal lines.
+        limits: signal, bound in SI units and a text, as horizontal lines.
         largest: size of the samples [bytes]; beyond it, the page carries the signals of the views and of the
             road alone. 0: no limit.
         ghosts: numbers of runs that are drawn faintly behind the others.
@@ -144,7 +145,7 @@ def side_file(key: str, runs: Sequence[LabelledRun], settings: Settings = SETTIN
 def _carried(
     runs: Sequence[LabelledRun], settings: Settings, packed: Sequence[PackedRun] | None = None
 ) -> tuple[dict[str, Any], Sequence[PackedRun]]:
-    """Return what a viewer needs to know of runs, and their packed samples."""
+    """Return the data of a viewer: its runs with their packed samples."""
     if not 1 <= len(runs) <= MOST:
         raise ResultsError(f"a viewer shows one to {MOST} runs, not {len(runs)}.")
     if empty := [run.label for run in runs if not run.results.time.size]:
@@ -164,8 +165,8 @@ def _carried(
         "grounds": grounds,
         "still": still_of(results),
         "limits": [
-            [column, level, text]
-            for signal, level, text in settings.limits
+            [column, bound, text]
+            for signal, bound, text in settings.limits
             for column in _columns(results, signal)
         ],
         "marks": [list(mark) for mark in settings.marks],
@@ -242,7 +243,7 @@ def answer_of(runs: Sequence[LabelledRun]) -> str:
     parts = [
         f"{run.label} failed at {shown(float(run.results.time[-1]), 's')}"
         for run in runs
-        if run.results.record.status not in ("", "completed")
+        if run.results.record.status not in (RunStatus.UNKNOWN, RunStatus.COMPLETED)
     ]
     parts += [f"{run.label}: {run.results.ended.rstrip('.')}" for run in runs if run.results.ended]
     for name in METRICS:

@@ -122,8 +122,8 @@ def source_of(path: Path, texts: Sequence[str] | None = None) -> ResultsSource:
     return opened
 
 
-def _class(place: str) -> Any:
-    return pkgutil.resolve_name(f"{__package__}.{place}")
+def _class(path: str) -> Any:
+    return pkgutil.resolve_name(f"{__package__}.{path}")
 
 
 class ResultsSource(Protocol):
@@ -175,7 +175,7 @@ def _free(folder: Path) -> float:
     absolute = folder.absolute()
     try:
         return shutil.disk_usage(
-            next(place for place in (absolute, *absolute.parents) if place.exists())
+            next(folder for folder in (absolute, *absolute.parents) if folder.exists())
         ).free
     except OSError:
         return math.inf

@@ -25,7 +25,7 @@ from ..fmu.binary import runs_as
 from ..names import SignalName
 from ..plan import DEFAULT, Fmu, InputSeries, Instance, Plan, ValueSource, Wire
 from .reader import load_results
-from .run_folder import COMPLETED, RUN_FILE, is_dead
+from .run_folder import RUN_FILE, RunStatus, is_dead
 from .run_record import (
     ConnectionRecord,
     DiagnosticRecord,
@@ -42,11 +42,11 @@ PROGRAMS = ("yawbench", "fmpy", "pythonfmu", "numpy")
 """Packages that influence the numbers."""
 
 
-def run_record(plan: Plan, *, status: str, started: datetime) -> RunRecord:
+def run_record(plan: Plan, *, status: RunStatus, started: datetime) -> RunRecord:
     """Return the record of a run as known at its start: no wall time, error, rows or warnings yet.
 
     Args:
-        status: "completed", "failed" or "interrupted".
+        status: of the run at that time.
         started: when the run began, with a time zone.
     """
     units = {unit.name: unit for unit in plan.instances}
@@ -98,10 +98,10 @@ def faults_of(plan: Plan) -> list[FaultRecord]:
     """Return the faults of a plan as the scenario states them, with their times [s] and variables."""
     records: dict[tuple[str, str], FaultRecord] = {}
     for signal in plan.faults:
-        place, says = str(signal.fault.on), str(signal.fault)
+        location, says = str(signal.fault.on), str(signal.fault)
         begin, end = (t if math.isfinite(t) else None for t in (signal.fault.begin, signal.fault.end))
-        new = FaultRecord(on=place, fault=says, begin=begin, until=end, at=[])
-        records.setdefault((place, says), new).at.append(f"{signal.instance}.{signal.variable}")
+        new = FaultRecord(on=location, fault=says, begin=begin, until=end, at=[])
+        records.setdefault((location, says), new).at.append(f"{signal.instance}.{signal.variable}")
     return list(records.values())
 
 
@@ -121,6 +121,7 @@ def _connection(wire: Wire, units: Mapping[str, Instance]) -> ConnectionRecord:
 def _fmu(unit: Instance, plan: Plan, sources: dict[ValueSource, int]) -> FmuRecord:
     """Return the record of an instance; adds the sources of its values, with their index."""
     fmu = unit.fmu
+    how = fmu.runs_as or runs_as(fmu.path)
     sourced = {name: origin.source for name, origin in unit.origins.items() if origin.source is not None}
     record = FmuRecord(
         name=fmu.name,
@@ -131,7 +132,7 @@ def _fmu(unit: Instance, plan: Plan, sources: dict[ValueSource, int]) -> FmuReco
         generation_tool=fmu.generation_tool,
         fmi_version=f"{fmu.fmi}.0",
         built=None if fmu.built is None else asdict(fmu.built),
-        runs_as=fmu.runs_as or runs_as(fmu.path),
+        runs_as=str(how) if how else None,
         step_size=float(unit.period * plan.step),
         tolerance=unit.tolerance or fmu.tolerance,
         parameters=dict(unit.parameters),
@@ -249,7 +250,7 @@ def staleness(plan: Plan, folder: Path) -> str | None:
         recorded = load_record(folder)
     except ResultsError as error:
         return "the last run has died" if is_dead(folder) else str(error)
-    if recorded.status != COMPLETED:
+    if recorded.status is not RunStatus.COMPLETED:
         return "the run did not reach its end"
     results = folder / recorded.results
     if not results.is_file():
@@ -264,7 +265,7 @@ def staleness(plan: Plan, folder: Path) -> str | None:
 
 
 def altered(folder: Path) -> str:
-    """Return a sentence on what has been changed in a folder since its run wrote it, "" if nothing has."""
+    """Return a sentence on changes in a folder since its run wrote it, "" if there are none."""
     if not (folder / RUN_FILE).is_file() or is_dead(folder):
         return ""
     try:
@@ -279,7 +280,7 @@ def altered(folder: Path) -> str:
 
 def _reason(plan: Plan, recorded: RunRecord) -> str:
     """Return in words why the key of a record differs from that of a plan."""
-    planned = run_record(plan, status=COMPLETED, started=datetime.now(timezone.utc))
+    planned = run_record(plan, status=RunStatus.COMPLETED, started=datetime.now(timezone.utc))
     for key, sentence in COMPARED.items():
         if getattr(recorded, key) != getattr(planned, key):
             return sentence

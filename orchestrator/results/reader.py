@@ -17,25 +17,18 @@ from pathlib import Path
 
 import numpy as np
 
-from ..cache import KEY, checksum
+from ..cache import checksum
 from ..errors import ResultsError
-from ..files import check_regular, open_own, reads, reason, write_whole
+from ..files import check_regular, reads, reason
 from ..messages import fold, listed, short
 from ..names import SignalName
 from ..scenario.quantities import conversion, measure_of
-from .file_formats import FILES, RESULTS_FILE, CsvFile, source_of
+from .file_formats import FILES, source_of
 from .run_folder import (
-    COMPLETED,
-    DIED,
     PART,
     RUN_FILE,
-    RUNNING,
-    FolderLock,
+    RunStatus,
     is_dead,
-    is_final,
-    is_regular,
-    put_in_place,
-    tidy,
     unfinished,
 )
 from .run_record import (
@@ -46,16 +39,13 @@ from .run_record import (
     warn_if_unchecked,
 )
 
-UNREADABLE = "unreadable"
-"""Status of a run whose record cannot be read or has been changed."""
-
 
 @dataclass(frozen=True)
 class FoundRun:
     """A run found on disk: its folder, status and record."""
 
     folder: Path
-    status: str  # "completed", "failed", "interrupted", "running", "died", or UNREADABLE
+    status: RunStatus
     record: RunRecord
     problem: str = ""  # why its results are missing or incomplete
 
@@ -68,7 +58,7 @@ def found_runs(folder: Path) -> list[FoundRun]:
     """
     if not folder.is_dir():
         raise ResultsError(f"{folder}: no such folder; name one with results", code="results-missing")
-    runs = [run for place in _folders(folder) for run in _runs_in(place)]
+    runs = [run for each in _folders(folder) for run in _runs_in(each)]
     if not runs:
         raise ResultsError(
             f"{folder}: contains no results; 'yawbench run SCENARIO' makes some", code="results-missing"
@@ -77,10 +67,10 @@ def found_runs(folder: Path) -> list[FoundRun]:
 
 
 def _folders(folder: Path) -> Iterator[Path]:
-    for place, below, files in os.walk(folder):
+    for above, below, files in os.walk(folder):
         below.sort()
         if not {RUN_FILE, f"{RUN_FILE}{PART}"}.isdisjoint(files):
-            yield Path(place)
+            yield Path(above)
 
 
 def _runs_in(folder: Path) -> Iterator[FoundRun]:
@@ -92,14 +82,15 @@ def _runs_in(folder: Path) -> Iterator[FoundRun]:
             record = check_record(going, folder / f"{RUN_FILE}{PART}")
         except ResultsError:  # the run may have died before it had written its record
             record = RunRecord()
-        yield FoundRun(folder, DIED if dead else RUNNING, record, "it ended abnormally" if dead else "")
+        status = RunStatus.DIED if dead else RunStatus.RUNNING
+        yield FoundRun(folder, status, record, "it ended abnormally" if dead else "")
     if going is not None and not os.path.lexists(folder / RUN_FILE):
         return
     try:
         record = load_record(folder, settled=going is not None)
         warn_if_unchecked(record, folder)
     except ResultsError as error:
-        yield FoundRun(folder, UNREADABLE, RunRecord(), str(error))
+        yield FoundRun(folder, RunStatus.UNREADABLE, RunRecord(), str(error))
         return
     yield FoundRun(folder, record.status, record, record.error.message if record.error else "")
 
@@ -124,8 +115,8 @@ def thinned(
         yield from blocks
         return
     length = -(-rows // STRETCHES)
-    place = {name: i for i, name in enumerate(columns)}
-    errors = [(i, place[r]) for name, i in place.items() if (r := _reference(name, columns)) is not None]
+    column = {name: i for i, name in enumerate(columns)}
+    errors = [(i, column[r]) for name, i in column.items() if (r := _reference(name, columns)) is not None]
     for block in blocks:
         numbers = [i for i, column in enumerate(block) if column.dtype.kind == "f"]
         distances = [block[i] - block[k] for i, k in errors if i in numbers and k in numbers]
@@ -306,7 +297,7 @@ def load_results(
         ) from None
     except (OSError, ValueError) as error:
         raise ResultsError(f"{path}: cannot be read: {reason(error)}") from None
-    if record.status == COMPLETED and not thin and time.size < record.rows:
+    if record.status is RunStatus.COMPLETED and not thin and time.size < record.rows:
         raise ResultsError(
             f"{path}: contains {time.size} of the {record.rows} rows of its run; run it again."
         )
@@ -365,68 +356,3 @@ def _joined(blocks: Iterable[list[np.ndarray]], columns: int) -> list[np.ndarray
         for part in parts:
             part[k] = np.empty(0)  # free the parts, else a long run would need twice the memory
     return arrays
-
-
-WHY = "the process of this run ended abnormally"
-
-
-def salvage(folder: Path) -> tuple[Path, int]:
-    """Turn what a dead run recorded into results: a final record and a file of complete rows.
-
-    They are treated like those of a failed run. Formats other than CSV cannot be read in part: such files are
-    removed, and the folder is as it was before the run. If the run had ended and only its files had not been
-    renamed yet, everything is kept, in any format.
-
-    Returns:
-        The folder of the results, and the number of rows.
-
-    Raises:
-        ResultsError: no run has died here, or its results cannot be read or written.
-    """
-    if not is_dead(folder):
-        raise ResultsError(
-            f"{folder}: no run has died here; there is nothing to salvage", code="nothing-to-salvage"
-        )
-    path = folder / f"{RESULTS_FILE}{PART}"
-    lock = FolderLock(folder)
-    try:
-        record = unfinished(folder) or {}
-        if is_final(folder):
-            rows = record.get("rows")
-            return put_in_place(folder), rows if isinstance(rows, int) else 0
-        rows = _keep_whole_rows(path) if is_regular(path) else 0
-        if rows:
-            ended = {"status": DIED, "rows": rows, "checksum": checksum(path), "error": {"message": WHY}}
-            known = {name: value for name, value in record.items() if name not in ("results", KEY)}
-            part = folder / f"{RUN_FILE}{PART}"
-            write_whole(part, check_record(known | ended, part).to_json())
-            return put_in_place(folder), rows
-        tidy(folder)
-        return folder, 0
-    except OSError as error:
-        raise ResultsError(
-            f"{folder}: what is left cannot be put in place: {reason(error)}.", code="results-unwritable"
-        ) from None
-    except ValueError as error:
-        raise ResultsError(f"{path}: cannot be read: {error}") from None
-    finally:
-        lock.release()
-
-
-def _keep_whole_rows(path: Path) -> int:
-    """Truncate the file after the last complete row; return the number of rows."""
-    end = 0
-    with os.fdopen(open_own(path, os.O_RDWR), "r+b") as stream:
-        position = 0
-        while block := stream.read(1 << 20):
-            if b"\n" in block:
-                end = position + block.rfind(b"\n") + 1
-            position += len(block)
-        stream.truncate(end)
-    return sum(len(time) for (time,) in CsvFile(path).blocks(["time"])) if end else 0
-
-
-def lost_format(folder: Path) -> str | None:
-    """Return the file that a dead run was writing in a format other than CSV, which is lost; else None."""
-    others = (name for name in FILES.values() if name != RESULTS_FILE)
-    return next((name for name in others if is_regular(folder / f"{name}{PART}")), None)

@@ -94,7 +94,7 @@ class Recorder(RowBlock):
         units: column -> unit, for formats that store it.
 
     Attributes:
-        place: where the results are once the run has ended: `folder`, or a folder below it if the run
+        written_to: where the results are once the run has ended: `folder`, or a folder below it if the run
             failed and `folder` has results of a completed run.
 
     Raises:
@@ -114,7 +114,7 @@ class Recorder(RowBlock):
         units: Mapping[str, str | None] | None = None,
     ) -> None:
         super().__init__(columns, real)
-        self.folder = self.place = folder
+        self.folder = self.written_to = folder
         self.units = dict(units or {})
         self._home = folder.absolute()  # an FMU may change the working directory
         self._path = self._home / f"{self.file}{PART}"
@@ -201,7 +201,7 @@ class Recorder(RowBlock):
                     raise
                 self._write_record(record)
             self._file.close()
-            self.place = self.folder / put_in_place(self._home).relative_to(self._home)
+            self.written_to = self.folder / put_in_place(self._home).relative_to(self._home)
         except ResultsError:
             self.discard()
             raise
@@ -216,13 +216,13 @@ class Recorder(RowBlock):
             record: the run record if it has changed since `finish`.
         """
         if record is not None:
-            path = self._home / self.place.relative_to(self.folder) / RUN_FILE
+            path = self._home / self.written_to.relative_to(self.folder) / RUN_FILE
             with contextlib.suppress(OSError):  # results and record are in place already
                 write_whole(path, record.to_json())
         self._lock.release()
 
     def _complete(self, record: RunRecord) -> None:
-        """Write what follows the rows, if the format needs it."""
+        """Write the end of the file, if the format has one."""
 
     def _checksum(self) -> str:
         return checksum(self._path) if self._digest is None else shown(self._digest)
@@ -303,7 +303,8 @@ class Columns:
         """Return the columns in order, time first: float64, int64, bool, or object for text."""
         reals = list(np.concatenate([np.empty((self._reals, 0)), *self._blocks], axis=1))
         return [
-            reals[place] if place < self._reals else self._other(place - self._reals) for place in self._order
+            reals[column] if column < self._reals else self._other(column - self._reals)
+            for column in self._order
         ]
 
     def _other(self, k: int) -> np.ndarray:
@@ -316,7 +317,7 @@ class Columns:
 class MemoryRecorder(RowBlock):
     """Records a run in memory only; `results` is what reading the files back would give."""
 
-    folder = place = None
+    folder = written_to = None
 
     def __init__(
         self, columns: Sequence[str], real: Sequence[bool], units: Mapping[str, str | None] | None = None

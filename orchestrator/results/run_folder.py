@@ -1,24 +1,20 @@
 """The results folder of a run: its files, their final renames, its lock, and where it is by default.
 
 While a run goes on its files end in `.part`, and its record says "running"; earlier results stay next to
-them. At the end the final record replaces that one, and the files get their names. If a record still ends in
-`.part` while no process has the folder locked, the run has died. Readers report that and change nothing; the
-next run in the folder, or `salvage`, completes the renames that are missing.
+them. At the end the files get their final names. If a record ends in `.part` while no process has the folder
+locked, the run has died. Readers report that and change nothing; the next run in the folder, or `salvage`,
+completes the renames.
 
-Results of a completed run are replaced only by those of another completed run. Those of a failed run go to
-`failed` below them, until a run completes again.
-
-The content of a folder is not trusted. Only files that have the names of our formats and are in the folder
-itself are moved; links are never followed.
+Results of a completed run are replaced only by those of another completed run; those of a failed run go to
+`failed` below them. Only files in the folder that have names of our formats are moved, and no links followed.
 
 Without `--out`, results go to a folder named after the file and its overrides:
 
     results/<folder of the file>/<its name>                                        no overrides
     results/<folder of the file>/<its name>,controller=controller_off,stop_time=2  with overrides
 
-One command at a time writes into a folder. A lock is a locked file in it that names its holder. The
-operating system releases it when the process ends, however it ends; the file that a killed process leaves
-behind is taken over by the next one.
+One command at a time writes into a folder. The lock is a locked file that names its holder; the operating
+system releases it when the process ends, and the next command takes over a file that was left behind.
 """
 
 from __future__ import annotations
@@ -36,6 +32,7 @@ import time
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from datetime import datetime
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -56,22 +53,40 @@ from ..plan import Override, Value
 from .file_formats import FILES, RESULTS_FILE
 
 RUN_FILE = "run.json"
-
 PART = ".part"
 """Suffix of a run's files until it has ended."""
 LARGEST = 100_000_000
 """Largest size of a record [bytes]. Chosen: a thousand times that of ours."""
 FAILED = "failed"
 """Subfolder for the results of a failed run when the folder has those of a completed one."""
-RUNNING, COMPLETED, DIED = "running", "completed", "died"
-"""Status in a record: the run is going on, it completed, it died and was salvaged."""
-FINAL = (COMPLETED, "failed", "interrupted", DIED)
-"""Statuses of runs that have ended."""
 
 
-def place_of(folder: Path, status: str) -> Path:
+class RunStatus(str, Enum):
+    """Status of a run, as its record has it."""
+
+    UNKNOWN = ""  # the record has none that is known
+    PLANNED = "planned"
+    RUNNING = "running"
+    COMPLETED = "completed"
+    FAILED = "failed"
+    INTERRUPTED = "interrupted"
+    DIED = "died"  # the process ended without a word; its results may be salvaged
+    UNREADABLE = "unreadable"  # the record cannot be read or has been changed
+
+    @classmethod
+    def _missing_(cls, value: object) -> RunStatus:
+        return cls.UNKNOWN
+
+    @property
+    def final(self) -> bool:
+        """Whether a run has ended with it."""
+        return self in (RunStatus.COMPLETED, RunStatus.FAILED, RunStatus.INTERRUPTED, RunStatus.DIED)
+
+
+def folder_for(folder: Path, status: RunStatus) -> Path:
     """Return the folder for the results of a run that has ended with `status`."""
-    return folder if status == COMPLETED or _status(folder / RUN_FILE) != COMPLETED else folder / FAILED
+    completed = RunStatus.COMPLETED
+    return folder if status is completed or _status(folder / RUN_FILE) is not completed else folder / FAILED
 
 
 def put_in_place(folder: Path) -> Path:
@@ -84,19 +99,20 @@ def put_in_place(folder: Path) -> Path:
     """
     part = folder / f"{RUN_FILE}{PART}"
     run = _record(part, follow=False)
-    place = place_of(folder, run.get("status", ""))
+    status = RunStatus(run.get("status"))
+    final = folder_for(folder, status)
     file = _file_of(run)
-    if place != folder:
-        refuse_link(place)
-        place.mkdir(exist_ok=True)
+    if final != folder:
+        refuse_link(final)
+        final.mkdir(exist_ok=True)
     if is_regular(results := folder / f"{file}{PART}"):
-        os.replace(results, place / file)
-    os.replace(part, place / RUN_FILE)
+        os.replace(results, final / file)
+    os.replace(part, final / RUN_FILE)
     for other in {*FILES.values()} - {file}:
-        (place / other).unlink(missing_ok=True)
-    if place == folder and run.get("status") == COMPLETED:
+        (final / other).unlink(missing_ok=True)
+    if final == folder and status is RunStatus.COMPLETED:
         remove_results(folder / FAILED)
-    return place
+    return final
 
 
 def remove_results(folder: Path) -> None:
@@ -175,7 +191,7 @@ def unfinished(folder: Path) -> dict[str, Any] | None:
 def is_final(folder: Path) -> bool:
     """Return whether a run has ended but its files still have their temporary names."""
     run = _record(folder / f"{RUN_FILE}{PART}", follow=False)
-    return run.get("status") in FINAL and _file_of(run) in FILES.values()
+    return RunStatus(run.get("status")).final and _file_of(run) in FILES.values()
 
 
 def _file_of(run: dict[str, Any]) -> str:
@@ -183,8 +199,8 @@ def _file_of(run: dict[str, Any]) -> str:
     return str(run.get("results") or RESULTS_FILE)
 
 
-def _status(path: Path) -> str:
-    return str(_record(path).get("status") or "")
+def _status(path: Path) -> RunStatus:
+    return RunStatus(_record(path).get("status"))
 
 
 def _record(path: Path, *, follow: bool = True) -> dict[str, Any]:
@@ -252,21 +268,21 @@ def below_results(*names: str) -> Path:
         ScenarioError: a name cannot be that of a folder.
         ResultsError: one of the folders is a link.
     """
-    place = RESULTS
+    folder = RESULTS
     for name in filter(None, names):
         if not _is_name(name):
             raise ScenarioError(
                 f"no folder below {RESULTS} can be called {name!r}; name one with --out",
                 code="folder-invalid",
             )
-        place /= name
-        if place.is_symlink():
+        folder /= name
+        if folder.is_symlink():
             raise ResultsError(
-                f"{place}: is a symbolic link, which is not followed below {RESULTS}; "
+                f"{folder}: is a symbolic link, which is not followed below {RESULTS}; "
                 "name the folder that it leads to with --out",
                 code="results-unwritable",
             )
-    return place
+    return folder
 
 
 def _is_name(text: str) -> bool:
@@ -336,7 +352,7 @@ class FolderLock:
         self._descriptor: int | None = None
         try:
             refuse_links_within(home)
-            self._made = [place for place in (home, *home.parents) if not place.exists()]
+            self._made = [parent for parent in (home, *home.parents) if not parent.exists()]
             home.mkdir(parents=True, exist_ok=True)
             self._descriptor = _claimed(self._path)
             os.ftruncate(self._descriptor, 0)
@@ -368,8 +384,8 @@ class FolderLock:
             if fcntl is not None:
                 os.close(descriptor)
         with contextlib.suppress(OSError):
-            for place in self._made:
-                place.rmdir()
+            for parent in self._made:
+                parent.rmdir()
 
 
 def _claimed(path: Path) -> int:

@@ -32,7 +32,7 @@ from ..messages import short
 from ..names import SignalName
 from ..plan import NEUTRAL, Override, ValueSource
 from .file_formats import FILES, RESULTS_FILE
-from .run_folder import FAILED, LARGEST, RUN_FILE, refuse_dead
+from .run_folder import FAILED, LARGEST, RUN_FILE, RunStatus, refuse_dead
 
 
 class _Part(BaseModel):
@@ -231,12 +231,23 @@ NOT_RECORDED = ValueSource(NEUTRAL, "source not recorded")
 """Of values in records of earlier versions."""
 
 
+def _run_status(value: object) -> RunStatus:
+    if not isinstance(value, str):
+        raise PydanticKnownError("string_type")
+    return RunStatus(value)
+
+
+RecordedStatus = Annotated[
+    RunStatus, PlainValidator(_run_status), PlainSerializer(lambda status: status.value, return_type=str)
+]
+
+
 class RunRecord(_Part):
     """The record of a run."""
 
     id: str | None = None
     key: str | None = None  # see `freshness.key_of`
-    status: str = ""
+    status: RecordedStatus = RunStatus.UNKNOWN
     error: ErrorRecord | None = None
     title: str | None = None
     started: str | None = None  # ISO 8601
@@ -396,7 +407,7 @@ def check_record(run: Any, file: Path) -> RunRecord:
         return RunRecord.model_validate(run)
     except ValidationError as errors:
         first, *others = errors.errors(include_url=False)
-        place = ".".join(map(str, first["loc"]))
+        key = ".".join(map(str, first["loc"]))
         more = f" ({len(others)} more like it)" if others else ""
-        wrong = f"{place}: {first['msg'].lower().partition(' or instance')[0]} (got {short(first['input'])})"
+        wrong = f"{key}: {first['msg'].lower().partition(' or instance')[0]} (got {short(first['input'])})"
         raise ResultsError(f"{file}: is not the record of a run: {wrong}{more}.") from None

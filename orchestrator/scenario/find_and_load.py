@@ -15,7 +15,7 @@ from ..files import TEXT, read_bytes, reads
 from ..messages import hint, listed, short
 from ..plan import Override
 from . import overrides, quantities, validation, yaml_lines
-from .scenario_schema import Connection, LoadedScenario, ScenarioSpec, Vehicle, endpoint
+from .schema import Connection, LoadedScenario, ScenarioSpec, Vehicle, endpoint
 from .tir import TyreFile, read_tir
 from .validation import KINDS
 from .yaml_lines import Document, KeyPath
@@ -279,11 +279,11 @@ def files(folder: Path, kinds: Collection[str], *, depth: int | None = None) -> 
 def _below(folder: Path, depth: int | None) -> Iterator[Path]:
     """Yield the readable entries below a folder; links to folders are not followed."""
     for above, inside, names in os.walk(folder):
-        place = Path(above)
-        level = len(place.relative_to(folder).parts) + 1
-        if depth is None or level == depth:
-            yield from (place / name for name in (*inside, *names))
-        if level == depth:
+        parent = Path(above)
+        below = len(parent.relative_to(folder).parts) + 1
+        if depth is None or below == depth:
+            yield from (parent / name for name in (*inside, *names))
+        if below == depth:
             inside.clear()
         inside.sort()
 

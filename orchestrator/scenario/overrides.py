@@ -50,7 +50,7 @@ def read_changes(
         swaps: `unit=fmu`, as given to --swap; a path is relative to the working directory. An FMU may bring
             parameters along, `unit=fmu:parameter=value`.
         settings: `unit.parameter=value`, as given to --set.
-        faults: `location: kind ...`, as given to --fault (see `scenario_schema`); those of a location add up.
+        faults: `location: kind ...`, as given to --fault (see `fault_schema`); those of a location add up.
 
     Raises:
         ScenarioError: with all malformed options.
@@ -114,7 +114,7 @@ def faults_at(place: str, stated: str | Mapping[str, Value], origin: str) -> Ove
     """Return the override of the faults of a location: all in one line, or one with its options as in a file.
 
     Raises:
-        ScenarioError: there is no such place or kind, or it takes something else.
+        ScenarioError: there is no such location or kind, or it takes something else.
     """
     line = stated
     if not isinstance(stated, str):
@@ -248,7 +248,7 @@ def _put_faults(document: Document, change: Override, place: str) -> bool:
     """Replace the faults of a location, after those of other locations; return whether they differ."""
     faults = document.data.get(FAULTS) or []
     if not isinstance(faults, list):
-        return True  # the schema will report what is wrong
+        return True  # the schema reports the error
     items = [{"on": place, **fault.item} for fault in change.faults]
     places = [spelled(str(fault.get("on"))) if isinstance(fault, dict) else None for fault in faults]
     there = [i for i, at in enumerate(places) if at == place]
@@ -306,6 +306,6 @@ def _put(document: Document, key: KeyPath, change: Override, value: Any = None) 
 
 
 def _mapping(data: Any, name: str) -> dict[str, Any]:
-    """Return data[name] if both are mappings, else an empty mapping: the schema reports what is wrong."""
+    """Return data[name] if both are mappings, else an empty mapping: the schema reports the error."""
     inner = data.get(name) if isinstance(data, dict) else None
     return inner if isinstance(inner, dict) else {}

@@ -154,7 +154,7 @@ def _symbol(symbol: str, text: str) -> Unit:
 
 
 def _product(tokens: list[Unit | str], text: str) -> tuple[Unit, list[Unit | str]]:
-    """Return the product at the head of `tokens`, and what follows it."""
+    """Return the product at the head of `tokens`, and the remaining tokens."""
     result, tokens = _factor(tokens, text)
     divided = False
     while tokens and tokens[0] != ")":

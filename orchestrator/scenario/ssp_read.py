@@ -133,7 +133,7 @@ def _scenario(archive: SspArchive, document: Document) -> dict[str, Any]:
         shown = listed(fold(list(dict.fromkeys(values.unknown))))
         sentence = f"the archive gives values to {shown}: ignored, as there are no such variables"
         document.notes.append(Diagnostic("variable-unknown", sentence, "info"))
-    by_end = _values_through_connectors(structure, values.given)
+    by_end = _values_through_connectors(structure, values.known)
     connections, driven = _connections(structure, names)
     by_end = {end: ssp_value for end, ssp_value in by_end.items() if end not in driven}
 

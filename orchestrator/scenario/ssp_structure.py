@@ -276,7 +276,7 @@ class SspValue:
 class SspValues:
     """The values of variables and connectors, and the unknown names."""
 
-    given: dict[SspEnd, SspValue] = field(default_factory=dict)
+    known: dict[SspEnd, SspValue] = field(default_factory=dict)
     unknown: list[str] = field(default_factory=list)
 
 
@@ -292,7 +292,7 @@ def read_values(archive: SspArchive, structure: SspStructure) -> SspValues:
         for name, value in _bound(archive, element):
             end = structure.find(path, name)
             if end is not None:
-                values.given[end] = value
+                values.known[end] = value
             else:
                 values.unknown.append(str(SspEnd(path, name)))
     return values

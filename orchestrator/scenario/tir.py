@@ -238,7 +238,7 @@ class _Reading:
         warnings = tuple(self.warnings)
         return TyreFile(self.path, sha256, KINDS[kind], side, values, self._rolling_radius(), warnings)
 
-    # ---- what the file says of itself -----------------------------------------------------------------
+    # ---- the file's own description -----------------------------------------------------------------
 
     def _kind(self) -> int | None:
         form = self.texts.get("PROPERTY_FILE_FORMAT")
@@ -290,7 +290,7 @@ class _Reading:
             self._warn(entry, f"{entry.text or 'no value'}: read as LEFT")
         return "LEFT"
 
-    # ---- what cannot be, and what is unusual ----------------------------------------------------------
+    # ---- impossible and unusual values ----------------------------------------------------------
 
     def _check_needed(self) -> None:
         for key in NEEDED:

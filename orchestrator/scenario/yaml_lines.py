@@ -147,7 +147,7 @@ def read(path: Path, *, what: str) -> Document:
 
     Args:
         path: the file.
-        what: what the file is, for messages: "scenario file".
+        what: kind of the file, for messages: "scenario file".
     """
     document = Document(path)
 

@@ -74,7 +74,7 @@ class TestTrack:
     planner: Planner = field(default_factory=Planner)
 
     @cached_property
-    def place(self) -> Path:
+    def scenario_path(self) -> Path:
         """Path used for the generated scenario: messages name the vehicle file."""
         return Path(os.path.relpath(self.vehicle))
 
@@ -82,7 +82,12 @@ class TestTrack:
     def plant_fmu(self) -> Fmu:
         """The plant's FMU."""
         return open_role(
-            self.plant, "plant", PLANT_KNOWN_BY, place=self.place, fmus=self.fmus, opener=self.planner.opener
+            self.plant,
+            "plant",
+            PLANT_KNOWN_BY,
+            near=self.scenario_path,
+            fmus=self.fmus,
+            opener=self.planner.opener,
         )
 
     def has(self, variable: str) -> bool:
@@ -111,7 +116,9 @@ class TestTrack:
         Raises:
             YawbenchError: the file, the plant or the tyres are invalid, or do not fit together.
         """
-        open_role(self.tyres, "tyre", KNOWN_BY, place=self.place, fmus=self.fmus, opener=self.planner.opener)
+        open_role(
+            self.tyres, "tyre", KNOWN_BY, near=self.scenario_path, fmus=self.fmus, opener=self.planner.opener
+        )
         units: dict[str, Any] = {"driver": dict(driver)}
         plant: dict[str, Any] = {"fmu": self._named(self.plant), "parameters": of_plant}
         inputs: dict[str, Any] = {}
@@ -135,7 +142,7 @@ class TestTrack:
             "inputs": inputs,
             "connections": connections,
         }
-        return self.planner.plan(self.planner.load(self.place, data=data), fmus=self.fmus)
+        return self.planner.plan(self.planner.load(self.scenario_path, data=data), fmus=self.fmus)
 
     def drive(self, driver: Mapping[str, Any], speed: float, stop_time: float, **of_plant: float) -> Results:
         """Return the results of a run; arguments as of `plan`.

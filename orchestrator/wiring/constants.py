@@ -15,7 +15,7 @@ from ..names import SignalName
 from ..plan import InputSeries, Value, ValueOrigin, Variable
 from ..scenario.find_and_load import LoadedScenario
 from ..scenario.quantities import measure_of
-from ..scenario.scenario_schema import SeriesSpec
+from ..scenario.schema import SeriesSpec
 from ..scenario.yaml_lines import KeyPath
 from .context import WiringContext, facts_of
 from .parameters import origin, value_for
@@ -41,17 +41,17 @@ class Constant:
     origin: ValueOrigin
     of_unit: bool  # the key names the instance, so it takes precedence over equal names
     exact: bool  # the key is not a pattern
-    level: int = INPUTS
+    precedence: int = INPUTS
 
     @property
     def rank(self) -> tuple[int, bool, bool]:
-        """Precedence: by level, then names before patterns, then keys with the instance before others."""
-        return self.level, self.exact, self.of_unit
+        """Sort key: by precedence, then names before patterns, then keys with the instance before others."""
+        return self.precedence, self.exact, self.of_unit
 
     @property
     def of_fact(self) -> bool:
         """Whether it comes from a fact, which applies only to inputs that nothing drives."""
-        return self.level in (FACT, CHANGED_FACT)
+        return self.precedence in (FACT, CHANGED_FACT)
 
 
 def constants(system: WiringContext) -> dict[Input, Constant]:
@@ -61,7 +61,7 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
     if any(isinstance(raw, SeriesSpec) for raw in scenario.inputs.values()):
         read = _series_reader(scenario)
     by_input = dict(_of_facts(system))
-    fact_changed = any(constant.level == CHANGED_FACT for constant in by_input.values())
+    fact_changed = any(constant.precedence == CHANGED_FACT for constant in by_input.values())
     for pattern, raw in scenario.inputs.items():
         key: KeyPath = ("inputs", pattern)
         prefix, name_pattern = SignalName.parse_input(pattern, fmus)
@@ -93,9 +93,9 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
                     value = value_for(variable, raw)
             except ValueError as error:
                 system.report(key, f"{error}, for {instance}.{name}", code_of(error))
-            level = CHANGED_INPUTS if fact_changed and scenario.document.override(key) else INPUTS
+            precedence = CHANGED_INPUTS if fact_changed and scenario.document.override(key) else INPUTS
             given_by = origin(scenario, key)
-            constant = Constant(value, key, given_by, of_unit, "*" not in pattern, level)
+            constant = Constant(value, key, given_by, of_unit, "*" not in pattern, precedence)
             other = by_input.setdefault((instance, name), constant)
             if other.rank < constant.rank:
                 by_input[instance, name] = constant
@@ -135,8 +135,8 @@ def _of_facts(system: WiringContext) -> Iterator[tuple[Input, Constant]]:
                 value = value_for(known[instance][variable], raw)
             except ValueError as error:
                 refused.setdefault(str(error), []).append(f"{instance}.{variable}")
-            level = CHANGED_FACT if changed else FACT
-            yield (instance, variable), Constant(value, key, origin(scenario, key), False, True, level)
+            precedence = CHANGED_FACT if changed else FACT
+            yield (instance, variable), Constant(value, key, origin(scenario, key), False, True, precedence)
         everywhere = [len(inputs) for inputs in refused.values()] == [len(takers)]
         for sentence, inputs in refused.items():
             for variable in inputs:

@@ -77,7 +77,7 @@ class WiringContext:
     """Returns the replaced FMU of an instance, None if it does not exist."""
     notes: list[Diagnostic] = field(default_factory=list)
     """Diagnostics that are not errors, for the plan."""
-    found: list[tuple[tuple[bool, KeyPath, str], str]] = field(default_factory=list)
+    reported: list[tuple[tuple[bool, KeyPath, str], str]] = field(default_factory=list)
     """Errors: whether the key is in the vehicle file, the key, the code; the sentence."""
 
     @cached_property
@@ -140,14 +140,14 @@ class WiringContext:
         Raises:
             WiringError: there are too many errors to continue.
         """
-        self.found.append(((document is self.scenario.vehicle_document, key, code), sentence))
-        if len(self.found) >= len(WHEELS) * MOST_ERRORS:
+        self.reported.append(((document is self.scenario.vehicle_document, key, code), sentence))
+        if len(self.reported) >= len(WHEELS) * MOST_ERRORS:
             raise WiringError(self.errors())
 
     def errors(self) -> list[Diagnostic]:
         """Return all errors in the order of the files' lines, with those of the four wheels merged."""
         errors: list[Diagnostic] = []
-        folded = fold_sentences(self.found)
+        folded = fold_sentences(self.reported)
         for of_vehicle, document in enumerate((self.scenario.document, self.scenario.vehicle_document)):
             of_document = [
                 Diagnostic(code, text, location=document.location(key))

@@ -92,17 +92,17 @@ class _Finder:
 
     def at(self, fault: Fault) -> list[tuple[str, str, bool]]:
         """Return (instance, variable, whether it is an output) of everything that the fault acts on."""
-        place = fault.on
-        for unit in filter(None, (place.instance, place.target)):
+        location = fault.on
+        for unit in filter(None, (location.instance, location.target)):
             if unit not in self.system.fmus:
                 self._report(
                     f"there is no unit {unit!r}{hint(unit, self.system.fmus, lead='units')}",
                     "instance-unknown",
                 )
                 return []
-        if place.target:
+        if location.target:
             return self._on_wires(fault)
-        signal = place.instance, place.variable
+        signal = location.instance, location.variable
         return self._on_outputs(*signal) or self._on_inputs(*signal)
 
     def _on_outputs(self, unit: str, pattern: str) -> list[tuple[str, str, bool]]:
@@ -117,7 +117,7 @@ class _Finder:
         driven = {w.input for w in self.wires if w.target == unit}
         if names and not driven & set(names):
             self._report(
-                f"{unit}.{pattern} is on no wire: a fault of an input is one of what a unit gives it",
+                f"{unit}.{pattern} is on no wire: faults of inputs act on values that units give",
                 "fault-without-effect",
             )
         if not names and not matching(pattern, self.system.outputs[unit]):
@@ -125,29 +125,30 @@ class _Finder:
         return [(unit, name, False) for name in names if name in driven]
 
     def _on_wires(self, fault: Fault) -> list[tuple[str, str, bool]]:
-        place = fault.on
-        between = [w for w in self.wires if (w.source, w.target) == (place.instance, place.target)]
+        location = fault.on
+        between = [w for w in self.wires if (w.source, w.target) == (location.instance, location.target)]
         matching_wires = [
             w for w in between
-            if match(place.variable, w.output) is not None and match(place.input, w.input) is not None
+            if match(location.variable, w.output) is not None and match(location.input, w.input) is not None
         ]  # fmt: skip
         if not matching_wires:
-            if {place.instance, place.target} & self.system.scenario.replaced.keys():
+            if {location.instance, location.target} & self.system.scenario.replaced.keys():
                 self._left_out()
                 return []
             self._report(
-                f"no wire leads from {place.instance}.{place.variable} to {place.target}{self._way(place)}",
+                f"no wire leads from {location.instance}.{location.variable} to {location.target}"
+                f"{self._way(location)}",
                 "wire-unknown",
             )
         return [(w.target, w.input, False) for w in matching_wires]
 
-    def _way(self, place: FaultLocation) -> str:
+    def _way(self, location: FaultLocation) -> str:
         """Return a hint at existing wires similar to the missing one."""
-        of = [w for w in self.wires if w.source == place.instance]
-        if targets := dict.fromkeys(w.target for w in of if match(place.variable, w.output) is not None):
+        of = [w for w in self.wires if w.source == location.instance]
+        if targets := dict.fromkeys(w.target for w in of if match(location.variable, w.output) is not None):
             return f"; it goes to {listed(targets)}"
-        there = fold([w.output for w in of if w.target == place.target])
-        return hint(place.variable, there, lead="there are") if there else "; nothing goes there"
+        there = fold([w.output for w in of if w.target == location.target])
+        return hint(location.variable, there, lead="there are") if there else "; nothing goes there"
 
     def _no_such(self, unit: str, pattern: str) -> None:
         if self.system.had([unit], pattern):

@@ -25,7 +25,7 @@ from ..errors import BuildError, Diagnostic, Location, ModelDescriptionError, Wi
 from ..fmu.binary import CORE
 from ..fmu.description import shadowed_modules
 from ..fmu.opener import Opener, find_fmu, find_folder, host_needs, stale_fmus
-from ..fmu.places import hidden
+from ..fmu.search_path import hidden
 from ..messages import closest, fold, hint, listed
 from ..names import SignalName, match
 from ..plan import DEFAULT, Fmu, InputSeries, Instance, Plan, Value, ValueOrigin, Variable, Wire
@@ -60,7 +60,7 @@ def missing_functions(
         ]
         for verb, names in (("Set", set_names), ("Get", read_names)):
             for name in dict.fromkeys(names):
-                kind = instance.fmu.variables[name].place.type
+                kind = instance.fmu.variables[name].ref.type
                 needed.setdefault(f"fmi{instance.fmu.fmi}{verb}{kind}", []).append(name)
         for function, names in needed.items():
             if function in instance.fmu.lacking:
@@ -157,14 +157,14 @@ def _network(
     swapped, units = tuple(scenario.replaced.items()), tuple(system.fmus)
     key = tuple(map(id, follows)), units, constant, swapped, scenario.explicit, isolated
     if key not in networks:
-        errors, notes = len(system.found), len(system.notes)
+        errors, notes = len(system.reported), len(system.notes)
         wires, kept = Connector(system).connect(by_input)
         record = recorded(system)
         evaluation = evaluate(system.fmus, wires)
         in_order = _sorted(wires, evaluation.order, system.fmus)
         shadowed = shadowed_modules(system.fmus, isolated=isolated)
         made = Network(wires, kept, record, evaluation, in_order, shadowed, system.notes[notes:], follows)
-        if len(system.found) > errors:
+        if len(system.reported) > errors:
             return made
         if len(networks) == NETWORKS:
             networks.clear()
@@ -356,14 +356,14 @@ def _open_all(scenario: LoadedScenario, fmus: Path | None, opener: Opener) -> Wi
     if fmus is None and not all(is_path(spec.fmu) for spec in scenario.units.values()):
         folder = find_folder(scenario.path, opener=opener)
 
-    above, found = scenario.path.absolute().parent, opener.found
+    above, opened_fmus = scenario.path.absolute().parent, opener.opened_as
 
     def opened(fmu: str, validate: bool, build: bool = True) -> Fmu:
         known = fmu, above, folder, validate, build
-        if known not in found:
+        if known not in opened_fmus:
             path = find_fmu(fmu, scenario=scenario.path, fmus=folder, opener=opener, build=build)
-            found[known] = opener.open(path, validate=validate)
-        return found[known]
+            opened_fmus[known] = opener.open(path, validate=validate)
+        return opened_fmus[known]
 
     def replaced(instance: str) -> Fmu | None:
         try:

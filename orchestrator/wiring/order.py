@@ -206,8 +206,8 @@ def in_order(names: Iterable[str], edges: Iterable[Edge]) -> list[str]:
     Raises:
         CycleError: the edges form a cycle.
     """
-    place = {name: i for i, name in enumerate(names)}
-    sorter: TopologicalSorter[str] = TopologicalSorter({name: () for name in place})
+    position = {name: i for i, name in enumerate(names)}
+    sorter: TopologicalSorter[str] = TopologicalSorter({name: () for name in position})
     for first, second in edges:
         sorter.add(second, first)
     sorter.prepare()
@@ -215,7 +215,7 @@ def in_order(names: Iterable[str], edges: Iterable[Edge]) -> list[str]:
     order: list[str] = []
     while sorter.is_active():
         ready += sorter.get_ready()
-        order.append(min(ready, key=place.__getitem__))
+        order.append(min(ready, key=position.__getitem__))
         ready.remove(order[-1])
         sorter.done(order[-1])
     return order

@@ -25,7 +25,7 @@ from ..messages import closest, fold, hint, listed, short
 from ..plan import DEFAULT, LITERATURE, VARIED, Fmu, Value, ValueOrigin, ValueSource, Variable
 from ..scenario import quantities
 from ..scenario.find_and_load import LoadedScenario
-from ..scenario.scenario_schema import TextSpec
+from ..scenario.schema import TextSpec
 from ..scenario.yaml_lines import Document, KeyPath
 from .context import WiringContext, facts_of
 from .derivations import CarQuantities, car_of, contradictions
@@ -304,7 +304,7 @@ class Parameters:
         A vehicle file from which not even static loads follow does not describe a car: it only replaces some
         defaults of the FMUs.
         """
-        wrong = any(of_vehicle for (of_vehicle, *_), _ in self._system.found)
+        wrong = any(of_vehicle for (of_vehicle, *_), _ in self._system.reported)
         if wrong or not self.car.values.keys() >= {*STATIC_LOADS}:
             return
         for unit, fmu in self._fmus.items():

@@ -31,12 +31,12 @@ from .context import FACTS
 from .parameters import STIFFNESSES, known_car
 
 CONTROL = ("reference", "controller", "allocator", "wheel_control", "monitor")
-"""Roles that decide what the car is to do."""
+"""Roles that command the car."""
 TRUTH = "truth"
 
 
 def seen_as(wire: Wire, units: Iterable[Instance]) -> str:
-    """Return what a wire gives to the control side: "truth", "late truth", "measurement" or "estimate".
+    """Return the kind of a wire to the control side: "truth", "late truth", "measurement" or "estimate".
 
     "" if the source is on the control side itself, or the target is not.
     """
@@ -82,7 +82,7 @@ INERTIA = ("yaw_inertia", "mass", "cg_to_front_axle", "cg_to_rear_axle")
 class _Given(NamedTuple):
     """A quantity of the car with its value, and where it is given."""
 
-    place: str
+    where: str
     name: str
     value: float  # in SI
     raw: object  # as written
@@ -140,10 +140,10 @@ def _beyond(item: _Given) -> Diagnostic | None:
     )
     unit = f" {quantity.unit}" if quantity.unit != "1" else ""
     says = (
-        f"{item.place}: {item.value:.10g}{unit} is implausible for a car "
+        f"{item.where}: {item.value:.10g}{unit} is implausible for a car "
         f"(plausible: {low:g} to {high:g}{unit})" + (f"; did you mean '{number} {likely}'?" if likely else "")
     )
-    return _warning("value-implausible", item.place, says, item.value)
+    return _warning("value-implausible", item.where, says, item.value)
 
 
 def _index(units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
@@ -202,11 +202,11 @@ class GivenValue(NamedTuple):
 
 def suspicious_values(scenario: LoadedScenario, units: Mapping[str, Instance]) -> list[Diagnostic]:
     """Return warnings about the values of a scenario's instances."""
-    parameters, given = [*_parameters(units.values())], [*_constants(units.values())]
+    parameters, constants = [*_parameters(units.values())], [*_constants(units.values())]
     return [
-        *_two_values(units, parameters, given),
+        *_two_values(units, parameters, constants),
         *_other_cars(scenario, parameters),
-        *_slips(scenario, parameters, given),
+        *_slips(scenario, parameters, constants),
         *_of_tyres(scenario, units, parameters),
         *suspicious_car(scenario, units),
         *_idle_units(scenario, units),
@@ -251,7 +251,7 @@ def _of_tyres(
 
 
 def _two_values(
-    units: Mapping[str, Instance], parameters: Sequence[GivenValue], given: Sequence[GivenValue]
+    units: Mapping[str, Instance], parameters: Sequence[GivenValue], constants: Sequence[GivenValue]
 ) -> Iterator[Diagnostic]:
     """Yield a warning for every quantity that has different values in several instances.
 
@@ -271,7 +271,7 @@ def _two_values(
     for name, fact in FACTS.items():
         of_fact = [item for item in parameters if item.name in fact.parameters]
         items = [item for item in of_fact if fact.counts(units[item.instance], item.name)]
-        items += [item for item in given if item.name in fact.inputs]
+        items += [item for item in constants if item.name in fact.inputs]
         meant = ({"scenario"}, {"default"}) if fact.inputs else ()  # a road may differ from wheel to wheel
         if _differ(items) and {item.origin for item in items} not in meant:
             yield _values_differ(name, items, f"--set {name}=VALUE sets it in all of them")
@@ -350,7 +350,7 @@ def _other_cars(scenario: LoadedScenario, parameters: Sequence[GivenValue]) -> I
 
 
 def _slips(
-    scenario: LoadedScenario, parameters: Sequence[GivenValue], given: Sequence[GivenValue]
+    scenario: LoadedScenario, parameters: Sequence[GivenValue], constants: Sequence[GivenValue]
 ) -> Iterator[Diagnostic]:
     """Yield a warning for every number that was probably meant in another unit."""
     for item in parameters:
@@ -368,12 +368,14 @@ def _slips(
                     f"{factor * item.value:.4g} {meant}; did you mean '{item.value:g} {meant}'?"
                 )
                 yield _warning("unit-suspicious", f"{item.instance}.{item.name}", says, item.value)
-    for item in given:
+    for item in constants:
         if item.name in FACTS["friction"].inputs and isinstance(item.value, float) and item.value > 2.0:
-            place = f"{item.instance}.{item.name}"
+            parameter = f"{item.instance}.{item.name}"
             number = f"{item.value:g}"
-            says = f"{place}: a friction of {number} is implausible for a road; did you mean '{number} %'?"
-            yield _warning("unit-suspicious", place, says, item.value)
+            says = (
+                f"{parameter}: a friction of {number} is implausible for a road; did you mean '{number} %'?"
+            )
+            yield _warning("unit-suspicious", parameter, says, item.value)
             return
 
 

@@ -19,7 +19,7 @@ from orchestrator.experiments.schema import ExperimentSpec
 from orchestrator.fmu.archive import open_fmu
 from orchestrator.messages import fold
 from orchestrator.metrics.measures import MEASURES
-from orchestrator.scenario.scenario_schema import ScenarioSpec
+from orchestrator.scenario.schema import ScenarioSpec
 from tests.checkout import ROOT
 from vocabulary.signals import SIGNALS
 

@@ -16,6 +16,7 @@ from fmus.build import build_component, find_components
 from orchestrator.commands.new import begin
 from tests.fmus.bare import ERROR, OK, Fmu, Refused, Unit
 from tests.fmus.plausible import plausible
+from tests.sentences import golden
 
 IN_C = "a unit in C"
 H = 0.002
@@ -25,6 +26,7 @@ pytestmark = [
     pytest.mark.parametrize("runs_as", ["native", "python"]),
     pytest.mark.parametrize("name", [IN_C, *find_components()]),
     pytest.mark.sampled(12),
+    pytest.mark.same_sentences("name", "runs_as"),
 ]
 
 
@@ -103,27 +105,26 @@ def test_another_guid_is_refused_with_a_sentence(fmu_of, name, runs_as):
     right = fmu.guid
     try:
         for fmu.guid in ("", "{00000000-0000-0000-0000-000000000000}", right[:-1], right + " "):
-            with pytest.raises(Refused, match="the GUID is not that of this FMU"):
+            with pytest.raises(Refused) as caught:
                 Unit(fmu)
+            assert golden(caught.value)
     finally:
         fmu.guid = right
     Unit(fmu).free()
 
 
 def test_calls_out_of_order_are_refused_and_change_nothing(unit):
-    assert step_refused(unit, 0.0) == "fmi2DoStep is not allowed before initialization"
-    assert refusal(unit, "fmi2ExitInitializationMode").endswith("is not allowed before initialization")
-    unit.do("fmi2EnterInitializationMode")
-    assert step_refused(unit, 0.0) == "fmi2DoStep is not allowed during initialization"
-    assert refusal(unit, "fmi2EnterInitializationMode").endswith("is not allowed during initialization")
     times = [ctypes.c_double(0.0)] * 2
-    assert refusal(unit, "fmi2SetupExperiment", 0, *times, 0, times[0]).endswith("during initialization")
+    said = [step_refused(unit, 0.0), refusal(unit, "fmi2ExitInitializationMode")]
+    unit.do("fmi2EnterInitializationMode")
+    said += [step_refused(unit, 0.0), refusal(unit, "fmi2EnterInitializationMode")]
+    said.append(refusal(unit, "fmi2SetupExperiment", 0, *times, 0, times[0]))
     unit.do("fmi2ExitInitializationMode")
-    assert refusal(unit, "fmi2SetupExperiment", 0, *times, 0, times[0]).endswith("after initialization")
+    said.append(refusal(unit, "fmi2SetupExperiment", 0, *times, 0, times[0]))
     unit.step(0.0, H)
     unit.do("fmi2Terminate")
-    assert step_refused(unit, H) == "fmi2DoStep is not allowed after fmi2Terminate"
-    assert refusal(unit, "fmi2Terminate") == "fmi2Terminate is not allowed after fmi2Terminate"
+    said += [step_refused(unit, H), refusal(unit, "fmi2Terminate")]
+    assert golden(said)
     unit.outputs()
     unit.do("fmi2Reset")
     started(unit)
@@ -135,18 +136,16 @@ def test_a_step_that_is_not_positive_and_finite_is_refused(unit, h):
     started(unit)
     unit.step(0.0, H)
     before = unit.outputs()
-    said = step_refused(unit, H, h)
-    assert said.startswith("fmi2DoStep: the step must be positive and finite (got ")
+    assert golden(step_refused(unit, H, h))
     assert (reached(unit), unit.outputs()) == (H, before)
     unit.step(H, H)
 
 
 def test_a_step_from_another_time_than_the_one_reached_is_refused(unit):
     started(unit, 0.5)
-    for t in (0.0, 0.5 - H, 0.5 + H, math.nan, math.inf):
-        assert step_refused(unit, t).endswith("the instance has reached t = 0.5 s")
+    assert golden([step_refused(unit, t) for t in (0.0, 0.5 - H, 0.5 + H, math.nan, math.inf)])
     unit.step(0.5, H)
-    assert step_refused(unit, 0.5) == "fmi2DoStep at t = 0.5 s: the instance has reached t = 0.502 s"
+    assert golden(step_refused(unit, 0.5))
     unit.step(0.5 + H, H)
 
 
@@ -167,7 +166,7 @@ def test_no_step_leads_beyond_the_stop_time(unit):
     started(unit, 0.0, 3 * H)
     for k in range(3):
         unit.step(k * H, H)
-    assert step_refused(unit, 3 * H) == "fmi2DoStep to t = 0.008 s: the stop time is 0.006 s"
+    assert golden(step_refused(unit, 3 * H))
     assert reached(unit) == 3 * H
 
 
@@ -186,7 +185,7 @@ def test_the_time_reached_is_saved_and_restored_with_the_state(unit):
     unit.do("fmi2Reset")
     unit.restore(saved)
     unit.step(H, H)
-    assert step_refused(unit, 2 * H, 4 * H).endswith("the stop time is 0.01 s")
+    assert golden(step_refused(unit, 2 * H, 4 * H))
 
 
 @pytest.mark.parametrize("times", ["sums", "products", "whole nanoseconds", "single precision"])

@@ -206,7 +206,8 @@ def test_a_component_that_has_no_fmu_yet_is_built(project):
         file.unlink()
     assert golden(yawbench(project, "run", "driver.yaml", "--out", "out").stderr)
     done = yawbench(project, "run", "driver.yaml", "--swap", "driver=driver_sin", "--out", "out")
-    assert (done.returncode, "did you mean 'driver_sine'?" in done.stderr) == (2, True)
+    assert done.returncode == 2
+    assert golden(done.stderr)
 
 
 def test_an_fmu_of_a_users_own_file_is_built_where_it_was_built_and_a_copy_is_let_be(project, tmp_path):
@@ -238,7 +239,8 @@ def test_a_copy_of_a_components_fmu_in_another_folder_is_told_of_and_not_touched
     old = (project / "before/driver_sine.fmu").read_bytes()
     double(project)
     done = yawbench(project, "run", "driver.yaml", "--fmus", "before", "--out", "out")
-    assert (done.returncode, "note: driver_sine.fmu is out of date with" in done.stderr) == (0, True)
+    assert done.returncode == 0
+    assert golden_in(done.stderr)
     assert (project / "before/driver_sine.fmu").read_bytes() == old
 
 

@@ -51,8 +51,8 @@ def test_bounds_of_a_share_hold_it_at_least_as_often_as_they_say():
 
 def test_29_of_29_and_45_of_46_say_that_fewer_than_a_tenth_fail():
     """One-sided at 95 %: the bound of an interval of 90 %."""
-    assert share_bounds(0, 29, level=0.9).high < 0.1 < share_bounds(0, 28, level=0.9).high
-    assert share_bounds(1, 46, level=0.9).high < 0.1 < share_bounds(1, 45, level=0.9).high
+    assert share_bounds(0, 29, confidence=0.9).high < 0.1 < share_bounds(0, 28, confidence=0.9).high
+    assert share_bounds(1, 46, confidence=0.9).high < 0.1 < share_bounds(1, 45, confidence=0.9).high
 
 
 @pytest.mark.parametrize("count, number", [(-1, 5), (6, 5), (0, 0)])

@@ -18,8 +18,8 @@ from orchestrator.experiments.comparison import (
     refinements,
 )
 from orchestrator.experiments.experiment import NamedRun, experiment_of
+from orchestrator.experiments.experiment_result import judge_results
 from orchestrator.experiments.jobs import Job, Outcome
-from orchestrator.experiments.outcome import judge_results
 from orchestrator.experiments.tables import to_csv
 from tests.changed import changed
 from tests.sentences import golden, refused

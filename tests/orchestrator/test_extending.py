@@ -18,9 +18,9 @@ from orchestrator.evaluation import standard_tests
 from orchestrator.evaluation.standard_tests import DRIVEN, TESTS, SeriesRun, StandardTest, evaluation
 from orchestrator.experiments.axis_figures import MetricDrawing
 from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.experiment_result import ExperimentResult
 from orchestrator.experiments.figures import draw_all
 from orchestrator.experiments.jobs import Job, MeasuredRun
-from orchestrator.experiments.outcome import ExperimentResult
 from orchestrator.experiments.planning import PlannedExperiment
 from orchestrator.experiments.schema import FIGURE_KINDS, FigureKind
 from orchestrator.fault_kinds import KINDS, FaultKind
@@ -151,7 +151,7 @@ class BarDrawing(MetricDrawing):
 
     def fill(self, axes, runs):
         values = [self.shown(self.value(run))[0] for run in runs]
-        axes.bar([self.place(self.at(run, self.spec.x), self.spec.x) for run in runs], values)
+        axes.bar([self.coordinate(self.at(run, self.spec.x), self.spec.x) for run in runs], values)
 
 
 SWEEP = """\

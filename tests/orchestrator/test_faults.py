@@ -20,9 +20,9 @@ from orchestrator.fault_kinds import KINDS, CountedNoise, Fault, FaultLocation, 
 from orchestrator.figures.panels import FAULTY, LabelledRun
 from orchestrator.figures.plots import draw
 from orchestrator.interrupts import StopFlag
-from orchestrator.master.master import Master
 from orchestrator.master.process_state import Log
 from orchestrator.master.simulate import simulate, simulate_in_memory
+from orchestrator.master.step_loop import Master
 from orchestrator.plan import Override
 from orchestrator.results.freshness import key_of, staleness
 from orchestrator.results.reader import load_results
@@ -360,7 +360,7 @@ def test_a_pattern_stands_for_several_and_each_has_random_numbers_of_its_own(fol
         ("plant.yaw_rat -> gyro: freeze", "no wire leads from plant.yaw_rat to gyro; did you mean"),
         ("law.yaw_moment -> gyro: freeze", "no wire leads from law.yaw_moment to gyro; it goes to plant"),
         ("gyro.yaw_rate -> plant: freeze", "no wire leads from gyro.yaw_rate to plant; it goes to law"),
-        ("law.friction: bias 1", "on no wire: a fault of an input is one of what a unit gives it"),
+        ("law.friction: bias 1", "on no wire: faults of inputs act on values that units give"),
         ("plant.gear: freeze", "plant.gear is Integer: faults are for Real"),
         ("gyro.yaw_rate: freez", "must be 'bias', 'gain', 'drift', 'noise', 'freeze'"),
         ("gyro.yaw_rate: bias", "bias needs a value: x + value"),

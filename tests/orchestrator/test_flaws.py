@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.measured.flaws import flaws_of
+from orchestrator.measured.flaws import FlawKind, flaws_of
 from orchestrator.measured.measurement import load_measurement
 from orchestrator.measured.single_track import effects_in
 from tests.commands import status_of
@@ -143,7 +143,7 @@ FLAWS = {
     "sign of v_y": (scaled("velocity_y", -1.0), "sign", "velocity_y", -1.0, 0.0),
     "offset": (shifted("acceleration_y", 0.4), "zero", "acceleration_y", 0.4, 0.02),
     "spikes": (spiked, "spikes", "yaw_rate", 3, 0),
-    "place": (elsewhere, "place", "acceleration_y", 0.8, 0.1),
+    "place": (elsewhere, "position", "acceleration_y", 0.8, 0.1),
 }
 
 
@@ -186,7 +186,7 @@ def test_times_that_do_not_increase_are_named(kind, seed, tmp_path):
     else:
         time[1500 + seed :] -= time[1500 + seed]
     (flaw,) = flaws_of(write(tmp_path, recording(seed), time))
-    assert flaw.kind == "refused"
+    assert flaw.kind is FlawKind.REFUSED
     assert {"repeated": "occurs twice", "restarts": "goes back"}[kind] in flaw.text
 
 

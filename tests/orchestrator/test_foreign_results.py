@@ -20,8 +20,8 @@ import yawbench as yb
 from orchestrator.errors import ResultsError, ScenarioError, YawbenchError
 from orchestrator.files import LOCK_FILE, NEW, write_whole
 from orchestrator.plan import Override
-from orchestrator.results.reader import salvage
 from orchestrator.results.run_folder import FolderLock, below_results, default_folder, holder_of
+from orchestrator.results.salvage import salvage
 from tests.sentences import golden_in, refused
 from tests.trees import snapshot
 

@@ -14,9 +14,9 @@ from orchestrator.cli import main
 from orchestrator.commands.check import show
 from orchestrator.commands.progress import print_tables, say
 from orchestrator.errors import Diagnostic, ScenarioError, YawbenchError
+from orchestrator.experiments.claim_schema import parse
 from orchestrator.experiments.experiment import LoadedExperiment, load_experiment
-from orchestrator.experiments.judged_schema import parse
-from orchestrator.experiments.outcome import judge_results
+from orchestrator.experiments.experiment_result import judge_results
 from orchestrator.experiments.schema import ExperimentSpec
 from orchestrator.experiments.tables import Table
 from orchestrator.files import reading

@@ -6,7 +6,8 @@ import pytest
 from orchestrator.experiments.tables import runs_table
 from orchestrator.metrics.run_metrics import columns_for, evaluate_all
 from orchestrator.pages.comparison import differences
-from orchestrator.results.reader import UNREADABLE, found_runs, load_results
+from orchestrator.results.reader import found_runs, load_results
+from orchestrator.results.run_folder import RunStatus
 from orchestrator.results.run_record import FmuRecord, RunRecord
 from tests.fmu_copies import put_fmus
 from tests.sentences import golden, golden_in
@@ -144,7 +145,7 @@ def test_a_run_whose_record_was_changed_is_listed_and_left_out_of_an_evaluation_
     file = tmp_path / "one" / "run.json"
     file.write_text(file.read_text().replace('"plant.yaw_rate": "rad/s"', '"plant.yaw_rate": "deg/s"'))
     sentence = f"{file}: is not what its run has written: 'units' was changed; run it again, or remove "
-    (one,) = (run for run in found_runs(tmp_path) if run.status == UNREADABLE)
+    (one,) = (run for run in found_runs(tmp_path) if run.status is RunStatus.UNREADABLE)
     assert one.problem.startswith(sentence)
     status, out, said = yawbench("evaluate", "step-steer", tmp_path / "one", "--no-figures")
     assert (status, out) == (2, "")

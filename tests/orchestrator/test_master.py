@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import SimulationError
-from orchestrator.master import master, step_program
+from orchestrator.master import step_loop, step_program
 from orchestrator.master.simulate import simulate
 from orchestrator.results.reader import load_results
 from tests.sentences import refused
@@ -90,7 +90,7 @@ def test_periods_without_a_common_factor_keep_few_programs_and_change_no_number(
         )  # fmt: skip
         return results["mass.x"], results["late.x"]
 
-    monkeypatch.setattr(master, "StepProgram", programs)
+    monkeypatch.setattr(step_loop, "StepProgram", programs)
     usual = positions()
     monkeypatch.setattr(step_program, "KEPT", 5)
     few = positions()

@@ -16,7 +16,7 @@ from orchestrator.measured.measurement import load_measurement
 from orchestrator.measured.segment import LowPass
 from orchestrator.plan import InputSeries
 from orchestrator.planner import Planner
-from orchestrator.results.measured import load_run
+from orchestrator.results.measurement_results import load_run
 from orchestrator.scenario.find_and_load import load_scenario
 from tests.sentences import golden
 

@@ -167,7 +167,7 @@ def test_evaluate_answers_with_what_evaluation_json_has(answers, tmp_path):
 def test_list_answers_with_its_tables(answers):
     made = answers("list", "metrics", with_fmus=False)
     assert set(made) == ALWAYS
-    assert [column["heading"] for column in made["tables"][0]["columns"]][:2] == ["metric", "what it is"]
+    assert [column["heading"] for column in made["tables"][0]["columns"]][:2] == ["metric", "meaning"]
     assert any(row[0] == "peak(x)" for row in made["tables"][0]["rows"])
 
 

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.fmu import places
+from orchestrator.fmu import search_path
 from orchestrator.fmu.opener import HOME
 from orchestrator.results.reader import Results, load_results
-from tests.sentences import golden
+from tests.sentences import golden, golden_in
 
 from .test_batch_commands import SCENARIO
 
@@ -54,12 +54,14 @@ def install(tmp_path, monkeypatch, cache) -> Iterator[Install]:
         info = site / f"{package}-1.0.dist-info"
         info.mkdir()
         (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {distribution}\nVersion: 1.0\n")
-        (info / "entry_points.txt").write_text(f"[{places.GROUP}]\nlaws = {of or f'{package}.components'}\n")
-        places.packaged_components.cache_clear()
+        (info / "entry_points.txt").write_text(
+            f"[{search_path.GROUP}]\nlaws = {of or f'{package}.components'}\n"
+        )
+        search_path.packaged_components.cache_clear()
         return controllers
 
     yield make
-    places.packaged_components.cache_clear()
+    search_path.packaged_components.cache_clear()
     for module in [name for name in sys.modules if name.partition(".")[0] in ("my_laws", "your_laws")]:
         del sys.modules[module]
 
@@ -114,14 +116,14 @@ def test_without_building_it_is_said_how_to_build_it(install, yawbench):
     assert golden(said)
     status, _, said = yawbench("build", "controller_follow")
     assert status == 0
-    assert "controller_follow of the package my-laws: " in said
+    assert golden_in(said)
     assert yawbench(*command)[0] == 0
 
 
 def test_it_is_suggested_and_listed(install, yawbench):
     install()
     _, _, said = yawbench("run", "half.yaml", "--swap", "controller=controller_folow")
-    assert "did you mean 'controller_follow'?" in said
+    assert golden_in(said)
     status, out, _ = yawbench("list", "fmus")
     assert status == 0
     assert "controller_follow" in out
@@ -159,7 +161,7 @@ def test_folders_of_the_environment_come_after_the_nearest(yawbench, tmp_path, m
     shutil.copy("fmus/controller_off.fmu", first / "controller_mine.fmu")
     shutil.copy("fmus/controller_fuzzy_sideslip.fmu", second / "controller_mine.fmu")
     shutil.copy("fmus/controller_off.fmu", second / "controller_off.fmu")
-    monkeypatch.setenv(places.FOLDERS, f"{first}:{second}")
+    monkeypatch.setenv(search_path.FOLDERS, f"{first}:{second}")
     status, _, said = yawbench(
         "run", "half.yaml", "--swap", "controller=controller_mine", "--out", "results/mine"
     )
@@ -173,7 +175,7 @@ def test_folders_of_the_environment_come_after_the_nearest(yawbench, tmp_path, m
 
 
 def test_a_folder_of_the_environment_that_is_not_there_is_told(yawbench, tmp_path, monkeypatch):
-    monkeypatch.setenv(places.FOLDERS, str(tmp_path / "nothing"))
+    monkeypatch.setenv(search_path.FOLDERS, str(tmp_path / "nothing"))
     status, _, said = yawbench("run", "half.yaml", "--swap", "controller=controller_mine")
     assert status == 2
     assert golden(said)
@@ -183,7 +185,7 @@ def test_nothing_is_searched_where_every_name_is_in_the_folder(yawbench, monkeyp
     def searched():
         raise AssertionError
 
-    monkeypatch.setattr(places, "packaged_components", searched)
+    monkeypatch.setattr(search_path, "packaged_components", searched)
     assert yawbench("run", "half.yaml")[0] == 0
 
 

@@ -22,10 +22,12 @@ from orchestrator.experiments.ranking_scores import (
     WORST,
     EntryScore,
     RankedRun,
+    RankedState,
     RankingCell,
     deciding_digits,
     placed,
 )
+from orchestrator.experiments.ranking_tables import state_words
 from orchestrator.figures.style import shown
 from tests.commands import status_of
 from tests.sentences import golden, golden_in
@@ -50,10 +52,10 @@ def standing(name: str, *cells: list[RankedRun]) -> EntryScore:
 def test_a_run_that_meets_the_criteria_with_much_sideslip_has_spun_and_does_not_pass():
     assert driven().passed
     spun = driven(sideslip=radians(21.0))
-    assert (spun.met, spun.passed, spun.verdict) == (True, False, "spun")
+    assert (spun.met, spun.passed, spun.state) == (True, False, RankedState.SPUN)
     assert not driven(stability=0.0).met
-    assert RankingCell("x", "c", [driven(), spun]).state == "spun"
-    assert RankingCell("x", "c", [driven(stability=0.0), spun]).state == "failed"
+    assert RankingCell("x", "c", [driven(), spun]).state is RankedState.SPUN
+    assert RankingCell("x", "c", [driven(stability=0.0), spun]).state is RankedState.FAILED
 
 
 @pytest.mark.parametrize("far", [0.0, None])
@@ -63,19 +65,19 @@ def test_responsiveness_is_asked_from_five_times_a_on_a_dry_road_alone(far):
     assert driven(5.0, responsiveness=far, dry=False).passed
 
 
-def test_the_margin_is_that_of_the_nearer_limit_in_points():
-    assert driven(ratio_1000=0.30, ratio_1750=0.02).margin == pytest.approx(5.0)
-    assert driven(ratio_1000=0.05, ratio_1750=0.25).margin == pytest.approx(-5.0)
-    assert driven(ratio_1000=None, ratio_1750=None).margin == pytest.approx(100 * (0.20 - UNHELD))
-    assert driven(ratio_1750=9.0).margin == WORST
+def test_the_headroom_is_that_of_the_nearer_limit_in_points():
+    assert driven(ratio_1000=0.30, ratio_1750=0.02).headroom == pytest.approx(5.0)
+    assert driven(ratio_1000=0.05, ratio_1750=0.25).headroom == pytest.approx(-5.0)
+    assert driven(ratio_1000=None, ratio_1750=None).headroom == pytest.approx(100 * (0.20 - UNHELD))
+    assert driven(ratio_1750=9.0).headroom == WORST
 
 
 def test_a_cell_tells_how_sure_the_mean_over_its_seeds_is():
     runs = [driven(m, repeat=r, ratio_1750=0.01 * r * m) for r in (1, 2, 3) for m in (1.0, 2.0)]
-    margin = RankingCell("x", "c", runs).margin
-    assert margin.mean == pytest.approx(20.0 - 4.0)  # the least of every seed: 18, 16, 14
-    assert margin.half == pytest.approx(4.302653 * 2.0 / 3**0.5, rel=1e-6)  # t of two degrees of freedom
-    assert RankingCell("x", "c", [driven(), driven(6.0)]).margin.half == 0.0
+    headroom = RankingCell("x", "c", runs).headroom
+    assert headroom.mean == pytest.approx(20.0 - 4.0)  # the least of every seed: 18, 16, 14
+    assert headroom.half == pytest.approx(4.302653 * 2.0 / 3**0.5, rel=1e-6)  # t of two degrees of freedom
+    assert RankingCell("x", "c", [driven(), driven(6.0)]).headroom.half == 0.0
 
 
 def test_places_go_by_conditions_passed_then_runs_then_sideslip():
@@ -115,8 +117,8 @@ def test_an_entry_without_a_run_is_missing_and_has_no_place():
     first, last = placed([standing("lacks", [driven()], [driven(), missing]), standing("has", [driven()])])
     assert (first.entry, first.place) == ("has", 1)
     assert (last.entry, last.place, last.missing) == ("lacks", None, 1)
-    assert last.cells["1"].state == "missing"
-    assert last.mean("margin") is None
+    assert last.cells["1"].state is RankedState.MISSING
+    assert last.mean("headroom") is None
 
 
 def test_a_run_that_broke_off_counts_as_lost():
@@ -124,9 +126,9 @@ def test_a_run_that_broke_off_counts_as_lost():
         "x", "c", A, A, MeasuredRun({}, (Diagnostic("run-failed", "the controller has crashed"),))
     )
     cell = RankingCell("x", "c", [driven(), lost])
-    assert cell.state == "failed"
-    assert cell.margin.mean == pytest.approx(100 * (0.20 - UNHELD))
-    assert golden_in(lost.verdict)
+    assert cell.state is RankedState.FAILED
+    assert cell.headroom.mean == pytest.approx(100 * (0.20 - UNHELD))
+    assert golden_in(state_words(lost))
 
 
 SMALL = f"""
@@ -214,13 +216,13 @@ def test_a_ranking_that_was_killed_goes_on_where_it_was(tmp_path, capsys):
 
 
 @pytest.mark.exhaustive
-def test_noisy_sensors_give_a_margin_with_its_confidence(tmp_path):
+def test_noisy_sensors_give_a_headroom_with_its_confidence(tmp_path):
     options = ("--condition", "saloon75_sensors", "--quick", "--only", "sliding_mode", "--out", tmp_path)
     assert status_of("rank", GROUND / "ranking.yaml", *options) == 0
     cell = next(row for row in rows(tmp_path / "cells.csv") if row["entry"] == "sliding_mode")
     assert int(cell["runs"]) == 5  # seeds
     assert 0 < float(cell["sideslip_half_width [rad]"]) < radians(1.0)
-    assert golden_in((tmp_path / "report.html").read_text())
+    assert golden_in((tmp_path / "data" / "sliding-mode-in-saloon75-sensors.js").read_text())
 
 
 @pytest.mark.parametrize(

@@ -12,14 +12,14 @@ from lxml import html
 
 from orchestrator.cli import main
 from orchestrator.errors import Diagnostic, ScenarioError
+from orchestrator.experiments.claim_schema import Claim
 from orchestrator.experiments.claims import Judgement, Region, judge
+from orchestrator.experiments.confidence import SequentialTest
 from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.experiment_result import ExperimentResult
 from orchestrator.experiments.jobs import MeasuredRun
-from orchestrator.experiments.judged_schema import Claim
-from orchestrator.experiments.outcome import ExperimentResult
 from orchestrator.experiments.planning import plan_experiment
 from orchestrator.experiments.region import judge_region, next_jobs, plan_region, runs_of
-from orchestrator.experiments.sequential import SequentialTest
 from orchestrator.experiments.verdict_tables import region_words, verdict
 from orchestrator.metrics.run_metrics import MetricValue
 from orchestrator.metrics.verdict import Status, Verdict, compare, not_judged, worst

@@ -8,10 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from orchestrator.experiments.axes import RegionSpec, places_of_hypercube
+from orchestrator.experiments.axes import RegionSpec, hypercube
 from orchestrator.experiments.claims import ONE_IN
-from orchestrator.experiments.confidence import share_bounds
-from orchestrator.experiments.sequential import Decision, SequentialTest
+from orchestrator.experiments.confidence import Decision, SequentialTest, share_bounds
 
 CLAIMS = 1000
 REGION = RegionSpec.model_validate(
@@ -45,10 +44,10 @@ def test_so_it_is_at_the_points_of_the_extended_hypercube(share):
     chance = np.random.default_rng(2)
     found = Counter[Decision]()
     for seed in range(CLAIMS):
-        places = places_of_hypercube(4, REGION.points, REGION.most, seed)
+        positions = hypercube(4, REGION.points, REGION.most, seed)
         start = chance.random(4)  # a box of this volume, wrapped around: flips depend on all open values
         sides = share ** chance.dirichlet(np.ones(4))
-        found[decided(np.all((places - start) % 1.0 < sides, axis=1))] += 1
+        found[decided(np.all((positions - start) % 1.0 < sides, axis=1))] += 1
     assert sum(found[one] for one in WRONG[share]) <= 0.05 * CLAIMS
 
 
@@ -75,7 +74,7 @@ def test_the_errors_at_the_limit_are_exact_and_nowhere_exceed_what_may_be_spent(
     assert found[Decision.ABOVE] / 20_000 == pytest.approx(high, abs=0.005)
 
 
-def test_the_interval_agrees_with_the_decision_and_has_its_level():
+def test_the_interval_agrees_with_the_decision_and_has_its_confidence():
     for look, (low, high) in zip(TEST.looks, TEST.boundaries, strict=True):
         if low >= 0:
             assert TEST.bounds(low, look).high <= TEST.limit
@@ -99,11 +98,11 @@ def test_a_single_look_has_the_interval_of_clopper_and_pearson():
 
 
 def test_a_hypercube_is_extended_without_giving_up_a_point():
-    places = places_of_hypercube(5, 16, 128, 1)
-    assert np.array_equal(places[:16], places_of_hypercube(5, 16, 16, 1))
+    positions = hypercube(5, 16, 128, 1)
+    assert np.array_equal(positions[:16], hypercube(5, 16, 16, 1))
     for number in (16, 32, 64, 128):
-        parts = np.sort((places[:number] * number).astype(int), axis=0)
+        parts = np.sort((positions[:number] * number).astype(int), axis=0)
         assert np.array_equal(parts, np.tile(np.arange(number)[:, None], 5))
-    assert np.array_equal(places[:112], places_of_hypercube(5, 16, 112, 1))
+    assert np.array_equal(positions[:112], hypercube(5, 16, 112, 1))
     assert all(a < b for a, b in pairwise(REGION.looks))
     assert REGION.looks == (16, 32, 48, 64, 80, 96, 112, 128)

@@ -17,7 +17,7 @@ from orchestrator.evaluation.steering_tests import G, characteristic_angle, eval
 from orchestrator.evaluation.trace import Trace, trace_of
 from orchestrator.figures.style import save
 from orchestrator.metrics.verdict import Status, Verdict, apart, not_judged
-from orchestrator.results.measured import load_run
+from orchestrator.results.measurement_results import load_run
 from tests.commands import status_of
 from tests.sentences import golden, golden_in
 from vocabulary.units import UNITS

@@ -11,9 +11,9 @@ import pytest
 from orchestrator.errors import Diagnostic, ResultsError
 from orchestrator.experiments.axis_figures import boundary, edges
 from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.experiment_result import ExperimentResult, limit_table, limits_of
 from orchestrator.experiments.figures import draw_over_axes
 from orchestrator.experiments.jobs import Job, MeasuredRun, measured
-from orchestrator.experiments.outcome import ExperimentResult, limit_table, limits_of
 from orchestrator.experiments.planning import PlannedExperiment
 from orchestrator.experiments.record import columns_of, write_table
 from orchestrator.experiments.tables import to_pandas

@@ -111,8 +111,8 @@ def test_everything_made_of_a_run_names_all_that_was_changed(yawbench, tmp_path,
 def test_the_figure_of_a_sweep_names_what_options_changed(yawbench, fmus, tmp_path):
 
     from orchestrator.experiments.experiment import load_experiment
+    from orchestrator.experiments.experiment_result import judge_records
     from orchestrator.experiments.jobs import MeasuredRun
-    from orchestrator.experiments.outcome import judge_records
     from orchestrator.experiments.planning import plan_experiment
     from tests.changed import changed as given
 

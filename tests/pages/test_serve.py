@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 from orchestrator.interrupts import StopFlag
-from orchestrator.pages.bench import Bench, Superseded, Wanted
 from orchestrator.pages.server import ResultsServer
+from orchestrator.pages.sliders import Bench, Superseded, Wanted
 from orchestrator.pages.viewer import page
 from tests.orchestrator.recorded import write
 from tests.sentences import golden

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.experiment_result import derive
 from orchestrator.experiments.jobs import Job, execute
-from orchestrator.experiments.outcome import derive
 from orchestrator.figures.style import shown
 from orchestrator.metrics.run_metrics import MetricValue
 from orchestrator.results.reader import load_results
@@ -127,7 +127,7 @@ def test_the_printed_limit_does_nothing_in_the_ramp_and_the_printed_table_is_one
     assert right > metric_of_all("ramp/pid", "sideslip")
 
 
-TOO_CLOSE = "Sine: with fuzzy PID the curves are smoother."
+TOO_CLOSE = "Sine: the curves are smoother with fuzzy PID than with PID."
 """Too close to be pinned."""
 
 

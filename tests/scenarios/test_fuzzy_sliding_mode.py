@@ -153,7 +153,7 @@ def test_braking_and_straight_ahead_it_does_too(metric_of_all, force, steer):
 
 LOST = {
     "Without control the car suffers severe lateral instability on low friction.",
-    "Slip control keeps the slip within 0.95 of the slip of most force.",
+    "Slip control keeps the slip below 0.95 of the slip with the largest force.",
     "Both controllers pull the sideslip angle towards zero.",
     "Every controller keeps the mean yaw-rate error to a quarter of that without control.",
 }
@@ -200,8 +200,8 @@ def test_the_distribution_table_is_the_papers_in_order_and_best_in_proportion_to
     assert found["derived"]["order_opposite"]["value"] < 0.8
     failing = [one["says"] for one in (*found["claims"], *found["checks"]) if not one["holds"]]
     assert failing == [
-        "The more even between front and rear, the better.",
-        "Any variant with a front share of 0 loses the car.",
+        "A distribution is the better, the more even it is between front and rear.",
+        "With any distribution with a front share of 0 the car is lost.",
         "The order within the groups is the paper's, too, with and without shares of zero or a quarter.",
         "With 0 on the left it is lost with 0.25 on the right, and kept with 0.5 or more.",
     ]

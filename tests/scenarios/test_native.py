@@ -12,7 +12,8 @@ import pytest
 
 from fmus.build import HERE as FMUS
 from fmus.build import build_all, find_components
-from orchestrator.fmu.binary import NATIVE, runs_as
+from orchestrator.fmu.binary import runs_as
+from orchestrator.plan import RunsAs
 from orchestrator.scenario.find_and_load import names
 
 SHORT = ("--set", "stop_time=1.2")
@@ -81,10 +82,10 @@ def test_shortened_scenarios_with_every_native_unit_give_the_same_bytes(tmp_path
     for name in RUNS:
         one, other = (tmp_path / units / name for units in ("native", "python"))
         assert (one / "results.csv").read_bytes() == (other / "results.csv").read_bytes(), name
-        native |= {fmu for fmu, how in ran_as(one).items() if how == NATIVE}
+        native |= {fmu for fmu, how in ran_as(one).items() if how == "native"}
         assert {how.partition(":")[0] for how in ran_as(other).values()} == {"Python"}
     own = {"driver_measured"}  # needs a recording: tests/components/test_measured_driver.py drives it
-    assert native | own == {name for name in find_components() if runs_as(FMUS / f"{name}.fmu") == NATIVE}
+    assert native | own == {name for name in find_components() if runs_as(FMUS / f"{name}.fmu") == RunsAs()}
 
 
 @pytest.mark.parametrize("name", names("a scenario"))

@@ -8,7 +8,7 @@ import pytest
 
 import yawbench as yb
 from orchestrator.experiments.experiment import load_experiment
-from orchestrator.experiments.outcome import judge_results
+from orchestrator.experiments.experiment_result import judge_results
 from orchestrator.experiments.verdict_tables import run_tables
 from orchestrator.figures.style import shown
 from tests.studies import check_figures, judge_all, judge_some, verdicts
@@ -76,15 +76,17 @@ def test_learning_goes_on_from_period_to_period(metric_of_all, speed):
 
 
 LOST = {
-    "With conventional fuzzy control it is above 10 % at 15 m/s.",
-    "With conventional fuzzy control it is above 40 % at 25 m/s.",
-    "With conventional fuzzy control it is above 40 % at 40 m/s.",
+    "With conventional fuzzy control the largest sideslip error exceeds 10 % at 15 m/s.",
+    "With conventional fuzzy control the largest sideslip error exceeds 40 % at 25 m/s.",
+    "With conventional fuzzy control the largest sideslip error exceeds 40 % at 40 m/s.",
     "The fuzzy neural network chatters less than conventional fuzzy control at 25 and 40 m/s.",
 }
+ONE_INPUT = "One steering input for all speeds: "
 LOST_WITH_ONE_INPUT_OR_HARSH_STEERING = {
-    "One steering input for all speeds: with conventional fuzzy control it is above 10, 40 and 40 %.",
-    "One steering input for all speeds: with the fuzzy neural network it is within 5 %.",
-    "One steering input for all speeds: the network follows more closely than conventional fuzzy.",
+    f"{ONE_INPUT}with conventional fuzzy control the largest sideslip error exceeds 10, 40 and 40 %.",
+    f"{ONE_INPUT}with the fuzzy neural network the largest sideslip error is within 5 %.",
+    f"{ONE_INPUT}the fuzzy neural network follows the reference "
+    "more closely than conventional fuzzy control.",
     "Under harsh steering at 40 m/s learning does no harm.",
 }
 

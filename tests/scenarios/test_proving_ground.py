@@ -26,7 +26,7 @@ A = {"large_saloon": 44.5, "saloon75": 35.9, "hard": 30.2}
 def scenario(name: str, vehicle: str) -> Scenario:
     base = yb.load(f"proving_ground/{name}")
     change = Override.of("vehicle", str(SHIPPED / "vehicles" / f"{vehicle}.yaml"), "test")
-    return Scenario(base.path, (change,), base.programs)
+    return Scenario(base.path, (change,), base._programs)
 
 
 def dwell(amplitude: float, controller: str = "off", **settings: object) -> Evaluation:

@@ -36,7 +36,7 @@ def test_the_observer_misses_no_more_than_it_may_and_the_documentation_says_what
 def test_four_lines_put_sensor_and_estimator_into_a_loop(name):
     more = name.startswith(("told_", "monitored_", "parity_"))  # who is told the truth, who watches
     more += name == "parity_weave"  # two monitors
-    assert len(yb.load(f"real_signals/{name}").loaded.connections) <= 4 + more
+    assert len(yb.load(f"real_signals/{name}")._loaded.connections) <= 4 + more
 
 
 @pytest.mark.parametrize("name", FILES)

@@ -280,14 +280,14 @@ def _parameters() -> Iterator[Parameter]:
     yield of("experiment.metrics", lambda x: yb.experiment(b.base, speeds, metrics=x), "metric",
              right=NO_ITEMS, may={"file"})  # fmt: skip
     yield of("experiment.metrics [0]", lambda x: yb.experiment(b.base, speeds, metrics=[x]), "metric")
-    yield of("Experiment.base", lambda x: yb.Experiment(x, b.experiment.design))
+    yield of("Experiment.base", lambda x: yb.Experiment(x, b.experiment._design))
     yield of("Experiment.design", lambda x: yb.Experiment(b.base, x))
     yield of("Experiment.run.workers", lambda x: b.experiment.run(workers=x), right={"None", "three",
              "numpy uint8"})  # fmt: skip
     yield of("Experiment.run.keep", lambda x: b.experiment.run(keep=x), right=TRUTHS)
     yield of("Experiment.run.progress", lambda x: b.experiment.run(progress=x), right={"None", *TRUTHS})
     yield of("Runs.findings", lambda x: yb.Runs(x))
-    yield of("Runs.runs", lambda x: yb.Runs(b.runs.findings, x), right={"None", "list of None"})
+    yield of("Runs.runs", lambda x: yb.Runs(b.runs._findings, x), right={"None", "list of None"})
     yield of("Runs.plot.metric", lambda x: b.runs.plot(x, x="driver.amplitude", lines="controller"))
     yield of("Runs.plot.x", lambda x: b.runs.plot("peak(sideslip)", x=x, lines="controller"), "x", "axis")
     for name in ("y", "lines", "panels"):
@@ -376,7 +376,7 @@ def _parameters() -> Iterator[Parameter]:
     yield of("tune.objective [weight]", lambda x: yb.tune(b.base, unknown, {"peak(sideslip)": x}),
              "objective", may=FINITE)  # fmt: skip
     yield of("Tuning.design", lambda x: yb.Tuning(x, None))
-    yield of("Tuning.tuned", lambda x: yb.Tuning(b.experiment.design, x))
+    yield of("Tuning.tuned", lambda x: yb.Tuning(b.experiment._design, x))
     # FMUs of plain Python.
     yield of("export_fmu.controller", lambda x: yb.export_fmu(x, "made.fmu"), "controller", "made",
              may={"lambda", "builtin"})  # fmt: skip
@@ -448,7 +448,7 @@ def plan_all(axes: Mapping[Any, Any]) -> None:
     from yawbench._calls import planner_of
 
     made = yb.experiment(BENCH.base, axes, metrics="peak(sideslip)")
-    plan_experiment(made.design, made.base.path.parent, planner=planner_of(made.base.programs))
+    plan_experiment(made._design, made.base.path.parent, planner=planner_of(made.base._programs))
 
 
 def rank(name: str, **more: Any) -> Callable[[Any], Any]:

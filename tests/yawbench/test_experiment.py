@@ -73,7 +73,7 @@ def test_levels_take_the_place_of_what_was_swapped_before(base):
 
     axes = {"controller": ["controller_off", Proportional()]}
     one, other = (yb.experiment(before, axes) for before in (base, base.swap(controller=Slow())))
-    assert one.design == other.design
+    assert one._design == other._design
 
 
 def test_a_run_that_fails_is_a_row_with_its_reason_and_the_others_are_made(base):

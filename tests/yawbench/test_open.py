@@ -25,7 +25,7 @@ def made():
 def folder(made, tmp_path_factory):
     """A folder as a sweep writes it: tables, and the results of every run."""
     out = tmp_path_factory.mktemp("sweep")
-    write_table(made.findings, out)
+    write_table(made._findings, out)
     for k, run in enumerate(made.runs):
         run.save(out / "runs" / str(k))
     return out
@@ -33,7 +33,7 @@ def folder(made, tmp_path_factory):
 
 def test_the_table_is_that_of_the_experiment_with_its_units(made, folder):
     table = yb.open(folder).table
-    assert list(table.columns) == columns_of(made.findings).headings
+    assert list(table.columns) == columns_of(made._findings).headings
     assert table["peak(sideslip)"].tolist() == made.table["peak(sideslip)"].tolist()
     assert table.attrs["units"]["peak(sideslip)"] == made.table.attrs["units"]["peak(sideslip)"]
 

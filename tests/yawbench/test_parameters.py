@@ -186,11 +186,11 @@ def test_two_objects_of_a_class_are_ranked_by_their_names(tmp_path):
     out = tmp_path / "ranking"
     both = {"weak": Law(1e3), "strong": Law(1e5)}
     places = yb.rank(both, against=["none"], conditions=["hard"], quick=True, out=out)
-    margins = places.cells.set_index("entry")["margin"]
-    assert set(margins.index) == {"weak", "strong", "none"}
-    assert margins.nunique() == 3
+    headroom = places.cells.set_index("entry")["headroom"]
+    assert set(headroom.index) == {"weak", "strong", "none"}
+    assert headroom.nunique() == 3
     other = yb.rank({"weak": Law(1e5)}, against=[], conditions=["hard"], quick=True, out=out)
-    assert other.cells["margin"].tolist() == [margins["strong"]]  # not the kept run of the first one
+    assert other.cells["headroom"].tolist() == [headroom["strong"]]  # not the kept run of the first one
     with refused(yb.ScenarioError, "argument-invalid"):
         yb.rank(both, name="both", against=[], conditions=["hard"], quick=True)
 

@@ -18,7 +18,7 @@ function surface(canvas, density) {
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   context.beginPath();
   context.rect(0, 0, width, height);
-  context.clip(); // in print a canvas is no picture: what leaves it would show
+  context.clip(); // when printed, a canvas is not clipped to its box
   context.fillStyle = GROUND;
   context.fillRect(0, 0, width, height);
   return {context, width, height};

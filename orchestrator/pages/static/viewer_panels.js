@@ -183,8 +183,8 @@ class Panel {
         if (value > range[1]) range[1] = value;
       }
     }
-    for (const [name, level] of this.viewer.data.limits) {
-      if (this.signals.includes(name) && !this.viewer.state.difference) range = extremes([level * factor], range);
+    for (const [name, bound] of this.viewer.data.limits) {
+      if (this.signals.includes(name) && !this.viewer.state.difference) range = extremes([bound * factor], range);
     }
     if (!(range[0] <= range[1])) return [-1, 1];
     const room = 0.07 * (range[1] - range[0]) || Math.abs(range[0]) * 0.1 || 1;
@@ -213,15 +213,15 @@ class Panel {
     ctx.strokeStyle = viewer.theme.mark;
     ctx.setLineDash([4 * ratio, 3 * ratio]);
     ctx.beginPath();
-    for (const [name, level] of viewer.data.limits) {
+    for (const [name, bound] of viewer.data.limits) {
       if (!this.signals.includes(name) || viewer.state.difference) continue;
-      const y = u.valToPos(level * factor, 'y', true);
+      const y = u.valToPos(bound * factor, 'y', true);
       ctx.moveTo(bbox.left, y);
       ctx.lineTo(bbox.left + bbox.width, y);
     }
     const tolerance = this.tolerance();
-    for (const level of tolerance > 0 ? [tolerance, -tolerance] : []) {
-      const y = u.valToPos(level * factor, 'y', true);
+    for (const bound of tolerance > 0 ? [tolerance, -tolerance] : []) {
+      const y = u.valToPos(bound * factor, 'y', true);
       if (y < bbox.top || y > bbox.top + bbox.height) continue;
       ctx.moveTo(bbox.left, y);
       ctx.lineTo(bbox.left + bbox.width, y);

@@ -14,6 +14,7 @@ from fmus.build import build_component
 from fmus.compiler import compiler_command
 from orchestrator.commands.new import begin
 from orchestrator.fmu.binary import REASON, runs_as
+from orchestrator.plan import RunsAs
 from tests.sentences import golden
 
 LAW = '''"""A law."""
@@ -83,7 +84,7 @@ def test_the_archive_holds_the_native_library_beside_python(law):
     names = zipfile.ZipFile(law).namelist()
     assert {"binaries/linux64/native.so", "binaries/linux64/libpythonfmu-export.so"} <= set(names)
     assert any(name.startswith("resources/yawbench_") for name in names)
-    assert runs_as(law) == "native"
+    assert runs_as(law) == RunsAs()
 
 
 def test_the_launcher_opens_the_native_library_and_python_on_request(law, monkeypatch):
@@ -91,7 +92,7 @@ def test_the_launcher_opens_the_native_library_and_python_on_request(law, monkey
     assert native[1:] == [True, False] and python[1:] == [False, True]
     assert native[0] == python[0] == 2000.0 * (0.3 - 0.1)
     monkeypatch.setenv("YAWBENCH_UNITS", "python")
-    assert golden(runs_as(law))
+    assert golden(str(runs_as(law)))
 
 
 def test_what_is_not_translated_runs_in_python_and_says_why(tmp_path):
@@ -103,7 +104,7 @@ def test_what_is_not_translated_runs_in_python_and_says_why(tmp_path):
     line = file.read_text().splitlines().index("        return (sum(x for x in u if x > 0.0),)") + 1
     why = f"a filter that is known at run time only (controllers/controller_law.py:{line})"
     assert zipfile.ZipFile(made).read(REASON).decode() == why
-    assert runs_as(made) == f"Python: {why}"
+    assert runs_as(made) == RunsAs(why)
     assert asked(made)[1:] == [False, True]
 
 
@@ -114,7 +115,7 @@ def test_what_yawbench_new_writes_is_native(kind, tmp_path):
         file = tmp_path / path
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(text)
-    assert runs_as(build_component(tmp_path / f"{kind}s" / "idea.py", tmp_path / "out")) == "native"
+    assert runs_as(build_component(tmp_path / f"{kind}s" / "idea.py", tmp_path / "out")) == RunsAs()
 
 
 def test_the_native_library_needs_libm_and_libc_alone(law, tmp_path):
@@ -134,4 +135,4 @@ def test_without_compiler_a_unit_runs_in_python(tmp_path, monkeypatch):
     file.write_text(LAW.replace("BODY", "self.p.gain * (u[0] - u[1])"))
     made = build_component(file, folder)
     assert compiler_command() == ["no-such-compiler"]
-    assert golden(runs_as(made))
+    assert golden(str(runs_as(made)))

@@ -12,7 +12,8 @@ import pytest
 
 from fmus.build import HERE as FMUS
 from fmus.build import find_components
-from orchestrator.fmu.binary import NATIVE, runs_as
+from orchestrator.fmu.binary import runs_as
+from orchestrator.plan import RunsAs
 from tests.fmus.bare import Fmu
 from tests.fmus.programs import (
     expected_outputs,
@@ -35,7 +36,7 @@ CHROOT = shutil.which("chroot")
 def native(archive, unpack) -> list[Path]:
     """Folders of all unpacked native FMUs."""
     archives = [archive(name) for name in find_components()]
-    return [unpack(fmu) for fmu in archives if runs_as(fmu) == NATIVE]
+    return [unpack(fmu) for fmu in archives if runs_as(fmu) == RunsAs()]
 
 
 @pytest.fixture(scope="module")

@@ -31,7 +31,7 @@ from ..planner import Planner
 from ..results.reader import Results
 from ..scenario import find_and_load
 from ..scenario.overrides import is_path, read_changes
-from ..scenario.scenario_schema import LoadedScenario
+from ..scenario.schema import LoadedScenario
 from ..wiring.context import FACTS
 from ..workers import Pool, default_workers
 from .page_parts import render
@@ -46,7 +46,7 @@ the papers' runs take, so that the worker keeps its FMUs."""
 FACT_RANGES = {"friction": (0.1, 1.1), "speed": (5.0, 50.0)}
 """Usual ranges of facts. Chosen: wet ice to racing tyres; a car park to 180 km/h."""
 SHOWN = ("mass", "cg_height")
-"""Quantities of the car with a slider at first, beside the facts and what the scenario sets of its driver."""
+"""Quantities of the car with a slider at first, besides facts and parameters of the driver."""
 FIRST = 6
 """Number of sliders at first; chosen: they fit above the fold."""
 
@@ -134,7 +134,7 @@ def _knob(target: str, variable: Variable, value: float) -> Knob:
 
 
 def shown_first(knobs: Sequence[Knob], plan: Plan) -> list[str]:
-    """Return the targets with a slider at first: facts, what the scenario sets of the driver, mass."""
+    """Return the targets with a slider at first: facts, the driver's parameters that are set, mass."""
     stated = {
         f"{instance.name}.{name}"
         for instance in plan.instances

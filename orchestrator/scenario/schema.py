@@ -258,7 +258,7 @@ Speed = Annotated[Scalar, WithJsonSchema(in_unit("m/s"))]
 
 def _of_car() -> dict[str, Any]:
     """Return the JSON Schema of a car's parameters: its quantities, and others that FMUs declare."""
-    known = {name: {**in_unit(one.unit), "description": one.text} for name, one in CAR.items()}
+    known = {name: {**in_unit(quantity.unit), "description": quantity.text} for name, quantity in CAR.items()}
     others = {"type": ["number", "string", "boolean"]}
     return {"type": "object", "properties": known, "additionalProperties": others}
 

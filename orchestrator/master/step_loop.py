@@ -81,7 +81,7 @@ class Master:
         for s in signals.slots:
             period = s.instance.period
             size = ctypes.c_double(float(period * plan.step))
-            into, of = [v.place for v in s.inputs], [v.place for v in s.outputs]
+            into, of = [v.ref for v in s.inputs], [v.ref for v in s.outputs]
             s.calls = s.fmu_instance.connect(Buffers(s.u, into, s.y, of, self.clocks[period], size))
         self.program = StepProgram(signals)
         self._operations: dict[int, list[Operation]] = {}  # of the current `advance`, by phase
@@ -183,7 +183,7 @@ class Master:
                 self._copies.end()
 
     def _walk(self, loop: CompiledLoop, end: int, others: list[list[Value]]) -> None:
-        """Step to `end` by the compiled loop, and do what it leaves to Python."""
+        """Step to `end` by the compiled loop, with the calls that only Python can make."""
         cycle = self.program.cycle
         while self.completed < end:
             answer = loop.walk(self.completed + 1 if self._recorded_others else end)

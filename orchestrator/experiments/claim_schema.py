@@ -1,4 +1,4 @@
-"""Schema of what an experiment computes and judges: metrics, grids, derived numbers, claims, limits.
+"""Schema of an experiment's results: metrics, grids, derived numbers, claims, limits.
 
 Numbers in experiment files are plain ones in SI units, or text with a unit.
 
@@ -415,7 +415,7 @@ class Claim(Assertion):
         {}, alias="for", description="Key -> values; one claim per combination, {key} in its texts"
     )
     short: str = Field("", description="The same for the table of runs, e.g. '> 100 %'")
-    source: str = Field("", description="Its place in the paper: section, figure, table")
+    source: str = Field("", description="Where it is in the paper: section, figure, table")
     note: str = Field("", description="What a reader should know about the verdict")
     open_values: list[str] | None = Field(
         None, description="Open values of the region that it depends on; default: all that affect its runs"

@@ -73,7 +73,7 @@ def packaged_components() -> Mapping[str, tuple[PackagedComponent, ...]]:
     """
     from importlib.metadata import entry_points  # slow to import, and rarely needed
 
-    found: dict[str, tuple[PackagedComponent, ...]] = {}
+    components: dict[str, tuple[PackagedComponent, ...]] = {}
     errors = []
     for entry in sorted(entry_points(group=GROUP), key=lambda entry: (entry.value, entry.name)):
         package = entry.dist.name if entry.dist else entry.value
@@ -83,13 +83,13 @@ def packaged_components() -> Mapping[str, tuple[PackagedComponent, ...]]:
                 f"{package}: the entry point {entry.name!r} of {GROUP} names {entry.value!r}, which is not "
                 "an importable package"
             )
-        for component in (one for folder in folders for one in _components_in(folder, package)):
-            others = found.get(component.fmu, ())
+        for component in (each for folder in folders for each in _components_in(folder, package)):
+            others = components.get(component.fmu, ())
             if component.source not in [other.source for other in others]:
-                found[component.fmu] = (*others, component)
+                components[component.fmu] = (*others, component)
     if errors:
         raise ModelDescriptionError(errors, code="folder-missing")
-    return MappingProxyType(found)
+    return MappingProxyType(components)
 
 
 def _folders_of(module: str) -> list[Path]:
@@ -119,13 +119,13 @@ def packaged(name: str) -> PackagedComponent | None:
     Raises:
         ModelDescriptionError: several packages have it.
     """
-    found = packaged_components().get(name, ())
-    if len(found) > 1:
+    components = packaged_components().get(name, ())
+    if len(components) > 1:
         raise ModelDescriptionError(
-            f"{name} is in {listed(found)}: rename one, or name the path of an FMU",
+            f"{name} is in {listed(components)}: rename one, or name the path of an FMU",
             code="fmu-ambiguous",
         )
-    return found[0] if found else None
+    return components[0] if components else None
 
 
 def hidden(names: Iterable[str], folder: Path, *, packages: bool) -> list[Diagnostic]:

@@ -19,12 +19,12 @@ from ..metrics.verdict import Status, Verdict, not_judged, worst
 from ..results.reader import Results
 from ..results.run_folder import RUN_FILE
 from .axes import RUN, DesignPoint, Level
+from .claim_schema import Claim, LimitSpec, calculate
 from .claims import ClaimResult, Judgement, MetricTable, Region, judge
 from .confidence import interval, share_bounds
 from .experiment import Case, LoadedExperiment, NamedRun
 from .grids import correlation
 from .jobs import NOT_MADE, MeasuredRun, Outcome, measured, read_back
-from .judged_schema import Claim, LimitSpec, calculate
 from .planning import PlannedExperiment, metrics_of
 from .schema import ExperimentSpec
 from .tables import Cell, Table
@@ -348,8 +348,8 @@ def _limit(
         verdict = judge(spec, findings.at[setting], {run.name: run.row}).verdict
         if not verdict.holds:
             records = (findings.record(case) for case in findings.cases_of(run, setting))
-            if status := next((record.status for record in records if not record.ok), ""):
-                verdict = not_judged(status)
+            if lost := next((record for record in records if not record.ok), None):
+                verdict = not_judged("the run failed" if lost.made else lost.status)
             return Limit(others, largest, here, verdict, (last, case) if last else (case,))
         largest, last = here, case
     return Limit(others, largest, None, verdict, (last,) if last else ())
@@ -389,6 +389,6 @@ def limit_table(findings: ExperimentResult, name: str) -> Table:
         words: list[Cell] = [level.words for level in limit.others.values()]
         up_to = "-" if limit.largest is None else digits_of(limit.largest)
         beyond = "-" if limit.beyond is None else digits_of(limit.beyond)
-        why = {"failed": "the run failed"}.get(limit.verdict.why, limit.verdict.why)
+        why = limit.verdict.why
         table.rows.append([*words, up_to, f"{beyond} ({why})" if why else beyond])
     return table

@@ -13,7 +13,7 @@ from ..errors import ResultsError
 from ..measured.measurement import ENDINGS, MEASURABLE, load_measurement
 from ..measured.segment import LowPass, even_grid
 from .reader import Results, load_results
-from .run_folder import COMPLETED
+from .run_folder import RunStatus
 from .run_record import DiagnosticRecord, FmuRecord, RunRecord
 
 STEERING = ("steering_wheel_angle", "steer_angle", "drive_force")
@@ -123,7 +123,7 @@ def measured_results(path: Path, start: float = 0.0) -> MeasuredResults:
         columns[column], units[column] = values, MEASURABLE[name].unit
     known = {**measurement.vehicle, **measurement.test}
     record = RunRecord(
-        status=COMPLETED,
+        status=RunStatus.COMPLETED,
         title=f"{measurement.title}, {segment.name}" if len(measurement.segments) > 1 else measurement.title,
         rows=segment.time.size,
         start_time=float(segment.time[0]) - start,
@@ -134,7 +134,7 @@ def measured_results(path: Path, start: float = 0.0) -> MeasuredResults:
             for role in ("driver", "plant")
         },
         scenario={"source": measurement.origin, "file": str(path)},
-        diagnostics=[DiagnosticRecord.of(one) for one in measurement.notes],
+        diagnostics=[DiagnosticRecord.of(note) for note in measurement.notes],
         results="",
     )
     return MeasuredResults(path, segment.time - start, columns, units, record, measurement.filter)

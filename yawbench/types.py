@@ -1,0 +1,68 @@
+"""Types of what the library takes and returns, for annotations and `isinstance`; users make few of them.
+
+from yawbench.types import Instance
+
+plan = yb.load("fnn_sideslip/25mps").plan()
+sensors: list[Instance] = [instance for instance in plan.instances if instance.role == "sensor"]
+"""
+
+from components.fmi.variables import VariableSpec
+from orchestrator.errors import Messages, Severity
+from orchestrator.evaluation.standard_tests import TestName
+from orchestrator.evaluation.validation import ComparedTest, CrossPlot
+from orchestrator.fault_kinds import Fault, FaultList, FaultLocation, FaultName, FaultySignal
+from orchestrator.metrics.verdict import Relation, Status
+from orchestrator.names import SignalName, Target, TargetKind
+from orchestrator.plan import (
+    BuildInfo,
+    Fmu,
+    InputSeries,
+    Instance,
+    RunsAs,
+    UnitDefinition,
+    Value,
+    ValueOrigin,
+    ValueRef,
+    ValueSource,
+    Variable,
+    Wire,
+)
+from orchestrator.results.reader import Results
+from orchestrator.results.run_record import RunRecord
+
+from ._controller import ControllerLike, Numbers
+
+__all__ = [
+    "BuildInfo",
+    "ComparedTest",
+    "ControllerLike",
+    "CrossPlot",
+    "Fault",
+    "FaultList",
+    "FaultLocation",
+    "FaultName",
+    "FaultySignal",
+    "Fmu",
+    "InputSeries",
+    "Instance",
+    "Messages",
+    "Numbers",
+    "Relation",
+    "Results",
+    "RunRecord",
+    "RunsAs",
+    "Severity",
+    "SignalName",
+    "Status",
+    "Target",
+    "TargetKind",
+    "TestName",
+    "UnitDefinition",
+    "Value",
+    "ValueOrigin",
+    "ValueRef",
+    "ValueSource",
+    "Variable",
+    "VariableSpec",
+    "Wire",
+]
