@@ -12,7 +12,8 @@ least, with |M| at most the limit. |beta| at the end of each value beyond its bo
 
 from dataclasses import dataclass
 
-from ..mathematics.quadratic_program import Rows, dot, inverse, multipliers
+from ..mathematics.quadratic_program import Rows, inverse, multipliers
+from ..mathematics.sums import added, dot
 from .linear_feedback import Matrix
 
 _ORDER = 14
@@ -87,7 +88,7 @@ class PredictiveLaw:
         inverted = inverse(hessian)
         self.moment_0 = w.moment_0
         self.unbound = [
-            [-sum(row[k] * linear[k][j] for k in range(n)) for j in range(2)] for row in inverted
+            [-added(row[k] * linear[k][j] for k in range(n)) for j in range(2)] for row in inverted
         ]  # z = unbound e_0 where no constraint is met
         rows += [[-value for value in row] for row in rows]  # upper bounds of all, then lower ones
         self.rows = rows
@@ -114,7 +115,7 @@ class PredictiveLaw:
         room = [highest] * len(z) + [bound - angle for angle in drift]
         room += [highest] * len(z) + [bound + angle for angle in drift]
         y = multipliers(self.p, [b - dot(row, z) for b, row in zip(room, self.rows, strict=True)])
-        first = z[0] - sum(y_i * reach[0] for y_i, reach in zip(y, self.reach, strict=True))
+        first = z[0] - added(y_i * reach[0] for y_i, reach in zip(y, self.reach, strict=True))
         return first * self.moment_0
 
 

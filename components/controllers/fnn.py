@@ -41,6 +41,7 @@ from operator import mul, sub
 from ..fmi.component import Component
 from ..fmi.variables import output, parameter
 from ..mathematics.fuzzy import gaussian_grades
+from ..mathematics.sums import added, dot
 
 N_SETS = 7
 CENTRES = tuple((j - 3) / 3.0 for j in range(N_SETS))
@@ -115,7 +116,7 @@ def initial_weights() -> list[float]:
 def normalised_grades(x: float, centres: Sequence[float], widths: Sequence[float]) -> list[float]:
     """Return the grades n_j = mu_j / sum(mu) of `x` in seven Gaussian sets; equation (24)."""
     grades = gaussian_grades(x, centres, widths)
-    total = sum(grades)
+    total = added(grades)
     return [grade / total for grade in grades]
 
 
@@ -136,9 +137,9 @@ def set_gradients(
     """
     n_1, n_2 = map(normalised_grades, x, centres, widths)
     rows = [weights[N_SETS * j : N_SETS * (j + 1)] for j in range(N_SETS)]
-    by_first = [sum(map(mul, n_2, row)) for row in rows]
-    by_second = [sum(map(mul, n_1, column)) for column in zip(*rows, strict=True)]
-    u = sum(map(mul, n_1, by_first))
+    by_first = [dot(n_2, row) for row in rows]
+    by_second = [dot(n_1, column) for column in zip(*rows, strict=True)]
+    u = dot(n_1, by_first)
     by_centre, by_width = [], []
     for x_i, n_i, q_i, c_i, s_i in zip(x, (n_1, n_2), (by_first, by_second), centres, widths, strict=True):
         distance = [(x_i - c) / s for c, s in zip(c_i, s_i, strict=True)]
@@ -209,7 +210,7 @@ class Fnn(Component):
         x_2 = tanh(0.5 * p.error_rate_gain * (beta_ref_rate - beta_rate))
         (c_1, c_2), (s_1, s_2) = self.centres, self.widths
         strengths = firing_strengths(normalised_grades(x_1, c_1, s_1), normalised_grades(x_2, c_2, s_2))
-        wanted = p.moment_gain * sum(map(mul, strengths, self.weights))
+        wanted = p.moment_gain * dot(strengths, self.weights)
         self.moment = min(max(wanted, -p.moment_limit), p.moment_limit)
         self.learning_error = 0.0
         if p.learning and abs(wanted) < min(p.moment_limit, p.learning_limit):

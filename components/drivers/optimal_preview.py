@@ -41,7 +41,7 @@ from ..driving.track import TRACK_OUTPUTS, LaneChangeParameters, Track
 from ..fmi.component import Component
 from ..fmi.variables import like, parameter
 from ..mathematics.preview_control import discrete, tracking_gains
-from ..mathematics.quadratic_program import dot
+from ..mathematics.sums import dot
 from .double_lane_change import DoubleLaneChangeParameters
 
 STEP = 0.03

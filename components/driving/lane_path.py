@@ -23,7 +23,8 @@ from typing import NamedTuple
 
 from vocabulary.lane_change import Lane
 
-from ..mathematics.quadratic_program import Rows, dot, solution
+from ..mathematics.quadratic_program import Rows, solution
+from ..mathematics.sums import dot
 from .track import Outline
 
 LEAD, TAIL = 15.0, 15.0

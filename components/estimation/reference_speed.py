@@ -22,6 +22,7 @@ from math import cos, sin
 
 from vocabulary.gravity import G
 
+from ..mathematics.sums import added
 from .estimator_parameters import EstimatorParameters
 
 ROLLING = 0.3
@@ -77,7 +78,7 @@ class ReferenceSpeed:
 
     def __init__(self, spins: Sequence[float], p: EstimatorParameters) -> None:
         self.p = p
-        self.v = sum(spins) / 4.0 * p.wheel_radius
+        self.v = added(spins) / 4.0 * p.wheel_radius
         self.rate = 0.0
 
     def see(
@@ -90,7 +91,7 @@ class ReferenceSpeed:
         a_x = shared(a_x, self.rate)
         seen = wheel_speeds_at_centre(spins, r=r, v_y=v_y, delta=delta, a_x=a_x, p=p)
         differences = [v - self.v for v in seen]
-        pull = sum(d * believed(d, p.speed_doubt, a_x) for d in differences) / 4.0
+        pull = added(d * believed(d, p.speed_doubt, a_x) for d in differences) / 4.0
         sideways = v_y / (ROLLING * max(self.v, 1.0))
         gain = p.speed_gain / (1.0 + sideways * sideways) ** 2
         self.v = max(self.v + min(gain * h, 1.0) * pull, 0.0)

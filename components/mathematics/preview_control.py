@@ -17,7 +17,8 @@ Source: R. S. Sharp, V. Valtetsiotis, Optimal preview car steering control, Vehi
 
 from collections.abc import Sequence
 
-from .quadratic_program import Rows, dot
+from .quadratic_program import Rows
+from .sums import added, dot
 
 ORDER = 12
 """Of the series of the matrix exponential: beyond what counts where its argument is at most 1."""
@@ -31,7 +32,7 @@ def discrete(a: Sequence[Sequence[float]], b: Sequence[float], h: float) -> tupl
     """Return Phi and Gamma of dx/dt = A x + b u over `h` [s] with u held; exact to rounding."""
     n = len(b)
     whole = [[*map(float, row), float(gain)] for row, gain in zip(a, b, strict=True)] + [[0.0] * (n + 1)]
-    largest = max(sum(map(abs, row)) for row in whole)
+    largest = max(added(map(abs, row)) for row in whole)
     halves = 0
     while h * largest > 1.0:
         h, halves = 0.5 * h, halves + 1

@@ -14,7 +14,8 @@ Model Predictive Control System Design and Implementation Using MATLAB, 2009, se
 """
 
 from collections.abc import Sequence
-from operator import mul
+
+from .sums import dot
 
 Rows = list[list[float]]
 
@@ -22,12 +23,6 @@ SWEEPS = 500
 """At most. Chosen: ten times what control of a car's yaw needs; programs without a solution end, too."""
 CLOSE = 1e-10
 """Of the largest multiplier, by which none may have moved. Chosen: far below a sensor's resolution."""
-
-
-def dot(a: Sequence[float], b: Sequence[float]) -> float:
-    """Return the sum of the products of two rows of numbers."""
-    total: float = sum(map(mul, a, b))
-    return total
 
 
 def inverse(h: Sequence[Sequence[float]]) -> Rows:

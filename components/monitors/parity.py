@@ -55,6 +55,7 @@ from ..estimation.single_track_filter import FilterParameters
 from ..estimation.steered_track import SteeredTrack, limited
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter, signal
+from ..mathematics.sums import added
 from .redundancy import INPUTS, SLOW, RedundancyParameters, median_speed
 
 GYRO, ACCELEROMETER, HAND_WHEEL, WHEEL, UNLOCATED = 1.0, 2.0, 3.0, 4.0, 5.0
@@ -365,7 +366,7 @@ class Parity(Component):
             return 0.0
         self.pending += h
         left = [
-            sum(
+            added(
                 [
                     s if both and i not in pair else 0.0
                     for both, s, pair in zip(known, self.evidence, PAIRS, strict=True)

@@ -4,7 +4,7 @@ Workers only need the same version of this program: every FMU is sent once to ea
 description, and the worker unpacks it into its own cache. Runs travel in batches, which refer to the FMUs and
 are compressed bytes: a scheduler unpickles the arguments of tasks, pickles them again, and keeps the last
 thousand messages to each worker. As with local runs, they are made by processes that the worker starts
-(`execute`), so an FMU that crashes does not take it down.
+(`execute`) and keeps from one batch to the next, so an FMU that crashes does not take it down.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import os
 import pickle
 import platform
 import tempfile
+import threading
 import zlib
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
@@ -34,8 +35,8 @@ from ..fmu.archive import open_fmu, read_archive
 from ..interrupts import terminable
 from ..messages import listed
 from ..plan import Fmu
-from ..workers import pickled
-from .jobs import Job, OnOutcome, Outcome, execute
+from ..workers import Pool, pickled
+from .jobs import LASTING, NEEDED, Job, OnOutcome, Outcome, execute
 
 TIMEOUT = 10.0
 """Time limit for connecting to the scheduler [s]."""
@@ -175,9 +176,35 @@ def _outcomes(future: Any, batch: Sequence[Job], scheduler: str) -> list[Outcome
     return [replace(outcome, job=job) for outcome, job in zip(future.result(), batch, strict=True)]
 
 
+class _Pools:
+    """On a worker: a process per thread, which makes one run after the other, of this batch and the next."""
+
+    def __init__(self) -> None:
+        self._of_thread: dict[int, Pool] = {}
+
+    def execute(self, batch: Sequence[Job]) -> list[Outcome]:
+        """Execute the runs of a batch in the process of this thread."""
+        thread = threading.get_ident()
+        if thread not in self._of_thread:
+            self._of_thread[thread] = Pool(1, preload=NEEDED, lasting=LASTING)
+        try:
+            return execute(batch, pool=self._of_thread[thread])
+        except BaseException:
+            self._of_thread.pop(thread).end()  # it may still make a run
+            raise
+
+    def end(self) -> None:
+        """End the processes."""
+        while self._of_thread:
+            self._of_thread.popitem()[1].end()
+
+
+_POOLS = _Pools()
+
+
 def _make(parcel: bytes) -> list[Outcome]:
-    """Execute runs on a worker, one after the other in a process of theirs."""
-    return [replace(outcome, job=_NO_JOB) for outcome in execute(_unpack(parcel), workers=1)]
+    """Execute runs on a worker, one after the other."""
+    return [replace(outcome, job=_NO_JOB) for outcome in _POOLS.execute(_unpack(parcel))]
 
 
 def _fmu(key: str) -> Fmu:
@@ -204,6 +231,10 @@ class _Fmus(distributed.WorkerPlugin):
                 path = Path(folder, f"{fmu.sha256}.fmu")
                 path.write_bytes(content)
                 _UNPACKED[key] = replace(fmu, directory=open_fmu(path, validate=False).directory)
+
+    def teardown(self, worker: Any) -> None:
+        """End the processes of runs; Dask calls this when the worker is closed."""
+        _POOLS.end()
 
 
 @contextlib.contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import zipfile
@@ -41,6 +42,13 @@ def unpack(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path], Path]:
         return unpacked[fmu]
 
     return do
+
+
+@pytest.fixture(scope="session")
+def wine_prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of Wine's drive, one for all workers: making it takes longer than all that is done there."""
+    base = tmp_path_factory.getbasetemp()
+    return (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "wine"
 
 
 @pytest.fixture(scope="session")

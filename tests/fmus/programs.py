@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import random
 import re
@@ -66,8 +67,16 @@ def host_outputs(done: subprocess.CompletedProcess[str], folder: Path) -> list[f
     return [values[fmu.reference[name]] for name in fmu.names("output")]
 
 
-def in_wine(units: Iterable[tuple[Fmu, dict[str, float]]], folder: Path) -> list[list[list[float]]]:
-    """Return all Reals of FMUs with these inputs after each of ten steps, as a host on Windows reads them."""
+def in_wine(
+    units: Iterable[tuple[Fmu, dict[str, float]]], folder: Path, prefix: Path
+) -> list[list[list[float]]]:
+    """Return all Reals of FMUs with these inputs after each of ten steps, as a host on Windows reads them.
+
+    Args:
+        units: the FMUs.
+        folder: for the host and the libraries.
+        prefix: folder of Wine's drive, which is made if it is missing.
+    """
     host = folder / "host.exe"
     source = Path(__file__).with_name("host_windows.c")
     subprocess.run([TO_WINDOWS, f"-I{FMUS}", source, "-o", host], check=True)
@@ -78,16 +87,18 @@ def in_wine(units: Iterable[tuple[Fmu, dict[str, float]]], folder: Path) -> list
         given = [f"{fmu.reference[name]}={value!r}" for name, value in inputs.items()]
         sizes.append(sum(kind == "Real" for kind in fmu.type.values()))
         lines.append(" ".join([library.name, fmu.guid, str(sizes[-1]), *given]))
-    wine = {"WINEPREFIX": str(folder / "wine"), "WINEDEBUG": "-all"}
-    done = subprocess.run(
-        [str(WINE), str(host)],
-        cwd=folder,
-        env=os.environ | wine,
-        input="\n".join(lines) + "\n",
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    wine = {"WINEPREFIX": str(prefix), "WINEDEBUG": "-all", "WINEDLLOVERRIDES": "mscoree,mshtml="}
+    with prefix.with_name("wine.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # another worker makes the drive
+        done = subprocess.run(
+            [str(WINE), str(host)],
+            cwd=folder,
+            env=os.environ | wine,
+            input="\n".join(lines) + "\n",
+            capture_output=True,
+            text=True,
+            check=False,
+        )
     assert done.returncode == 0, done.stderr
     rows = [[float.fromhex(word) for word in line.split()] for line in done.stdout.splitlines()]
     assert [len(row) for row in rows] == [size for size in sizes for _ in range(10)]

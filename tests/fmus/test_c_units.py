@@ -213,7 +213,7 @@ def test_a_unit_in_c_gets_a_library_for_windows_where_a_compiler_makes_one(folde
 
 
 @in_windows
-def test_the_library_for_windows_steps_as_the_one_for_linux(folder, tmp_path, unpack):
+def test_the_library_for_windows_steps_as_the_one_for_linux(folder, tmp_path, unpack, wine_prefix):
     fmu = Fmu(unpack(build_component(folder, tmp_path / "a")))
     inputs = {"yaw_rate_ref": 0.1, "yaw_rate": 0.02}
-    assert in_wine([(fmu, inputs)], tmp_path) == [ten_steps(fmu, inputs)]
+    assert in_wine([(fmu, inputs)], tmp_path, wine_prefix) == [ten_steps(fmu, inputs)]

@@ -308,15 +308,13 @@ def test_a_run_that_ended_at_its_start_is_one_sentence(rows):
         draw([LabelledRun("good", car()), LabelledRun("ended", ended)])
 
 
-@pytest.mark.parametrize(
-    "label", ["\x1b[31mred", "a\x00b", "\u202eturned", "\ufffe\uffff", "\ud800", "<&>\"'"]
-)
-def test_a_figure_is_valid_svg_whatever_characters_a_label_has(label, tmp_path):
-    runs = [LabelledRun(label, car(1.2)), LabelledRun("other", car(2.4))]
-    figures = {"plot": draw(runs, title=label), "portrait": draw(runs, ["yaw_rate(sideslip)"], title=label)}
+def test_a_figure_is_valid_svg_whatever_characters_labels_have(tmp_path):
+    labels = ["\x1b[31mred", "a\x00b", "\u202eturned", "\ufffe\uffff", "\ud800", "<&>\"'"]
+    runs, title = [LabelledRun(label, car(1.2)) for label in labels], " ".join(labels)
+    figures = {"plot": draw(runs, title=title), "portrait": draw(runs, ["yaw_rate(sideslip)"], title=title)}
     for name, figure in figures.items():
         svg, png = save(figure, tmp_path / name)
         root = ElementTree.parse(svg).getroot()
         assert root.tag == "{http://www.w3.org/2000/svg}svg"
         assert png.stat().st_size
-        assert printable(label) in legend(figure)
+        assert {*map(printable, labels)} <= {*legend(figure)}

@@ -1,8 +1,5 @@
 """Folders that commands have written, opened from Python."""
 
-import os
-import subprocess
-import sys
 import warnings
 from pathlib import Path
 
@@ -12,6 +9,7 @@ from pyarrow import parquet
 
 import yawbench as yb
 from orchestrator.experiments.record import columns_of, write_table
+from tests.commands import status_of
 
 
 @pytest.fixture(scope="module")
@@ -96,10 +94,9 @@ def yawbench(folder, *arguments):
     """Run a command in a folder with the files."""
     for name, text in FILES.items():
         (folder / f"{name}.yaml").write_text(text)
-    command = [sys.executable, "-m", "yawbench", *arguments, "--out", "made"]
-    path = os.environ | {"PYTHONPATH": str(SCENARIO.parents[2])}
-    done = subprocess.run(command, cwd=folder, env=path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        assert status_of(*arguments, "--out", "made") == 0
     with warnings.catch_warnings():
         warnings.simplefilter("error", DeprecationWarning)
         opened = yb.open(folder / "made")

@@ -120,8 +120,8 @@ def test_fifty_instances_in_fifty_threads_give_what_each_gives_alone(native, tmp
 
 
 @in_windows
-def test_on_windows_native_units_agree_with_linux_to_a_trillionth(native, tmp_path):
+def test_on_windows_native_units_agree_with_linux_to_a_trillionth(native, tmp_path, wine_prefix):
     units = [(Fmu(folder), unpacked_inputs(folder)) for folder in native]
-    for (fmu, inputs), found in zip(units, in_wine(units, tmp_path), strict=True):
+    for (fmu, inputs), found in zip(units, in_wine(units, tmp_path, wine_prefix), strict=True):
         for row, expected in zip(found, ten_steps(fmu, inputs), strict=True):
             assert row == pytest.approx(expected, rel=1e-12, abs=1e-12), fmu.name
