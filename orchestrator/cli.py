@@ -209,13 +209,14 @@ def _status_of_printing(printed: output.Output, status: int) -> int:
 
 @contextlib.contextmanager
 def _warnings_as_notes() -> Iterator[None]:
-    """Print this package's warnings as notes; leave other warnings to Python."""
+    """Print this package's warnings as notes, in JSON too; leave other warnings to Python."""
     with warnings.catch_warnings():
         warnings.simplefilter("always", RecordWarning)
         before = warnings.showwarning
 
         def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
             if issubclass(category, RecordWarning):
+                output.note([Diagnostic("results-changed", str(message), "warning")])
                 print(cut(printable(f"note: {message}"), LONGEST_MESSAGE), file=sys.stderr, flush=True)
             else:
                 before(message, category, *where, **more)

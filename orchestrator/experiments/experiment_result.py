@@ -320,6 +320,11 @@ class Limit:
     verdict: Verdict  # at that value, else at the largest; not judged: why the run has no metric
     cases: tuple[Case, ...] = ()  # the last that holds and the first that fails; of repeats the first
 
+    @property
+    def missing(self) -> bool:
+        """Whether the run at the next value has not been made."""
+        return self.verdict.why == NOT_MADE.reason
+
 
 def limits_of(findings: ExperimentResult, spec: LimitSpec) -> list[Limit]:
     """Return the limit for every run and setting of the other axes, in the order of the design."""
@@ -389,6 +394,9 @@ def limit_table(findings: ExperimentResult, name: str) -> Table:
         words: list[Cell] = [level.words for level in limit.others.values()]
         up_to = "-" if limit.largest is None else digits_of(limit.largest)
         beyond = "-" if limit.beyond is None else digits_of(limit.beyond)
-        why = limit.verdict.why
-        table.rows.append([*words, up_to, f"{beyond} ({why})" if why else beyond])
+        if limit.missing:
+            beyond = f"unknown ({beyond} not made)"
+        elif why := limit.verdict.why:
+            beyond = f"{beyond} ({why})"
+        table.rows.append([*words, up_to, beyond])
     return table

@@ -223,7 +223,7 @@ def record_of(findings: ExperimentResult, drawn: Mapping[str, str] = NO_FIGURES)
                 {
                     "at": {axis: level.value for axis, level in reached.others.items()},
                     "up_to": reached.largest,
-                    "not_at": reached.beyond,
+                    "not_at": None if reached.missing else reached.beyond,
                     **reached.verdict.as_data(),
                 }
                 for reached in limits_of(findings, limit)

@@ -203,7 +203,8 @@ def _mdf(raw: bytes) -> _Table:
             if index != mdf.masters_db.get(group)
         ]
     except Exception as error:  # asammdf raises whatever its parsing meets
-        raise ValueError(f"is not an MDF file, or damaged: {' '.join(str(error).split())}") from None
+        why = re.sub(r'"?<_io\.BytesIO[^>]*>"?', "it", " ".join(str(error).split()))
+        raise ValueError(f"is not an MDF file, or damaged: {why}") from None
 
     def signal(at: int) -> Any:
         group, index, *_ = channels[at]

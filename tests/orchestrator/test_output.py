@@ -255,3 +255,26 @@ def test_every_command_that_prints_tables_takes_both_forms():
         if "print_tables(" in file.read_text() and file.name != "progress.py":
             printing.add(file.stem)
     assert {COMMANDS[name] for name in output.COMMANDS} == printing
+
+
+def test_a_limit_whose_runs_are_missing_is_unknown(answers, tmp_path):
+    limits = "limits: {top: {says: Highest speed, of: speed, holds_if: [{metric: moment, below: 1e9}]}}\n"
+    (tmp_path / "sweep.yaml").write_text(SWEEP + limits)
+    made = answers("sweep", "sweep.yaml", "--out", "out")
+    assert made["tables"][-1]["rows"] == [["20.0", "-"]]
+    (tmp_path / "sweep.yaml").write_text(SWEEP.replace("[10, 20]", "[10, 20, 30]") + limits)
+    made = answers("sweep", "sweep.yaml", "--out", "out", "--no-run")
+    assert made["tables"][-1]["rows"] == [["20.0", "unknown (30.0 not made)"]]
+    (limit,) = made["experiments"][0]["record"]["limits"]["top"]
+    assert (limit["up_to"], limit["not_at"], limit["why"]) == (20.0, None, "not made")
+
+
+def test_records_that_were_changed_are_among_the_diagnostics(answers, tmp_path):
+    answers("sweep", "sweep.yaml", "--out", "out")
+    journal = tmp_path / "out" / "runs.jsonl"
+    journal.write_text(journal.read_text().replace("peak", "poke").replace("moment", "momant"))
+    told = answers("sweep", "sweep.yaml", "--out", "out")["diagnostics"]
+    changed = [entry for entry in told if entry["code"] == "results-changed"]
+    assert changed
+    assert {entry["severity"] for entry in changed} == {"warning"}
+    assert "runs.jsonl" in changed[0]["message"]
