@@ -304,9 +304,13 @@ def _verdict(over: str, tests: Sequence[ComparedTest]) -> Verdict:
 
 
 def _conditions(bands: Bands, over: np.ndarray, tests: Sequence[np.ndarray]) -> Iterator[str]:
-    """Yield warnings about what the comparison lacks."""
-    if len(tests) < LEAST_TESTS:
-        yield f"{counted(len(tests), 'test')} of the car; ISO 19364, as cited, asks for {LEAST_TESTS} or more"
+    """Yield warnings about what the comparison lacks; tests with the same samples are one."""
+    number = len({test.tobytes() for test in tests})
+    if number < LEAST_TESTS:
+        again = f" ({len(tests)} segments, some the same)" if number < len(tests) else ""
+        yield (
+            f"{counted(number, 'test')} of the car{again}; ISO 19364, as cited, asks for {LEAST_TESTS} or more"
+        )
     wanted = float(np.abs(over).max())
     reached = max(float(np.abs(test).max()) for test in tests)
     tolerance = float(bands.tolerances[bands.over](np.array(wanted)))

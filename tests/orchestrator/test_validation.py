@@ -31,12 +31,13 @@ date: 2024-01-01
 
 
 def write(folder: Path, name: str, hand: np.ndarray, a_y: np.ndarray, more: str = "", tests: int = 3) -> Path:
-    """Write a measurement of some equal tests."""
-    table = np.column_stack([0.01 * np.arange(hand.size), hand, a_y])
-    header = "time [s],hand [rad],a_y [m/s2]"
-    np.savetxt(folder / f"{name}.csv", table, "%.9g", ",", header=header, comments="")
+    """Write a measurement of some tests that are equal but for the resolution of a sensor."""
+    header, files = "time [s],hand [rad],a_y [m/s2]", [f"{name}_{k}.csv" for k in range(tests)]
+    for k, file in enumerate(files):
+        table = np.column_stack([0.01 * np.arange(hand.size), hand, a_y + 1e-7 * k])
+        np.savetxt(folder / file, table, "%.9g", ",", header=header, comments="")
     path = folder / f"{name}.yaml"
-    path.write_text(MEASURED.format(files=", ".join([f"{name}.csv"] * tests), more=more))
+    path.write_text(MEASURED.format(files=", ".join(files), more=more))
     return path
 
 
@@ -119,6 +120,10 @@ def test_conditions_that_are_not_met_are_warnings(tmp_path):
     assert [one.code for one in few.diagnostics] == ["validation-conditions"] * 2
     assert golden("\n".join(map(str, few.diagnostics)))
     assert few.holds
+    path = line(tmp_path, "thrice")
+    path.write_text(path.read_text().replace("_1.csv", "_0.csv").replace("_2.csv", "_0.csv"))
+    (again,) = yb.validate(run, path).diagnostics
+    assert golden(str(again))
 
 
 def test_the_command_draws_writes_and_ends_with_the_verdict(tmp_path, capsys):
