@@ -308,9 +308,8 @@ def _conditions(bands: Bands, over: np.ndarray, tests: Sequence[np.ndarray]) -> 
     number = len({test.tobytes() for test in tests})
     if number < LEAST_TESTS:
         again = f" ({len(tests)} segments, some the same)" if number < len(tests) else ""
-        yield (
-            f"{counted(number, 'test')} of the car{again}; ISO 19364, as cited, asks for {LEAST_TESTS} or more"
-        )
+        tested = f"{counted(number, 'test')} of the car{again}"
+        yield f"{tested}; ISO 19364, as cited, asks for {LEAST_TESTS} or more"
     wanted = float(np.abs(over).max())
     reached = max(float(np.abs(test).max()) for test in tests)
     tolerance = float(bands.tolerances[bands.over](np.array(wanted)))
