@@ -184,3 +184,19 @@ def test_modules_are_subjects_of_natural_size():
     assert sum(path.name != "__init__.py" for path in lines) <= 150  # markers of packages hold no subject
     assert {path: number for path, number in lines.items() if number > 450} == {}
     assert imports <= 0.075 * sum(lines.values())
+
+
+EMPTY = {"one", "found", "given", "said", "told", "asked"}
+"""Names that say nothing about what they name."""
+
+
+def test_no_name_is_an_empty_word():
+    names = [
+        (path.relative_to(ROOT).as_posix(), node.lineno, name)
+        for path in (path for room in PRODUCT for path in (ROOT / room).rglob("*.py"))
+        for node in ast.walk(tree_of(path))
+        if isinstance(node, (ast.Name, ast.arg, ast.Attribute))
+        for name in [getattr(node, "id", None) or getattr(node, "arg", None) or getattr(node, "attr", None)]
+        if name in EMPTY
+    ]
+    assert names == []
