@@ -315,7 +315,7 @@ def _of_standard_test(result: ThreatResult, name: str) -> Discipline:
     ])  # fmt: skip
     cells = {
         entry: [
-            _mean_text(
+            _median_text(
                 [result.quantities[name, car, entry].get(key) for car in cars],
                 result.units.get((name, key), ""),
             )
@@ -330,19 +330,19 @@ def _of_standard_test(result: ThreatResult, name: str) -> Discipline:
         ends = (f"{x * scale:.3g}" for x in (quantity.best, quantity.worst))
         ranges.append(f"{quantity.title} {' to '.join(ends)}{f' {unit}' if unit else ''}")
     about = (
-        f"{spec.source}. Means over {', '.join(cars)}; less is better. Each range counts as one unit: "
+        f"{spec.source}. Medians over {', '.join(cars)}; less is better. Each range counts as one unit: "
         f"{'; '.join(ranges)}."
     )
     return Discipline(spec.title, score_table(entries, positions, REFERENCE), cells, headings, about)
 
 
-def _mean_text(magnitudes: Sequence[float | None], unit: str) -> str:
-    """Return the mean over the cars that were not lost, in the unit shown."""
+def _median_text(magnitudes: Sequence[float | None], unit: str) -> str:
+    """Return the median over the cars that were not lost, in the unit shown."""
     known = [x for x in magnitudes if x is not None]
     if not known:
         return "lost"
     lost = f", lost on {len(magnitudes) - len(known)}" if len(known) < len(magnitudes) else ""
-    return f"{digits_of(shown_unit(unit)[1] * sum(known) / len(known), 3)}{lost}"
+    return f"{digits_of(shown_unit(unit)[1] * float(np.median(known)), 3)}{lost}"
 
 
 def discipline_table(result: ThreatResult, discipline: Discipline) -> Table:
