@@ -202,8 +202,8 @@ def test_the_sampling_time_of_an_object_holds_in_a_ranking(tmp_path):
     places = yb.rank(
         {"slow": Slow(1e5), "fast": Law(1e5)}, against=[], conditions=["hard"], quick=True, out=tmp_path
     )
-    margins = places.cells.set_index("entry")["margin"]
-    assert margins["slow"] != margins["fast"]
+    headroom = places.cells.set_index("entry")["headroom"]
+    assert headroom["slow"] != headroom["fast"]
     runs = yb.open(tmp_path).runs.values()
     sampled = {run.results.record.fmus["controller"].step_size for run in runs}
     assert sampled == {0.1, 0.005}
