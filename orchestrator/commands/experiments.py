@@ -144,37 +144,29 @@ def chapter_of(
     folder: Path,
     command: str,
     *,
-    shown_in: Path,
     views: Sequence[View] = (),
     measured: Sequence[LabelledRun] = (),
     each: Each = map,
     **more: Any,
 ) -> dict[str, Any]:
-    """Return the chapter of an experiment for a page in `shown_in`; `more`: further template data."""
+    """Return the template data of an experiment's page in its folder; `more`: further data."""
     from ..pages.report import chapter
     from ..results.freshness import staleness
     from ..results.run_folder import RUN_FILE
 
     jobs = findings.planned.jobs if findings.planned and not findings.spec.axes else []
-    out_of_date = {
+    stale = {
         job.label: why
         for job in jobs
         if job.plan and (job.out / RUN_FILE).is_file() and (why := staleness(job.plan, job.out))
     }
     with stoppable(folder):
         facts = chapter(
-            findings,
-            command=command,
-            stale=out_of_date,
-            folder=folder,
-            shown_in=shown_in,
-            views=views,
-            measured=measured,
-            each=each,
+            findings, command=command, stale=stale, folder=folder, views=views, measured=measured, each=each
         )
-    for name, why in out_of_date.items():
+    for name, why in stale.items():
         say(f"{name}: out of date: {why}")
-    return facts | {"comparison": None, "results": []} | more
+    return facts | more
 
 
 def command_of(preset: str, path: Path, *, quick: bool = False, **options: Iterable[object] | None) -> str:
@@ -186,18 +178,37 @@ def command_of(preset: str, path: Path, *, quick: bool = False, **options: Itera
     return shlex.join(["yawbench", preset, str(path), *flags, *itertools.chain.from_iterable(pairs)])
 
 
-def write_page(chapters: Sequence[dict[str, Any]], folder: Path) -> None:
-    """Write a page of chapters into a folder and print its path."""
+def write_page(facts: dict[str, Any], folder: Path) -> Path:
+    """Write the page of an experiment into its folder; return its path."""
+    from ..files import write_whole
+    from ..pages.report import PAGE, study_page
+
+    page = folder / PAGE
+    write_whole(page, study_page(facts))
+    output.answer(page=page)
+    return page
+
+
+def say_page(page: Path) -> None:
+    """Print the path of a page and its size."""
+    say(f"The page: {page} ({page.stat().st_size / 1e6:.1f} MB)")
+
+
+def write_overview(chapters: Sequence[dict[str, Any]], pages: Sequence[Path], folder: Path) -> Path:
+    """Write the overview of several experiments into a folder; return its path."""
     import os
 
     from ..files import write_whole
-    from ..pages.report import PAGE, RANKING, report_page
+    from ..pages.report import PAGE, RANKING, overview_page
+
+    def address(page: Path) -> str:
+        return Path(os.path.relpath(page, folder)).as_posix()
 
     page = folder / PAGE
-    ranking = Path(os.path.relpath(RANKING, folder)).as_posix() if RANKING.is_file() else ""
-    write_whole(page, report_page(chapters, ranking))
+    ranking = address(RANKING) if RANKING.is_file() else ""
+    write_whole(page, overview_page(chapters, [*map(address, pages)], folder, ranking))
     output.answer(page=page)
-    say(f"The page: {page} ({page.stat().st_size / 1e6:.1f} MB)")
+    return page
 
 
 def of_files(context: typer.Context, files: Sequence[Path], options: RunOptions) -> None:
@@ -252,7 +263,7 @@ def of_files(context: typer.Context, files: Sequence[Path], options: RunOptions)
         return
     hold(context, *folders)
     each = pooled(context, options)
-    chapters, conducted, failed = [], [], False
+    chapters, pages, conducted, failed = [], [], [], False
     for experiment, folder in zip(experiments, folders, strict=True):
         findings = conduct(experiment, folder, options, each)
         command = command_of(
@@ -261,7 +272,8 @@ def of_files(context: typer.Context, files: Sequence[Path], options: RunOptions)
             quick=options.quick and (experiment.spec.region is not None or bool(experiment.spec.repeats)),
             **options.changing,
         )
-        chapters.append(chapter_of(findings, folder, command, shown_in=page, each=each))
+        chapters.append(chapter_of(findings, folder, command, each=each))
+        pages.append(write_page(chapters[-1], folder))
         conducted.append(data_of(findings, folder))
         failed = failed or bool(findings.failed) or bool(findings.not_made)
         if len(files) == 1:
@@ -269,7 +281,7 @@ def of_files(context: typer.Context, files: Sequence[Path], options: RunOptions)
         if verdicts := tally_words(counts_of(findings.claims)):
             where = reach(findings)
             say(f"{experiment.spec.title}: {verdicts}" + f" ({where})" * bool(where))
-    write_page(chapters, page)
+    say_page(pages[0] if len(pages) == 1 else write_overview(chapters, pages, page))
     output.answer(experiments=conducted)
     if failed:
         raise typer.Exit(1)
@@ -316,15 +328,15 @@ Studies = Annotated[
 
 @takes(*MAKING, "jobs", "format_", "quick", "fresh", "no_run", "dry_run")
 def report(context: typer.Context, options: RunOptions, studies: Studies = None) -> None:
-    """Write one page that reproduces the papers.
+    """Write the pages that reproduce the papers.
 
-    report.html: per study the verdicts, system, figures, tables, parameters and their sources; a single
-    file, with the figures beside it as SVG and PNG. Runs whose results are missing or out of date are
-    made first. Without --out, the page of one study goes to its folder below results/, that of several
-    to results/. Regions take most of the time, half an hour on two cores for all studies in scenarios/;
-    --quick omits them.
+    Per study report.html, a single file: verdicts, runs, system, tables, parameters and their sources,
+    with the figures beside it as SVG and PNG. Of several studies also an overview, which shows the runs
+    of every claim. Runs whose results are missing or out of date are made first. Without --out, pages go
+    to the studies' folders below results/, the overview to results/. Regions take most of the time, half
+    an hour on two cores for all studies in scenarios/; --quick omits them.
     """
-    from ..pages.report import found_studies
+    from ..experiments.experiment import found_studies
 
     paths = list(dict.fromkeys(studies or found_studies()))
     of_files(context, paths, options)
@@ -400,5 +412,5 @@ def tune(context: typer.Context, file: TuningFile, options: RunOptions, seed: Tu
     save(history_figure(experiment, tuned, command), folder / "history")
     charts = [image_of(folder / "history.svg", experiment.spec.title)]
     facts: dict[str, Any] = {"results": [table], "charts": charts}
-    write_page([chapter_of(findings, folder, command, shown_in=folder, **facts)], folder)
+    say_page(write_page(chapter_of(findings, folder, command, **facts), folder))
     output.answer(experiments=[data_of(findings, folder)])

@@ -13,7 +13,6 @@ from .options import CHANGES, MAKING, RunOptions, takes
 from .progress import hold, print_tables, say, stoppable
 
 if TYPE_CHECKING:
-    from ..evaluation.validation import Validation
     from ..experiments.fit_result import FitResult
     from ..experiments.tables import Table
     from ..measured.measurement import Measurement
@@ -29,6 +28,9 @@ MeasuredOption = Annotated[Path, typer.Option("--measured", metavar="FILE", help
 BandsOption = Annotated[
     str,
     typer.Option("--bands", metavar="NAME", help="File of tolerances, or its name in scenarios/bands."),
+]
+ValidationPage = Annotated[
+    bool, typer.Option("--page", help="Also write validation.html, an interactive page.")
 ]
 FigureFile = Annotated[
     Path | None, typer.Option("--out", metavar="FILE.svg", help="Figure of all signals to write.")
@@ -219,21 +221,27 @@ def vehicle_text(result: FitResult, folder: Path, planner: Planner) -> str:
 
 @takes(*CHANGES, *MAKING)
 def validate(
-    scenario: Validated, options: RunOptions, measured: MeasuredOption, bands: BandsOption = "steady_state"
+    scenario: Validated,
+    options: RunOptions,
+    measured: MeasuredOption,
+    bands: BandsOption = "steady_state",
+    page: ValidationPage = False,
 ) -> None:
     """Compare steady-state runs with measurements, by bands.
 
     Prints a verdict per signal: the largest distance of a measured point from the cross plot, relative to the
     tolerance. Draws the cross plots and writes validation.json. The measurement's low pass is applied to the
     run, too. Without --out, both go to the folder of the run. Exit status 1 if a signal lies outside its
-    band, or none could be judged.
+    band, or none could be judged. A study with `validations` has them in its report.
     """
     import json
 
     from ..evaluation.validation import compare_run, load_bands
+    from ..experiments.verdict_tables import conditions_table, validation_table
     from ..figures.style import save
     from ..files import write_whole
     from ..measured.measurement import load_measurement
+    from ..pages.evaluation_page import validation_page
     from ..results.measurement_results import load_run
     from .results import recorded
 
@@ -248,21 +256,13 @@ def validate(
     )
     output.answer(folder=out, validation=validation.as_data())
     output.note((*measurement.notes, *validation.diagnostics))
-    print_tables([validation_table(validation)])
+    print_tables([validation_table(validation), conditions_table(validation)])
     for diagnostic in (*measurement.notes, *validation.diagnostics):
         say(f"{'note' if diagnostic.severity == 'info' else 'warning'}: {diagnostic}")
-    say(", ".join([str(out / "validation.json"), *(path.name for path in drawing)]))
+    written = [str(out / "validation.json"), *(path.name for path in drawing)]
+    if page:
+        write_whole(out / "validation.html", validation_page(validation))
+        written.append("validation.html")
+    say(", ".join(written))
     if not validation.holds:
         raise typer.Exit(1)
-
-
-def validation_table(validation: Validation) -> Table:
-    """Return the verdicts of a validation as a table."""
-    from ..experiments.tables import Table
-
-    title = f"{validation.title}, against {validation.measured}"
-    table = Table(title, ["signal", "verdict", "largest distance"])
-    for name, verdict in validation.verdicts.items():
-        table.rows.append([name, verdict.status.value, verdict.why])
-    table.notes.append(f"{validation.bands}: {validation.source}")
-    return table

@@ -13,7 +13,7 @@ import typer
 from ..coupling import ALGORITHMS
 from ..messages import hint, listed, printable
 from . import output
-from .experiments import chapter_of, command_of, conduct, data_of, write_page
+from .experiments import chapter_of, command_of, conduct, data_of, say_page, write_page
 from .options import CHANGES, MAKING, RunOptions, ScenarioFile, plan_of_scenario, takes
 from .progress import hold, pooled, print_tables, say, shows_bars
 from .results import MeasuredFrom, MeasuredRuns, distinct, start_of, with_segments
@@ -204,10 +204,8 @@ def compare(
     command = command_of("compare", scenario, **options.changing | {"swap": swap} | beside)
     facts = comparison_facts(findings)
     views = facts["views"] if facts else []
-    chapter = chapter_of(
-        findings, folder, command, shown_in=folder, views=views, measured=recordings, comparison=facts
-    )
-    write_page([chapter], folder)
+    chapter = chapter_of(findings, folder, command, views=views, measured=recordings, comparison=facts)
+    say_page(write_page(chapter, folder))
     output.answer(experiments=[data_of(findings, folder)])
     if findings.failed:
         raise typer.Exit(1)
@@ -307,7 +305,7 @@ def converge(
         save(figure, folder / "converge")
         charts = [image_of(folder / "converge.svg", experiment.spec.title)]
     facts: dict[str, Any] = {"results": [table], "charts": charts}
-    write_page([chapter_of(findings, folder, command, shown_in=folder, **facts)], folder)
+    say_page(write_page(chapter_of(findings, folder, command, **facts), folder))
     if any(row.failed for row in rows):
         raise typer.Exit(1)
 
@@ -325,7 +323,7 @@ def diff(first_run: FirstRun, second_run: SecondRun, begin: MeasuredFrom = "0 s"
     by signal: when they start to differ, when the difference becomes visible (1 % of the signal's
     largest value), and the largest difference. The filter of a measurement acts on the other run, too.
     """
-    from ..pages.comparison import differences, differences_table, divergence, partings_table
+    from ..pages.comparison import differences, differences_table, divergence, outcome_table
     from .results import distinct, read_runs, start_of
 
     first, second = read_runs([first_run, second_run], start_of(begin))
@@ -348,6 +346,6 @@ def diff(first_run: FirstRun, second_run: SecondRun, begin: MeasuredFrom = "0 s"
     if inputs:
         print_tables([differences_table(inputs, *distinct([first_run, second_run]))])
     if parted.partings or parted.notes:
-        print_tables([partings_table(parted, first, second)])
+        print_tables([outcome_table(parted, first, second)])
     if not (inputs or parted.partings or parted.notes):
         say("The runs are identical: same inputs, same numbers.")

@@ -36,6 +36,7 @@ from ..errors import Diagnostic, ResultsError, ScenarioError, code_of, warnings_
 from ..figures.style import CHANGED, frame, line_style, new_figure, shown_unit
 from ..files import reads
 from ..measured.measurement import Measurement
+from ..measured.segment import Segment
 from ..messages import counted, hint
 from ..metrics.measures import words
 from ..metrics.verdict import Verdict, apart, compare, not_judged, worst
@@ -166,12 +167,14 @@ class ComparedTest:
     """A test of the car in a cross plot.
 
     Attributes:
-        name: of the segment.
-        over, values: of the measured points, shape (points,), to the side of the run.
+        name: of the segment; says so if it is mirrored.
+        time: of the measured points [s], shape (points,).
+        over, values: of these points, to the side of the run.
         distance: of each of them, over the tolerance.
     """
 
     name: str
+    time: np.ndarray
     over: np.ndarray
     values: np.ndarray
     distance: np.ndarray
@@ -183,17 +186,31 @@ class CrossPlot:
 
     Attributes:
         signal: its name.
-        over, values: of the run, shape (points,).
+        time: of the run [s], shape (points,).
+        over, values: of the run, of the same shape.
         of_over, of_values: their tolerances, of the same shape.
         tests: of the car.
     """
 
     signal: str
+    time: np.ndarray
     over: np.ndarray
     values: np.ndarray
     of_over: np.ndarray
     of_values: np.ndarray
     tests: Sequence[ComparedTest]
+
+    @property
+    def outline(self) -> tuple[np.ndarray, np.ndarray]:
+        """Both boundaries of the band as one closed line: (over, values), as the source gives them."""
+        along, up = np.gradient(self.over), np.gradient(self.values)
+        length = np.hypot(along * self.of_values, up * self.of_over)
+        length = np.where(length > 0.0, length, 1.0)
+        aside, above = up * self.of_over**2 / length, along * self.of_values**2 / length
+        return (
+            np.concatenate([self.over - aside, (self.over + aside)[::-1]]),
+            np.concatenate([self.values + above, (self.values - above)[::-1]]),
+        )
 
 
 @dataclass(frozen=True)
@@ -208,7 +225,8 @@ class Validation:
         measured: car and date of the measurement; `origin`: its source and licence.
         bands: their title; `source`: where their tolerances come from.
         verdicts: signal -> verdict; its number is the largest distance over the tolerance, its bound 1.
-        diagnostics: warnings if the conditions of such a comparison are not met.
+        conditions: name -> verdict on what such a comparison asks for: tests of the car, their range.
+        diagnostics: warnings where they are not met.
     """
 
     title: str
@@ -217,6 +235,7 @@ class Validation:
     bands: str
     source: str
     verdicts: Mapping[str, Verdict]
+    conditions: Mapping[str, Verdict]
     diagnostics: tuple[Diagnostic, ...]
     plots: Sequence[CrossPlot]
     horizontal: str
@@ -242,6 +261,7 @@ class Validation:
             "run": self.title, "measured": self.measured, "origin": self.origin, "bands": self.bands,
             "source": self.source, "over": self.horizontal, "holds": self.holds,
             "signals": {name: verdict.as_data() for name, verdict in self.verdicts.items()},
+            "conditions": {name: verdict.as_data() for name, verdict in self.conditions.items()},
             "warnings": [str(diagnostic) for diagnostic in self.diagnostics],
         }  # fmt: skip
 
@@ -277,17 +297,17 @@ def compare_run(results: Results, measurement: Measurement, bands: Bands) -> Val
         if name not in trace or not own:
             verdicts[name] = not_judged("not measured" if name in trace else "not recorded in the run")
             continue
-        band = _Band(over, trace[name], bands.tolerances[bands.over], bands.tolerances[name])
+        band = _Band(trace.time, over, trace[name], bands.tolerances[bands.over], bands.tolerances[name])
         sides = [band.side_of(segment.signals[bands.over], (bands.over, name)) for segment in own]
         compared = [
-            band.test(segment.name, side * segment.signals[bands.over], side * segment.signals[name])
-            for segment, side in zip(own, sides, strict=True)
+            band.test(segment, side, (bands.over, name)) for segment, side in zip(own, sides, strict=True)
         ]
         verdicts[name] = _verdict(bands.over, compared)
-        plots.append(CrossPlot(name, *band.points, *band.tolerances, compared))
-    notes = _conditions(bands, over, [segment.signals[bands.over] for segment in tests])
+        plots.append(CrossPlot(name, band.time, *band.points, *band.tolerances, compared))
+    conditions = dict(_conditions(bands, over, [segment.signals[bands.over] for segment in tests]))
+    notes = [verdict.why for verdict in conditions.values() if not verdict.holds]
     return Validation(
-        trace.title, measurement.title, measurement.origin, bands.title, bands.source, verdicts,
+        trace.title, measurement.title, measurement.origin, bands.title, bands.source, verdicts, conditions,
         tuple(Diagnostic("validation-conditions", note, "warning") for note in notes), plots, bands.over,
     )  # fmt: skip
 
@@ -303,39 +323,45 @@ def _verdict(over: str, tests: Sequence[ComparedTest]) -> Verdict:
     )
 
 
-def _conditions(bands: Bands, over: np.ndarray, tests: Sequence[np.ndarray]) -> Iterator[str]:
-    """Yield warnings about what the comparison lacks; tests with the same samples are one."""
+def _conditions(bands: Bands, over: np.ndarray, tests: Sequence[np.ndarray]) -> Iterator[tuple[str, Verdict]]:
+    """Yield name and verdict of what the comparison asks for; tests with the same samples are one."""
     number = len({test.tobytes() for test in tests})
-    if number < LEAST_TESTS:
-        again = f" ({len(tests)} segments, some the same)" if number < len(tests) else ""
-        tested = f"{counted(number, 'test')} of the car{again}"
-        yield f"{tested}; ISO 19364, as cited, asks for {LEAST_TESTS} or more"
+    again = f" ({len(tests)} segments, some the same)" if number < len(tests) else ""
+    tested = f"{counted(number, 'test')} of the car{again}"
+    few = f"{tested}; ISO 19364, as cited, asks for {LEAST_TESTS} or more"
+    yield "tests of the car", compare(float(number), "at_least", float(LEAST_TESTS), why=few)
     wanted = float(np.abs(over).max())
     reached = max(float(np.abs(test).max()) for test in tests)
     tolerance = float(bands.tolerances[bands.over](np.array(wanted)))
-    if reached < wanted - tolerance:
-        unit = SIGNALS[bands.over].unit
-        yield (
-            f"the measurement ends at {reached:.3g} {unit} of {bands.over}, the run at {wanted:.3g} {unit}; "
-            "the rest is not judged"
-        )
+    unit = SIGNALS[bands.over].unit
+    short = (
+        f"the measurement ends at {reached:.3g} {unit} of {bands.over}, the run at {wanted:.3g} {unit}; "
+        "the rest is not judged"
+    )
+    yield f"largest {bands.over}", compare(reached, "at_least", wanted - tolerance, unit, why=short)
 
 
 class _Band:
     """The band around the cross plot of a run.
 
     Args:
-        over, values: of the run, shape (rows,).
-        of_over, of_values: their tolerances.
+        time, over, values: of the run, shape (rows,).
+        of_over, of_values: tolerances of over and values.
     """
 
     def __init__(
-        self, over: np.ndarray, values: np.ndarray, of_over: Tolerance, of_values: Tolerance
+        self,
+        time: np.ndarray,
+        over: np.ndarray,
+        values: np.ndarray,
+        of_over: Tolerance,
+        of_values: Tolerance,
     ) -> None:
         steps = np.hypot(np.diff(over) / of_over(over[1:]), np.diff(values) / of_values(values[1:]))
         length = np.concatenate([[0.0], np.cumsum(steps)])
         count = min(LONGEST, 2 + math.ceil(length[-1] / SPACING))
         places = np.linspace(0.0, length[-1], count)
+        self.time = np.interp(places, length, time)
         self.points = np.interp(places, length, over), np.interp(places, length, values)
         self.tolerances = of_over(self.points[0]), of_values(self.points[1])
 
@@ -347,9 +373,10 @@ class _Band:
         against = float(over[np.abs(over).argmax()]) * (low + high) < 0.0
         return -1.0 if against and not both and all(name in MIRRORED for name in names) else 1.0
 
-    def test(self, name: str, over: np.ndarray, values: np.ndarray) -> ComparedTest:
-        """Return a test with the distances of its points."""
+    def test(self, segment: Segment, side: float, names: tuple[str, str]) -> ComparedTest:
+        """Return a test, mirrored if `side` is -1, with the distances of its points."""
         (x, y), (eps_x, eps_y) = self.points, self.tolerances
+        over, values = (side * segment.signals[name] for name in names)
         distance = np.empty(over.size)
         rows = max(1, 2_000_000 // x.size)
         for first in range(0, over.size, rows):
@@ -357,7 +384,8 @@ class _Band:
             aside = (over[some, None] - x) / eps_x
             up = (values[some, None] - y) / eps_y
             distance[some] = np.sqrt((aside * aside + up * up).min(axis=1))
-        return ComparedTest(name, over, values, distance)
+        name = f"{segment.name}, mirrored" if side < 0.0 else segment.name
+        return ComparedTest(name, segment.time, over, values, distance)
 
 
 def _draw(validation: Validation) -> Figure:

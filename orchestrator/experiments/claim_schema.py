@@ -427,6 +427,16 @@ class Claim(Assertion):
         return otherwise if self._number is None else self._number
 
 
+class ValidationSpec(StrictModel):
+    """A run compared with measurements of the car."""
+
+    run: str = Field(description="Name of a run, of a steady-state test")
+    measured: str = Field(description="Measurement file, relative to this file", min_length=1)
+    bands: str = Field(
+        "steady_state", description="Tolerances: a name in scenarios/bands, or a file beside it"
+    )
+
+
 class LimitSpec(Assertion):
     """The largest value of an axis up to which all conditions hold, for each setting of the others."""
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import ScenarioError
 from ..files import reads
@@ -21,14 +21,18 @@ from ..messages import hint, short
 from ..metrics.run_metrics import TimeWindow
 from ..names import Target
 from ..plan import Override
-from ..scenario import overrides, yaml_lines
+from ..scenario import find_and_load, overrides, yaml_lines
 from ..scenario.validation import validate
 from ..scenario.yaml_lines import Document, KeyPath
 from .axes import DesignAxisSpec, DesignPoint, changes_at, changes_of_file, points
-from .claim_schema import Claim, DerivedSpec
+from .claim_schema import Claim, DerivedSpec, ValidationSpec
 from .jobs import TestRequest
 from .names_check import check_axes, check_names
 from .schema import ChoiceSpec, ExperimentSpec, RunSpec
+
+if TYPE_CHECKING:
+    from ..evaluation.validation import Bands
+    from ..measured.measurement import Measurement
 
 FIGURES = "figures"
 """Folder of the figures, next to the folders of named runs."""
@@ -287,6 +291,24 @@ class LoadedExperiment:
         target = change.target if change else None
         return next(((name, target) for name, axis in axes if target in axis.targets), None)
 
+    @cached_property
+    def recordings(self) -> list[tuple[ValidationSpec, Measurement, Bands]]:
+        """The validations with their measurements and bands."""
+        if not self.spec.validations:
+            return []
+        from ..evaluation.validation import load_bands
+        from ..measured.measurement import load_measurement
+
+        beside = self.path.parent
+        return [
+            (
+                spec,
+                load_measurement(beside / spec.measured),
+                load_bands(beside / spec.bands if (beside / spec.bands).is_file() else spec.bands),
+            )
+            for spec in self.spec.validations
+        ]
+
     def _at(self, point: DesignPoint, run: NamedRun | None = None) -> list[Override]:
         """Return the overrides at a point; with `run`, only those of axes that apply to it."""
         pairs = [
@@ -324,6 +346,30 @@ def experiment_of(
     listed = [{"name": run.name, "scenario": run.scenario.name} for run in named.values()]
     spec = ExperimentSpec.model_validate({"runs": listed, **keys}).model_copy(update={"axes": axes or {}})
     return LoadedExperiment(path, spec, named, (), tuple(changes), tuple(design), origin)
+
+
+SCENARIOS = Path("scenarios")
+"""Folder searched for studies if none is given."""
+
+
+def found_studies(folder: Path = SCENARIOS) -> list[Path]:
+    """Return all study files in the subfolders of a folder, sorted by title.
+
+    The studies of one folder stay together, `study.yaml` first.
+
+    Raises:
+        ScenarioError: there are none.
+    """
+    titles: dict[Path, str] = {}
+    for path, _ in find_and_load.files(folder, ["a study file"], depth=2):
+        data = yaml_lines.read(path, what="study file").data
+        titles[path] = str(data.get("title", "")) if isinstance(data, dict) else ""
+    if not titles:
+        raise ScenarioError(
+            f"no study file was named, and there is none in {folder}/*/", code="file-wrong-kind"
+        )
+    first = {path.parent: min(titles[p] for p in titles if p.parent == path.parent) for path in titles}
+    return sorted(titles, key=lambda path: (first[path.parent], path.stem != "study", titles[path]))
 
 
 @reads("experiment file", ScenarioError)
@@ -364,4 +410,5 @@ def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> Lo
         check_names(experiment, document)
     if document.errors:
         raise ScenarioError(document.sorted_errors())
+    _ = experiment.recordings  # a mistake in a measurement file is told before the runs are made
     return experiment

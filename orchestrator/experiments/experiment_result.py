@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..errors import Diagnostic
+from ..evaluation.validation import Validation, compare_run
 from ..figures.style import digits_of
 from ..messages import counted
 from ..metrics.run_metrics import MetricValue
@@ -210,6 +211,15 @@ class ExperimentResult:
     def checks(self) -> list[ClaimResult]:
         """Our own checks, judged."""
         return self._judged("checks", self.spec.checks)
+
+    @cached_property
+    def validations(self) -> list[Validation]:
+        """The comparisons with measured cars, of the runs that have results."""
+        return [
+            compare_run(self.results[spec.run], measurement, bands)
+            for spec, measurement, bands in self.experiment.recordings
+            if spec.run in self.results
+        ]
 
     @property
     def judgements(self) -> list[ClaimResult]:

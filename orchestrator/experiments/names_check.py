@@ -97,6 +97,8 @@ def _names(spec: ExperimentSpec) -> Iterator[tuple[str, str, KeyPath]]:
             yield "open value", name, (group, i, "open_values", k)
     if spec.tuning:
         yield "derived number", spec.tuning.objective, ("tuning", "objective")
+    for i, validation in enumerate(spec.validations):
+        yield "run", validation.run, ("validations", i, "run")
     for name, limit in spec.limits.items():
         yield "axis", limit.of, ("limits", name, "of")
     for i, figure in enumerate(spec.figures):

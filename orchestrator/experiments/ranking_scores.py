@@ -3,8 +3,11 @@
 A run passes if the regulation's criteria are met and the sideslip stays below 20 degrees, beyond which a car
 turns round though its yaw-rate ratio may meet them. A condition is passed if all of its runs pass.
 
-Controllers are ranked by the number of conditions passed; ties by the share of runs that pass, then by the
-peak sideslip, both averaged over conditions. A controller with missing runs is not ranked.
+Controllers are ordered by the number of conditions passed; ties by the share of runs that pass, then by the
+peak sideslip, both averaged over conditions. A controller with missing runs is not ranked. The conditions are
+a sample of those that a car meets: the interval of the number passed is that of a bootstrap that draws
+conditions. A place is one more than the number of controllers whose whole interval lies above, and never
+better than that of a controller earlier in the order; so those that cannot be told apart share it.
 
 `run_ranking` executes a ranking: first the runs for the angle A of every car, then all runs still missing.
 """
@@ -16,15 +19,15 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
-from itertools import pairwise
+from itertools import combinations, pairwise
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import ResultsError
 from ..evaluation.sine_with_dwell import FROM, RATIOS, SLIGHT, SPUN
 from ..figures.style import digits_apart
 from ..plan import Value
-from .confidence import ConfidenceInterval, interval
+from .confidence import Bounds, ConfidenceInterval, bootstrap, interval, percentile_bounds
 from .execution import Executor
 from .experiment_result import ExperimentResult
 from .jobs import STEP_TIME, Job, MeasuredRun
@@ -37,6 +40,9 @@ from .ranking import (
     angles_of,
     dwell_experiment,
 )
+
+if TYPE_CHECKING:
+    import numpy as np
 
 UNHELD = 1.0
 """Yaw-rate ratio without a second peak after the reversal: the car keeps turning as before."""
@@ -226,7 +232,9 @@ class EntryScore:
     entry: str
     spec: EntrySpec
     cells: dict[str, RankingCell]  # condition -> cell
-    place: int | None = None  # None: not ranked, as runs are missing
+    place: int | None = None  # shared by those that cannot be told apart; None: not ranked, runs are missing
+    rank: int | None = None  # in the order; equal ones share it
+    bounds: Bounds | None = None  # of the number of conditions passed
 
     @property
     def missing(self) -> int:
@@ -304,13 +312,37 @@ def deciding_digits(ranked: Sequence[EntryScore]) -> Digits:
 
 
 def placed(every: Sequence[EntryScore]) -> list[EntryScore]:
-    """Return the scores in order, with places; equal ones share a place."""
+    """Return the scores in order, with ranks, intervals and places."""
     whole = sorted((entry for entry in every if not entry.missing), key=lambda entry: entry.order)
+    lows, highs = percentile_bounds(_resampled(whole)) if whole else ((), ())
     ordered: list[EntryScore] = []
-    for number, entry in enumerate(whole, start=1):
-        same = ordered and ordered[-1].order == entry.order
-        ordered.append(replace(entry, place=ordered[-1].place if same else number))
+    for number, (entry, low, high) in enumerate(zip(whole, lows, highs, strict=True), start=1):
+        before = ordered[-1] if ordered else None
+        ordered.append(
+            replace(
+                entry,
+                rank=before.rank if before and before.order == entry.order else number,
+                place=max(before.place or 1 if before else 1, 1 + int(sum(other > high for other in lows))),
+                bounds=Bounds(float(low), float(high)),
+            )
+        )
     return ordered + [entry for entry in every if entry.missing]
+
+
+def _resampled(scores: Sequence[EntryScore]) -> np.ndarray:
+    """Return the number of conditions that each entry passes in resamples of them: shape (draws, entries)."""
+    import numpy as np
+
+    passed = np.array([[cell.passed for cell in score.cells.values()] for score in scores], dtype=float)
+    return bootstrap(lambda chosen: passed[:, chosen].sum(axis=1), passed.shape[1:])
+
+
+def told_apart(scores: Sequence[EntryScore]) -> tuple[int, int]:
+    """Return how many pairs of ranked entries differ with one sign in 95 % of resamples, and of how many."""
+    resampled = _resampled([score for score in scores if score.place])
+    pairs = list(combinations(range(resampled.shape[1]), 2))
+    ends = [percentile_bounds(resampled[:, i] - resampled[:, k]) for i, k in pairs]
+    return sum(bool(low > 0.0 or high < 0.0) for low, high in ends), len(pairs)
 
 
 @dataclass(frozen=True)

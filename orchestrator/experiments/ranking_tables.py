@@ -56,6 +56,11 @@ def place_words(score: EntryScore) -> str:
     return str(score.place) if score.place else "–"
 
 
+def interval_words(score: EntryScore) -> str | None:
+    """Return the interval of the number of conditions passed; None if the entry is not ranked."""
+    return None if score.bounds is None else f"{score.bounds.low:.0f} to {score.bounds.high:.0f}"
+
+
 def draw_matrix(ranked: RankingResult, note: str) -> Figure:
     """Draw which controller passes which condition: a row per controller, best at the top."""
     from matplotlib.patches import Patch, Rectangle
@@ -131,17 +136,17 @@ def draw_pareto(ranked: RankingResult, note: str) -> Figure:
                 label=f"gains: {score.spec.gains}",
             )  # fmt: skip
             axes.text(
-                x, y, str(score.place), color="white", fontsize=7, weight="bold", ha="center", va="center",
+                x, y, str(score.rank), color="white", fontsize=7, weight="bold", ha="center", va="center",
                 zorder=3,
             )  # fmt: skip
         best = [x for x, *_ in front], [y for _, y, _ in front]
         axes.plot(*best, color=QUIET, linewidth=1.0, zorder=1, label="none is better in both:")
         for _, _, score in front:
-            axes.plot([], [], " ", label=f"{score.place}  {score.spec.title}")
+            axes.plot([], [], " ", label=f"{score.rank}  {score.spec.title}")
         axes.set_xlabel("Intervention: ∫|torque| dt of the wheel that gets most, once steered, mean [kN·m·s]")
         axes.set_title("Headroom: percentage points below the limits, least of each condition, mean")
         handles = {str(line.get_label()): line for line in axes.get_lines()}
-        title = "Stability over intervention; numbers are places"
+        title = "Stability over intervention; numbers are ranks in the order"
         frame(figure, 4.9, list(handles.values()), title, " · ".join([*left_out, note]))
     return figure
 
@@ -152,8 +157,10 @@ def degrees(amplitude: float) -> str:
 
 
 RULE = (
-    "Places: the number of conditions passed, then the share of runs that pass, then the peak sideslip, "
-    "the last two in the mean over conditions. A run passes if it meets the regulation's criteria with at "
+    "Order: the number of conditions passed, then the share of runs that pass, then the peak sideslip, the "
+    "last two in the mean over conditions. Interval: 95 % of the number passed, by a bootstrap that draws "
+    "conditions. Place: one more than the controllers whose whole interval lies above, so that those that "
+    "cannot be told apart share it. A run passes if it meets the regulation's criteria with at "
     "most 20° of sideslip; a condition is passed if all of its runs pass."
 )
 UNITS = {
@@ -196,6 +203,7 @@ def row_of(score: EntryScore, digits: Digits) -> dict[str, Cell]:
         "controller": score.spec.title,
         "gains": score.spec.gains,
         "passed": str(score.count(RankedState.PASSED)),
+        "95 % interval": interval_words(score),
         "spun": str(score.count(RankedState.SPUN)),
         "runs": shown(score.share, "%", digits=digits.share),
         **means,
@@ -213,7 +221,7 @@ def table_of(ranked: RankingResult, *left_out: str) -> Table:
     digits = deciding_digits(ranked.scores)
     rows = [row_of(score, digits) for score in ranked.scores]
     kept = [heading for heading in rows[0] if heading not in left_out]
-    texts = ("place", "passed", "spun", "runs", "headroom", "sideslip", "time per step")
+    texts = ("place", "passed", "95 % interval", "spun", "runs", "headroom", "sideslip", "time per step")
     numbers = {kept.index(heading) for heading in texts if heading in kept}
     cells = [[row[heading] for heading in kept] for row in rows]
     return Table(ranked.ranking.spec.title, kept, [*cells], [RULE], numbers)
@@ -267,8 +275,11 @@ def columns_of_entries(ranked: RankingResult) -> Table:
             _text("title", (score.spec.title for score in rows)),
             _text("gains", (score.spec.gains for score in rows)),
             _counts("place", (score.place for score in rows)),
+            _counts("rank", (score.rank for score in rows)),
             _counts("conditions", (len(score.cells) for score in rows)),
             _counts("passed", (score.count(RankedState.PASSED) for score in rows)),
+            _numbers("passed_low", "1", (score.bounds and score.bounds.low for score in rows)),
+            _numbers("passed_high", "1", (score.bounds and score.bounds.high for score in rows)),
             _counts("spun", (score.count(RankedState.SPUN) for score in rows)),
             _counts("missing", (score.missing for score in rows)),
             _numbers("share", "1", (None if score.missing else score.share for score in rows)),

@@ -218,6 +218,7 @@ def record_of(findings: ExperimentResult, drawn: Mapping[str, str] = NO_FIGURES)
         },
         "claims": [_judgement(result) for result in findings.claims],
         "checks": [_judgement(result) for result in findings.checks],
+        "validations": [validation.as_data() for validation in findings.validations],
         "limits": {
             key: [
                 {

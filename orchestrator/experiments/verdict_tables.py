@@ -11,10 +11,11 @@ from dataclasses import replace
 
 from ..errors import text_of
 from ..evaluation.standard_tests import Evaluation, StandardTest, TestQuantity, TestSeries
+from ..evaluation.validation import Validation
 from ..figures.style import digits_of, shown
 from ..messages import changed
 from ..metrics.run_metrics import MetricValue, metric
-from ..metrics.verdict import Status, Verdict
+from ..metrics.verdict import SYMBOLS, Status, Verdict
 from .axes import levels_of
 from .claim_schema import GridSpec, MetricReference, MetricSpec, si_number
 from .claims import ClaimResult
@@ -38,6 +39,7 @@ def all_tables(findings: ExperimentResult) -> list[Table]:
         *run_tables(findings),
         *derived_tables(findings),
         *claim_tables(findings),
+        *map(validation_table, findings.validations),
         *limit_tables(findings),
     ]
 
@@ -311,6 +313,28 @@ def claim_tables(findings: ExperimentResult) -> list[Table]:
             table.notes.append(f"verdicts: {only}")
         tables += [table] if table.rows else []
     return tables
+
+
+def validation_table(validation: Validation) -> Table:
+    """Return the table of a validation: a row per signal, then per condition of such a comparison."""
+    title = f"{validation.title}, against {validation.measured}"
+    table = Table(title, ["signal", "verdict", "largest distance"])
+    for name, verdict in validation.verdicts.items():
+        table.rows.append([name, verdict.status.value, verdict.why])
+    table.notes = [f"{validation.bands}: {validation.source}"]
+    return table
+
+
+def conditions_table(validation: Validation) -> Table:
+    """Return the table of what a validation asks for."""
+    table = Table("Conditions", ["condition", "verdict", "value", "asked"], numbers={2, 3})
+    for name, verdict in validation.conditions.items():
+        assert verdict.value is not None and verdict.bound is not None and verdict.relation
+        ends = (verdict.value, verdict.bound)
+        value, bound = (f"{x:g}" if verdict.unit == "1" else shown(x, verdict.unit) for x in ends)
+        asked = f"{SYMBOLS[verdict.relation]} {bound}"
+        table.rows.append([name, verdict.status.value, value, asked])
+    return table
 
 
 def _cell(quantity: TestQuantity | None) -> Cell:

@@ -207,26 +207,6 @@ def _text(value: Any) -> str | None:
     return f"{value:.10g}"
 
 
-def partings_table(comparison: RunComparison, first: Results, second: Results) -> Table:
-    """Return the table of signals that differ between two runs, the earliest first."""
-    headings = ["signal", "differs from", "visible from", "largest difference", "at"]
-    table = Table("What came out", headings, notes=list(comparison.notes))
-    for parting in comparison.partings:
-        table.rows.append([
-            parting.signal,
-            MetricValue(parting.first, "s"),
-            None if parting.seen is None else MetricValue(parting.seen, "s"),
-            None if math.isnan(parting.largest) else MetricValue(parting.largest, parting.unit or "1"),
-            MetricValue(parting.largest_at, "s"),
-        ])  # fmt: skip
-    ends = {f"{run.time[-1]:.6g} s" for run in (first, second) if run.time.size}
-    table.notes += [f"The runs end at {' and '.join(sorted(ends))}."] if len(ends) > 1 else []
-    table.notes.append(
-        f"{counted(comparison.compared, 'signal')} compared; the others are the same to the end."
-    )
-    return table
-
-
 MOST_DIFFERENT = 6
 """Number of most different signals drawn; chosen: three rows of two panels fill a screen."""
 AT_ONCE = 8
@@ -244,14 +224,6 @@ OF_CONTROL = ("effort", "total_variation_rate")
 """Measures of control activity: a controller that does nothing has small values, too."""
 
 
-class MetricCell(NamedTuple):
-    """A value and its difference from the first run's, as text, empty if there is none."""
-
-    value: str
-    difference: str
-    best: bool
-
-
 def comparison_facts(findings: ExperimentResult) -> dict[str, Any] | None:
     """Return the template data of a page that compares runs with the first one; None if none has results.
 
@@ -267,9 +239,7 @@ def comparison_facts(findings: ExperimentResult) -> dict[str, Any] | None:
     first, *others = runs
     divergences = [divergence(first.results, other.results) for other in others]
     return {
-        "labels": [marked(*run) for run in runs],
-        "rows": metric_rows(findings),
-        "remarks": remarks(runs),
+        "table": metric_table(findings, runs),
         "views": _most_different(divergences),
         "partings": [
             _parted(run.label, first.label, difference)
@@ -279,9 +249,19 @@ def comparison_facts(findings: ExperimentResult) -> dict[str, Any] | None:
     }
 
 
-def metric_rows(findings: ExperimentResult) -> list[dict[str, Any]]:
-    """Return the metrics of all runs with results, each with its difference from the first."""
-    rows = []
+BEST = "★"
+"""Mark of the best value of a metric."""
+
+
+def metric_table(findings: ExperimentResult, runs: Sequence[LabelledRun]) -> Table:
+    """Return the metrics of all runs with results, each with its difference from the first below it."""
+    headings = ["metric", "definition", *(marked(*run) for run in runs)]
+    table = Table("", headings, notes=remarks(runs), numbers=range(2, len(headings)))
+    if len(runs) > 1:
+        table.notes.append(
+            f"Below each value: the difference from {headings[2]}. {BEST}: the best value, for metrics where "
+            "less is better."
+        )
     idle = _idle(findings)
     for key, spec in findings.spec.metrics.items():
         chosen = metric(spec.metric)
@@ -289,15 +269,15 @@ def metric_rows(findings: ExperimentResult) -> list[dict[str, Any]]:
         measure = chosen.name.partition("(")[0]
         least = _best(values, idle if measure in OF_CONTROL else ()) if measure in LESS_IS_BETTER else None
         cells = [
-            MetricCell(
-                shown(value.number, value.unit) if value else "",
-                difference(values[0], value) if k else "",
-                k == least,
-            )
+            shown(value.number, value.unit)
+            + f" {BEST}" * (k == least)
+            + (f"\n{apart}" if k and (apart := difference(values[0], value)) else "")
+            if value
+            else None
             for k, value in enumerate(values)
         ]
-        rows.append({"title": chosen.title, "formula": chosen.formula, "cells": cells})
-    return rows
+        table.rows.append([chosen.title, chosen.formula, *cells])
+    return table
 
 
 def _idle(findings: ExperimentResult) -> set[int]:
@@ -361,8 +341,8 @@ def _parted(label: str, first: str, comparison: RunComparison) -> dict[str, Any]
     return {
         "title": f"{label} against {first}",
         "summary": parting_summary(comparison),
-        "table": parting_table(comparison.partings[:AT_ONCE]),
-        "rest": parting_table(comparison.partings[AT_ONCE:]),
+        "table": partings_table(comparison.partings[:AT_ONCE]),
+        "rest": partings_table(comparison.partings[AT_ONCE:]),
         "notes": comparison.notes,
     }
 
@@ -390,10 +370,10 @@ def parting_summary(comparison: RunComparison) -> str:
     return f"The first to differ is {first.signal}, at {first.first:g} s{then}. {sentence}"
 
 
-def parting_table(partings: Sequence[SignalDifference]) -> Table:
-    """Return a table of signals that differ, the earliest first."""
+def partings_table(partings: Sequence[SignalDifference], title: str = "") -> Table:
+    """Return the table of signals that differ between two runs, the earliest first."""
     headings = ["signal", "goes to", "differs from", "visible from", "largest difference", "at"]
-    table = Table("", headings, numbers={2, 3, 4, 5} if partings else set())
+    table = Table(title, headings, numbers={2, 3, 4, 5} if partings else set())
     for parting in partings:
         table.rows.append([
             parting.signal,
@@ -403,4 +383,16 @@ def parting_table(partings: Sequence[SignalDifference]) -> Table:
             None if math.isnan(parting.largest) else shown(parting.largest, parting.unit),
             f"{parting.largest_at:g} s",
         ])  # fmt: skip
+    return table
+
+
+def outcome_table(comparison: RunComparison, first: Results, second: Results) -> Table:
+    """Return the table of all signals that differ, with notes on what could not be compared."""
+    table = partings_table(comparison.partings, "What came out")
+    ends = {f"{run.time[-1]:.6g} s" for run in (first, second) if run.time.size}
+    table.notes += comparison.notes
+    table.notes += [f"The runs end at {' and '.join(sorted(ends))}."] if len(ends) > 1 else []
+    table.notes.append(
+        f"{counted(comparison.compared, 'signal')} compared; the others are the same to the end."
+    )
     return table

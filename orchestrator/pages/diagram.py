@@ -1,8 +1,7 @@
-"""Block diagrams of a system as SVG: instances on a diagonal for wide pages, in a column for narrow ones.
+"""Block diagrams of a system as SVG: instances in a column, in the order of the scenario.
 
-On the diagonal, signals run from an instance sideways into the column of the instance that takes them: above
-the diagonal to later instances, below it back to earlier ones. Both drawings show the same wires. A diagram
-may cover several runs with the same instances; a block then lists all FMUs used for its instance.
+Each source has a lane on the right; an arrow into a block points at the line that lists its signals. A
+diagram may cover several runs with the same instances; a block then lists all FMUs used for its instance.
 """
 
 from __future__ import annotations
@@ -75,14 +74,12 @@ NAME, SMALL, SIGNAL = 13, 10, 10.5
 """Font sizes of an instance's name, of its FMUs, of signals [px]."""
 LEADING = 1.25
 """Line spacing over the font size."""
-PAD, GAP = 7, 20
-"""Padding inside a block and gap between blocks [px]."""
+PAD = 7
+"""Padding inside a block [px]."""
 ARROW = 7
 """Length of an arrowhead [px]."""
 
 BLOCK = {"rx": 5, "fill": "#eef4fa", "stroke": "#0072B2", "stroke_width": 1.6}
-LABEL = {"rx": 2, "fill": "#ffffff", "stroke": "#c9c9c9", "stroke_width": 0.8}
-BUS = "#555555"
 
 DiagramParts = list[Markup]
 
@@ -96,10 +93,6 @@ def _tag(name: str, content: str = "", **attributes: Any) -> Markup:
         for key, attribute in attributes.items()
     )
     return Markup("<{0}{1}>{2}</{0}>").format(name, Markup("").join(written), content)
-
-
-def _width(texts: Sequence[str], size: float) -> float:
-    return max((len(text) for text in texts), default=0) * size * WIDE
 
 
 def _lines(x: float, y: float, texts: Sequence[str], size: float, **look: Any) -> DiagramParts:
@@ -129,68 +122,22 @@ def _box(x: float, y: float, width: float, height: float, look: Mapping[str, Any
     return _tag("rect", x=x, y=y, width=width, height=height, **look)
 
 
-def _svg(kind: str, width: float, height: float, title: str, parts: DiagramParts) -> Markup:
-    frame = {"viewBox": f"0 0 {width:.0f} {height:.0f}", "style": f"max-width:{width:.0f}px", "class": kind}
+def _svg(width: float, height: float, title: str, parts: DiagramParts) -> Markup:
+    frame = {"viewBox": f"0 0 {width:.0f} {height:.0f}", "style": f"max-width:{width:.0f}px"}
     about = {"role": "img", "aria_label": title, "font_family": "system-ui, sans-serif"}
     return _tag("svg", Markup("\n").join(parts), **frame, **about)
 
 
-def _block_size(block: DiagramBlock) -> tuple[float, float]:
-    """Return the width and height of a block's text."""
-    width = max(_width([block.name], NAME) * 1.05, _width(block.fmus, SMALL))
-    return width, LEADING * (NAME + SMALL * len(block.fmus))
-
-
-def diagonal(system: SystemDiagram, title: str) -> Markup:
-    """Return the diagram with instances on the diagonal, for wide pages."""
-    blocks, count = system.blocks, len(system.blocks)
-    place = {block.name: i for i, block in enumerate(blocks)}
-    cells = {(place[a], place[b]): names for (a, b), names in system.signals.items()}
-    sizes = [_block_size(block) for block in blocks]
-    widths, heights = [2 * PAD + width for width, _ in sizes], [2 * PAD + height for _, height in sizes]
-    for (i, j), names in cells.items():
-        widths[j] = max(widths[j], 2 * PAD + _width(names, SIGNAL))
-        heights[i] = max(heights[i], 2 * PAD + LEADING * SIGNAL * len(names))
-    left = [1 + sum(widths[:j]) + GAP * j for j in range(count)]
-    top = [1 + sum(heights[:i]) + GAP * i for i in range(count)]
-    middle_x = [x + w / 2 for x, w in zip(left, widths, strict=True)]
-    middle_y = [y + h / 2 for y, h in zip(top, heights, strict=True)]
-    lines: DiagramParts = []
-    labels: DiagramParts = []
-    for (i, j), names in cells.items():
-        if i == j:
-            continue
-        forward = j > i
-        start = left[i] + widths[i] if forward else left[i]
-        end = top[j] if forward else top[j] + heights[j]
-        corner = (middle_x[j], middle_y[i])
-        lines.append(_line([(start, middle_y[i]), corner, (middle_x[j], end)], BUS))
-        lines.append(_arrow(middle_x[j], end, 0, 1 if forward else -1, BUS))
-        high, wide = LEADING * SIGNAL * len(names) + 6, _width(names, SIGNAL) + 8
-        y = middle_y[i] - high / 2
-        labels.append(_box(middle_x[j] - wide / 2, y, wide, high, LABEL))
-        labels += _lines(middle_x[j], y + 2.5, names, SIGNAL, text_anchor="middle", fill="#222")
-    for i, block in enumerate(blocks):
-        x, y = middle_x[i], middle_y[i] - sizes[i][1] / 2
-        labels.append(_box(left[i], top[i], widths[i], heights[i], BLOCK))
-        labels += _lines(x, y, [block.name], NAME, text_anchor="middle", font_weight=600)
-        labels += _lines(x, y + LEADING * NAME, block.fmus, SMALL, text_anchor="middle", fill="#444")
-    return _svg("diagonal", left[-1] + widths[-1] + 1, top[-1] + heights[-1] + 1, title, lines + labels)
-
-
-STACK = 372
-"""Width of the narrow diagram [px]; chosen: a phone's 400 less its margins."""
+COLUMN = 372
+"""Width of a diagram [px]; chosen: a phone's 400 less its margins."""
 LANE = 11
 """Distance between lanes [px]."""
 
 
-def stack(system: SystemDiagram, title: str) -> Markup:
-    """Return the diagram with the instances in a column, for phones and print.
-
-    Each source has a lane on the right; an arrow into a block points at the line that lists its signals.
-    """
+def diagram(system: SystemDiagram, title: str) -> Markup:
+    """Return the drawing of a system."""
     sources = [block.name for block in system.blocks if any(a == block.name for a, _ in system.signals)]
-    right = STACK - LANE * len(sources) - 10  # right edge of the blocks
+    right = COLUMN - LANE * len(sources) - 10  # right edge of the blocks
     characters = int((right - 2 * PAD) / (SIGNAL * WIDE))
     lane = {name: right + 14 + LANE * k for k, name in enumerate(sources)}
     leaves: dict[str, float] = {}
@@ -228,9 +175,4 @@ def stack(system: SystemDiagram, title: str) -> Markup:
         for end in enters[name]:
             lines.append(_line([(x, end), (right + ARROW - 1, end)], colour, 1.3))
             lines.append(_arrow(right + 0.8, end, -1, 0, colour))
-    return _svg("stack", STACK, y - 11, title, lines + drawn)
-
-
-def diagrams(system: SystemDiagram, title: str) -> Markup:
-    """Return both drawings; the style of the page shows the one that fits."""
-    return diagonal(system, title) + stack(system, title)
+    return _svg(COLUMN, y - 11, title, lines + drawn)

@@ -1,26 +1,41 @@
-"""Page of a standard test: the verdict on every criterion with its distance to the limit, and the runs.
+"""Pages of evaluations: a standard test, and a validation by measurements.
 
-The viewer shows at first the runs that decide, with the instants and limits of the test.
+That of a test has the verdict on every criterion with its distance to the limit; the viewer shows at first
+the runs that decide, with the instants and limits of the test. That of a validation has the verdict on every
+signal; the viewer shows its cross plot with the band.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
 
 from vocabulary.signals import SIGNALS
 
 from ..evaluation.standard_tests import Evaluation, Limit, StandardTest, TestSeries
 from ..evaluation.trace import Trace
-from ..experiments.verdict_tables import margin_words, run_table, runs_table
-from ..figures.style import LabelledRun, digits_apart, shown
-from ..messages import counted
+from ..evaluation.validation import Validation
+from ..experiments.tables import Table
+from ..experiments.verdict_tables import (
+    conditions_table,
+    margin_words,
+    run_table,
+    runs_table,
+    validation_table,
+)
+from ..figures.style import LabelledRun, digits_apart, digits_of, shown
+from ..messages import counted, listed
 from ..metrics.measures import words
-from ..metrics.verdict import SYMBOLS, Verdict, worst
+from ..metrics.verdict import SYMBOLS, Status, Verdict, worst
+from ..results.measurement_results import MeasuredResults
 from ..results.reader import Results, load_results
 from ..results.run_record import RunRecord
-from .page_parts import render
+from .page_parts import document
 from .viewer import MOST, Settings, View, assets, viewer
 
 LARGEST = 2_000_000
@@ -30,41 +45,33 @@ PANELS = ("steering_wheel_angle", "yaw_rate", "sideslip", "acceleration_y")
 """Signals shown first; chosen: what most tests judge."""
 
 
-@dataclass(frozen=True)
-class CriterionRow:
-    """A criterion: the verdict on it, and the run that decides with its numbers."""
+def criteria_table(judged: Sequence[Evaluation], series: TestSeries | None) -> tuple[Table, list[str]]:
+    """Return a row per criterion, and the label of the run that decides it.
 
-    name: str
-    verdict: Verdict
-    run: str  # label, "" if there is only one
-    why: str
-    value: str
-    limit: str
-
-    @property
-    def distance(self) -> str:
-        """How far the value lies from its limit, in its unit and relative to it."""
-        beyond, margin = self.verdict.beyond, margin_words(self.verdict)
-        if beyond is None:
-            return ""
-        return (
-            f"{shown(beyond, self.verdict.unit)} ({margin})" if margin else shown(beyond, self.verdict.unit)
-        )
-
-
-def criteria_of(judged: Sequence[Evaluation], series: TestSeries | None) -> list[CriterionRow]:
-    """Return a row per criterion, with the verdict of the series, or that of the run that decides."""
-    rows = []
+    A row has the verdict of the series, or of the run that decides, with its distance to the limit.
+    """
+    headings = ["criterion", "verdict", "value", "limit", "distance to the limit"]
+    headings += ["decided by"] * (len(judged) > 1) + ["why"]
+    table, labels = Table("", headings, numbers={2, 3, 4}), []
     for name in dict.fromkeys(name for run in judged for name in run.criteria):
         own = {run.label: run.criteria[name] for run in judged if name in run.criteria}
         deciding = worst(own.values())
         assert deciding is not None
-        label = next(label for label, verdict in own.items() if verdict is deciding)
+        labels.append(next(label for label, verdict in own.items() if verdict is deciding))
         verdict = series.criteria.get(name, deciding) if series else deciding
         number = verdict if verdict.beyond is not None else replace(deciding, status=verdict.status)
-        row = CriterionRow(name, number, label if len(judged) > 1 else "", verdict.why, *_numbers(number))
-        rows.append(row)
-    return rows
+        row = [name, verdict.status.value, *_numbers(number), _distance(number)]
+        row += labels[-1:] * (len(judged) > 1) + [verdict.why]
+        table.rows.append([cell or None for cell in row])
+    return table, labels
+
+
+def _distance(verdict: Verdict) -> str:
+    """Return how far the value lies from its limit, in its unit and relative to it."""
+    beyond, margin = verdict.beyond, margin_words(verdict)
+    if beyond is None:
+        return ""
+    return f"{shown(beyond, verdict.unit)} ({margin})" if margin else shown(beyond, verdict.unit)
 
 
 def _numbers(verdict: Verdict) -> tuple[str, str]:
@@ -85,42 +92,43 @@ def evaluation_page(
     Raises:
         ResultsError: results cannot be read.
     """
-    rows = criteria_of(judged, series)
+    criteria, decide = criteria_table(judged, series)
     labels = [trace.label for trace in traces]
-    deciding = [labels.index(row.run) for row in rows if row.run] or [0]
+    deciding = [labels.index(label) for label in decide] or [0]
     chosen = judged[deciding[0]]
     marks, limits = test.marks(chosen)
     shown_first = sorted(set(deciding))[:MOST]
     views = [View("the runs that decide", PANELS, shown_first)]
     if len(traces) > len(shown_first):
         views.append(View("all runs", PANELS))
-    table = runs_table(series.runs if series else judged, test, series) if len(judged) > 1 else None
+    every = [runs_table(series.runs if series else judged, test, series)] if len(judged) > 1 else []
     runs = [LabelledRun(label, results_of(trace)) for label, trace in zip(labels, traces, strict=True)][:MOST]
     settings = Settings(views, marks=marks, limits=limits, largest=LARGEST)
-    return render(
-        "evaluation.html.j2",
-        title=f"{test.name.replace('-', ' ').capitalize()}: {counted(len(judged), 'run')}",
+    dashed = [*(f"{instant:.3f} s: {text}" for instant, text in marks), *map(_limit_words, limits)]
+    return document(
+        f"{test.name.replace('-', ' ').capitalize()}: {counted(len(judged), 'run')}",
         below=f"{test.says[:1].upper()}{test.says[1:]}.",
-        sentence=series.summary if series else _sentence(rows, judged),
-        rows=rows,
-        marked=chosen.label,
-        dashed=[*(f"{instant:.3f} s: {text}" for instant, text in marks), *map(_limit_words, limits)],
+        sentence=series.summary if series else _sentence(criteria, judged),
+        first=[criteria] if criteria.rows else [],
         viewer=viewer(runs, settings, name="test", alone=True),
-        table=table,
-        each=[run_table(run, test.says) for run in judged],
+        notes=[f"Dashed, of {chosen.label}: {'; '.join(dashed)}."] if dashed else [],
+        sections=[
+            *([("All runs", every)] if every else []),
+            ("Quantities", [run_table(run, test.says) for run in judged]),
+        ],
         assets=assets(),
     )
 
 
-def _sentence(rows: Sequence[CriterionRow], judged: Sequence[Evaluation]) -> str:
+def _sentence(criteria: Table, judged: Sequence[Evaluation]) -> str:
     """Return the result in a sentence."""
-    if not rows:
+    if not criteria.rows:
         missing = sum(run.judges_nothing for run in judged)
         return (
             "The test has no criteria." if not missing else f"{counted(missing, 'run')} could not be judged."
         )
-    passed = sum(bool(row.verdict.holds) for row in rows)
-    return f"{passed} of {counted(len(rows), 'criterion', 'criteria')} passed."
+    passed = sum(row[1] == Status.PASSED.value for row in criteria.rows)
+    return f"{passed} of {counted(len(criteria.rows), 'criterion', 'criteria')} passed."
 
 
 def _limit_words(limit: Limit) -> str:
@@ -134,3 +142,88 @@ def results_of(trace: Trace) -> Results:
         return load_results(trace.folder)
     units = {name: SIGNALS[name].unit if name in SIGNALS else "" for name in trace.signals}
     return Results(Path(), trace.time, dict(trace.signals), {"time": "s", **units}, RunRecord())
+
+
+def validation_page(validation: Validation) -> str:
+    """Return the page of a run compared with measurements."""
+    facts = validation_facts(validation)
+    return document(
+        f"Validation: {validation.title}",
+        sentence=facts["sentence"],
+        warnings=facts["warnings"],
+        below=facts["below"],
+        first=[facts["verdicts"]],
+        viewer=facts["viewer"],
+        sections=[("", [facts["conditions"]])],
+        assets=assets(),
+    )
+
+
+def validation_facts(validation: Validation, name: str = "validation") -> dict[str, Any]:
+    """Return the template data of a validation; `name`: anchor of its viewer."""
+    return {
+        "title": f"{validation.title}, against {validation.measured}",
+        "sentence": validation_sentence(validation),
+        "warnings": [str(diagnostic) for diagnostic in validation.diagnostics],
+        "below": " · ".join(filter(None, [validation.measured, validation.origin])),
+        "verdicts": validation_table(validation),
+        "conditions": conditions_table(validation),
+        "viewer": viewer(*_cross_plots(validation), name=name) if validation.plots else Markup(""),
+    }
+
+
+def validation_sentence(validation: Validation) -> str:
+    """Return the result of a validation in a sentence."""
+    judged = [verdict for verdict in validation.verdicts.values() if verdict.holds is not None]
+    if not judged:
+        return "No signal could be judged."
+    largest = max(float(verdict.value or 0.0) for verdict in judged)
+    digits = digits_apart([(largest, 1.0)], "1")
+    sides = {
+        side: [words(name).lower() for name, verdict in validation.verdicts.items() if verdict.holds is holds]
+        for side, holds in (("within", True), ("outside", False))
+    }
+    parts = [f"{side} the band: {listed(names, last='and')}" for side, names in sides.items() if names]
+    text = f"{'; '.join(parts)}. The furthest point lies at {digits_of(largest, digits)} of the tolerance."
+    return f"{text[:1].upper()}{text[1:]}"
+
+
+OUTLINE = 4000
+"""Most points of a band's outline; chosen: dense at any width of a page."""
+DISTANCE = "distance"
+"""Name of the signal that tells how far points lie from the run, over the tolerance."""
+
+
+def _cross_plots(validation: Validation) -> tuple[list[LabelledRun], Settings]:
+    """Return band, run and tests of all cross plots as runs of a viewer, with a view of each plot."""
+    runs: list[LabelledRun] = []
+    views, bands = [], []
+    over = f"plant.{validation.horizontal}"
+    for plot in validation.plots:
+        signal, distance = f"plant.{plot.signal}", f"{plot.signal}.{DISTANCE}"
+        first = len(runs)
+        units = {over: SIGNALS[validation.horizontal].unit, signal: SIGNALS[plot.signal].unit, distance: "1"}
+        columns = {over: plot.over, signal: plot.values}
+        runs.append(_plotted(validation.title, Results, plot.time, columns, units))
+        for test in plot.tests:
+            columns = {over: test.over, signal: test.values, distance: test.distance}
+            runs.append(_plotted(test.name, MeasuredResults, test.time, columns, units))
+        x, y = plot.outline
+        every = slice(None, None, 1 + x.size // OUTLINE)
+        band = {over: x[every], signal: y[every]}
+        bands.append(len(runs))
+        runs.append(_plotted("tolerance", Results, np.arange(float(x[every].size)), band, units))
+        title = f"{words(plot.signal)} over {words(validation.horizontal).lower()}"
+        views.append(View(title, [signal, distance], range(first, len(runs)), over))
+        views.append(
+            View(f"{words(plot.signal)} over time", [signal, over, distance], range(first, len(runs) - 1))
+        )
+    limits = [(f"{plot.signal}.{DISTANCE}", 1.0, "tolerance") for plot in validation.plots]
+    return runs, Settings(views, metrics=(), limits=limits, bands=bands, largest=LARGEST)
+
+
+def _plotted(
+    label: str, kind: type[Results], time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str]
+) -> LabelledRun:
+    own = {"time": "s"} | {name: units[name] for name in columns}
+    return LabelledRun(label, kind(Path(), time, columns, own, RunRecord()))

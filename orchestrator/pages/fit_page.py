@@ -18,7 +18,7 @@ from ..metrics.run_metrics import MetricValue
 from ..results.measurement_results import MeasuredResults
 from ..results.reader import Results
 from ..results.run_record import RunRecord
-from .page_parts import render
+from .page_parts import document
 from .viewer import Settings, View, assets, viewer
 
 BINS = 4
@@ -41,13 +41,16 @@ def fit_page(result: FitResult) -> str:
     if "acceleration_y" in names and len(names) > 1:
         others = [name for name in names if name != "acceleration_y"]
         views.append(View("over lateral acceleration", others, x="plant.acceleration_y"))
-    return render(
-        "fit.html.j2",
-        title=result.fit.spec.title,
+    return document(
+        result.fit.spec.title,
         sentence=f"{result.verdict[:1].upper()}{result.verdict[1:]}.",
         below=" · ".join(filter(None, (measurement.title, measurement.origin))),
         viewer=viewer(runs, Settings(views, metrics=(), largest=LARGEST), name="fit", alone=True),
-        tables=[score_table(result), *map(parameter_table, result.models), *residual_tables(result)],
+        sections=[
+            ("", [score_table(result)]),
+            ("Parameters", [*map(parameter_table, result.models)]),
+            ("Where the models differ from the car", residual_tables(result)),
+        ],
         assets=assets(),
     )
 

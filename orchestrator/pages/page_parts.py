@@ -10,11 +10,12 @@ import functools
 import os
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from importlib.resources import files
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 from urllib.parse import quote
 
@@ -139,9 +140,42 @@ SIGNS = {
 """Verdict -> CSS class and symbol, which differ even without colours."""
 
 
-def render(template: str, **facts: Any) -> str:
+def render(template: str, facts: Mapping[str, Any] = MappingProxyType({}), **more: Any) -> str:
     """Render a template; a variable that is missing is an error, not empty text."""
-    return _templates().get_template(template).render(facts)
+    return _templates().get_template(template).render(**facts, **more)
+
+
+MANY = 6
+"""Tables of a section from which on they are folded. Chosen: more hide what comes after them."""
+
+
+def document(
+    title: str,
+    *,
+    viewer: Markup,
+    assets: Markup,
+    sentence: str = "",
+    changed: str = "",
+    below: str = "",
+    warnings: Sequence[str] = (),
+    first: Sequence[Table] = (),
+    notes: Sequence[str] = (),
+    sections: Sequence[tuple[str, Sequence[Table]]] = (),
+) -> str:
+    """Return a page around a viewer.
+
+    Args:
+        title: its heading.
+        viewer, assets: see `viewer`.
+        sentence: the result.
+        changed: overrides of the scenario that the title names.
+        below: a line on what the data are.
+        warnings: shown below the sentence.
+        first: tables before the viewer.
+        notes: below the viewer.
+        sections: heading, or "", and tables.
+    """
+    return render("document.html.j2", locals() | {"many": MANY})
 
 
 @functools.cache

@@ -24,11 +24,13 @@ from ..experiments.ranking_scores import (
     RankingCell,
     RankingResult,
     deciding_digits,
+    told_apart,
 )
 from ..experiments.ranking_tables import (
     RULE,
     UNITS,
     degrees,
+    interval_words,
     place_words,
     row_of,
     runs_table,
@@ -40,12 +42,10 @@ from ..experiments.ranking_tables import (
 )
 from ..experiments.tables import Table
 from ..figures.style import LabelledRun
-from ..files import write_whole
 from ..messages import changed, counted, listed
 from ..results.reader import Results, load_results
 from .page_parts import FigureImage, anchor, image_of, option_of, render
-from .sweep_view import DATA, tidy_sides
-from .viewer import Settings, View, assets, side_file, viewer_frame
+from .viewer import DATA, Settings, View, assets, carried, embedded, tidy_sides, write_side
 
 STATES = {
     RankedState.PASSED: "passed",
@@ -75,7 +75,7 @@ def ranking_page(ranked: RankingResult, folder: Path, command: str, each: Each =
     cells = [(score, cell) for score in ranked.scores for cell in score.cells.values()]
     wanted = [_side(ranked, score, cell, folder) for score, cell in cells]
     list(each(_write_side, *zip(*wanted, strict=True)))
-    tidy_sides(folder, [_id(cell) for _, cell in cells])
+    tidy_sides(folder, {_id(cell) for _, cell in cells})
     lost = next(
         (cell for _, cell in cells if cell.state in (RankedState.FAILED, RankedState.SPUN)), cells[0][1]
     )
@@ -89,7 +89,7 @@ def ranking_page(ranked: RankingResult, folder: Path, command: str, each: Each =
         notes=[*ranking.spec.notes, *ranking.edited],
         quick=ranking.quick,
         missing=[score.spec.title for score in ranked.scores if score.missing],
-        first=["place", "controller", "passed", "runs"],
+        first=["place", "controller", "passed", "95 %", "runs"],
         conditions=[
             {"short": condition.heading, "title": condition.title}
             for condition in ranking.conditions.values()
@@ -97,14 +97,14 @@ def ranking_page(ranked: RankingResult, folder: Path, command: str, each: Each =
         rows=_rows(ranked, digits),
         first_cell=_id(lost),
         sides=DATA,
-        frame=viewer_frame("run"),
+        frame=embedded(None, "run"),
         pareto=_image(folder / FIGURES / "pareto.svg", "Stability over intervention"),
         table=Table("", table.columns, table.rows),
         described=_conditions(ranked),
         entries=_entries(ranked),
         command=command,
         folder=str(folder),
-        assets=assets("ranking.js"),
+        assets=assets("chooser.js"),
     )
 
 
@@ -114,16 +114,18 @@ def answer(ranked: RankingResult) -> str:
     placed = [score for score in ranked.scores if score.place]
     if not placed:
         return f"No controller has all of its runs under {counted(number, 'condition')}."
-    first = [score for score in placed if score.place == 1]
-    others = [score for score in placed if score.place != 1][:1]
+    sharing = sum(score.place == 1 for score in placed)
+    first = [score for score in placed if score.rank == 1]
+    others = [score for score in placed if score.rank != 1][:1]
     others += [score for score in placed if score.spec.fmu == IDLE and score not in (*first, *others)]
-    names = listed(score.spec.title for score in first)
-    rest = "".join(
-        f"; {score.spec.title} (place {score.place}) {score.count(RankedState.PASSED)}" for score in others
-    )
+    names = listed((score.spec.title for score in first), last="and")
+    rest = "".join(f"; {score.spec.title} {score.count(RankedState.PASSED)}" for score in others)
+    apart, pairs = told_apart(placed)
+    share = f"{sharing} share the first place, as their intervals overlap; " if sharing > len(first) else ""
+    surely = f" Of {pairs} pairs, {apart} can be told apart." if pairs else ""
     return (
-        f"Of {counted(len(placed), 'controller')}, the first is {names}: "
-        f"{first[0].count(RankedState.PASSED)} of {counted(number, 'condition')} passed{rest}."
+        f"Of {counted(len(placed), 'controller')}, {share}{names} {'is' if len(first) == 1 else 'are'} best: "
+        f"{first[0].count(RankedState.PASSED)} of {counted(number, 'condition')} passed{rest}.{surely}"
     )
 
 
@@ -144,6 +146,7 @@ def _rows(ranked: RankingResult, digits: Digits) -> list[dict[str, Any]]:
             "passed": f"{score.count(RankedState.PASSED)}/{len(score.cells)}"
             if score.place
             else f"{score.missing} missing",
+            "interval": interval_words(score) or "–",
             "share": row_of(score, digits)["runs"] if score.place else "–",
             "cells": [
                 {
@@ -190,20 +193,19 @@ def _side(
         "worst": f"Its worst run: {label}, {state_words(worst)}." if shows else "Its runs kept no results.",
     }  # fmt: skip
     html = render("ranking_cell.html.j2", cell=details)
-    return _id(cell), label, worst.results if shows else None, html, folder / DATA
+    return _id(cell), label, worst.results if shows else None, html, folder
 
 
 def _write_side(key: str, label: str, results: Path | None, html: str, folder: Path) -> None:
     """Write the side file of a cell; without results, or unreadable ones, it has no run."""
-    text = side_file(key, [], html=html)
+    content = None
     if results is not None:
         with suppress(ResultsError):
             run = load_results(results)
             limits = [("sideslip", side * SPUN, "20° of sideslip") for side in (1.0, -1.0)]
             settings = Settings([View(panels=SHOWN)], marks=_instants(run), limits=limits, largest=1)
-            text = side_file(key, [LabelledRun(label, run)], settings, html=html)
-    folder.mkdir(parents=True, exist_ok=True)
-    write_whole(folder / f"{key}.js", text)
+            content = carried([LabelledRun(label, run)], settings)
+    write_side(folder, key, content, html=html)
 
 
 def _instants(run: Results) -> list[tuple[float, str]]:

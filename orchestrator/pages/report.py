@@ -1,6 +1,8 @@
-"""The report page of one or several experiments, a chapter for each, in a single HTML file.
+"""The page of an experiment, a single HTML file, and the overview of several.
 
-A chapter has the verdicts, system, figures, tables and parameters of an experiment, and how to repeat it.
+A page has the verdicts, runs, system, tables and parameters of an experiment, and how to repeat it. The
+overview has the verdicts of all experiments, each with a link to its page; a click on a claim loads its runs
+from a side file.
 """
 
 from __future__ import annotations
@@ -11,9 +13,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from markupsafe import Markup
-
-from ..errors import ResultsError, ScenarioError
+from ..errors import ResultsError
 from ..experiments.claims import ClaimResult
 from ..experiments.confidence import CONFIDENCE
 from ..experiments.experiment import FIGURES
@@ -49,9 +49,9 @@ from ..results.measurement_results import filtered_alike
 from ..results.reader import Results
 from ..results.run_folder import RunStatus
 from ..results.run_record import RunRecord, load_record
-from ..scenario import find_and_load, yaml_lines
 from ..scenario.find_and_load import LoadedScenario
-from .diagram import diagrams, systems_of
+from .diagram import diagram, systems_of
+from .evaluation_page import validation_facts
 from .page_parts import (
     FigureImage,
     anchor,
@@ -62,8 +62,21 @@ from .page_parts import (
     programs_of,
     render,
 )
-from .sweep_view import DATA, sweep_view, write_sides
-from .viewer import MOST, PANELS, Settings, View, answer_of, assets, viewer
+from .sweep_view import sweep_view, write_sides
+from .viewer import (
+    DATA,
+    MOST,
+    PANELS,
+    Carried,
+    Settings,
+    View,
+    answer_of,
+    assets,
+    carried,
+    embedded,
+    tidy_sides,
+    write_side,
+)
 
 
 def chapter(
@@ -72,19 +85,17 @@ def chapter(
     command: str,
     stale: dict[str, str],
     folder: Path,
-    shown_in: Path,
     views: Sequence[View] = (),
     measured: Sequence[LabelledRun] = (),
     each: Each = map,
 ) -> dict[str, Any]:
-    """Return the template data of an experiment's chapter; write the side files of its runs.
+    """Return the template data of an experiment's page; write the side files of its runs along axes.
 
     Args:
         findings: the experiment and its results.
         command: command line that repeats it.
         stale: run -> why its results are not those of its plan.
-        folder: of its results and figures.
-        shown_in: folder of the page.
+        folder: of its results, figures and page.
         views: of the viewer, before those of the figures.
         measured: recordings that the viewer shows beside the runs.
         each: `map`, or a parallel equivalent, to write side files with.
@@ -95,16 +106,15 @@ def chapter(
     groups = groups_of([(record_of(job, plan), plan) for job, (_, plan) in plans])
     made = runs_made(findings)
     failed = findings.failed
-    drawing, numbers = viewer_of(findings, name, views, measured)
+    content, numbers = viewer_of(findings, views, measured)
     sweep = None
     if spec.axes and findings.planned and len(findings.records) > 1:
-        sides = write_sides(findings, folder, each)
-        sweep = sweep_view(findings, f"{name}{SWEEP}", sides, _relative_to(folder / DATA, shown_in))
+        sweep = sweep_view(findings, "sweep", write_sides(findings, folder, each))
 
     def link(result: ClaimResult) -> str:
-        """Return the address that shows a claim's runs in the viewer; "" if it has none of them."""
+        """Return the state of the viewer that shows a claim's runs; "" if it has none of them."""
         shown = [numbers[run] for run in runs_of_claim(experiment, result.claim) if run in numbers]
-        return f"#{name}{VIEW}?shown={shown}&baseline={shown[0]}".replace(" ", "") if shown else ""
+        return f"{VIEW}?shown={shown}&baseline={shown[0]}".replace(" ", "") if shown else ""
 
     return {
         "id": name,
@@ -113,16 +123,15 @@ def chapter(
         "changed": changed(experiment.by_options),
         "counts": counts_of(findings.claims),
         "reach": reach(findings),
-        "conclusions": conclusions(findings),
         "answer": answer(findings),
         "claims": [judged(result) | {"link": link(result)} for result in findings.claims],
         "checks": [judged(result) | {"link": link(result)} for result in findings.checks],
         "region": region_table(findings) if findings.regions else None,
         "limits": limit_tables(findings),
         "systems": systems(plans, spec.title),
-        "viewer": drawing,
+        "content": content,
         "sweep": sweep,
-        "figures": figure_files(findings, _relative_to(folder / FIGURES, shown_in)),
+        "figures": figure_files(findings),
         "charts": charts(findings, folder / FIGURES),
         "tables": [*run_tables(findings), *derived_tables(findings, apart=True)],
         "definitions": definitions(findings),
@@ -139,6 +148,12 @@ def chapter(
         "grid": grid_of_times(made),
         "runs": len(findings.records),
         "not_made": findings.not_made,
+        "comparison": None,
+        "results": [],
+        "validations": [
+            validation_facts(validation, f"validation-{number}")
+            for number, validation in enumerate(findings.validations, start=1)
+        ],
         "fmus": fmus_of(made),
         "programs": programs_of(made),
     }
@@ -187,19 +202,6 @@ def plans_of(findings: ExperimentResult) -> list[tuple[Job, tuple[LoadedScenario
     ]
 
 
-def conclusions(findings: ExperimentResult) -> list[dict[str, Any]]:
-    """Return the claims and checks for the overview: those that do not hold or are undecided.
-
-    With a region, claims that hold are included, and robust verdicts come first.
-    """
-    shown = [
-        judged(judgement)
-        for judgement in findings.judgements
-        if verdict(judgement) != HOLDS or (judgement.group == "claims" and judgement.region)
-    ]
-    return sorted(shown, key=lambda judgement: not judgement["robust"])
-
-
 def answer(findings: ExperimentResult) -> str:
     """Return the result in one sentence: how many claims (or checks) hold, and where they were judged.
 
@@ -221,14 +223,16 @@ def answer(findings: ExperimentResult) -> str:
 
 
 def of_all(chapters: Sequence[dict[str, Any]]) -> str:
-    """Return in a sentence how many claims of all chapters hold; "" for a single chapter."""
+    """Return in a sentence how many claims of all studies hold; "" without claims."""
     counts: Counter[str] = Counter()
     for facts in chapters:
         counts.update(facts["counts"])
-    if len(chapters) < 2 or not counts:
+    if not counts:
         return ""
     parts = [f"{n} {word if n == 1 else SEVERAL.get(word, word)}" for word, n in counts.items()]
-    return f"Of {sum(counts.values())} claims in {counted(len(chapters), 'chapter')}, {listed(parts)}."
+    return (
+        f"Of {sum(counts.values())} claims in {counted(len(chapters), 'study', 'studies')}, {listed(parts)}."
+    )
 
 
 def judged(result: ClaimResult) -> dict[str, Any]:
@@ -253,7 +257,7 @@ def systems(plans: Sequence[tuple[Job, tuple[LoadedScenario, Plan]]], title: str
     drawn = []
     for system, numbers in systems_of([plan for _, (_, plan) in plans]):
         files = dict.fromkeys(plans[k][0].scenario.name for k in numbers)
-        drawn.append({"drawing": diagrams(system, title), "runs": ", ".join(files)})
+        drawn.append({"drawing": diagram(system, title), "runs": ", ".join(files)})
     return drawn
 
 
@@ -261,23 +265,19 @@ LIVELY = tuple(map(metric, ("peak(sideslip)", "peak(yaw_rate)")))
 """Metrics of how lively a run is; the first that all runs have is used."""
 SEVERAL = {HOLDS: "hold", **{word: word.replace("does", "do", 1) for word in FAILS.values()}}
 """Verdict -> its plural."""
-VIEW, SWEEP = "-view", "-sweep"
-"""Suffixes of a chapter's anchor: its viewer, its view over axes."""
+VIEW = "view"
+"""Anchor of the viewer."""
 LARGEST = 1_500_000
 """Size of the samples in a chapter [bytes]. Chosen: a page of 2.5 MB opens at once, also by mail."""
 
 
 def viewer_of(
-    findings: ExperimentResult,
-    chapter: str,
-    views: Sequence[View] = (),
-    measured: Sequence[LabelledRun] = (),
-) -> tuple[Markup | None, dict[str, int]]:
-    """Return the viewer of all runs of figures and claims, and the number of each run in it.
+    findings: ExperimentResult, views: Sequence[View] = (), measured: Sequence[LabelledRun] = ()
+) -> tuple[Carried | None, dict[str, int]]:
+    """Return the content of a viewer of all runs of figures and claims, and the number of each run in it.
 
     Args:
         findings: the experiment and its results.
-        chapter: anchor of its chapter.
         views: of all runs, before those of the figures, of which the liveliest comes first.
         measured: recordings that all views show; their filter acts on the runs, too.
     """
@@ -307,7 +307,7 @@ def viewer_of(
     runs = [*named.values(), *measured]
     alike = filtered_alike([run.results for run in runs])
     runs = [LabelledRun(run.label, results) for run, results in zip(runs, alike, strict=True)]
-    return viewer(runs, settings, name=f"{chapter}{VIEW}"), numbers
+    return carried(runs, settings), numbers
 
 
 def _views(spec: FigureSpec, title: str, shown: Sequence[int]) -> Iterator[View]:
@@ -329,10 +329,10 @@ def _liveliest(runs: Sequence[LabelledRun]) -> float:
     return 0.0
 
 
-def figure_files(findings: ExperimentResult, files: str) -> list[dict[str, str]]:
+def figure_files(findings: ExperimentResult) -> list[dict[str, str]]:
     """Return title and path, without suffix, of the figures that the page shows in another form."""
     return [
-        {"title": title_of(findings, spec), "file": f"{files}/{spec.name}"}
+        {"title": title_of(findings, spec), "file": f"{FIGURES}/{spec.name}"}
         for spec in findings.spec.figures
         if spec.what.over_axes or (spec.what.shows == "runs" and runs_of(findings, spec))
     ]
@@ -392,49 +392,41 @@ def grid_of_times(runs: Iterable[Results | Plan]) -> list[str]:
     return [f"{text} ({counted(count, 'run')})" for text, count in counts.items()]
 
 
-def _relative_to(path: Path, folder: Path) -> str:
-    """Return a path relative to the folder of a page."""
-    try:
-        return path.resolve().relative_to(folder.resolve()).as_posix()
-    except ValueError:
-        return path.as_posix()
-
-
 PAGE = "report.html"
 """File name of the page."""
 RANKING = Path("results/proving_ground/ranking", PAGE)
 """Default path of the ranking's page."""
-SCENARIOS = Path("scenarios")
-"""Folder searched for studies if none is given."""
 TITLE = "Yaw-stability control: what papers say, and what comes out"
 
 
-def found_studies(folder: Path = SCENARIOS) -> list[Path]:
-    """Return all study files in the subfolders of a folder, sorted by title.
-
-    The studies of one folder stay together, `study.yaml` first.
-
-    Raises:
-        ScenarioError: there are none.
-    """
-    titles: dict[Path, str] = {}
-    for path, _ in find_and_load.files(folder, ["a study file"], depth=2):
-        data = yaml_lines.read(path, what="study file").data
-        titles[path] = str(data.get("title", "")) if isinstance(data, dict) else ""
-    if not titles:
-        raise ScenarioError(
-            f"no study file was named, and there is none in {folder}/*/", code="file-wrong-kind"
-        )
-    first = {path.parent: min(titles[p] for p in titles if p.parent == path.parent) for path in titles}
-    return sorted(titles, key=lambda path: (first[path.parent], path.stem != "study", titles[path]))
-
-
-def report_page(chapters: Sequence[dict[str, Any]], ranking: str = "") -> str:
-    """Return the HTML page of one or several chapters; `ranking`: link to the ranking's page."""
-    title = TITLE if len(chapters) > 1 else str(chapters[0]["title"])
-    sweeps = ["sweep.js"] if any(chapter["sweep"] for chapter in chapters) else []
-    scripts = assets(*sweeps) if sweeps or any(chapter["viewer"] for chapter in chapters) else ""
+def study_page(facts: dict[str, Any]) -> str:
+    """Return the page of an experiment."""
+    content, scripts = facts["content"], ["sweep.js"] if facts["sweep"] else []
     return render(
-        "report.html.j2", title=title, chapters=chapters, ranking=ranking, assets=scripts,
-        answer=of_all(chapters),
+        "report.html.j2",
+        facts,
+        viewer=embedded(content, VIEW) if content else None,
+        assets=assets(*scripts) if content or scripts or facts["validations"] else "",
+    )
+
+
+def overview_page(
+    chapters: Sequence[dict[str, Any]], pages: Sequence[str], folder: Path, ranking: str = ""
+) -> str:
+    """Return the page on several experiments; write side files with their runs.
+
+    Args:
+        chapters: of the experiments.
+        pages: their addresses.
+        folder: of the overview.
+        ranking: address of the ranking's page; "": there is none.
+    """
+    shown = {facts["id"]: facts["content"] for facts in chapters if facts["content"]}
+    for key, content in shown.items():
+        write_side(folder, key, content)
+    tidy_sides(folder, shown.keys())
+    return render(
+        "overview.html.j2", title=TITLE, chapters=[*zip(chapters, pages, strict=True)], ranking=ranking,
+        answer=of_all(chapters), folder=DATA, first=next(iter(shown), ""), frame=embedded(None, VIEW),
+        assets=assets("chooser.js"),
     )  # fmt: skip

@@ -23,7 +23,6 @@ from ..experiments.experiment import Case
 from ..experiments.experiment_result import Each, ExperimentResult, limits_of
 from ..experiments.jobs import Job
 from ..figures.style import LabelledRun, digits_of, shown, shown_unit
-from ..files import write_whole
 from ..messages import counted, listed
 from ..metrics.measures import variable_of
 from ..metrics.run_metrics import metric
@@ -31,10 +30,8 @@ from ..plan import Override
 from ..results.reader import load_results
 from ..results.run_folder import RUN_FILE
 from .page_parts import option_of, render
-from .viewer import METRICS, PANELS, Settings, View, side_file, viewer_frame
+from .viewer import DATA, METRICS, PANELS, Settings, View, carried, embedded, tidy_sides, write_side
 
-DATA = "data"
-"""Folder of the side files, beside the page."""
 KEY = 12
 """Characters of a run's key that name its file, as they name its folder."""
 DIGITS = 6
@@ -43,19 +40,17 @@ MOST_METRICS = 8
 """Metrics in the table of an opened run."""
 
 
-def sweep_view(findings: ExperimentResult, name: str, sides: Mapping[int, str], folder: str) -> Markup:
+def sweep_view(findings: ExperimentResult, name: str, sides: Mapping[int, str]) -> Markup:
     """Return the view of an experiment along axes as part of a page.
 
     Args:
         findings: the experiment and the records of its runs.
         name: its anchor.
         sides: number of a case -> key of its side file; see `write_sides`.
-        folder: of the side files, relative to the page.
     """
-    data = _data(findings, sides) | {"folder": folder}
-    frame = viewer_frame(f"{name}-run")
     text = render(
-        "sweep.html.j2", name=name, data=data, frame=frame, counts=status_counts(findings),
+        "sweep.html.j2", name=name, data=_data(findings, sides) | {"folder": DATA},
+        frame=embedded(None, f"{name}-run"), counts=status_counts(findings),
         answer=limit_sentences(findings) or [range_sentence(findings)],
     )  # fmt: skip
     return Markup(text)
@@ -283,18 +278,11 @@ def write_sides(findings: ExperimentResult, folder: Path, each: Each = map) -> d
         if job.keep and (job.out / RUN_FILE).is_file()
     ]
     settings = side_settings(findings)
-    wanted = [(job, findings.words(case), settings, folder / DATA) for case, job in kept]
+    wanted = [(job, findings.words(case), settings, folder) for case, job in kept]
     written = list(each(_write_side, *zip(*wanted, strict=True))) if wanted else []
     keys = {case.number: job.key[:KEY] for (case, job), done in zip(kept, written, strict=True) if done}
-    tidy_sides(folder, keys.values())
+    tidy_sides(folder, set(keys.values()))
     return keys
-
-
-def tidy_sides(folder: Path, keys: Any) -> None:
-    """Remove side files that the page does not refer to."""
-    for file in (folder / DATA).glob("*.js"):
-        if file.stem not in set(keys):
-            file.unlink()
 
 
 def side_settings(findings: ExperimentResult) -> Settings:
@@ -315,9 +303,8 @@ def side_settings(findings: ExperimentResult) -> Settings:
 def _write_side(job: Job, label: str, settings: Settings, folder: Path) -> bool:
     """Write the side file of a run; return False if its results cannot be shown."""
     try:
-        text = side_file(job.key[:KEY], [LabelledRun(label, load_results(job.out))], settings)
+        content = carried([LabelledRun(label, load_results(job.out))], settings)
     except ResultsError:
         return False
-    folder.mkdir(parents=True, exist_ok=True)
-    write_whole(folder / f"{job.key[:KEY]}.js", text)
+    write_side(folder, job.key[:KEY], content)
     return True

@@ -10,13 +10,13 @@ those of uPlot, taken from the installed package `uplot-python`.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import distribution
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from markupsafe import Markup
@@ -24,13 +24,14 @@ from markupsafe import Markup
 from ..errors import ResultsError
 from ..figures.panels import spans_of
 from ..figures.style import LINES, MEASURED_LINE, LabelledRun, digits_apart, line_style, shown, shown_unit
+from ..files import write_whole
 from ..messages import listed
 from ..metrics.measures import words
 from ..metrics.run_metrics import MetricValue, columns_of, evaluate, metric, reference_of
 from ..results.measurement_results import MeasuredResults
 from ..results.reader import Results
 from ..results.run_folder import RunStatus
-from .page_parts import render
+from .page_parts import document, render
 from .road import legend_of, notes_of, road_of
 from .viewer_data import PackedRun, is_numeric, pack
 
@@ -80,6 +81,7 @@ class Settings:
         largest: size of the samples [bytes]; beyond it, the page carries the signals of the views and of the
             road alone. 0: no limit.
         ghosts: numbers of runs that are drawn faintly behind the others.
+        bands: numbers of runs whose closed line is filled, behind all others; not over time.
     """
 
     views: Sequence[View] = (View(),)
@@ -88,6 +90,7 @@ class Settings:
     limits: Sequence[tuple[str, float, str]] = ()
     largest: int = 0
     ghosts: Sequence[int] = ()
+    bands: Sequence[int] = ()
 
 
 SETTINGS = Settings()
@@ -113,39 +116,57 @@ def viewer(
     Raises:
         ResultsError: there are no runs, more than `MOST`, or one without samples.
     """
-    data, blocks = _carried(runs, settings, packed)
-    text = render("viewer.html.j2", name=name, data=data | {"alone": alone, "file": name}, blocks=blocks)
-    return Markup(text)
+    return embedded(carried(runs, settings, packed), name, alone=alone)
 
 
-def viewer_frame(name: str) -> Markup:
-    """Return a viewer without runs; a script of the page fills it with those of side files."""
-    return Markup(render("viewer.html.j2", name=name, data=None, blocks=[]))
+class Carried(NamedTuple):
+    """What a page carries for a viewer: what it needs to know of the runs, and their samples."""
+
+    data: dict[str, Any]
+    blocks: Sequence[PackedRun]
 
 
-def side_file(key: str, runs: Sequence[LabelledRun], settings: Settings = SETTINGS, *, html: str = "") -> str:
-    """Return a script that hands runs to the page that loads it.
+def embedded(content: Carried | None, name: str, *, alone: bool = False) -> Markup:
+    """Return a viewer as part of a page; without content, a script fills it with runs of side files."""
+    data = content and content.data | {"alone": alone, "file": name}
+    return Markup(render("viewer.html.j2", name=name, data=data, blocks=content.blocks if content else []))
 
-    Pages opened as files cannot fetch, but load scripts.
+
+DATA = "data"
+"""Folder of the side files, beside the page."""
+
+
+def write_side(folder: Path, key: str, content: Carried | None, *, html: str = "") -> None:
+    """Write a script that hands runs to the page that loads it: pages opened as files cannot fetch.
 
     Args:
+        folder: of the page.
         key: by which the page asks for it.
-        runs, settings: see `viewer`; without runs, the file has only `html`.
-        html: markup that the page shows with them.
+        content: of the viewer; None: the file has only `html`.
+        html: markup that the page shows with the runs.
+    """
+    data, blocks = content or (None, [])
+    parts = {"data": data, "blocks": [run.block for run in blocks], "html": html}
+    text = f"yawbenchSide({json.dumps(key)}, {json.dumps(parts, ensure_ascii=False)});\n"
+    (folder / DATA).mkdir(parents=True, exist_ok=True)
+    write_whole(folder / DATA / f"{key}.js", text)
+
+
+def tidy_sides(folder: Path, keys: Collection[str]) -> None:
+    """Remove side files that the page in a folder does not refer to."""
+    for file in (folder / DATA).glob("*.js"):
+        if file.stem not in keys:
+            file.unlink()
+
+
+def carried(
+    runs: Sequence[LabelledRun], settings: Settings = SETTINGS, packed: Sequence[PackedRun] | None = None
+) -> Carried:
+    """Return what a page carries for the viewer of runs.
 
     Raises:
         ResultsError: see `viewer`.
     """
-    data, packed = _carried(runs, settings) if runs else (None, [])
-    blocks = [run.block for run in packed]
-    content = json.dumps({"data": data, "blocks": blocks, "html": html}, ensure_ascii=False)
-    return f"yawbenchSide({json.dumps(key)}, {content});\n"
-
-
-def _carried(
-    runs: Sequence[LabelledRun], settings: Settings, packed: Sequence[PackedRun] | None = None
-) -> tuple[dict[str, Any], Sequence[PackedRun]]:
-    """Return the data of a viewer: its runs with their packed samples."""
     if not 1 <= len(runs) <= MOST:
         raise ResultsError(f"a viewer shows one to {MOST} runs, not {len(runs)}.")
     if empty := [run.label for run in runs if not run.results.time.size]:
@@ -184,13 +205,14 @@ def _carried(
                 "notes": notes_of(run.results, road),
                 "road": road,
                 "ghost": number in settings.ghosts,
+                "band": number in settings.bands,
                 **({"dash": MEASURED_LINE[1]} if isinstance(run.results, MeasuredResults) else {}),
                 **block.header,
             }
             for number, (run, road, block) in enumerate(zip(runs, roads, packed, strict=True))
         ],
     }
-    return data, packed
+    return Carried(data, packed)
 
 
 def assets(*scripts: str) -> Markup:
@@ -224,14 +246,13 @@ def page(
         below: a line under the title.
         changed: overrides of the scenario that the title names.
     """
-    return render(
-        "viewer_page.html.j2",
-        title=title or " and ".join(run.label for run in runs),
+    return document(
+        title or " and ".join(run.label for run in runs),
+        sentence=answer_of(runs),
         below=below,
         changed=changed,
-        answer=answer_of(runs),
-        assets=assets(),
         viewer=viewer(runs, settings, name="run", alone=True),
+        assets=assets(),
     )
 
 

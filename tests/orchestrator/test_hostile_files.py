@@ -20,7 +20,7 @@ from orchestrator.experiments.experiment_result import judge_results
 from orchestrator.experiments.schema import ExperimentSpec
 from orchestrator.experiments.tables import Table
 from orchestrator.files import reading
-from orchestrator.pages.report import chapter, report_page
+from orchestrator.pages.report import chapter, study_page
 from orchestrator.scenario import yaml_lines
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.scenario.overrides import read_changes
@@ -299,8 +299,8 @@ def test_pages_hold_no_escape_sequences_and_no_html_of_users() -> None:
     table = Table(ESCAPES, [ESCAPES], [[ESCAPES]], [ESCAPES])
     spec = ExperimentSpec.model_validate({"title": ESCAPES, "runs": [{"name": "a", "scenario": "a.yaml"}]})
     findings = judge_results(LoadedExperiment(Path("a.yaml"), spec, {}), Path("none"))
-    facts = chapter(findings, command=ESCAPES, stale={}, folder=Path("none"), shown_in=Path("none"))
-    text = report_page([facts | {"comparison": None, "results": [table]}])
+    facts = chapter(findings, command=ESCAPES, stale={}, folder=Path("none"))
+    text = study_page(facts | {"results": [table]})
     assert text.count("&lt;script&gt;") >= 6
     assert not set("\x1b\u202e") & set(text)
     assert "<script>alert" not in text

@@ -13,6 +13,7 @@ from math import radians
 from pathlib import Path
 
 import pytest
+from scipy.stats import binom
 
 from orchestrator.errors import Diagnostic, RecordWarning
 from orchestrator.experiments.jobs import MeasuredRun
@@ -26,6 +27,7 @@ from orchestrator.experiments.ranking_scores import (
     RankingCell,
     deciding_digits,
     placed,
+    told_apart,
 )
 from orchestrator.experiments.ranking_tables import state_words
 from orchestrator.figures.style import shown
@@ -90,14 +92,29 @@ def test_places_go_by_conditions_passed_then_runs_then_sideslip():
         standing("as both", [driven()], [driven()]),
         standing("none", [bad], [bad]),
     ]
-    found = [(one.entry, one.place) for one in placed(every)]
+    found = [(one.entry, one.rank) for one in placed(every)]
     assert golden(found)  # fmt: skip
+
+
+def test_entries_whose_intervals_overlap_share_a_place_and_those_far_apart_do_not():
+    def passing(name: str, count: int) -> EntryScore:
+        return standing(name, *([driven(stability=float(k < count))] for k in range(12)))
+
+    ranked = placed([passing("nine", 9), passing("none", 0), passing("eight", 8), passing("one", 1)])
+    assert [(one.entry, one.place, one.rank) for one in ranked] == [
+        ("nine", 1, 1), ("eight", 1, 2), ("one", 3, 3), ("none", 3, 4),
+    ]  # fmt: skip
+    nine = ranked[0].bounds
+    draws = binom(12, 9 / 12)  # of conditions passed, when 12 are drawn from these with replacement
+    assert abs(nine.low - draws.ppf(0.025)) <= 1 and abs(nine.high - draws.ppf(0.975)) <= 1
+    apart, pairs = told_apart(ranked)
+    assert (apart, pairs) == (4, 6)  # neither nine and eight nor one and none
 
 
 def test_numbers_that_decide_places_read_differently():
     close = [
-        standing("first", [driven(sideslip=0.300001)]),
-        standing("second", [driven(sideslip=0.300004)]),
+        standing("first", *2 * [[driven(sideslip=0.300001)]]),
+        standing("second", *2 * [[driven(sideslip=0.300004)]]),
         standing("bad", [driven(stability=0.0, sideslip=0.300004)] + [driven()] * 999, [driven()]),
         standing("worse", [driven(stability=0.0, sideslip=0.3)] * 2 + [driven()] * 998, [driven()]),
     ]
@@ -222,7 +239,8 @@ def test_noisy_sensors_give_a_headroom_with_its_confidence(tmp_path):
     cell = next(row for row in rows(tmp_path / "cells.csv") if row["entry"] == "sliding_mode")
     assert int(cell["runs"]) == 5  # seeds
     assert 0 < float(cell["sideslip_half_width [rad]"]) < radians(1.0)
-    assert golden_in((tmp_path / "data" / "sliding-mode-in-saloon75-sensors.js").read_text())
+    side = tmp_path / "data" / "sliding-mode-in-saloon75-sensors.js"
+    assert golden_in(side.read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from orchestrator.experiments.planning import plan_experiment
 from orchestrator.experiments.verdict_tables import limit_tables, run_tables, verdict
 from orchestrator.figures.style import shown
 from orchestrator.metrics.run_metrics import MetricValue
-from orchestrator.pages.report import report_page
+from orchestrator.pages.report import study_page
 from tests.sentences import golden, texts_of
 
 SCENARIO = """
@@ -171,10 +171,8 @@ def test_in_haste_there_are_fewer_repeats(load):
 
 def test_a_quick_page_says_so_before_anything_else(load, fmus, tmp_path):
     quick = findings_of(load().short, fmus, tmp_path)
-    facts = chapter_of(quick, tmp_path, "yawbench study", shown_in=tmp_path)
-    tree = html.fromstring(report_page([facts], ""))
-    section = tree.xpath("//section[@class='chapter']")[0]
-    assert section.xpath("string(.//p[1])") == "A quick look: 3 of 4 repeats."
+    tree = html.fromstring(study_page(chapter_of(quick, tmp_path, "yawbench study")))
+    assert tree.xpath("string(//main/p[1])") == "A quick look: 3 of 4 repeats."
 
 
 @pytest.mark.parametrize(

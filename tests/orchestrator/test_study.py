@@ -28,9 +28,8 @@ from orchestrator.experiments.tables import Table, for_terminal
 from orchestrator.experiments.verdict_tables import claim_tables, derived_tables, run_tables, share
 from orchestrator.figures.style import shown
 from orchestrator.metrics.run_metrics import MetricValue
-from orchestrator.pages.report import chapter, report_page, viewer_of
+from orchestrator.pages.report import chapter, study_page, viewer_of
 from orchestrator.plan import Override
-from tests.pages.made_up import data_in
 from tests.sentences import golden, golden_in, refused, texts_of
 
 from .recorded import car, write
@@ -103,8 +102,8 @@ def problems(study, *changes):
 
 def page(findings, out) -> str:
     """Return what a reader of the experiment's page sees."""
-    facts = chapter(findings, command="yawbench study", stale={}, folder=out, shown_in=out)
-    text = report_page([facts | {"comparison": None, "results": []}])
+    facts = chapter(findings, command="yawbench study", stale={}, folder=out)
+    text = study_page(facts)
     return " ".join(" ".join(html.fromstring(text).itertext()).split())
 
 
@@ -192,9 +191,9 @@ figures:
         run = car(gain)
         lost = replace(run, columns={k: x for k, x in run.columns.items() if "position" not in k})
         write(lost if name == "slow" else run, tmp_path / "out" / name)
-    shown, _ = viewer_of(judge_results(made, tmp_path / "out"), "chapter")
+    shown, _ = viewer_of(judge_results(made, tmp_path / "out"))
     assert shown is not None
-    data = data_in(shown)
+    data = shown.data
     assert [view["title"] for view in data["views"]] == ["Lively", "Calm", "Calm: sideslip(yaw_rate)"]
     assert [view["x"] for view in data["views"]] == ["time", "time", "plant.yaw_rate"]
     assert data["views"][1]["panels"] == ["plant.yaw_rate,reference.yaw_rate_ref"]

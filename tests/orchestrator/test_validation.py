@@ -9,11 +9,16 @@ import numpy as np
 import pytest
 
 import yawbench as yb
-from orchestrator.errors import ScenarioError
+from orchestrator.errors import ResultsError, ScenarioError
 from orchestrator.evaluation.validation import BANDS, Tolerance, load_bands
+from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.experiment_result import judge_results
+from orchestrator.experiments.record import record_of
+from orchestrator.experiments.verdict_tables import all_tables
 from tests.commands import status_of
 from tests.sentences import golden
 
+from . import recorded
 from .test_output import ALWAYS, documented
 
 UNITS = (
@@ -182,3 +187,58 @@ def test_unknown_bands_are_named_with_those_there_are():
     with pytest.raises(ScenarioError) as refused:
         load_bands("steady")
     assert golden(str(refused.value))
+
+
+STUDY = """title: A car and its model
+runs: [{name: ramp, scenario: ramp.yaml, label: model}]
+metrics: {peak: {metric: peak(acceleration_y)}}
+validations:
+  - {run: ramp, measured: near.yaml}
+  - {run: ramp, measured: far.yaml, bands: wide.yaml}
+"""
+
+
+@pytest.fixture
+def study(tmp_path):
+    """A study with two validations, and results of its run, along a = 10 delta."""
+    line(tmp_path, "near", up=0.05)
+    line(tmp_path, "far", up=0.5, tests=2)
+    (tmp_path / "wide.yaml").write_text(
+        "title: Wide\nsource: chosen\nbands: {acceleration_y: {offset: 0.1 m/s2, gain: 0}, "
+        "steering_wheel_angle: {offset: 10 deg, gain: 0}}\n"
+    )
+    (tmp_path / "study.yaml").write_text(STUDY)
+    a_y = np.linspace(1.0, 5.0, 200)
+    columns = {"plant.acceleration_y": a_y, "driver.steering_wheel_angle": 0.1 * a_y}
+    units = {"plant.acceleration_y": "m/s2", "driver.steering_wheel_angle": "rad"}
+    made = recorded.results(columns, 0.01 * np.arange(200.0), units)
+    recorded.write(made, tmp_path / "ramp")
+    return load_experiment(tmp_path / "study.yaml")
+
+
+def test_a_study_has_its_validations_in_tables_record_and_answer(study, tmp_path):
+    findings = judge_results(study, tmp_path)
+    near, far = findings.validations
+    assert (near.holds, far.holds) == (True, False)
+    assert [verdict.holds for verdict in far.conditions.values()] == [False, True]
+    assert (far.bands, near.bands) == ("Wide", load_bands(BANDS).title)
+    assert [one["holds"] for one in record_of(findings)["validations"]] == [True, False]
+    tables = [table for table in all_tables(findings) if "against" in table.title]
+    assert [table.rows[0][:2] for table in tables] == [
+        ["steering_wheel_angle", "passed"], ["steering_wheel_angle", "failed"],
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code"),
+    [
+        ("run: ramp, measured: near", "run: ramps, measured: near", "name-unknown"),
+        ("near.yaml", "nowhere.yaml", "file-missing"),
+        ("wide.yaml", "wider", "scenario-unknown"),
+    ],
+)
+def test_mistakes_of_validations_are_told_before_any_run(old, new, code, study, tmp_path):
+    (tmp_path / "study.yaml").write_text(STUDY.replace(old, new))
+    with pytest.raises((ScenarioError, ResultsError)) as refused:
+        load_experiment(tmp_path / "study.yaml")
+    assert code in {one.code for one in refused.value.diagnostics}

@@ -47,7 +47,7 @@ return found;
 """
 TEXTS_ON_EACH_OTHER = """
 const found = [];
-for (const svg of document.querySelectorAll('svg.diagonal, svg.stack')) {
+for (const svg of document.querySelectorAll('.system svg')) {
   const frame = svg.getBoundingClientRect();
   if (!frame.width) continue;
   const texts = [...svg.querySelectorAll('text')].map((e) => [e.textContent, e.getBoundingClientRect()]);

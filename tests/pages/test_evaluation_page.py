@@ -12,7 +12,7 @@ from lxml import html
 from orchestrator.evaluation.standard_tests import TESTS, Evaluation
 from orchestrator.evaluation.trace import trace_of
 from orchestrator.metrics.verdict import compare, not_judged
-from orchestrator.pages.evaluation_page import criteria_of, evaluation_page, results_of
+from orchestrator.pages.evaluation_page import criteria_table, evaluation_page, results_of
 from tests.orchestrator.recorded import write
 
 from .browser import DESK, PHONE, Browser
@@ -44,22 +44,22 @@ def traces(tmp_path_factory):
 
 
 def test_a_criterion_has_the_run_that_decides_and_its_distance_to_the_limit():
-    rows = criteria_of([judged("slow", 0.1, 2.0), judged("fast", 0.42, 1.9)], None)
-    assert [(row.name, row.verdict.status.value, row.run) for row in rows] == [
-        ("stability", "failed", "fast"), ("responsiveness", "passed", "fast"),
+    table, decide = criteria_table([judged("slow", 0.1, 2.0), judged("fast", 0.42, 1.9)], None)
+    assert decide == ["fast", "fast"]
+    assert table.text()[0][:6] == ["stability", "failed", "42.0 %", "≤ 35.0 %", "-7.00 % (-20 %)", "fast"]
+    assert table.text()[1][:6] == [
+        "responsiveness", "passed", "1.90 m", "≥ 1.83 m", "0.0700 m (3.8 %)", "fast",
     ]  # fmt: skip
-    assert (rows[0].value, rows[0].limit, rows[0].distance) == ("42.0 %", "≤ 35.0 %", "-7.00 % (-20 %)")
-    assert (rows[1].value, rows[1].limit, rows[1].distance) == ("1.90 m", "≥ 1.83 m", "0.0700 m (3.8 %)")
 
 
 def test_numbers_that_decide_read_differently():
-    (row, _) = criteria_of([judged("x", 0.350004)], None)
-    assert row.verdict.holds is False and row.value != row.limit.removeprefix("≤ ")
+    (_, status, value, limit, *_), _ = criteria_table([judged("x", 0.350004)], None)[0].text()
+    assert status == "failed" and value != limit.removeprefix("≤ ")
 
 
 def test_a_criterion_that_was_not_judged_has_a_reason_and_no_number():
-    (_, row) = criteria_of([judged("x", 0.1)], None)
-    assert (row.value, row.limit, row.distance, row.why) == ("", "", "", "the record ends early")
+    _, (_, _, *numbers, why) = criteria_table([judged("x", 0.1)], None)[0].text()
+    assert (numbers, why) == (["-", "-", "-"], "the record ends early")
 
 
 def test_the_viewer_has_the_instants_and_limits_of_the_run_that_decides(traces):
@@ -79,7 +79,7 @@ def test_counts_and_headings_are_those_of_the_tables(traces):
     assert page.findtext(".//h1") == "Sine with dwell: 2 runs"
     assert len(page.xpath("//script[@type='text/plain']")) == 2
     assert page.xpath("string(//p[@class='said'])") == "1 of 2 criteria passed."
-    assert len(page.cssselect("table.criteria tbody tr")) == 2
+    assert len(page.xpath("//table[thead/tr/th='criterion']/tbody/tr")) == 2
     assert len(page.cssselect("main")) == 1
 
 

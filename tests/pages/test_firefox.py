@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from orchestrator.figures.panels import LabelledRun
-from orchestrator.pages.viewer import assets, page, side_file, viewer_frame
+from orchestrator.pages.viewer import assets, carried, embedded, page, write_side
 
 from .browser import Firefox, start_firefox
 from .made_up import whole_car
@@ -83,13 +83,12 @@ def test_a_link_opened_anew_shows_the_same_picture(firefox, two):
 
 def test_a_side_file_opens_its_run(firefox, tmp_path):
     run = whole_car()
-    (tmp_path / "data").mkdir()
-    (tmp_path / "data" / "cell.js").write_text(side_file("cell", [LabelledRun("worst", run)]), "utf-8")
+    write_side(tmp_path, "cell", carried([LabelledRun("worst", run)]))
     matrix = "<table class='matrix'><tr><td class='cell'><a href='#cell?id=cell'>0/1</a></td></tr></table>"
-    chosen = f"<div class='chosen'><p class='details'></p><template>{viewer_frame('run')}</template></div>"
-    content = f"<div class='ranking' data-folder='data' data-first='cell'>{matrix}{chosen}</div>"
+    chosen = f"<div class='chosen'><p class='details'></p><template>{embedded(None, 'run')}</template></div>"
+    content = f"<div class='choosing' data-folder='data' data-first='cell'>{matrix}{chosen}</div>"
     head = "<!DOCTYPE html><html lang='en'><meta charset='utf-8'><title>cells</title>"
-    (tmp_path / "page.html").write_text(f"{head}{assets('ranking.js')}<main>{content}</main>", "utf-8")
+    (tmp_path / "page.html").write_text(f"{head}{assets('chooser.js')}<main>{content}</main>", "utf-8")
     firefox.open(tmp_path / "page.html")
     firefox.wait_for(f"document.querySelector('.chosen') && {READY}")
     assert firefox.run(VIEWER + "return viewer.runs[0].rows") == run.time.size

@@ -5,10 +5,9 @@ from __future__ import annotations
 from fractions import Fraction
 from pathlib import Path
 
-import pytest
 from lxml import etree
 
-from orchestrator.pages.diagram import diagonal, diagrams, stack, system_of, systems_of
+from orchestrator.pages.diagram import diagram, system_of, systems_of
 from orchestrator.plan import Fmu, Instance, Plan, Wire
 from tests.sentences import golden
 from vocabulary.wheels import WHEELS
@@ -59,30 +58,18 @@ def test_the_wires_of_four_wheels_are_one_signal():
     assert signals["driver", "plant"] == ("steer_angle",)
 
 
-@pytest.mark.parametrize("draw", [diagonal, stack])
-def test_every_unit_fmu_and_signal_is_in_the_drawing(draw):
-    said = " ".join(texts(draw(system_of([plan(extra=True)]), "title"))).replace("  ", " ")
+def test_every_unit_fmu_and_signal_is_in_the_drawing():
+    said = " ".join(texts(diagram(system_of([plan(extra=True)]), "title"))).replace("  ", " ")
     for word in ("driver", "plant_seven_dof", "road_patches", "yaw_rate", "friction", "torque_request_*"):
         assert word in said
 
 
-def test_the_diagonal_has_an_arrow_for_every_pair_of_units():
+def test_the_drawing_has_an_arrow_for_every_pair_of_units():
     system = system_of([plan(extra=True)])
-    root = etree.fromstring(str(diagonal(system, "title")))
+    root = etree.fromstring(str(diagram(system, "title")))
     assert len(list(root.iter("polygon"))) == len(system.signals)
-    assert len(list(etree.fromstring(str(stack(system, "title"))).iter("polygon"))) == len(system.signals)
-
-
-def test_feedback_enters_from_below_and_what_goes_forward_from_above():
-    root = etree.fromstring(str(diagonal(system_of([plan()]), "title")))
-    ends = [
-        [tuple(map(float, p.split(","))) for p in line.get("points").split()]
-        for line in root.iter("polyline")
-    ]
-    down = [points for points in ends if points[-1][1] > points[-2][1]]
-    assert len(down) == 2 and len(ends) == 3
 
 
 def test_names_cannot_break_out_of_the_drawing():
     nasty = plan("<script>alert(1)</script>")
-    assert "<script" not in diagrams(system_of([nasty]), '"><script>')
+    assert "<script" not in diagram(system_of([nasty]), '"><script>')

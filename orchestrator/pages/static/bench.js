@@ -29,8 +29,7 @@ class Bench {
   }
 
   restore() {
-    const own = location.hash.slice(1).split('&&').find((part) => part.startsWith('bench?'));
-    const words = new URLSearchParams(own ? own.slice(6) : '');
+    const words = readAddress('bench') ?? new URLSearchParams();
     this.values = new Map(this.facts.shown.map((target) => [target, this.facts.knobs[target].value]));
     for (const text of words.getAll('set')) {
       const [target, value] = text.split('=');
@@ -49,9 +48,7 @@ class Bench {
     for (const text of this.changes.settings) words.append('set', text);
     for (const text of this.changes.swaps) words.append('swap', text);
     for (const text of this.changes.faults) words.append('fault', text);
-    const others = location.hash.slice(1).split('&&').filter((part) => part && !part.startsWith('bench?'));
-    const all = [...(words.size ? [`bench?${words}`] : []), ...others];
-    if (all.length || location.hash) history.replaceState(null, '', '#' + all.join('&&'));
+    writeAddress('bench', words);
   }
 
   get changes() {

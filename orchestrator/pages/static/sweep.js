@@ -397,11 +397,7 @@ class Sweep {
       this.draw();
     });
     find('clear').addEventListener('click', () => { this.state.brush = {}; this.draw(); });
-    find('csv').addEventListener('click', () => {
-      const link = Object.assign(document.createElement('a'), {href: URL.createObjectURL(new Blob([this.csv()], {type: 'text/csv'})), download: `${this.key}.csv`});
-      link.click();
-      setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-    });
+    find('csv').addEventListener('click', () => saveFile(new Blob([this.csv()], {type: 'text/csv'}), `${this.key}.csv`));
     find('link').addEventListener('click', (event) => { this.remember(); copyAddress(event.target); });
     const map = find('map');
     map.addEventListener('pointermove', (event) => this.point(this.cellAt(event)));

@@ -46,8 +46,9 @@ class Viewer {
     this.removal = new AbortController();
     this.listen();
     this.road = null;
-    this.refresh();
-    setTimeout(() => this.openRoad()); // the curves first
+    this.level = headingLevel(root);
+    this.refresh(undefined, 1); // the first curves at once
+    requestAnimationFrame(() => setTimeout(() => this.complete()));
     const {signal} = this.removal;
     window.addEventListener('hashchange', () => {
       if (!this.restore()) return;
@@ -61,8 +62,10 @@ class Viewer {
     addEventListener('afterprint', () => this.print(false), {signal});
   }
 
-  openRoad() {
+  // Draw the other panels, and the road.
+  complete() {
     if (this.removal.signal.aborted) return;
+    this.drawPanels(1);
     if (this.runs.some((run) => run.road)) {
       this.road = new Road(this);
       this.road.arrange();
@@ -198,6 +201,7 @@ class Viewer {
   }
 
   colour(run) {
+    if (run.band) return this.theme.pale;
     const colour = this.theme.runs[this.style(run)];
     return run.ghost ? colour + (colour.length === 4 ? '7' : '73') : colour; // a hexadecimal alpha
   }
@@ -334,10 +338,10 @@ class Viewer {
     const style = getComputedStyle(this.root);
     const value = (name) => style.getPropertyValue('--yv-' + name).trim();
     this.theme = {runs: [0, 1, 2, 3, 4, 5, 6].map((k) => value(`run-${k}`))};
-    for (const name of ['ink', 'quiet', 'line', 'pale', 'faulty', 'mark', 'ground', 'lane']) this.theme[name] = value(name);
+    for (const name of ['ink', 'quiet', 'line', 'pale', 'faulty', 'mark', 'ground', 'lane', 'band']) this.theme[name] = value(name);
   }
 
-  refresh(ratio = devicePixelRatio || 1) {
+  refresh(ratio = devicePixelRatio || 1, most = Infinity) {
     this.Plot = plotter(ratio);
     this.readTheme();
     this.shift();
@@ -353,13 +357,18 @@ class Viewer {
     [slider.min, slider.max] = this.ends();
     slider.step = 'any';
     if (this.road) this.road.arrange();
-    this.redraw();
+    this.redraw(most);
   }
 
-  redraw() {
+  redraw(most = Infinity) {
     this.wide = this.root.clientWidth; // before: drawn panels may bring a scroll bar, and then another width
-    this.panels.forEach((panel, k) => panel.draw(k === this.panels.length - 1));
+    this.drawPanels(0, most);
     this.moveCursor();
+  }
+
+  drawPanels(first, most = Infinity) {
+    const wide = this.panels[first]?.chart.clientWidth; // of all: asked for once, as it makes the browser lay out
+    for (const panel of this.panels.slice(first, most)) panel.draw(panel === this.panels.at(-1), wide);
   }
 
   resized() {
@@ -437,8 +446,8 @@ class Viewer {
     this.find('all').addEventListener('click', () => this.zoomTo(null));
     this.find('in').addEventListener('click', () => this.zoom(1.6));
     this.find('out').addEventListener('click', () => this.zoom(1 / 1.6));
-    this.find('csv').addEventListener('click', () => this.save(new Blob([this.csv()], {type: 'text/csv'}), 'csv'));
-    this.find('png').addEventListener('click', () => this.picture().toBlob((blob) => this.save(blob, 'png')));
+    this.find('csv').addEventListener('click', () => saveFile(new Blob([this.csv()], {type: 'text/csv'}), `${this.data.file}.csv`));
+    this.find('png').addEventListener('click', () => this.picture().toBlob((blob) => saveFile(blob, `${this.data.file}.png`)));
     this.find('link').addEventListener('click', (event) => { this.remember(); copyAddress(event.target); });
     this.find('slider').addEventListener('input', (event) => this.seek(Number(event.target.value)));
     const keys = this.data.alone ? document : this.root; // several viewers of a page: the one with the focus
@@ -529,14 +538,12 @@ class Viewer {
     }
     return sheet;
   }
+}
 
-  save(blob, kind) {
-    const link = document.createElement('a');
-    link.href = URL.createObjectURL(blob);
-    link.download = `${this.data.file}.${kind}`;
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-  }
+function saveFile(blob, name) {
+  const link = Object.assign(document.createElement('a'), {href: URL.createObjectURL(blob), download: name});
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
 async function copyAddress(button) {

@@ -11,7 +11,7 @@ async function inflate(text) {
 }
 
 function decodeTime([form, first, begin, end], rows, bytes) {
-  if (form === 'u') return Float64Array.from({length: rows}, (_, i) => begin + ((end - begin) * i) / (rows - 1));
+  if (form === 'u') return new Float64Array(rows).map((_, i) => begin + ((end - begin) * i) / (rows - 1));
   const raw = new Uint8Array(8 * rows);
   for (let i = 0; i < rows; i++) for (let k = 0; k < 8; k++) raw[8 * i + k] = bytes[first + k * rows + i];
   return new Float64Array(raw.buffer);
@@ -32,13 +32,13 @@ function decodeColumn([form, offset, first, step, order, size], rows, bytes) {
     }
     return values;
   }
-  if (form === 'r') return Float64Array.from(new Float32Array(bytes.slice(offset, offset + 4 * rows).buffer));
+  if (form === 'r') return new Float64Array(new Float32Array(bytes.slice(offset, offset + 4 * rows).buffer));
   const bits = new Int32Array(rows);
   for (let i = 0, sum = 0; i < rows; i++) {
     for (let k = 0; k < 4; k++) sum = (sum + (bytes[offset + k * rows + i] << (8 * k))) | 0;
     bits[i] = sum;
   }
-  return Float64Array.from(new Float32Array(bits.buffer));
+  return new Float64Array(new Float32Array(bits.buffer));
 }
 
 // Index of the last row at or before t, and the way from there to the next row, 0 to 1.

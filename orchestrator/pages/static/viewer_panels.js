@@ -8,7 +8,11 @@ const CURSOR_DIGITS = 4;
 // `turn`: an angle's whole turn; the line breaks where it leaves its range at one end and comes back at the other.
 function linePath(u, xs, ys, factor, turn) {
   const path = new Path2D();
-  const {left, width} = u.bbox;
+  const {left, width, top, height} = u.bbox;
+  const {x: across, y: up} = u.scales;
+  const toX = width / (across.max - across.min);
+  const toY = (factor * height) / (up.max - up.min);
+  const bottom = top + height + (up.min * height) / (up.max - up.min);
   let [column, low, high, last, pen, before] = [null, 0, 0, 0, false, NaN];
   const flush = () => {
     if (column === null || low === high) return;
@@ -17,7 +21,7 @@ function linePath(u, xs, ys, factor, turn) {
     path.lineTo(column, last);
   };
   for (let i = 0; i < xs.length; i++) {
-    const value = ys[i] * factor;
+    const value = ys[i];
     if (!(Number.isFinite(value) && Number.isFinite(xs[i]))) {
       flush();
       [column, pen] = [null, false];
@@ -28,15 +32,15 @@ function linePath(u, xs, ys, factor, turn) {
       [column, pen] = [null, false];
     }
     before = value;
-    const x = u.valToPos(xs[i], 'x', true);
-    const outside = (x < left - width && i + 1 < xs.length && u.valToPos(xs[i + 1], 'x', true) < left)
-      || (x > left + 2 * width && i > 0 && u.valToPos(xs[i - 1], 'x', true) > left + width);
+    const x = left + (xs[i] - across.min) * toX;
+    const outside = (x < left - width && i + 1 < xs.length && xs[i + 1] < across.min)
+      || (x > left + 2 * width && i > 0 && xs[i - 1] > across.max);
     if (outside) {
       flush();
       [column, pen] = [null, false];
       continue;
     }
-    const y = u.valToPos(value, 'y', true);
+    const y = bottom - value * toY;
     const at = Math.round(x * 2) / 2;
     if (at === column) {
       if (y < low) low = y;
@@ -74,14 +78,15 @@ class Panel {
     const found = [];
     for (const [k, name] of this.signals.entries()) {
       for (const run of viewer.runs) {
-        if (!run.has(name) || (k > 0 && run !== viewer.lead())) continue;
+        if (!run.has(name) || (k > 0 && run !== viewer.lead()) || (run.band && viewer.state.x === 'time')) continue;
         const difference = viewer.state.difference && run !== viewer.baseline;
         if (viewer.state.difference && (k > 0 || !viewer.baseline.has(name) || run === viewer.baseline)) continue;
         const values = difference ? this.differenceOf(run, name) : run.column(name);
         found.push({run, name, values, xs: viewer.horizontal(run), reference: k > 0});
       }
     }
-    return found.sort((one, other) => other.reference - one.reference);
+    const rank = ({run, reference}) => (run.band ? 0 : reference ? 1 : 2);
+    return found.sort((one, other) => rank(one) - rank(other));
   }
 
   differenceOf(run, name) {
@@ -104,7 +109,7 @@ class Panel {
       + '<thead class="yv-hidden"><tr><th scope="col">run</th><th scope="col">at the cursor</th>'
       + '<th scope="col">smallest</th><th scope="col">largest</th></tr></thead><tbody></tbody></table><p class="yv-hidden"></p>';
     root.querySelector('h4').textContent = unit ? `${label} in ${unit}` : label;
-    root.querySelector('h4').setAttribute('aria-level', headingLevel(viewer.root));
+    root.querySelector('h4').setAttribute('aria-level', viewer.level);
     const names = root.querySelector('small');
     names.textContent = names.title = this.signals.join(', ');
     root.querySelector('caption').textContent = `Values of ${label}`;
@@ -117,7 +122,7 @@ class Panel {
     });
   }
 
-  draw(last) {
+  draw(last, wide) {
     const {viewer} = this;
     if (this.plot) this.plot.destroy();
     this.drawn = this.lines();
@@ -126,7 +131,7 @@ class Panel {
     const {factor} = this.meaning;
     const axis = {stroke: theme.quiet, font: '12px system-ui, sans-serif', grid: {stroke: theme.line, width: 1}, ticks: {show: false}};
     const options = {
-      width: Math.max(this.chart.clientWidth, 160),
+      width: Math.max(wide, 160),
       height: (viewer.state.x in viewer.data.signals ? PORTRAIT_HEIGHT : PANEL_HEIGHT) + (last ? 34 : 0),
       padding: [6, 10, last ? 0 : 4, 0],
       legend: {show: false},
@@ -143,7 +148,11 @@ class Panel {
         stroke: reference ? theme.pale : viewer.colour(run),
         width: reference ? 5 : 1.7,
         dash: reference ? [] : viewer.dash(run).map((part) => 1.7 * part),
-        paths: (u) => ({stroke: linePath(u, xs, values, factor, this.meaning.si === 'rad' ? 2 * Math.PI * factor : 0), fill: null, clip: null, flags: 1}),
+        fill: run.band ? theme.band : undefined,
+        paths: (u) => {
+          const path = linePath(u, xs, values, factor, this.meaning.si === 'rad' ? 2 * Math.PI : 0);
+          return {stroke: path, fill: run.band ? path : null, clip: null, flags: 1};
+        },
         points: {show: false},
       }))],
       hooks: {
@@ -272,6 +281,8 @@ class Panel {
     const {viewer} = this;
     const time = viewer.state.time;
     const {factor} = this.meaning;
+    const ratio = this.plot.ctx.canvas.width / this.plot.width;
+    const [wide, high] = [this.plot.bbox.width / ratio, this.plot.bbox.height / ratio];
     this.shown.forEach((line, k) => {
       const [row, part] = place(line.run.shifted, time);
       const at = part > 0.5 ? row + 1 : row;
@@ -279,7 +290,6 @@ class Panel {
       const value = inside ? line.values[at] * factor : NaN;
       const x = this.plot.valToPos(line.xs[at], 'x');
       const y = this.plot.valToPos(value, 'y');
-      const [wide, high] = [this.plot.over.clientWidth, this.plot.over.clientHeight];
       const seen = Number.isFinite(value) && x >= 0 && x <= wide && y >= -2 && y <= high + 2;
       this.dots[k].style.display = seen ? '' : 'none';
       if (seen) this.dots[k].style.transform = `translate(${x}px, ${y}px)`;
@@ -288,7 +298,7 @@ class Panel {
     const lead = viewer.lead();
     const [row, part] = place(lead.shifted, time);
     const x = this.plot.valToPos(viewer.horizontal(lead)[part > 0.5 ? row + 1 : row], 'x');
-    this.pointer.style.display = x >= 0 && x <= this.plot.over.clientWidth ? '' : 'none';
+    this.pointer.style.display = x >= 0 && x <= wide ? '' : 'none';
     this.pointer.style.transform = `translateX(${x}px)`;
   }
 

@@ -19,6 +19,7 @@ function loadSide(folder, key) {
 
 // The runs of several files as those of one viewer; the first has the views.
 function together(parts) {
+  if (parts.length === 1) return parts[0];
   const data = {...parts[0], grounds: [], runs: [], signals: {}, metrics: [], marks: [], limits: []};
   const seen = new Set();
   for (const part of parts) {
@@ -52,12 +53,16 @@ function clearViewer(holder) {
   writeAddress(root.id, new URLSearchParams());
 }
 
-// Show the runs of side files in the viewer that a template holds, in place of the one before.
-async function showSides(holder, contents) {
-  const before = holder.querySelector('.yv');
-  const state = before?.viewer?.state;
+// The viewer without runs that a holder has for its side files.
+function frameOf(holder) { return holder.querySelector('template').content.firstElementChild; }
+
+// Show the runs of side files in the viewer that a template holds, in place of the one before, whose panels stay
+// unless the address asks for a picture (`asked`).
+async function showSides(holder, contents, asked = null) {
+  const state = asked ? null : holder.querySelector('.yv')?.viewer?.state;
   clearViewer(holder);
-  const root = holder.querySelector('template').content.firstElementChild.cloneNode(true);
+  const root = frameOf(holder).cloneNode(true);
+  if (asked) writeAddress(root.id, asked);
   holder.append(root);
   root.classList.add('yv-started');
   const data = together(contents.map((one) => one.data));

@@ -1,0 +1,46 @@
+// Links on one side, #KIND?id=KEY, and on the other what the side file KEY has: text, and runs in the viewer.
+
+function startChooser() {
+  const root = document.querySelector('.choosing');
+  if (!root) return;
+  const [chosen, details] = ['.chosen', '.details'].map((name) => root.querySelector(name));
+  const idOf = (hash) => hash.slice(1).split('&&').map((part) => new URLSearchParams(part.split('?')[1]).get('id')).find(Boolean);
+  const links = () => [...root.querySelectorAll('a[href^="#"]')];
+  let shown = null;
+  const show = async () => {
+    const asked = links().filter((link) => idOf(link.hash) === idOf(location.hash));
+    const key = asked.length ? idOf(location.hash) : (shown || root.dataset.first);
+    const current = asked.find((link) => link.hash === location.hash) || asked[0];
+    for (const link of links()) link.removeAttribute('aria-current');
+    (current || links().find((link) => idOf(link.hash) === key))?.setAttribute('aria-current', 'true');
+    const turned = shown !== null;
+    if (key && key !== shown) {
+      shown = key;
+      try {
+        const content = await loadSide(root.dataset.folder, key);
+        if (shown !== key) return;
+        details.innerHTML = content.html;
+        if (content.data) await showSides(chosen, [content], readAddress(frameOf(chosen).id)); else clearViewer(chosen);
+      } catch (error) {
+        details.textContent = `${error.message}: it belongs beside this page.`;
+        clearViewer(chosen);
+      }
+      root.dataset.shown = key;
+    }
+    const beside = chosen.getBoundingClientRect().left > root.firstElementChild.getBoundingClientRect().left + 10;
+    if (turned && asked.length && !beside) chosen.scrollIntoView();
+  };
+  root.querySelector('.matrix')?.addEventListener('keydown', (event) => {
+    const step = {ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowUp: [-1, 0], ArrowDown: [1, 0]}[event.key];
+    if (!step || !event.target.closest('td')) return;
+    const rows = [...event.currentTarget.tBodies[0].rows].map((row) => [...row.querySelectorAll('td.cell a')]);
+    const i = rows.findIndex((row) => row.includes(event.target));
+    const next = rows[i + step[0]]?.[rows[i].indexOf(event.target) + step[1]];
+    if (next) { event.preventDefault(); next.focus(); }
+  });
+  addEventListener('hashchange', show);
+  show();
+}
+
+if (document.readyState === 'loading') document.addEventListener('DOMContentLoaded', startChooser);
+else startChooser();

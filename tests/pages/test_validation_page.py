@@ -1,0 +1,185 @@
+"""Validations on pages: made-up tests of a car beside a run, in `yawbench validate --page` and in a study."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lxml import html
+
+import yawbench as yb
+from orchestrator.evaluation.validation import CrossPlot
+from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.experiment_result import judge_results
+from orchestrator.pages.evaluation_page import validation_page, validation_sentence
+from orchestrator.pages.report import chapter, study_page
+from tests.commands import status_of
+from tests.orchestrator.recorded import write as write_run
+from tests.orchestrator.test_validation import STUDY, line, write
+
+from .browser import DESK, PHONE, Browser
+from .flaws import flaws, inaccessible, open_all
+from .made_up import data_in, whole_car
+
+VIEWER = "const viewer = document.querySelector('.yv').viewer;"
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A run along a = 10 delta, and four noisy tests of a car, the last two to the right."""
+    folder = tmp_path_factory.mktemp("validation")
+    rng = np.random.default_rng(5)
+    files = []
+    for k in range(4):
+        a_y = np.linspace(1.0, 5.2, 400) * (1.0 if k < 2 else -1.0)
+        hand = 0.1 * a_y + 0.03 * np.sign(a_y) + rng.normal(0.0, 0.002, 400)
+        write(folder, f"test{k}", hand, a_y + rng.normal(0.0, 0.03, 400))
+        files.append(f"test{k}.csv")
+    described = (folder / "test0.yaml").read_text(encoding="utf-8")
+    measured = folder / "car.yaml"
+    measured.write_text(re.sub("files: .*", f"files: [{', '.join(files)}]", described), "utf-8")
+    run = yb.measured(line(folder, "run"), segment=1)
+    return folder, run, yb.validate(run, measured)
+
+
+@pytest.fixture(scope="module")
+def page(made) -> Path:
+    folder, _, validation = made
+    file = folder / "validation.html"
+    file.write_text(validation_page(validation), "utf-8")
+    return file
+
+
+def test_it_has_the_verdict_the_conditions_and_the_source_of_the_bands(made, page):
+    _, _, validation = made
+    tree = html.fromstring(page.read_text(encoding="utf-8"))
+    (verdict,) = validation.verdicts.values()
+    signals, conditions = tree.cssselect("main > table")
+    rows = [row.text_content() for row in signals.cssselect("tbody tr")]
+    assert len(rows) == len(validation.verdicts)
+    assert f"{verdict.value:.3g}" in rows[0] and verdict.status.value in rows[0]
+    assert len(conditions.cssselect("tbody tr")) == len(validation.conditions) == 2
+    assert [row.cssselect(".verdict.good") != [] for row in conditions.cssselect("tbody tr")] == [True, True]
+    text = tree.text_content()
+    assert validation.source in text and validation.origin in text
+    assert f"{verdict.value:.3g} of the tolerance" in tree.xpath("string(//p[@class='said'])")
+
+
+def test_a_distance_next_to_the_bound_never_reads_as_the_bound(made):
+    _, _, validation = made
+    (verdict,) = validation.verdicts.values()
+    near = replace(validation, verdicts={"steering_wheel_angle": replace(verdict, value=1.00004)})
+    assert "1.00004 of" in validation_sentence(near)
+
+
+def test_the_outline_of_a_band_is_at_one_tolerance_from_its_line():
+    x = np.linspace(-1.0, 3.0, 50)
+    wide, high = np.full(50, 0.2), 0.1 + 0.03 * np.abs(x)
+    (plot,) = [CrossPlot("roll_angle", x, x, np.zeros(50), wide, high, ())]
+    over, values = plot.outline
+    np.testing.assert_allclose(over, np.concatenate([x, x[::-1]]))
+    np.testing.assert_allclose(values, np.concatenate([high, -high[::-1]]))
+
+
+def test_the_page_carries_run_band_and_tests_to_the_side_of_the_run(made, page):
+    _, _, validation = made
+    data = data_in(page.read_text(encoding="utf-8"))
+    labels = [run["label"] for run in data["runs"]]
+    assert [labels[0], labels[-1]] == [validation.title, "tolerance"]
+    assert [label.endswith(", mirrored") for label in labels[1:-1]] == [False, False, True, True]
+    assert [run["band"] for run in data["runs"]] == 5 * [False] + [True]
+    assert [view["x"] for view in data["views"]] == ["plant.acceleration_y", "time"]
+    assert data["views"][1]["shown"] == [0, 1, 2, 3, 4]
+    assert {name for name, _, _ in data["limits"]} == {"steering_wheel_angle.distance"}
+
+
+def test_decoded_samples_equal_those_of_the_car(chromium: Browser, made, page):
+    _, _, validation = made
+    (plot,) = validation.plots
+    chromium.open(page)
+    chromium.wait_for("document.querySelector('.yv-ready')")
+    rng = np.random.default_rng(3)
+    names = {"plant.acceleration_y": "over", "plant.steering_wheel_angle": "values",
+             "steering_wheel_angle.distance": "distance"}  # fmt: skip
+    spans = chromium.run(
+        VIEWER + "return Object.fromEntries(arguments[0].map((name) => {"
+        " const all = viewer.runs.filter((run) => run.has(name)).flatMap((run) => [...run.column(name)]);"
+        " return [name, Math.max(...all) - Math.min(...all)]; }))",
+        [*names],
+    )
+    for _ in range(20):
+        k, (name, field) = int(rng.integers(4)), [*names.items()][int(rng.integers(3))]
+        row = int(rng.integers(plot.tests[k].over.size))
+        value = chromium.run(
+            VIEWER + "return viewer.runs[arguments[0]].column(arguments[1])[arguments[2]]", k + 1, name, row
+        )
+        wanted = getattr(plot.tests[k], field)[row]
+        assert abs(value - wanted) <= spans[name] / 131068 * (1 + 1e-9), name
+
+
+def test_the_band_is_filled_behind_the_points(chromium: Browser, page):
+    chromium.open(page)
+    chromium.wait_for("document.querySelector('.yv-ready')")
+    lines = VIEWER + "return viewer.panels[0].shown.map(({run}) => Boolean(run.band))"
+    assert chromium.run(lines) == [True] + 5 * [False]
+    filled = chromium.run(
+        VIEWER + "const {plot} = viewer.panels[0]; const {ctx} = plot;"
+        "const x = plot.valToPos(3, 'x', true); const y = plot.valToPos(3 * 18 / Math.PI + 4.5, 'y', true);"
+        "return [...ctx.getImageData(Math.round(x), Math.round(y), 1, 1).data];"
+    )
+    assert filled[:3] == [0xDC, 0xE9, 0xF5]
+    chromium.run(VIEWER + "viewer.state.x = 'time'; viewer.state.span = null; viewer.refresh();")
+    assert chromium.run(lines) == 5 * [False]  # a band has no times
+
+
+@pytest.mark.parametrize("width", [PHONE, DESK])
+def test_the_page_has_no_flaws_and_stays_within_its_budget(chromium: Browser, page, width):
+    chromium.open(page, width=width)
+    open_all(chromium)
+    assert flaws(chromium) == []
+    assert inaccessible(chromium) == []
+    assert chromium.run("return document.querySelectorAll('*').length") <= 2000
+    text = page.read_text(encoding="utf-8")
+    blocks = sum(map(len, re.findall(r'<script type="text/plain">(.*?)</script>', text)))
+    assert len(text.encode()) - blocks < 250_000
+
+
+def test_validate_writes_the_page_when_asked(made, tmp_path, capsys):
+    folder, run, _ = made
+    results = run.save(tmp_path / "results")
+    call = ("validate", results, "--measured", folder / "car.yaml", "--out", tmp_path / "out")
+    assert status_of(*call) == 0 and not (tmp_path / "out/validation.html").exists()
+    assert status_of(*call, "--page") == 0
+    assert "validation.html" in capsys.readouterr().err
+    assert "tolerance" in (tmp_path / "out/validation.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("width", [PHONE, DESK])
+def test_a_study_has_a_chapter_on_its_validations(chromium: Browser, tmp_path, width):
+    line(tmp_path, "near", up=0.05)
+    line(tmp_path, "far", up=0.5, tests=2)
+    (tmp_path / "wide.yaml").write_text(
+        "title: Wide\nsource: chosen\nbands: {acceleration_y: {offset: 0.1 m/s2, gain: 0}, "
+        "steer_angle: {offset: 0.5 deg, gain: 0}, steering_wheel_angle: {offset: 10 deg, gain: 0}}\n"
+    )
+    (tmp_path / "study.yaml").write_text(STUDY)
+    run = whole_car()
+    wheel = "driver.steering_wheel_angle"
+    run.columns[wheel], run.units[wheel] = 15.0 * run.columns["driver.steer_angle"], "rad"
+    write_run(run, tmp_path / "ramp")
+    findings = judge_results(load_experiment(tmp_path / "study.yaml"), tmp_path)
+    page = tmp_path / "report.html"
+    page.write_text(
+        study_page(chapter(findings, command="yawbench study", stale={}, folder=tmp_path)), "utf-8"
+    )
+    tree = html.fromstring(page.read_text(encoding="utf-8"))
+    assert len(tree.cssselect("#validations ~ h3")) == len(findings.validations) == 2
+    near, far = findings.validations
+    assert "2 tests of the car" in tree.text_content()
+    assert {near.source, far.source} == {"chosen", near.source}
+    chromium.open(page, width=width)
+    assert flaws(chromium) == []
+    assert inaccessible(chromium) == []
