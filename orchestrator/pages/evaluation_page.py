@@ -28,10 +28,10 @@ from ..experiments.verdict_tables import (
     runs_table,
     validation_table,
 )
-from ..figures.style import LabelledRun, digits_apart, digits_of, shown
+from ..figures.style import LabelledRun, digits_apart, shown
 from ..messages import counted, listed
 from ..metrics.measures import words
-from ..metrics.verdict import SYMBOLS, Status, Verdict, worst
+from ..metrics.verdict import SYMBOLS, Status, Verdict, apart, worst
 from ..results.measurement_results import MeasuredResults
 from ..results.reader import Results, load_results
 from ..results.run_record import RunRecord
@@ -178,13 +178,13 @@ def validation_sentence(validation: Validation) -> str:
     if not judged:
         return "No signal could be judged."
     largest = max(float(verdict.value or 0.0) for verdict in judged)
-    digits = digits_apart([(largest, 1.0)], "1")
     sides = {
         side: [words(name).lower() for name, verdict in validation.verdicts.items() if verdict.holds is holds]
         for side, holds in (("within", True), ("outside", False))
     }
     parts = [f"{side} the band: {listed(names, last='and')}" for side, names in sides.items() if names]
-    text = f"{'; '.join(parts)}. The furthest point lies at {digits_of(largest, digits)} of the tolerance."
+    furthest = f"The furthest point lies at {apart(largest, 1.0, decimals=2)} of the tolerance."
+    text = f"{'; '.join(parts)}. {furthest}"
     return f"{text[:1].upper()}{text[1:]}"
 
 

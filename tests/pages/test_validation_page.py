@@ -14,6 +14,7 @@ import yawbench as yb
 from orchestrator.evaluation.validation import CrossPlot
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.experiment_result import judge_results
+from orchestrator.metrics.verdict import apart
 from orchestrator.pages.evaluation_page import validation_page, validation_sentence
 from orchestrator.pages.report import chapter, study_page
 from tests.commands import status_of
@@ -36,8 +37,8 @@ def made(tmp_path_factory):
     for k in range(4):
         a_y = np.linspace(1.0, 5.2, 400) * (1.0 if k < 2 else -1.0)
         hand = 0.1 * a_y + 0.03 * np.sign(a_y) + rng.normal(0.0, 0.002, 400)
-        write(folder, f"test{k}", hand, a_y + rng.normal(0.0, 0.03, 400))
-        files.append(f"test{k}.csv")
+        write(folder, f"test{k}", hand, a_y + rng.normal(0.0, 0.03, 400), tests=1)
+        files.append(f"test{k}_0.csv")
     described = (folder / "test0.yaml").read_text(encoding="utf-8")
     measured = folder / "car.yaml"
     measured.write_text(re.sub("files: .*", f"files: [{', '.join(files)}]", described), "utf-8")
@@ -60,12 +61,13 @@ def test_it_has_the_verdict_the_conditions_and_the_source_of_the_bands(made, pag
     signals, conditions = tree.cssselect("main > table")
     rows = [row.text_content() for row in signals.cssselect("tbody tr")]
     assert len(rows) == len(validation.verdicts)
-    assert f"{verdict.value:.3g}" in rows[0] and verdict.status.value in rows[0]
+    distance = apart(verdict.value, 1.0, decimals=2)
+    assert distance in rows[0] and verdict.status.value in rows[0]
     assert len(conditions.cssselect("tbody tr")) == len(validation.conditions) == 2
     assert [row.cssselect(".verdict.good") != [] for row in conditions.cssselect("tbody tr")] == [True, True]
     text = tree.text_content()
     assert validation.source in text and validation.origin in text
-    assert f"{verdict.value:.3g} of the tolerance" in tree.xpath("string(//p[@class='said'])")
+    assert f"{distance} of the tolerance" in tree.xpath("string(//p[@class='said'])")
 
 
 def test_a_distance_next_to_the_bound_never_reads_as_the_bound(made):
