@@ -332,8 +332,8 @@ def conditions_table(validation: Validation) -> Table:
         assert verdict.value is not None and verdict.bound is not None and verdict.relation
         ends = (verdict.value, verdict.bound)
         value, bound = (f"{x:g}" if verdict.unit == "1" else shown(x, verdict.unit) for x in ends)
-        asked = f"{SYMBOLS[verdict.relation]} {bound}"
-        table.rows.append([name, verdict.status.value, value, asked])
+        limit = f"{SYMBOLS[verdict.relation]} {bound}"
+        table.rows.append([name, verdict.status.value, value, limit])
     return table
 
 
