@@ -267,4 +267,4 @@ def _make_printable() -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -250,7 +250,7 @@ def beyond_stepping(path: Path) -> float:
             metrics = {"yaw_rate": {"metric": "peak(yaw_rate)"}}
             sweep.write_text(json.dumps({**keys, "axes": {"friction": axis}, "metrics": metrics}))
             out = Path(folder, str(runs))
-            return spent("-m", "orchestrator.cli", "sweep", sweep, "--fresh", "--out", out, "--jobs", 1)
+            return spent("-m", "yawbench", "sweep", sweep, "--fresh", "--out", out, "--jobs", 1)
 
         few, many = (min(cost(runs) for _ in range(REPEATS)) for runs in RUNS)
     plan = make_plan(load_scenario(path))
@@ -319,12 +319,12 @@ def ratios(path: Path, *, long: bool) -> None:
         line(f"a step over one of {title}, native units, one core", share, "0.5 of the better")
     line("`import yawbench` over a bare loop of 1e7 additions", ratio(importing, bare), "0.3")
     with tempfile.TemporaryDirectory() as folder:
-        run = ratio(lambda: spent("-m", "orchestrator.cli", "run", path, "--out", folder), bare)
+        run = ratio(lambda: spent("-m", "yawbench", "run", path, "--out", folder), bare)
     line("`yawbench run` over a bare loop of 1e7 additions", run, "1.2")
     line("processor time of a run in a sweep beyond stepping [s]", beyond_stepping(path), "0.03")
     line("steps per second of the environment yawbench/sine-with-dwell-v0", episode_steps(), "")
     if long:
-        command = "-m", "orchestrator.cli"
+        command = "-m", "yawbench"
         with tempfile.TemporaryDirectory() as folder:
             built = took(*command, "build", "--out", folder, YAWBENCH_CACHE=f"{folder}/cache")
             line("first build of all FMUs [s]", built, "180")
@@ -338,7 +338,7 @@ def ratios(path: Path, *, long: bool) -> None:
 def process(path: Path) -> float:
     """Return the time [s] of a whole `yawbench run`."""
     with tempfile.TemporaryDirectory() as folder:
-        return min(took("-m", "orchestrator.cli", "run", path, "--out", folder) for _ in range(REPEATS))
+        return min(took("-m", "yawbench", "run", path, "--out", folder) for _ in range(REPEATS))
 
 
 def main(arguments: Sequence[str]) -> None:

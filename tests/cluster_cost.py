@@ -79,7 +79,7 @@ def main() -> None:
         with distributed.Client(scheduler_file=str(cluster), set_as_default=False) as client:
             client.wait_for_workers(WORKERS)
             address = client.scheduler.address
-        command = [sys.executable, "-m", "orchestrator.cli", "sweep", str(file), "--out", str(out)]
+        command = [sys.executable, "-m", "yawbench", "sweep", str(file), "--out", str(out)]
         planning, idle = perf_counter(), processor_time(scheduler)
         with subprocess.Popen([*command, "--scheduler", address], stderr=subprocess.DEVNULL) as running:
             everyone = psutil.Process(running.pid), scheduler, *workers
