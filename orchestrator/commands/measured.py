@@ -40,7 +40,7 @@ SETS = "sets"
 
 
 def measured(action: MeasuredAction, file: MeasurementFile, out: FigureFile = None) -> None:
-    """Examine a recording: signals, flaws, which parameters a fit can identify.
+    """Examine a recording: signals, flaws, what a fit can find.
 
     Flaws are spikes, times that are uneven, repeated or restart, and signals that contradict the motion of a
     rigid car: wrong signs, mistaken units, lag, position and zero points of sensors, a speed that does not
