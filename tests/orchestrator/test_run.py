@@ -412,7 +412,8 @@ def repeat_runs(scenario, fmus, out):
 
 @pytest.mark.exhaustive
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-def test_300_runs_in_one_process_neither_leak_nor_take_more_work(fmus, tmp_path):
+def test_300_runs_in_one_process_neither_leak_nor_take_more_work(fmus, tmp_path, monkeypatch):
+    monkeypatch.setenv("YAWBENCH_UNITS", "python")
     scenario = car(tmp_path, stop=0.004)
     slave = open_instance(make_plan(load_scenario(scenario), fmus=fmus).instances[0], log.Log(), set())
     alive = live_components()
