@@ -369,6 +369,7 @@ def test_the_four_papers_are_found_in_their_order_and_what_goes_beyond_them_afte
         "fuzzy_feedback/study.yaml",
         "real_signals/latency.yaml",
         "real_signals/closed_loop.yaml",
+        "real_signals/blind_estimators.yaml",
         "real_signals/faults.yaml",
         "real_signals/degradation.yaml",
     ]
