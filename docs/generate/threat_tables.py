@@ -6,7 +6,7 @@ import textwrap
 from dataclasses import replace
 from pathlib import Path
 
-from orchestrator.experiments.ranking_tables import gains_sentence, gains_table
+from orchestrator.experiments.ranking_tables import gains_sentence, gains_table, seeds_table
 from orchestrator.experiments.tables import Table
 from orchestrator.experiments.threat_runs import ThreatResult, published_result
 from orchestrator.experiments.threat_scores import compared_gains, scored
@@ -32,7 +32,7 @@ def tables_text(result: ThreatResult) -> str:
         "### The threats",
         _text(threats_page.threats_table(result)),
         "### Orders without a threat or a car",
-        _text(threats_page.orders_table(result, order)),
+        _text(threats_page.orders_table(result, scores)),
     ]
     gains = compared_gains(result)
     if gains:
@@ -40,13 +40,14 @@ def tables_text(result: ThreatResult) -> str:
             "### Gains and laws",
             _wrapped(gains_sentence(gains)),
             _text(gains_table(result, gains)),
+            _text(seeds_table(result, gains)),
         ]
-    others = [name for name in threats.spec.settings if threats_page.is_compared(result, name)]
+    others = threats_page.compared_settings(result)
     if others:
         parts += ["### What settings change", _text(threats_page.settings_table(result, others))]
-    for name, spec in threats.spec.settings.items():
-        if threats_page.is_compared(result, name):
-            parts += [f"### Setting: {spec.title}", _text(threats_page.setting_table(result, name))]
+    for name in others:
+        title = threats.spec.settings[name].title
+        parts += [f"### Setting: {title}", _text(threats_page.setting_table(result, name))]
     driven = [threats_page.discipline_table(result, test) for test in threats_page.disciplines(result)]
     for table in (threats_page.overview(result, scores), *driven):
         parts += [f"### {table.title}", _text(table)]

@@ -31,6 +31,8 @@ COLOURS = {
 }
 """Colours of cells, which their text also tells apart."""
 TUNED = {"authors": ("o", "#0072B2"), "tuned": ("D", "#D55E00")}
+FIRST_SEED = "1"
+"""Seed of the tuned entries of a ranking itself."""
 ROW = 0.235
 """Height of a row of the matrix [inch]."""
 
@@ -362,9 +364,10 @@ def gains_table(result: ThreatResult, compared: ComparedGains) -> Table:
     headings = ["standard deviation of the mean level, % of a range"]
     for title in compared.groups:
         headings += [title, "95 % interval"]
-    searched = threats.threats_in(compared.setting), threats.cars_in(compared.setting)
+    seeds = 1 + len(threats.spec.settings[compared.setting].seeds)
+    searched = threats.threats_in(compared.setting), threats.cars_in(compared.setting), seeds
     notes = [
-        f"Threats: {', '.join(searched[0])}; cars: {', '.join(searched[1])}; {compared.seeds} seeds of the "
+        f"Threats: {', '.join(searched[0])}; cars: {', '.join(searched[1])}; {searched[2]} seeds of the "
         "search. Intervals of a bootstrap over laws, threats and cars, in blocks; that of the ratio by the F "
         "distribution, for laws and seeds as samples of normal distributions on these threats and cars. The "
         "first two are components of variance."
@@ -394,3 +397,15 @@ def _gains_of_group(title: str, gains: GainsAndLaws) -> str:
         luck = "less than by luck"
     times = f"{ratio.value:.1f} times ({ratio.bounds.low:.1f} to {ratio.bounds.high:.1f})"
     return f"Among {title}, {verdict}; tuned alike, laws vary {times} as much as seeds of the search, {luck}."
+
+
+def seeds_table(result: ThreatResult, compared: ComparedGains) -> Table:
+    """Return the table of mean levels of each law with the gains of its study and of every seed."""
+    threats = result.threats
+    seeds = [FIRST_SEED, *threats.spec.settings[compared.setting].seeds]
+    headings = ["mean level, % of a range", "study", *(f"seed {seed}" for seed in seeds)]
+    rows = [
+        [threats.ranking.entries[law][0].title, *(f"{100 * mean:.1f}" for mean in means)]
+        for law, means in compared.means.items()
+    ]
+    return Table("", headings, [*rows], numbers={*range(1, len(headings))})

@@ -20,7 +20,7 @@ Mean ranks are a second order, which knows nothing of distances.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -81,6 +81,7 @@ class ThreatScore:
     mean: float  # position
     mean_rank: float
     by_rank: int  # place by the mean rank
+    best: float  # share of the draws in which it has the best score
 
 
 @dataclass(frozen=True)
@@ -95,6 +96,10 @@ class ScoreTable:
     def order(self) -> list[str]:
         """Return the entries, the best first."""
         return [score.entry for score in self.scores]
+
+    def by_entry(self) -> dict[str, float]:
+        """Return entry -> score, the best first."""
+        return {score.entry: score.score for score in self.scores}
 
 
 def score_table(
@@ -118,6 +123,7 @@ def score_table(
     low, high = percentile_bounds(resampled)
     order = order_of(scores)
     places = np.maximum.accumulate([1 + int((low > high[i]).sum()) for i in order])
+    leaders = np.bincount(resampled.argmax(axis=1), minlength=len(entries)) / len(resampled)
     by_rank = {i: place for place, i in enumerate(order_of(-ranks), start=1)}
     means = mean_positions(positions)
     pairs = [(i, k) for i in range(len(entries)) for k in range(i)]
@@ -129,21 +135,12 @@ def score_table(
         [
             ThreatScore(
                 entries[i], float(scores[i]), Bounds(float(low[i]), float(high[i])), int(place),
-                float(means[i]), float(ranks[i]), by_rank[i],
+                float(means[i]), float(ranks[i]), by_rank[i], float(leaders[i]),
             )
             for i, place in zip(order, places, strict=True)
         ],
         groups_of(list(zip(low, high, strict=True))), len(pairs), apart,
     )  # fmt: skip
-
-
-def rank_correlation(table: ScoreTable, other: ScoreTable, reference: str) -> float:
-    """Return Spearman's rank correlation of the scores of entries in both tables; NaN for less than 3."""
-    first, second = ({row.entry: row.score for row in scores.scores} for scores in (table, other))
-    both = [entry for entry in first if entry in second and entry != reference]
-    scores = [first[entry] for entry in both], [second[entry] for entry in both]
-    correlation = claim_schema.rank_correlation(*scores) if len(both) > 2 else None
-    return math.nan if correlation is None else correlation
 
 
 def table_of_scores(table: ScoreTable) -> Table:
@@ -155,6 +152,7 @@ def table_of_scores(table: ScoreTable) -> Table:
         "high": [row.bounds.high for row in rows],
         "mean_position": [row.mean for row in rows],
         "mean_rank": [row.mean_rank for row in rows],
+        "best_in_draws": [row.best for row in rows],
     }
     return Table.of_columns(
         [
@@ -174,40 +172,57 @@ def groups_of(bounds: Sequence[tuple[float, float]]) -> int:
     return number
 
 
-def orders_without(
+def scores_without(
     entries: Sequence[str], positions: np.ndarray, reference: str
-) -> dict[tuple[str, int], list[str]]:
-    """Return the order without each threat and each car: ("threat" or "car", its index) -> entries."""
+) -> dict[tuple[str, int], dict[str, float]]:
+    """Return the scores without each threat and each car.
+
+    Returns:
+        ("threat" or "car", its index) -> entry -> score, the best first.
+    """
     none = entries.index(reference)
-    orders = {}
+    scores = {}
     for axis, word in ((1, "threat"), (2, "car")):
         for k in range(positions.shape[axis]) if positions.shape[axis] > 1 else ():
             left = np.delete(positions, k, axis=axis)
             if np.isnan(left[0]).all(axis=1).any():  # a threat that no other car drives
                 left = left[:, ~np.isnan(left[0]).all(axis=1)]
-            orders[word, k] = [entries[i] for i in order_of(scores_of_positions(left, none))]
-    return orders
+            numbers = scores_of_positions(left, none)
+            scores[word, k] = {entries[i]: float(numbers[i]) for i in order_of(numbers)}
+    return scores
 
 
 class Moves(NamedTuple):
     """How an order differs from another one of the same entries."""
 
-    correlation: float  # Spearman's, of the places; without control, which is last in both
-    moved: int  # entries whose place changes
-    farthest: str  # the entry that moves farthest
+    correlation: float  # Spearman's, of the entries with control; NaN for fewer than three, or equal ones
+    moved: int  # of them, those whose place changes
+    farthest: str  # that which moves farthest
     before: int  # its place
     after: int
 
 
-def moves_between(before: Sequence[str], after: Sequence[str], reference: str) -> Moves:
-    """Compare two orders of the same entries; `reference`: the entry without control."""
-    places = {entry: (before.index(entry) + 1, after.index(entry) + 1) for entry in before}
-    farthest = max(before, key=lambda entry: abs(places[entry][1] - places[entry][0]))
-    of_laws = [place for entry, place in places.items() if entry != reference]
+def moves_between(before: Mapping[str, float], after: Mapping[str, float], reference: str) -> Moves:
+    """Compare the orders of the entries in both by their scores; equal scores share a place.
+
+    Args:
+        before, after: entry -> score.
+        reference: the entry without control.
+    """
+    both = [entry for entry in before if entry in after]
+    places = {
+        entry: tuple(
+            1 + sum(round(scores[other] - scores[entry], 9) > 0.0 for other in both)
+            for scores in (before, after)
+        )
+        for entry in both
+    }
+    of_laws = [places[entry] for entry in both if entry != reference]
+    farthest = max(both, key=lambda e: abs(places[e][1] - places[e][0]) if e != reference else -1)
     correlation = claim_schema.rank_correlation(*zip(*of_laws, strict=True)) if len(of_laws) > 2 else None
     return Moves(
         math.nan if correlation is None else correlation,
-        sum(old != new for old, new in places.values()),
+        sum(old != new for old, new in of_laws),
         farthest,
         *places[farthest],
     )
@@ -337,12 +352,12 @@ class ComparedGains:
 
     Attributes:
         setting: its name.
-        seeds: how many of each law.
+        means: law, by its entry with the studies' gains -> mean position with these, and with each seed.
         groups: title of a group of laws -> spreads; all laws first.
     """
 
     setting: str
-    seeds: int
+    means: dict[str, list[float]]
     groups: dict[str, GainsAndLaws]
 
 
@@ -364,12 +379,18 @@ def compared_gains(result: ThreatResult) -> ComparedGains | None:
     }
     laws = {name: others for name, others in tuned.items() if len(others) == 1 + len(spec.seeds)}
     groups = {f"all {len(laws)} laws": [*laws], **spec.groups}
+    tuned_positions = {name: result.positions(setting, others) for name, others in laws.items()}
+    studies = {name: result.positions(threats.main, [name], like=setting) for name in laws}
     compared = {
         title: gains_and_laws(
-            np.array([result.positions(setting, laws[name]) for name in names]),
-            result.positions(threats.main, names, like=setting),
+            np.array([tuned_positions[name] for name in names]),
+            np.concatenate([studies[name] for name in names]),
         )
         for title, names in groups.items()
         if len(names) >= FEWEST and {*names} <= {*laws}
     }
-    return ComparedGains(setting, 1 + len(spec.seeds), compared) if compared else None
+    means = {
+        name: [float(x) for x in mean_positions(np.concatenate([studies[name], tuned_positions[name]]))]
+        for name in laws
+    }
+    return ComparedGains(setting, means, compared) if compared else None

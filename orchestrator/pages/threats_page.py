@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..experiments.confidence import Bounds
-from ..experiments.ranking_tables import gains_sentence, gains_table
+from ..experiments.ranking_tables import gains_sentence, gains_table, seeds_table
 from ..experiments.tables import Table
 from ..experiments.threat_runs import ThreatResult
 from ..experiments.threat_scores import (
@@ -20,10 +20,9 @@ from ..experiments.threat_scores import (
     compared_gains,
     compared_setting,
     moves_between,
-    orders_without,
-    rank_correlation,
     score_table,
     scored,
+    scores_without,
 )
 from ..experiments.threats import LANE_CHANGE, REFERENCE, LoadedThreats, SearchPlace, ThreatSpec
 from ..figures.style import digits_of, shown_unit
@@ -33,9 +32,9 @@ from .report import PAGE, RANKING
 
 RULE = (
     "Score: the geometric mean of the highest levels survived, over threats and cars, each threat's range "
-    "taken as one unit; no control has 0, the best 100. Interval: 95 %, threats and cars drawn in blocks. "
-    "Place: one more than the entries whose whole interval lies above, never better than that of a higher "
-    "score. Order by rank: by the mean rank."
+    "taken as one unit; no control has 0, the best 100. Interval: 95 %, threats and cars drawn in blocks; "
+    "best: draws in which it has the best score. Place: one more than the entries whose whole interval lies "
+    "above, never better than that of a higher score. Order by rank: by the mean rank."
 )
 GROUPS = 8
 """Intervals that lie apart, from which on scores are said to tell entries apart; chosen."""
@@ -58,21 +57,22 @@ def main_table(result: ThreatResult, table: ScoreTable) -> Table:
     rows = [
         [
             str(score.place), titles[score.entry] + (" (published)" if score.entry in published else ""),
-            f"{score.score:.1f}", interval_text(score.bounds), f"{score.mean_rank:.1f}", str(score.by_rank),
+            f"{score.score:.1f}", interval_text(score.bounds), f"{100 * score.best:.0f}",
+            f"{score.mean_rank:.1f}", str(score.by_rank),
         ]
         for score in table.scores
     ]  # fmt: skip
     return Table(
         f"Scores: {result.threats.spec.settings[result.threats.main].title}",
-        ["place", "controller", "score", "95 % interval", "mean rank", "order by rank"],
-        [*rows], [RULE, _other_order(titles, table), told_apart(table)], {0, 2, 4, 5},
+        ["place", "controller", "score", "95 % interval", "best [% of draws]", "mean rank", "order by rank"],
+        [*rows], [RULE, _other_order(titles, table), told_apart(table)], {0, 2, 4, 5, 6},
     )  # fmt: skip
 
 
 def _other_order(titles: Mapping[str, str], table: ScoreTable) -> str:
     """Describe how far the order by the mean rank differs from that by the score."""
-    by_rank = [score.entry for score in sorted(table.scores, key=lambda score: score.by_rank)]
-    moves = moves_between(table.order(), by_rank, REFERENCE)
+    by_rank = {score.entry: -score.mean_rank for score in table.scores}
+    moves = moves_between(table.by_entry(), by_rank, REFERENCE)
     return (
         f"The order by the mean rank differs for {counted(moves.moved, 'entry', 'entries')}"
         f"{f', most for {_moved(titles, moves)}' if moves.moved else ''} (Spearman's rank correlation "
@@ -144,11 +144,13 @@ def levels_table(result: ThreatResult, entries: Sequence[str]) -> Table:
             levels = _of_threat(result, threats.main, name, entry)
             ends = {level.end for level in levels}
             mean = sum(level.position for level in levels) / len(levels)
-            row.append(level_text(spec, mean, ends.pop() if len(ends) == 1 else ""))
+            row.append(
+                "fails" if ends == {"easy"} else level_text(spec, mean, "hard" if ends == {"hard"} else "")
+            )
         table.rows.append(row)
     table.notes.append(
-        "Geometric means over cars of the highest level survived. Fails at: on every car at the easy end of "
-        "the range, which then counts. ≥, ≤: survived to the hard end on every car."
+        "Geometric means over cars of the highest level survived. Fails: on every car at the easy end of the "
+        "range, which then counts. ≥, ≤: survived to the hard end on every car."
     )
     return table
 
@@ -195,22 +197,22 @@ def threats_table(result: ThreatResult) -> Table:
     return table
 
 
-def orders_table(result: ThreatResult, entries: Sequence[str]) -> Table:
+def orders_table(result: ThreatResult, table: ScoreTable) -> Table:
     """Return the orders without each threat and each car."""
     threats, titles = result.threats, titles_of(result)
     names = {"threat": threats.threats_in(threats.main), "car": threats.cars_in(threats.main)}
     headings = ["without", "first", "rank correlation", "entries that move", "farthest move", "order"]
-    table = Table("", headings, numbers={2, 3})
-    entries_of_main = result.complete[threats.main]
-    for (word, k), order in orders_without(
-        entries_of_main, result.positions(threats.main, entries_of_main), REFERENCE
-    ).items():
-        moves = moves_between(entries, order, REFERENCE)
-        table.rows.append([
-            f"{word} {names[word][k]}", titles[order[0]], f"{moves.correlation:.2f}", str(moves.moved),
-            _moved(titles, moves), " > ".join(titles[entry] for entry in order),
+    orders = Table("", headings, numbers={2, 3})
+    entries = result.complete[threats.main]
+    without = scores_without(entries, result.positions(threats.main, entries), REFERENCE)
+    for (word, k), scores in without.items():
+        moves = moves_between(table.by_entry(), scores, REFERENCE)
+        order = [titles[entry] for entry in scores]
+        orders.rows.append([
+            f"{word} {names[word][k]}", order[0], f"{moves.correlation:.2f}", str(moves.moved),
+            _moved(titles, moves), " > ".join(order),
         ])  # fmt: skip
-    return table
+    return orders
 
 
 def settings_table(result: ThreatResult, settings: Sequence[str]) -> Table:
@@ -223,20 +225,21 @@ def settings_table(result: ThreatResult, settings: Sequence[str]) -> Table:
     table = Table("", headings, numbers={3, 4, 5, 6})
     for setting in settings:
         compared = compared_setting(result, setting)
-        if compared.main is None or threats.spec.settings[setting].seeds:  # the same levels, and more entries
+        if compared.main is None:
             continue
-        before, moved = compared.main.order(), round(100 * compared.moved, 1) + 0.0  # no -0.0
-        after = [entry for entry in compared.table.order() if entry in before]
+        moved = round(100 * compared.moved, 1) + 0.0  # no -0.0
+        before, after = compared.main.by_entry(), compared.table.by_entry()
         moves = moves_between(before, after, REFERENCE)
         table.rows.append([
             threats.spec.settings[setting].title, ", ".join(threats.threats_in(setting)),
             ", ".join(threats.cars_in(setting)), str(len(before)), f"{moved:+.1f}",
             f"{moves.correlation:.2f}", str(moves.moved), _moved(titles, moves),
-            titles[after[0]], titles[before[0]],
+            titles[next(iter(after))], titles[next(iter(before))],
         ])  # fmt: skip
     table.notes.append(
         "Each setting against the main one on the same threats, cars and entries. Levels move: mean "
-        "difference; above 0, more is survived. Rank correlation: Spearman's, without no control."
+        "difference; above 0, more is survived. Rank correlation: Spearman's, without no control; "
+        "equal scores share a place."
     )
     return table
 
@@ -378,18 +381,24 @@ def overview(result: ThreatResult, table: ScoreTable) -> Table:
         "intervals overlap. No control has 0, the best 100; below 0 is worse than no control."
     ]
     if driven:
-        agreements = (f"{d.title} {rank_correlation(table, d.scores, REFERENCE):.2f}" for d in driven)
+        agreements = (
+            f"{d.title} {moves_between(table.by_entry(), d.scores.by_entry(), REFERENCE).correlation:.2f}"
+            for d in driven
+        )
         notes.append(f"Rank correlation with the order by threats (Spearman): {', '.join(agreements)}.")
     headings = ["controller", "matrix", *(title for title, _ in columns)]
     return Table("All disciplines", headings, [*rows], notes, {*range(1, len(headings))})
 
 
-def is_compared(result: ThreatResult, setting: str) -> bool:
-    """Return whether a setting with all levels is compared with the main one, not a discipline."""
+def compared_settings(result: ThreatResult) -> list[str]:
+    """Return the settings with all levels that are compared with main: no disciplines, no further seeds."""
     threats = result.threats
-    return bool(
-        setting != threats.main and result.complete[setting] and not _of_lane_changes(threats, setting)
-    )
+    return [
+        name
+        for name, spec in threats.spec.settings.items()
+        if name != threats.main and result.complete[name] and not spec.seeds
+        and not _of_lane_changes(threats, name)
+    ]  # fmt: skip
 
 
 def _of_lane_changes(threats: LoadedThreats, setting: str) -> bool:
@@ -408,7 +417,7 @@ def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command:
     threats = result.threats
     order = table.order()
     gains = compared_gains(result)
-    others = [name for name in threats.spec.settings if is_compared(result, name)]
+    others = compared_settings(result)
     matrix = folder.parent / RANKING.parent.name / PAGE
     page: str = render(
         "threats.html.j2",
@@ -421,10 +430,10 @@ def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command:
         published=_published(result, order),
         main=main_table(result, table),
         levels=levels_table(result, order),
-        orders=orders_table(result, order),
+        orders=orders_table(result, table),
         moves=settings_table(result, others),
         settings=[setting_table(result, name) for name in others],
-        gains=gains_table(result, gains) if gains else None,
+        gains=[gains_table(result, gains), seeds_table(result, gains)] if gains else [],
         sentence=gains_sentence(gains) if gains else "",
         overview=overview(result, table),
         disciplines=[discipline_table(result, discipline) for discipline in disciplines(result)],

@@ -11,7 +11,7 @@ from docs.generate.threat_tables import FILE
 from orchestrator.experiments.threat_runs import published_result
 from orchestrator.experiments.threat_scores import scored
 from orchestrator.experiments.threats import load_threats
-from orchestrator.pages.threats_page import threats_page
+from orchestrator.pages.threats_page import compared_settings, threats_page
 
 from .browser import DESK, Browser
 from .flaws import inaccessible, open_all
@@ -46,7 +46,9 @@ def test_it_keeps_its_budget_and_can_be_read_by_everyone(chromium: Browser, page
 def test_every_level_is_on_the_page_and_counts_are_those_of_its_tables(published, page):
     tree = html.fromstring(page.read_text(encoding="utf-8"))
     entries = published.complete[published.threats.main]
-    folded = tree.xpath("//details/template/table")
+    settings = tree.xpath("//h2[@id='settings']/following-sibling::details[following::h2[@id='cars']]")
+    assert len(settings) == len(compared_settings(published)) > 0
+    folded = tree.xpath("//h2[@id='cars']/following-sibling::details/template/table")
     assert len(folded) == len(published.threats.threats_in(published.threats.main))
     assert all(len(table.xpath("tbody/tr")) == len(entries) for table in folded)
     scores = scored(published)
