@@ -1,4 +1,4 @@
-"""The table of blind tests in docs/estimators.md: `python -m docs.generate.blind_tables`.
+"""The table of tests with wrong parameters in docs/estimators.md: `python -m docs.generate.blind_tables`.
 
 It comes from scenarios/real_signals/blind_runs.csv, every run of
 `yawbench sweep real_signals/blind_estimators`, which `--runs TABLE` takes from the sweep's table.csv.
@@ -78,14 +78,33 @@ def _with_bounds(errors: np.ndarray, sign: str = "") -> str:
     return f"{errors.mean():{sign}.2f}° ({low:{sign}.2f} to {high:{sign}.2f})"
 
 
-def worst_sentence(metrics: Mapping[str, Errors]) -> str:
-    """Return which error does most harm to each estimator."""
-    parts = []
+def worst_sentences(metrics: Mapping[str, Errors]) -> str:
+    """Return which error does most harm to each estimator, and which are not separable from it."""
+    sentences = []
     for name in ESTIMATORS:
-        more = {error: table.mean() for error, table in added(metrics[name]).items()}
-        worst = max(more, key=lambda error: more[error])
-        parts.append(f"{name}: {worst} ({more[worst]:+.2f}° rms)")
-    return f"What harms most: {'; '.join(parts)}."
+        more = added(metrics[name])
+        worst, *others = sorted(more, key=lambda error: -more[error].mean())
+        sentence = f"{name.capitalize()}: a {worst} adds {_with_bounds(more[worst])} to the rms"
+        differences = {error: more[worst] - more[error] for error in others}
+        near = [error for error in others if mean_bounds(differences[error]).low <= 0.0]
+        if near:
+            listed = ", ".join(f"{error} by {_with_bounds(differences[error], '+')}" for error in near)
+            sentences.append(f"{sentence}, not separable from the next (paired: worse than {listed}).")
+        else:
+            listed = f"{_with_bounds(differences[others[0]], '+')} more than {others[0]}"
+            sentences.append(f"{sentence}, more than any other (paired: {listed}).")
+    return " ".join(sentences)
+
+
+def parameters_sentence(metrics: Mapping[str, Errors]) -> str:
+    """Return what a wrong stiffness or mass adds to the observer's error at most."""
+    more = {error: table for error, table in added(metrics["observer"]).items() if "bank" not in error}
+    worst = max(more, key=lambda error: more[error].mean())
+    largest = max(table.max() for table in more.values())
+    return (
+        f"A wrong stiffness or mass adds at most {_with_bounds(more[worst])} to the observer's mean rms "
+        f"({worst}), {largest:.2f}° in the worst run."
+    )
 
 
 def pages_with_tables() -> dict[Path, str]:
@@ -97,7 +116,11 @@ def pages_with_tables() -> dict[Path, str]:
         "of the noise, with 95 % intervals of a bootstrap that draws manoeuvres and seeds, in blocks; with "
         "so few manoeuvres they say little about others. Worst second: the largest rms over a second."
     )
-    text = "\n\n".join([worst_sentence(metrics), table_text(metrics), wrapped(note)])
+    first = (
+        f"Over these {manoeuvres} manoeuvres a bank that is not measured harms most. "
+        f"{worst_sentences(metrics)} {parameters_sentence(metrics)}"
+    )
+    text = "\n\n".join([wrapped(first), table_text(metrics), wrapped(note)])
     return {PAGE: replaced(PAGE.read_text(encoding="utf-8"), "blind tests", text)}
 
 
