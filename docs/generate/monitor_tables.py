@@ -69,6 +69,8 @@ BESIDE = {
     "brake": "one wheel not braked",
 }  # fmt: skip
 """Runs of the study without a fault of a sensor."""
+SPIN = 45.0
+"""Sideslip angle beyond which a car spins [deg]; as of the warning `car-spins`."""
 OFF = {"B": "off/lane_change_80kmh", "C": "off/double_lane_change"}
 
 
@@ -187,7 +189,7 @@ def blind_table(results: dict[str, Outcome]) -> str:
     """Return the table of the faults that no run or only some runs find, kinds by sizes."""
     lines = [
         "| fault | "
-        + " | ".join(f"{word}, {m}" for m in MONITORS.values() for word in ("never found", "in some")),
+        + " | ".join(f"{word}, {m}" for m in MONITORS.values() for word in ("in no run", "in some runs")),
         "|---|" + "---|---|" * len(MONITORS),
     ]
     lines[0] += " |"
@@ -209,19 +211,48 @@ def blind_table(results: dict[str, Outcome]) -> str:
     return "\n".join(lines)
 
 
+def blame_table(results: dict[str, Outcome]) -> str:
+    """Return the table of the faults of which some run blames a wrong signal or cannot tell."""
+    lines = ["| fault | " + " | ".join(MONITORS.values()) + " |", f"|---|{'---|' * len(MONITORS)}"]
+    for paper in OFF:
+        for title, name, signal in rows_of_faults():
+            found = [results.get(f"{key}/{paper}/{name}") for key in MONITORS]
+            if any(outcome and outcome.located(signal) < len(outcome.blamed) for outcome in found):
+                cells = [blamed_text(outcome) for outcome in found if outcome]
+                lines.append(f"| {paper}, {title} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def harm_table(results: dict[str, Outcome]) -> str:
+    """Return the table of the largest sideslip angles in B where the monitors differ."""
+    heads = ["without a monitor", *MONITORS.values()]
+    lines = [f"| B, largest sideslip angle [deg] | {' | '.join(heads)} |", f"|---|{'---:|' * len(heads)}"]
+    titles = {**BESIDE, **{name: title for title, name, _ in rows_of_faults()}}
+    for name in ("none", "gyro_noise_3", "gyro_frozen", "gyro_bias_20", "gyro_drift_10"):
+        cells = [sideslip_text(results[f"{key}/B/{name}"]) for key in ("without", *MONITORS)]
+        lines.append(f"| {titles[name]} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def sideslip_text(outcome: Outcome) -> str:
+    """Return the median of the largest sideslip angles with their range; of runs that spin, how many."""
+    kept = [angle for angle in outcome.sideslip if angle <= SPIN]
+    spins = outcome.number - len(kept)
+    if not spins:
+        return median_text(kept, 2)
+    return f"spins ({spins} of {outcome.number}){f', else {median_text(kept, 2)}' if kept else ''}"
+
+
 def sideslip_table(results: dict[str, Outcome]) -> str:
     """Return the table of the largest sideslip angles of every run of both papers."""
     heads = ["without a monitor", *MONITORS.values()]
     lines = [f"| largest sideslip angle [deg] | {' | '.join(heads)} |", f"|---|{'---:|' * len(heads)}"]
     titles = {**BESIDE, **{name: title for title, name, _ in rows_of_faults()}}
     for paper, off in OFF.items():
-        lines.append(f"| {paper}, no control at all | {median_text(results[off].sideslip, 2)} | - | - |")
+        lines.append(f"| {paper}, no control at all | {sideslip_text(results[off])} | - | - |")
         for name, title in titles.items():
             if f"without/{paper}/{name}" in results:
-                cells = [
-                    median_text(results[f"{key}/{paper}/{name}"].sideslip, 2)
-                    for key in ("without", *MONITORS)
-                ]
+                cells = [sideslip_text(results[f"{key}/{paper}/{name}"]) for key in ("without", *MONITORS)]
                 lines.append(f"| {paper}, {title} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
@@ -231,8 +262,9 @@ def tables(results: dict[str, Outcome]) -> dict[Path, dict[str, str]]:
     number = results["parity/B/none"].number
     most = f"{100 * share_bounds(0, number).high:.0f} %"
     blind = (
-        f"Sizes that no run of {number} finds, and those that some find, in the lane change of paper B (80 "
-        f"km/h, mu 0.3). None of {number} still allows a share of {most} (95 %, Clopper and Pearson)."
+        f"Sizes that the monitor finds in none of {number} runs, and those that it finds in some, in the "
+        f"lane change of paper B (80 km/h, mu 0.3). None of {number} still allows a share of {most} (95 %, "
+        "Clopper and Pearson)."
     )
     note = (
         "Lane change of paper B (80 km/h, mu 0.3) and double lane change of paper C (90 km/h, mu 0.4), "
@@ -242,11 +274,23 @@ def tables(results: dict[str, Outcome]) -> dict[Path, dict[str, str]]:
     )
     of_faults = [faults_table(results, paper) for paper in OFF]
     of_detection = [totals_table(results), *of_faults, wrapped(note)]
-    sideslip = f"Medians (ranges) over {number} seeds of the noise, the same with the monitors and without."
+    sideslip = (
+        f"Medians (ranges) over {number} seeds of the noise, the same with the monitors and without. Spins: "
+        f"beyond {SPIN:g}°, in how many runs. The moment taken away: nothing is wrong, but from 1.5 s on the "
+        "controller's moment is set to zero, as by a wrong alarm. One wheel not braked: from 1.5 s on the "
+        "brake of the left front wheel does nothing."
+    )
+    blame = (
+        f"Blamed at the end, in how many runs of {number}; unclear: `monitor_parity` says that it cannot "
+        "tell. All other faults are blamed on the right signal wherever they are found."
+    )
+    harm = f"Medians (ranges) over {number} seeds; spins: beyond {SPIN:g}°."
     return {
         PAGE: {
             "blind": f"{blind_table(results)}\n\n{wrapped(blind)}",
+            "blame": f"{blame_table(results)}\n\n{wrapped(blame)}",
             "detection": "\n\n".join(of_detection),
+            "harm": f"{harm_table(results)}\n\n{wrapped(harm)}",
         },
         SIDESLIP_PAGE: {"sideslip": f"{sideslip_table(results)}\n\n{wrapped(sideslip)}"},
     }

@@ -14,7 +14,7 @@ CONTROLLERS = {
     "conventional": "conventional fuzzy",
 }
 
-MET = {"holds": "met", "does not reproduce": "not met", "undecided": "within noise"}
+MET = {"holds": "met", "does not hold": "not met", "undecided": "within noise"}
 """Verdict of a check -> what the docs call it: there are no open values to decide it over."""
 
 

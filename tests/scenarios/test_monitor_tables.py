@@ -13,6 +13,7 @@ from scipy.stats import chi2
 import yawbench as yb
 from docs.generate import monitor_tables
 from docs.generate.monitor_tables import GYRO, WHEEL, Outcome
+from orchestrator.experiments.confidence import share_bounds
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.scenario import yaml_lines
 from tests.commands import status_of
@@ -39,7 +40,7 @@ def test_every_run_of_the_study_is_published_with_ten_seeds(published):
 def test_the_page_names_every_fault_that_no_run_finds_before_anything_else(published):
     page = monitor_tables.PAGE.read_text(encoding="utf-8")
     first = next(line for line in page.splitlines() if line.startswith("|"))
-    assert first.startswith("| fault | never found, monitor_redundancy")
+    assert first.startswith("| fault | in no run, monitor_redundancy")
     blind = page.partition("<!-- end of blind -->")[0]
     (row,) = (line for line in blind.splitlines() if line.startswith("| gyro: bias"))
     cells = [cell.strip() for cell in row.strip("|").split("|")]
@@ -62,9 +63,29 @@ def test_a_bias_of_5_deg_s_is_no_longer_blamed_on_the_accelerometer(published):
 
 
 def test_a_healthy_monitor_gives_no_alarm(published):
+    page = monitor_tables.PAGE.read_text(encoding="utf-8")
     for key in monitor_tables.MONITORS:
-        assert published[f"{key}/B/none"].delays == []
-        assert published[f"{key}/C/none"].delays == []
+        healthy = [published[f"{key}/{paper}/none"] for paper in "BC"]
+        assert [outcome.delays for outcome in healthy] == [[], []]
+        number = sum(outcome.number for outcome in healthy)
+        most = f"at most {100 * share_bounds(0, number).high:.0f} %"
+        assert f"Of the {number} healthy runs" in page
+        assert most in page
+
+
+def test_a_run_that_spins_is_counted_and_the_others_keep_their_angle():
+    some = Outcome(3, [], [], [100.0, 4.0, 6.0])
+    assert monitor_tables.sideslip_text(some) == "spins (1 of 3), else 5.00 (4.00 to 6.00)"
+    assert monitor_tables.sideslip_text(Outcome(1, [], [], [60.0])) == "spins (1 of 1)"
+    assert monitor_tables.sideslip_text(Outcome(1, [], [], [44.0])) == "44.00"
+
+
+def test_every_fault_blamed_wrongly_or_on_none_is_in_the_table_of_blame(published):
+    table = monitor_tables.blame_table(published)
+    for title, name, signal in monitor_tables.rows_of_faults():
+        found = [published[f"{key}/B/{name}"] for key in monitor_tables.MONITORS]
+        listed = any(line.startswith(f"| B, {title} |") for line in table.splitlines())
+        assert listed == any(set(outcome.blamed) - {signal} for outcome in found)
 
 
 def test_outcomes_count_alarms_and_whom_they_blame():
