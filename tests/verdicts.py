@@ -13,32 +13,38 @@ from pathlib import Path
 from typing import NamedTuple
 
 from orchestrator.experiments.confidence import Bounds
-from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.experiment import found_studies, load_experiment
 from orchestrator.experiments.verdict_tables import (
     FAILS,
     HOLDS,
     NO_FLIP,
+    SENSITIVE,
     UNDECIDED,
     flip_words,
     share,
     share_words,
 )
 from orchestrator.messages import listed
-from orchestrator.pages.report import found_studies
 from tests.checkout import ROOT
 
 FILE = ROOT / "docs" / "verdicts.md"
 HEAD = """# Every verdict, and how far it carries
 
 All claims of the four papers, judged over the values that each of them leaves open. "Holds" and "does not
-reproduce" are robust: with 95 % confidence less than 10 % of the region flips the verdict. The others are
-undecided.
-[How far a verdict carries](regions.md) explains the runs and the columns; the ranges of the open values, and
-the reason for each, are in the study files and in `results/report.html`.
+reproduce" are robust: with 95 % confidence less than 10 % of the region flips the verdict. If a claim
+"depends on open values", more than 10 % does; if it is "undecided", 128 points do not tell. The confidence
+is that of each claim, not of all together.
+
+The margin is how far a number is from the paper's bound at the values that we chose, in per cent of the
+bound: positive where the claim is true there, "by far" beyond 100 %. A claim that holds by 1 % is decided,
+but says little to an engineer. The region gives the number of points that flip the verdict, and the 95 %
+interval of the share; the nearest flip is the one open value that changes the verdict first, all others as
+chosen. [How far a verdict carries](regions.md) explains the runs; the ranges of the open values, and the
+reason for each, are in the study files and in `results/report.html`.
 
 *A test makes all these runs and checks this page.*
 """
-KINDS = (HOLDS, UNDECIDED, FAILS["claims"])
+KINDS = (HOLDS, FAILS["claims"], SENSITIVE, UNDECIDED)
 
 
 class Row(NamedTuple):

@@ -156,7 +156,12 @@ class Region:
     @property
     def robust(self) -> bool:
         """Whether it is known that less than one tenth of the region flips the verdict."""
-        return self.test.decision(self.flipping, len(self.points)) is Decision.BELOW
+        return self.decision is Decision.BELOW
+
+    @property
+    def decision(self) -> Decision:
+        """Whether the share of the region that flips the verdict is known to be below or above a tenth."""
+        return self.test.decision(self.flipping, len(self.points))
 
     @property
     def flip(self) -> Flip | None:
@@ -200,9 +205,14 @@ class ClaimResult(Judgement):
 
     @property
     def status(self) -> Status:
-        """Status of the verdict; undecided if chance or the region could change it."""
-        undecided = not self.certain or (self.region is not None and not self.region.robust)
-        return Status.UNDECIDED if undecided and self.verdict.holds is not None else self.verdict.status
+        """Status of the verdict, as far as chance and the region of open values let it stand."""
+        if self.verdict.holds is None:
+            return self.verdict.status
+        if not self.certain:
+            return Status.UNDECIDED
+        if self.region is None or self.region.robust:
+            return self.verdict.status
+        return Status.SENSITIVE if self.region.decision is Decision.ABOVE else Status.UNDECIDED
 
 
 def judge(

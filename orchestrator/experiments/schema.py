@@ -79,7 +79,8 @@ range; claims are judged again along each of them, and at the points of a Latin 
 An open value applies to the runs that have its target and do not override it themselves; with `times` it is a
 factor on each run's value. A variant may replace a run's scenario. A claim depends on all open values that
 apply to its runs, or on those listed in its `open_values`. Checks are judged over the region if the runs for
-the claims suffice. Margin, share, flip and "undecided" are defined in `docs/regions.md`.
+the claims suffice. Margin, share, flip and the verdicts are defined in
+`docs/regions.md`.
 
 With axes, a limit is how far one of them may go; curves and maps show a metric over one or two of them.
 

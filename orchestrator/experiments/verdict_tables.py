@@ -27,7 +27,12 @@ from .jobs import NOT_MADE
 from .schema import TableSpec
 from .tables import Cell, Column, Table, marked, remarks
 
-HOLDS, UNDECIDED, NOT_JUDGED = "holds", Status.UNDECIDED.value, Status.NOT_JUDGED.value
+HOLDS, SENSITIVE, UNDECIDED, NOT_JUDGED = (
+    "holds",
+    Status.SENSITIVE.value,
+    Status.UNDECIDED.value,
+    Status.NOT_JUDGED.value,
+)
 CARRIES = ("margin", "region", "nearest flip")
 """Headings about the robustness of a verdict; the last two need a region."""
 FAILS = {"claims": "does not reproduce", "checks": "does not hold"}
@@ -165,7 +170,7 @@ def flip_words(says: str, level: str, chosen: str = "") -> str:
 def counts_of(judgements: Sequence[ClaimResult]) -> dict[str, int]:
     """Return verdict -> number of judgements, of the verdicts that occur."""
     words = [verdict(result) for result in judgements]
-    every = (HOLDS, UNDECIDED, *FAILS.values(), NOT_JUDGED)
+    every = (HOLDS, *FAILS.values(), SENSITIVE, UNDECIDED, NOT_JUDGED)
     return {word: words.count(word) for word in every if word in words}
 
 

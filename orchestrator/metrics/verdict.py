@@ -34,11 +34,12 @@ class Status(str, Enum):
 
     PASSED = "passed"
     FAILED = "failed"
-    UNDECIDED = "undecided"  # it would change by chance, or within the region of open values
+    SENSITIVE = "depends on open values"  # it changes in at least a tenth of their region
+    UNDECIDED = "undecided"  # chance may change it, or whether it is sensitive is not known
     NOT_JUDGED = "not judged"
 
 
-WORST_FIRST = (Status.FAILED, Status.NOT_JUDGED, Status.UNDECIDED, Status.PASSED)
+WORST_FIRST = (Status.FAILED, Status.NOT_JUDGED, Status.SENSITIVE, Status.UNDECIDED, Status.PASSED)
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from markupsafe import Markup
 from vocabulary.wheels import WHEEL_NAMES, WHEELS
 
 from ..experiments.tables import Table
-from ..experiments.verdict_tables import FAILS, HOLDS, NOT_JUDGED, UNDECIDED
+from ..experiments.verdict_tables import FAILS, HOLDS, NOT_JUDGED, SENSITIVE, UNDECIDED
 from ..messages import fold, printable
 from ..metrics.verdict import Status
 from ..plan import (
@@ -133,6 +133,7 @@ SIGNS = {
     HOLDS: ("good", "✓"),
     Status.PASSED.value: ("good", "✓"),
     Status.FAILED.value: ("bad", "✗"),
+    SENSITIVE: ("unsure", "±"),
     UNDECIDED: ("unsure", "?"),
     NOT_JUDGED: ("open", "–"),
     **{word: ("bad", "✗") for word in FAILS.values()},

@@ -26,6 +26,7 @@ from ..experiments.tables import Cell, Table
 from ..experiments.verdict_tables import (
     FAILS,
     HOLDS,
+    SENSITIVE,
     counts_of,
     derived_tables,
     heading,
@@ -263,7 +264,11 @@ def systems(plans: Sequence[tuple[Job, tuple[LoadedScenario, Plan]]], title: str
 
 LIVELY = tuple(map(metric, ("peak(sideslip)", "peak(yaw_rate)")))
 """Metrics of how lively a run is; the first that all runs have is used."""
-SEVERAL = {HOLDS: "hold", **{word: word.replace("does", "do", 1) for word in FAILS.values()}}
+SEVERAL = {
+    HOLDS: "hold",
+    SENSITIVE: "depend on open values",
+    **{word: word.replace("does", "do", 1) for word in FAILS.values()},
+}
 """Verdict -> its plural."""
 VIEW = "view"
 """Anchor of the viewer."""

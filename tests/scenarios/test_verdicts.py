@@ -9,11 +9,12 @@ import pytest
 
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.journal import FILE as JOURNAL
+from orchestrator.experiments.verdict_tables import FAILS, HOLDS
 from orchestrator.results.run_folder import default_folder
 from tests.checkout import ROOT
 from tests.evidence import RECORD
 from tests.studies import judge_all
-from tests.verdicts import FILE, UNDECIDED, page, recorded, rows_of, studies, summary, table_in
+from tests.verdicts import FILE, KINDS, page, recorded, rows_of, studies, summary, table_in
 
 FILES = (
     "fnn_sideslip/study", "fuzzy_sliding_mode/study", "fuzzy_sliding_mode/distribution", "fuzzy_pid/study",
@@ -58,9 +59,12 @@ def test_the_page_on_papers_tells_of_verdicts_what_the_page_does():
         [paper.removeprefix("Paper "), *row]
         for paper, rows in found.items()
         for row in rows
-        if row.verdict != UNDECIDED
+        if row.verdict in (HOLDS, FAILS["claims"])
     ]
     assert told[2 + len(found) :] == decided
+    counts = [sum(int(row[k]) for row in summary(found)) for k in range(2, 2 + len(KINDS))]
+    words = "{} hold, {} do not reproduce, {} depend on these values, {} are undecided".format(*counts)
+    assert words in " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
     total = sum(map(len, found.values()))
     assert "Most of the papers' claims depend on values" in section
     assert total - len(decided) > total / 2
