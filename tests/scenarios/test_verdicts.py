@@ -72,7 +72,9 @@ def test_the_page_on_papers_tells_of_verdicts_what_the_page_does():
 
 def test_the_page_on_papers_tells_how_far_the_best_of_26_carries():
     title = next(title for title in recorded() if "table 3" in title)
-    (best,) = (row for row in recorded()[title] if row.says.endswith("the one in proportion to load is the best."))
+    (best,) = (
+        row for row in recorded()[title] if row.says.endswith("the one in proportion to load is the best.")
+    )
     section = (ROOT / "docs" / "papers.md").read_text(encoding="utf-8").partition("## Paper B")[2]
     told = " ".join(section.partition("\n## ")[0].split())
     assert f"the best of 26, by {best.margin}. That {best.verdict}: {best.region}, it {best.flip}" in told
