@@ -247,9 +247,9 @@ def recipe_of(
             code="component-without-role",
         )
     module = (role, source.stem)
-    for folder in source.parents:  # a component of a checkout is built with the modules of that checkout
-        if folder.name == root.name and (folder / "fmi" / "component.py").is_file():
-            root = folder
+    for above in source.parents:  # a component of a checkout is built with the modules of that checkout
+        if above.name == root.name and (above / "fmi" / "component.py").is_file():
+            root = above
     user = None if source.is_relative_to(root) else UserModules(source)
     sources = Sources(root, user=user, entry=module)
     recipe = PythonRecipe(name or natural_name((role, stem)), module, sources, dict(defaults or {}))
