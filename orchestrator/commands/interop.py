@@ -100,7 +100,7 @@ def show(opinions: list[SecondOpinion]) -> None:
         if opinion.problem:
             print(printable(f"{opinion.master.title}: {opinion.problem}"))
         elif opinion.one_step or opinion.master.note:
-            step = "compared with a common step size for all units: " if opinion.one_step else ""
+            step = "compared with a common step size for all instances: " if opinion.one_step else ""
             print(printable(f"{opinion.master.title}: {step}{opinion.master.note}"))
 
 

@@ -57,16 +57,18 @@ class RunOptions:
     swap: Annotated[
         list[str] | None,
         typer.Option(
-            "--swap", metavar="UNIT=FMU", help="Replace the FMU of a unit, by name or path. Repeatable."
+            "--swap",
+            metavar="INSTANCE=FMU",
+            help="Replace the FMU of an instance, by name or path. Repeatable.",
         ),
     ] = None
     set_: Annotated[
         list[str] | None,
         typer.Option(
             "--set",
-            metavar="UNIT.PARAMETER=VALUE",
-            help="Set a parameter of a unit; also vehicle.NAME, inputs.NAME, UNIT.step_size, UNIT.validate, "
-            "start_time, stop_time, step_size, algorithm. Repeatable.",
+            metavar="INSTANCE.PARAMETER=VALUE",
+            help="Set a parameter of an instance; also vehicle.NAME, inputs.NAME, INSTANCE.step_size, "
+            "INSTANCE.validate, start_time, stop_time, step_size, algorithm. Repeatable.",
         ),
     ] = None
     fault: Annotated[
@@ -75,7 +77,7 @@ class RunOptions:
             "--fault",
             metavar="'TARGET: KIND VALUE'",
             help="Inject a fault, such as 'plant.yaw_rate -> sensor: freeze from 2 s until 3 s'; "
-            "target: unit.output, unit.output -> unit or unit.input; "
+            "target: INSTANCE.OUTPUT, INSTANCE.OUTPUT -> INSTANCE or INSTANCE.INPUT; "
             f"kind: {', '.join(KINDS)}; {NO_FAULTS} removes the scenario's own. Repeatable.",
         ),
     ] = None
@@ -147,8 +149,8 @@ class RunOptions:
         bool,
         typer.Option(
             "--isolate",
-            help="Run each unit in its own process: if its FMU crashes or hangs, the run ends with "
-            "an error and the results so far. Same numbers; 30 to 70 µs more per unit and step.",
+            help="Run each instance in its own process: if its FMU crashes or hangs, the run ends with "
+            "an error and the results so far. Same numbers; 30 to 70 µs more per instance and step.",
         ),
     ] = False
     call_limit: Annotated[

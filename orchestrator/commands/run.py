@@ -166,9 +166,9 @@ Swaps = Annotated[
     list[str],
     typer.Option(
         "--swap",
-        metavar="UNIT=FMU,FMU,...",
-        help="FMUs to compare for a unit; a single FMU is compared with the scenario's. An FMU may bring "
-        "parameters, FMU:PARAMETER=VALUE. Repeatable.",
+        metavar="INSTANCE=FMU,FMU,...",
+        help="FMUs to compare for an instance; a single FMU is compared with the scenario's. An FMU may "
+        "bring parameters, FMU:PARAMETER=VALUE. Repeatable.",
     ),
 ]
 
@@ -182,7 +182,7 @@ def compare(
     measured: MeasuredRuns = None,
     begin: MeasuredFrom = "0 s",
 ) -> None:
-    """Run a scenario with several FMUs for a unit and compare.
+    """Run a scenario with several FMUs for an instance and compare.
 
     Writes report.html: metrics side by side, the signals that differ most, when the runs diverge,
     overlays, and the system. Recordings of a car are shown beside them.
@@ -227,7 +227,7 @@ Halvings = Annotated[
     int,
     typer.Option("--halvings", metavar="N", min=2, max=10, help="Number of times the step size is halved."),
 ]
-Signal = Annotated[str, typer.Option("--signal", metavar="UNIT.VARIABLE", help="Signal to compare.")]
+Signal = Annotated[str, typer.Option("--signal", metavar="INSTANCE.VARIABLE", help="Signal to compare.")]
 Algorithms = Annotated[
     list[str] | None,
     typer.Option(
@@ -250,7 +250,7 @@ def converge(
 ) -> None:
     """Halve the step size repeatedly; show error and order.
 
-    Errors are relative to the finest run. Units with their own step size keep it. Runs are made one
+    Errors are relative to the finest run. Instances with their own step size keep it. Runs are made one
     after the other, so that their wall times can be compared. Without --out, results go to
     results/<folder of the scenario>/<its name>-converge.
     """
@@ -300,7 +300,7 @@ def converge(
     )
     charts = []
     if any(row.error for row in rows):
-        note = f"yawbench converge {scenario} · units with their own step size keep it"
+        note = f"yawbench converge {scenario} · instances with their own step size keep it"
         figure = convergence_figure(rows, signal, experiment.spec.title, note)
         save(figure, folder / "converge")
         charts = [image_of(folder / "converge.svg", experiment.spec.title)]

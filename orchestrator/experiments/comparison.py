@@ -117,7 +117,8 @@ def _choices(swaps: Sequence[str]) -> dict[str, list[str]]:
         names = [fmus] if Path(fmus).is_file() else [name.strip() for name in fmus.split(",")]
         if not (unit.strip() and equals and all(names)):
             raise ScenarioError(
-                f"--swap {text}: write --swap UNIT=FMU or --swap UNIT=FMU,FMU,...", code="option-invalid"
+                f"--swap {text}: write --swap INSTANCE=FMU or --swap INSTANCE=FMU,FMU,...",
+                code="option-invalid",
             )
         known = choices.get(unit.strip(), [])
         choices[unit.strip()] = list(dict.fromkeys([*known, *names]))
@@ -188,7 +189,7 @@ def refinements(
     loaded = load_scenario(scenario, changes=changes)
     if not all(SignalName.parse(signal)):
         raise ScenarioError(
-            f"--signal {signal}: write UNIT.VARIABLE, for example plant.yaw_rate", code="option-invalid"
+            f"--signal {signal}: write INSTANCE.VARIABLE, for example plant.yaw_rate", code="option-invalid"
         )
     runs = []
     for algorithm in algorithms or [loaded.algorithm]:

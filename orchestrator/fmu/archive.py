@@ -72,7 +72,7 @@ def open_fmu(path: Path | str, *, validate: bool = True) -> Fmu:
             continue
         if validate and fmu.violations:
             more = f" (and {len(fmu.violations) - 1} more)" if len(fmu.violations) > 1 else ""
-            way = "; 'validate: false' for the unit (--set UNIT.validate=false) makes it a warning"
+            way = "; 'validate: false' for the instance (--set INSTANCE.validate=false) makes it a warning"
             raise ModelDescriptionError(f"{fmu.path}: {fmu.violations[0].message.rstrip('.')}{more}{way}")
         if wrong := binary_problem(fmu):
             raise ModelDescriptionError(f"{fmu.path}: {wrong}")

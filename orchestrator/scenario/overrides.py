@@ -62,7 +62,7 @@ def read_changes(
         if unit and equals and fmu:
             changes += swap_of(unit, fmu, "--swap")
         else:
-            errors.append(f"--swap {text}: write --swap UNIT=FMU")
+            errors.append(f"--swap {text}: write --swap INSTANCE=FMU")
     for text in settings:
         name, equals, raw = (part.strip() for part in text.partition("="))
         target = _settable(name) if equals else None
@@ -70,13 +70,13 @@ def read_changes(
             value = os.path.abspath(raw) if target.kind == "tyres" else yaml_lines.scalar(raw)
             changes.append(setting(target, value, "--set"))
         else:
-            sentence = f"write --set UNIT.PARAMETER=VALUE, or {listed((*OF_RUN, *FACTS), last='or')}=VALUE"
-            errors.append(f"--set {text}: {sentence}")
+            others = listed((*OF_RUN, *FACTS), last="or")
+            errors.append(f"--set {text}: write --set INSTANCE.PARAMETER=VALUE, or {others}=VALUE")
     at: dict[Target, FaultList] = {}
     for text in faults:
         location, colon, line = (part.strip() for part in text.partition(":"))
         if not (location and colon and line):
-            errors.append(f"--fault {text}: write --fault 'UNIT.OUTPUT: KIND VALUE from TIME until TIME'")
+            errors.append(f"--fault {text}: write --fault 'INSTANCE.OUTPUT: KIND VALUE from TIME until TIME'")
             continue
         try:
             faults_there = faults_at(location, line, "--fault")

@@ -401,7 +401,7 @@ def _check_instances(system: WiringContext) -> None:
             system.report(
                 ("units", name, "fmu"),
                 f"{fmu.name} can be instantiated only once per process, and {other} uses it already; "
-                "with --isolate each unit has a process of its own",
+                "with --isolate each instance has a process of its own",
                 "fmu-once-per-process",
             )
 

@@ -352,7 +352,7 @@ def test_a_pattern_stands_for_several_and_each_has_random_numbers_of_its_own(fol
 @pytest.mark.parametrize(
     ("fault", "sentence"),
     [
-        ("gyro.yaw_rate", "write --fault 'UNIT.OUTPUT: KIND VALUE from TIME until TIME'"),
+        ("gyro.yaw_rate", "write --fault 'INSTANCE.OUTPUT: KIND VALUE from TIME until TIME'"),
         ("gyro.yaw_rte: freeze", "gyro has neither an output nor an input 'yaw_rte'; did you mean"),
         ("gyr.yaw_rate: freeze", "there is no unit 'gyr'; did you mean 'gyro'?"),
         ("gyro yaw_rate: freeze", "must be unit.output, unit.input or unit.output -> unit, with at"),

@@ -287,12 +287,12 @@ def test_folders_in_each_other_are_unpacked_up_to_a_depth(nested: int, tmp_path:
             model_description("a").replace('guid="a"', ""),
             "the model description is not valid FMI 2.0: ERROR (line 2, column 0): Element "
             "'fmiModelDescription': The attribute 'guid' is required but missing"
-            "; 'validate: false' for the unit (--set UNIT.validate=false) makes it a warning",
+            "; 'validate: false' for the instance (--set INSTANCE.validate=false) makes it a warning",
         ),
         (
             model_description("a", outputs=["x", "x"]),
             'the model description is not valid FMI 2.0: The variable name "x" (line 7) is not unique; '
-            "'validate: false' for the unit (--set UNIT.validate=false) makes it a warning",
+            "'validate: false' for the instance (--set INSTANCE.validate=false) makes it a warning",
         ),
         (
             model_description("a", outputs=["x"]).replace('index="1"', 'index="7"'),

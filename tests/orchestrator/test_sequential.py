@@ -11,18 +11,34 @@ import pytest
 from orchestrator.experiments.axes import RegionSpec, hypercube
 from orchestrator.experiments.claims import ONE_IN
 from orchestrator.experiments.confidence import Decision, SequentialTest, share_bounds
+from tests.checkout import ROOT
+from tests.verdicts import table_in
 
+PAGE = ROOT / "docs" / "regions.md"
 CLAIMS = 1000
 REGION = RegionSpec.model_validate(
     {"open_values": {"a": {"vary": "a.b", "from": 0, "to": 1, "because": "chosen: to show"}}}
 )
 TEST = SequentialTest(REGION.looks, 1 / ONE_IN)
 WRONG = {
+    0.02: {Decision.ABOVE},
     0.05: {Decision.ABOVE},
     0.10: {Decision.ABOVE, Decision.BELOW},
     0.20: {Decision.BELOW},
 }
 """Share of points that flip -> what would be a wrong decision."""
+RANDOM, HYPERCUBE = slice(1, 4), slice(4, 7)
+"""Cells of the table in docs/regions.md with the decisions at random points, and at those of a hypercube."""
+
+
+def published(share: float) -> list[str]:
+    """Return the row of the docs for a true share."""
+    (row,) = (row for row in table_in(PAGE.read_text(encoding="utf-8")) if row[0] == f"{100 * share:g} %")
+    return row
+
+
+def cells(found: Counter[Decision]) -> list[str]:
+    return [str(found[decision]) for decision in (Decision.BELOW, Decision.ABOVE, Decision.OPEN)]
 
 
 def decided(outcomes: np.ndarray) -> Decision:
@@ -37,6 +53,7 @@ def test_of_a_thousand_claims_at_most_one_in_twenty_is_decided_wrongly(share):
     found = Counter(decided(one) for one in chance.random((CLAIMS, TEST.looks[-1])) < share)
     assert found.total() == CLAIMS
     assert sum(found[one] for one in WRONG[share]) <= 0.05 * CLAIMS
+    assert cells(found) == published(share)[RANDOM]
 
 
 @pytest.mark.parametrize("share", WRONG)
@@ -49,6 +66,7 @@ def test_so_it_is_at_the_points_of_the_extended_hypercube(share):
         sides = share ** chance.dirichlet(np.ones(4))
         found[decided(np.all((positions - start) % 1.0 < sides, axis=1))] += 1
     assert sum(found[one] for one in WRONG[share]) <= 0.05 * CLAIMS
+    assert cells(found) == published(share)[HYPERCUBE]
 
 
 def test_claims_far_from_the_limit_are_decided_early():

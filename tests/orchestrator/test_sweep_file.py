@@ -329,8 +329,11 @@ def test_options_change_all_runs_as_the_file_would(sweep, tmp_path, fmus):
     ("options", "sentence"),
     [
         ({"swaps": ["controller=controller_off"]}, "controller is given by set or swap already"),
-        ({"swaps": ["controller"]}, "--swap controller: write --swap UNIT=FMU"),
-        ({"settings": ["amplitude=3"]}, "--set amplitude=3: write --set UNIT.PARAMETER=VALUE, or start_time"),
+        ({"swaps": ["controller"]}, "--swap controller: write --swap INSTANCE=FMU"),
+        (
+            {"settings": ["amplitude=3"]},
+            "--set amplitude=3: write --set INSTANCE.PARAMETER=VALUE, or start_time",
+        ),
         ({"settings": ["driver.amplitude=3"]}, "driver.amplitude is given by set or swap already"),
         ({"settings": ["stop_time="]}, "--set stop_time="),
     ],

@@ -152,7 +152,7 @@ def test_braking_and_straight_ahead_it_does_too(metric_of_all, force, steer):
 
 
 LOST = {
-    "Without control the car suffers severe lateral instability on low friction.",
+    "Without control the car suffers severe lateral instability on low friction (50 km/h, mu 0.3).",
     "Slip control keeps the slip below 0.95 of the slip with the largest force.",
     "Both controllers pull the sideslip angle towards zero.",
     "Every controller keeps the mean yaw-rate error to a quarter of that without control.",
