@@ -182,7 +182,7 @@ def compare(
     measured: MeasuredRuns = None,
     begin: MeasuredFrom = "0 s",
 ) -> None:
-    """Run a scenario with several FMUs for an instance and compare.
+    """Compare runs of a scenario with several FMUs for an instance.
 
     Writes report.html: metrics side by side, the signals that differ most, when the runs diverge,
     overlays, and the system. Recordings of a car are shown beside them.

@@ -117,7 +117,8 @@ def test_every_command_of_a_page_works_as_it_stands(page, checkout, done):
             assert ended.returncode == 0, f"{command}\n{ended.stdout[-2000:]}\n{ended.stderr[-2000:]}"
             assert "Traceback" not in ended.stderr, command
     if program:
-        ended = run_in(checkout, "python", "-c", program, MPLBACKEND="agg")
+        (checkout / "page.py").write_text(program, encoding="utf-8")  # a function needs a source
+        ended = run_in(checkout, "python", "page.py", MPLBACKEND="agg")
         assert ended.returncode == 0, f"{program}\n{ended.stderr[-2000:]}"
 
 

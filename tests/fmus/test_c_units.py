@@ -94,7 +94,7 @@ def test_an_fmu_whose_sources_are_broken_stays_and_one_whose_sources_are_gone_is
         ('modelIdentifier="controller_idea"', 'modelIdentifier="x"', 'modelIdentifier="controller_idea"'),
         ('valueReference="5"', 'valueReference="7"', "moment_limit must have the value reference 5"),
         ('name="yaw_moment"', 'name="moment"', "a controller must declare the output yaw_moment"),
-        ('name="yaw_rate"', 'name="yaw rate"', "'yaw rate' can be no name in C"),
+        ('name="yaw_rate"', 'name="yaw rate"', "'yaw rate' is not a valid name in C"),
         ('causality="input"', 'causality="local"', "yaw_rate must be an input, an output or a parameter"),
         ('<Real unit="N.m" start', "<Integer start", "moment_limit is not Real"),
         ('min="0"', 'min="none"', "min must be a number (got 'none')"),

@@ -52,7 +52,7 @@ def test_a_sentence_that_is_not_asked_for_is_an_error(own):
 
 def test_a_sentence_of_a_test_that_does_not_exist_fails_a_whole_run_and_is_removed_by_rewriting(own):
     here, other = "tests/orchestrator/test_sentences.py", "tests/docs/test_site.py"
-    item = SimpleNamespace(nodeid=f"{here}::test_there")
+    item = SimpleNamespace(nodeid=f"{here}::test_there", get_closest_marker=lambda name: None)
 
     def collect(*arguments):
         sentences.pytest_collection_modifyitems(SimpleNamespace(args=arguments), [item])

@@ -430,7 +430,7 @@ def journal_of(folder):
         ("0.0302", "true", "'values' was changed"),
         ("0.0302", "NaN", "'values' was changed"),
         ("0.0302", "1e308", "'values' was changed"),
-        ("0.0302", "[" * 5000 + "]" * 5000, "is no JSON"),
+        ("0.0302", "[" * 5000 + "]" * 5000, "is not JSON"),
         ('"slip"', '"moment"', "'values' was changed"),
         ('"key": "one"', '"key": "two"', "'key' was changed"),
         ('"car-spins"', '"car-rolls"', "'diagnostics' was changed"),
@@ -438,7 +438,7 @@ def journal_of(folder):
         ('"key": "one", ', '"key": "one", "findings": ["spin"], ', "'findings' was added"),
         ('"checksums"', '"checksum"', "it has no checksums"),
         ('"checksums": {"*"', '"checksums": {"+"', "'checksums' was changed"),
-        ('"key": "one"', '"key: "one"', "is no JSON"),
+        ('"key": "one"', '"key: "one"', "is not JSON"),
     ],
 )
 def test_an_altered_line_of_a_journal_is_named_and_its_run_made_again(old, new, words, tmp_path):
@@ -502,7 +502,7 @@ def test_runs_that_were_never_made_are_not_called_failed(moods, yawbench, tmp_pa
     assert "failed" not in out + said
     assert "failed" not in (tmp_path / "out" / "table.csv").read_text()
     assert [row["status"] for row in csv.DictReader((tmp_path / "out/table.csv").open())] == ["not made"] * 6
-    assert "1.00 (not made)" in out  # the limit's table: from where on nothing is known
+    assert "unknown (1.00 not made)" in out  # the limit's table: from where on nothing is known
     assert golden_in(words_of(page_of(tmp_path / "out")))
     page = words_of(page_of(tmp_path / "out").body)
     assert "failed" not in page

@@ -256,7 +256,7 @@ FIGURES_REFUSED = [
     ("kind: curve", "kind: map", "a map needs y"),
     ("kind: limit, limit: gentle, x: control", "kind: map, metric: moment, x: amplitude, y: control",
      "the values of 'control' must be numbers"),
-    ("x: control}", "x: amplitude}", "'amplitude' is what the limit 'gentle' is of"),
+    ("x: control}", "x: amplitude}", "'amplitude' is the axis of the limit 'gentle'"),
     ("of: amplitude", "of: control", "the values of 'control' must be numbers"),
     ("at_most: 100 N.m", "at_most: 100 N.m, above: 1", "needs exactly one of above, at_least, below"),
     ("at_most: 100 N.m", "at_most: many", "must be a number, a number with its unit"),

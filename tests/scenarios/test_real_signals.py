@@ -39,7 +39,7 @@ def test_four_lines_put_sensor_and_estimator_into_a_loop(name):
     assert len(yb.load(f"real_signals/{name}")._loaded.connections) <= 4 + more
 
 
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("name", [name for name in FILES if name != "blind"])  # there estimators only listen
 def test_no_input_of_the_control_side_is_exact_but_the_drivers_wish(name):
     plan = yb.load(f"real_signals/{name}").plan()
     truth = {"driver", "plant"}

@@ -484,7 +484,8 @@ def described() -> dict[str, list[str]]:
         if not isinstance(public, type):
             found[name] = list(inspect.signature(public).parameters)
         elif not issubclass(public, BaseException):
-            found[name] = list(inspect.signature(public).parameters)
+            own = [*inspect.signature(public).parameters]
+            found[name] = [parameter for parameter in own if not parameter.startswith("_")]
             for member, one in inspect.getmembers(public, inspect.isfunction):
                 called = not member.startswith("_") or member in ("__getitem__", "__contains__")
                 if called and one.__module__.startswith("yawbench"):
