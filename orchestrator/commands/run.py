@@ -182,7 +182,7 @@ def compare(
     measured: MeasuredRuns = None,
     begin: MeasuredFrom = "0 s",
 ) -> None:
-    """Compare runs of a scenario with several FMUs for an instance.
+    """Compare runs of a scenario with different FMUs.
 
     Writes report.html: metrics side by side, the signals that differ most, when the runs diverge,
     overlays, and the system. Recordings of a car are shown beside them.
