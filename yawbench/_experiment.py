@@ -236,7 +236,6 @@ class Runs:
         True
 
     Attributes:
-        findings: metrics and reasons of failures, as for studies and sweeps.
         runs: every run, None for a failed run; None if results were not kept.
     """
 

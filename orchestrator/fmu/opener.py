@@ -59,7 +59,7 @@ class Opener:
         self.folders: dict[tuple[Path, Path], Path] = {}
         """Folder of a scenario, working directory -> what `find_folder` has returned."""
         self.opened_as: dict[Hashable, Fmu] = {}
-        """What scenarios name, and where from -> the opened FMU."""
+        """(name in a scenario, folder it is named from) -> the opened FMU."""
 
     @cached_property
     def _upkeep(self) -> FmuUpdater:

@@ -120,7 +120,7 @@ def viewer(
 
 
 class Carried(NamedTuple):
-    """What a page carries for a viewer: what it needs to know of the runs, and their samples."""
+    """Data of a viewer in a page: a description of the runs, and their samples."""
 
     data: dict[str, Any]
     blocks: Sequence[PackedRun]

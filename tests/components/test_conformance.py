@@ -326,8 +326,10 @@ def test_outputs_read_before_parameters_are_set_do_not_bind(component):
     stands[0].set(**some_inputs(component, 0))
     stands[0].outputs()
     stands[0].set(**changed)
-    for k, stand in enumerate(stands * 3):
-        (stand.step if k > 1 else stand.start)(*[0.001][: k > 1], **some_inputs(component, k // 2))
+    for stand in stands:
+        stand.start(**some_inputs(component, 0))
+        for k in (1, 2):
+            stand.step(0.001, **some_inputs(component, k))
     assert [*map(repr, stands[0].outputs().values())] == [*map(repr, stands[1].outputs().values())]
 
 

@@ -198,16 +198,21 @@ validations:
 """
 
 
+def write_study(folder, *, more_bands=""):
+    """Write a study with two validations, their recordings along a = 10 delta, and the bands of one."""
+    line(folder, "near", up=0.05)
+    line(folder, "far", up=0.5, tests=2)
+    (folder / "wide.yaml").write_text(
+        "title: Wide\nsource: chosen\nbands: {acceleration_y: {offset: 0.1 m/s2, gain: 0}, "
+        f"{more_bands}steering_wheel_angle: {{offset: 10 deg, gain: 0}}}}\n"
+    )
+    (folder / "study.yaml").write_text(STUDY)
+
+
 @pytest.fixture
 def study(tmp_path):
-    """A study with two validations, and results of its run, along a = 10 delta."""
-    line(tmp_path, "near", up=0.05)
-    line(tmp_path, "far", up=0.5, tests=2)
-    (tmp_path / "wide.yaml").write_text(
-        "title: Wide\nsource: chosen\nbands: {acceleration_y: {offset: 0.1 m/s2, gain: 0}, "
-        "steering_wheel_angle: {offset: 10 deg, gain: 0}}\n"
-    )
-    (tmp_path / "study.yaml").write_text(STUDY)
+    """A study with two validations, and results of its run."""
+    write_study(tmp_path)
     a_y = np.linspace(1.0, 5.0, 200)
     columns = {"plant.acceleration_y": a_y, "driver.steering_wheel_angle": 0.1 * a_y}
     units = {"plant.acceleration_y": "m/s2", "driver.steering_wheel_angle": "rad"}

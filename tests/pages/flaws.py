@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import functools
+import re
 from importlib.resources import files
+from pathlib import Path
 
 from .browser import Browser
 
@@ -130,3 +132,15 @@ def flaws(chromium: Browser) -> list[str]:
 def open_all(chromium: Browser) -> None:
     """Unfold everything that unfolds."""
     chromium.run("document.querySelectorAll('details').forEach((one) => { one.open = true; });")
+
+
+def check_whole(chromium: Browser, page: Path, width: int) -> None:
+    """Open a page with everything unfolded: it has no flaws, and stays within the budget without samples."""
+    chromium.open(page, width=width)
+    open_all(chromium)
+    assert flaws(chromium) == []
+    assert inaccessible(chromium) == []
+    assert chromium.run("return document.querySelectorAll('*').length") <= 2000
+    text = page.read_text(encoding="utf-8")
+    blocks = sum(map(len, re.findall(r'<script type="text/plain">(.*?)</script>', text)))
+    assert len(text.encode()) - blocks < 250_000

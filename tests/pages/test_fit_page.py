@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ from orchestrator.figures.style import shown
 from tests.orchestrator.test_fit import TRUTH, folder, run
 
 from .browser import DESK, PHONE, Browser
-from .flaws import flaws, inaccessible, open_all
+from .flaws import check_whole
 from .made_up import data_in
 
 VIEWER = "const viewer = document.querySelector('.yv').viewer;"
@@ -76,11 +75,4 @@ def test_its_views_are_histories_and_cross_plots_of_the_car_and_both_models(page
 
 @pytest.mark.parametrize("width", [PHONE, DESK])
 def test_the_page_has_no_flaws_and_stays_within_its_budget(chromium: Browser, page, width):
-    chromium.open(page, width=width)
-    open_all(chromium)
-    assert flaws(chromium) == []
-    assert inaccessible(chromium) == []
-    assert chromium.run("return document.querySelectorAll('*').length") <= 2000
-    text = page.read_text(encoding="utf-8")
-    blocks = sum(map(len, re.findall(r'<script type="text/plain">(.*?)</script>', text)))
-    assert len(text.encode()) - blocks < 250_000
+    check_whole(chromium, page, width)

@@ -19,10 +19,10 @@ from orchestrator.pages.evaluation_page import validation_page, validation_sente
 from orchestrator.pages.report import chapter, study_page
 from tests.commands import status_of
 from tests.orchestrator.recorded import write as write_run
-from tests.orchestrator.test_validation import STUDY, line, write
+from tests.orchestrator.test_validation import line, write, write_study
 
 from .browser import DESK, PHONE, Browser
-from .flaws import flaws, inaccessible, open_all
+from .flaws import check_whole, flaws, inaccessible
 from .made_up import data_in, whole_car
 
 VIEWER = "const viewer = document.querySelector('.yv').viewer;"
@@ -139,14 +139,7 @@ def test_the_band_is_filled_behind_the_points(chromium: Browser, page):
 
 @pytest.mark.parametrize("width", [PHONE, DESK])
 def test_the_page_has_no_flaws_and_stays_within_its_budget(chromium: Browser, page, width):
-    chromium.open(page, width=width)
-    open_all(chromium)
-    assert flaws(chromium) == []
-    assert inaccessible(chromium) == []
-    assert chromium.run("return document.querySelectorAll('*').length") <= 2000
-    text = page.read_text(encoding="utf-8")
-    blocks = sum(map(len, re.findall(r'<script type="text/plain">(.*?)</script>', text)))
-    assert len(text.encode()) - blocks < 250_000
+    check_whole(chromium, page, width)
 
 
 def test_validate_writes_the_page_when_asked(made, tmp_path, capsys):
@@ -161,13 +154,7 @@ def test_validate_writes_the_page_when_asked(made, tmp_path, capsys):
 
 @pytest.mark.parametrize("width", [PHONE, DESK])
 def test_a_study_has_a_chapter_on_its_validations(chromium: Browser, tmp_path, width):
-    line(tmp_path, "near", up=0.05)
-    line(tmp_path, "far", up=0.5, tests=2)
-    (tmp_path / "wide.yaml").write_text(
-        "title: Wide\nsource: chosen\nbands: {acceleration_y: {offset: 0.1 m/s2, gain: 0}, "
-        "steer_angle: {offset: 0.5 deg, gain: 0}, steering_wheel_angle: {offset: 10 deg, gain: 0}}\n"
-    )
-    (tmp_path / "study.yaml").write_text(STUDY)
+    write_study(tmp_path, more_bands="steer_angle: {offset: 0.5 deg, gain: 0}, ")
     run = whole_car()
     wheel = "driver.steering_wheel_angle"
     run.columns[wheel], run.units[wheel] = 15.0 * run.columns["driver.steer_angle"], "rad"
