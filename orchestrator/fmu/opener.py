@@ -59,7 +59,7 @@ class Opener:
         self.folders: dict[tuple[Path, Path], Path] = {}
         """Folder of a scenario, working directory -> what `find_folder` has returned."""
         self.opened_as: dict[Hashable, Fmu] = {}
-        """(name in a scenario, folder it is named from) -> the opened FMU."""
+        """FMU as named, with the folders and options by which it is found -> the opened FMU."""
 
     @cached_property
     def _upkeep(self) -> FmuUpdater:
