@@ -5,7 +5,7 @@
 
 An FMU is current if it was built from the same sources, by the same builder, with the same
 launcher; the key of all these is in the stamp of its archive. If a component cannot be built, its old
-FMU stays, but runs do not use it (see `upkeep`).
+FMU stays, but runs do not use it (see `rebuild_stale`).
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from vocabulary.roles import ROLES
 from .build_stamp import BuildStamp, read_stamp
 from .c.c_recipe import CRecipe, find_c_components
 from .check import defects, reference_files
-from .closure import Parts, Sources, UserModules
 from .compiler import compile_launcher
 from .native.build import LATER
 from .packing import to_bytes
 from .presentation import CREDITS, presented
 from .recipe import TOOL, PythonRecipe, natural_name
+from .source_files import Parts, Sources, UserModules
 
 HERE = Path(__file__).resolve().parent
 COMPONENTS = HERE.parent / "components"

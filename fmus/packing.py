@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from .build_stamp import BuildStamp
-from .closure import PYTHONFMU
+from .source_files import PYTHONFMU
 
 DESCRIPTION = "modelDescription.xml"
 _DATE = (1980, 1, 1, 0, 0, 0)

@@ -15,12 +15,12 @@ from orchestrator.errors import BuildError
 from orchestrator.fmu.binary import REASON
 from vocabulary.roles import ROLES
 
-from .closure import Parts, Sources
 from .compiler import compile_launcher, compiler_tools
-from .evidence import SourceDigests
 from .native.build import HEADERS, native, toolchain, tools
 from .packing import LIBRARIES, pack
 from .presentation import PAGE, icon
+from .source_digests import SourceDigests
+from .source_files import Parts, Sources
 from .staging import entry_module, missing_signals, staged, variant
 
 TOOL = f"yawbench {version('yawbench')}, pythonfmu {version('pythonfmu')}"

@@ -22,7 +22,7 @@ from orchestrator.errors import BuildError
 from vocabulary.roles import Role
 from vocabulary.wheels import wheels
 
-from .closure import Parts
+from .source_files import Parts
 
 ENTRY = '''"""Entry module of the FMU {name}."""
 {needs}

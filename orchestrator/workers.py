@@ -24,7 +24,7 @@ from typing import Any, NamedTuple, TypeVar
 from .errors import RecordWarning, YawbenchError
 from .plan import Fmu
 from .processes import ServedChild, start
-from .supervisor import LOOK_EVERY, REPLY, REQUEST, PipeChannel, ProcessLost, SupervisedProcess
+from .supervised_process import LOOK_EVERY, REPLY, REQUEST, PipeChannel, ProcessLost, SupervisedProcess
 
 T = TypeVar("T")
 

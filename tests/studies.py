@@ -15,8 +15,8 @@ from orchestrator.experiments.execution import left_to_do
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.experiment_result import judge_results
 from orchestrator.experiments.jobs import execute
-from orchestrator.experiments.planning import plan_experiment
-from orchestrator.experiments.record import RECORD, write_findings
+from orchestrator.experiments.plan_experiment import plan_experiment
+from orchestrator.experiments.result_files import RECORD, write_findings
 
 
 def judge_some(file: Path, out: Path, *runs: str) -> dict[str, Any]:

@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     )
     from orchestrator.evaluation.standard_tests import Evaluation, TestQuantity
     from orchestrator.evaluation.validation import Validation
-    from orchestrator.metrics.run_metrics import MetricValue
+    from orchestrator.metrics.expressions import MetricValue
     from orchestrator.metrics.verdict import Verdict
     from orchestrator.plan import Override, Plan
 
@@ -121,7 +121,7 @@ _MODULES = {
     "components.fmi.variables": ("output", "parameter", "signal"),
     "orchestrator.evaluation.standard_tests": ("Evaluation", "TestQuantity"),
     "orchestrator.evaluation.validation": ("Validation",),
-    "orchestrator.metrics.run_metrics": ("MetricValue",),
+    "orchestrator.metrics.expressions": ("MetricValue",),
     "orchestrator.metrics.verdict": ("Verdict",),
     "orchestrator.plan": ("Override", "Plan"),
     "yawbench._controller": ("Controller",),

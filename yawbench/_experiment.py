@@ -16,26 +16,26 @@ from orchestrator.experiments.experiment import NamedRun
 from orchestrator.experiments.experiment_result import ExperimentResult
 from orchestrator.experiments.figures import draw_over_axes
 from orchestrator.experiments.jobs import Job, Outcome, measured
-from orchestrator.experiments.planning import metrics_of, plan_experiment
-from orchestrator.experiments.record import columns_of
+from orchestrator.experiments.plan_experiment import metrics_of, plan_experiment
+from orchestrator.experiments.result_files import columns_of
 from orchestrator.experiments.schema import ExperimentSpec, FigureSpec
 from orchestrator.experiments.tables import to_pandas
 from orchestrator.master.fmi import open_instance
-from orchestrator.master.run_loop import OpenInstance
+from orchestrator.master.run_lifecycle import OpenInstance
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.messages import hint, listed, short
 from orchestrator.plan import Value
 from orchestrator.results.reader import Results
 from orchestrator.scenario.quantities import number_and_unit
-from orchestrator.scenario.validation import Model, validate
+from orchestrator.scenario.schema_validation import Model, validate
 from orchestrator.scenario.yaml_lines import Document, scalar
 
 from . import arguments
-from ._calls import make_all, planner_of
 from ._controller import PythonComponent
 from ._dataset import dataset
 from ._progress import bar
 from ._run import Run, shown_in_notebooks
+from ._run_many import make_all, planner_of
 from ._scenario import Scenario, warn
 
 if TYPE_CHECKING:

@@ -16,11 +16,11 @@ from typing import Any
 from components.fmi.component import Component
 from fmus.build import COMPONENTS, put
 from fmus.build_stamp import BuildStamp
-from fmus.closure import Parts, Sources, UserModules
-from fmus.native.gate import Twin, random_inputs
+from fmus.native.compare_with_python import Twin, random_inputs
 from fmus.packing import to_bytes
 from fmus.presentation import presented
 from fmus.recipe import TOOL, PythonRecipe
+from fmus.source_files import Parts, Sources, UserModules
 from fmus.staging import staged
 from orchestrator.errors import BuildError, ScenarioError
 from orchestrator.messages import listed, short

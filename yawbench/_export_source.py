@@ -21,9 +21,9 @@ from pathlib import Path
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any
 
-from fmus.closure import NOT_PACKED, Parts, Sources
 from fmus.native.read import Sources as SourceTrees
 from fmus.native.values import Refused
+from fmus.source_files import NOT_PACKED, Parts, Sources
 from orchestrator.errors import BuildError
 
 from . import arguments

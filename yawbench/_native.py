@@ -1,4 +1,4 @@
-"""Native libraries of components in plain Python, by the translator and the gate of `fmus.native`.
+"""Native libraries of components in plain Python, by the translator of `fmus.native`, compared with Python.
 
 A component is translated as it is when a run is planned, with the values of its module at that time; what
 was compiled before is in the cache. A function or an object becomes a class for the translator: the one that
@@ -28,7 +28,7 @@ from orchestrator.plan import Fmu, RunsAs
 from ._parameters import ProgramParameters
 
 LIMIT = 20
-"""Processor time [s] that the gate may take, while a run waits; chosen: a short law takes one."""
+"""Processor time [s] that the comparison with Python may take, in a run; chosen: a short law takes one."""
 PLAIN = (bool, int, float, str, type(None))
 """Types of values that an object may hold before its first step."""
 

@@ -28,10 +28,10 @@ from orchestrator.results.run_folder import writing
 from orchestrator.scenario import find_and_load
 
 from . import arguments
-from ._calls import make_all, planner_of
 from ._controller import Controller, ControllerLike, PythonComponent
 from ._progress import bar
 from ._run import shown_in_notebooks
+from ._run_many import make_all, planner_of
 from ._scenario import fmu_of
 
 if TYPE_CHECKING:

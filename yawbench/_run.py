@@ -16,7 +16,7 @@ from orchestrator.errors import Diagnostic, ResultsError, ScenarioError, warning
 from orchestrator.evaluation.standard_tests import TESTS, Evaluation, TestName
 from orchestrator.evaluation.trace import trace_of
 from orchestrator.messages import hint, short
-from orchestrator.metrics.run_metrics import STANDARD, MetricValue, evaluate, evaluate_all, metric, why_none
+from orchestrator.metrics.expressions import STANDARD, MetricValue, evaluate, evaluate_all, metric, why_none
 from orchestrator.plan import Override
 from orchestrator.results.measurement_results import filtered_alike, measured_results
 from orchestrator.results.reader import Results

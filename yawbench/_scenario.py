@@ -34,10 +34,10 @@ from vocabulary.roles import role_of
 from vocabulary.vehicle import CAR
 
 from . import arguments
-from ._calls import opener_of, planner_of
 from ._controller import ControllerLike, PythonComponent
 from ._progress import bar
 from ._run import Run
+from ._run_many import opener_of, planner_of
 
 
 def load(source: str | Path) -> Scenario:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.errors import Diagnostic, Location, ResultsError, ScenarioError
-from orchestrator.experiments.axes import AxisSpec
+from orchestrator.experiments.axes_and_sampling import AxisSpec
 from orchestrator.experiments.experiment import LoadedExperiment as Design
 from orchestrator.experiments.experiment import NamedRun
 from orchestrator.experiments.experiment_result import ExperimentResult
@@ -18,7 +18,7 @@ from orchestrator.experiments.schema import ExperimentSpec
 from orchestrator.experiments.tables import to_pandas
 from orchestrator.experiments.tuning import TunedLaw, columns_of, history_figure, search
 from orchestrator.messages import counted, listed, short
-from orchestrator.metrics.run_metrics import metric
+from orchestrator.metrics.expressions import metric
 from orchestrator.plan import Value
 
 from . import arguments

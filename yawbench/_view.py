@@ -11,7 +11,7 @@ from orchestrator.errors import ResultsError
 from orchestrator.figures.style import LabelledRun
 from orchestrator.files import reason, write_whole
 from orchestrator.messages import counted, listed
-from orchestrator.metrics.run_metrics import columns_of
+from orchestrator.metrics.expressions import columns_of
 from orchestrator.pages.viewer import SETTINGS, Settings, page
 from orchestrator.pages.viewer import View as Selection
 

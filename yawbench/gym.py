@@ -35,8 +35,8 @@ from orchestrator.plan import Plan
 from orchestrator.results.reader import Results
 
 from . import arguments
-from ._calls import opener_of
 from ._run import Run
+from ._run_many import opener_of
 from ._scenario import load
 
 __all__ = ["SIGNALS", "SineWithDwell", "as_controller"]

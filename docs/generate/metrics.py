@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from orchestrator.metrics import run_metrics
+from orchestrator.metrics import expressions
 from orchestrator.metrics.measures import catalogue
 
 from .text import NOTE, cell, code, docstring, table
@@ -15,13 +15,13 @@ def page() -> str:
         for one in catalogue()
     ]
     standard = []
-    for name in run_metrics.STANDARD:
-        metric = run_metrics.metric(name)
+    for name in expressions.STANDARD:
+        metric = expressions.metric(name)
         standard.append((code(name), f"{cell(metric.definition)}<br>{code(metric.formula)}"))
     return "\n\n".join([
         "# Metrics",
         NOTE,
-        docstring(run_metrics.__doc__ or ""),
+        docstring(expressions.__doc__ or ""),
         "x is the signal, x_ref its reference, T the duration of the run or of the window. A signal's rate "
         "is the recorded one, `x_rate`, else the difference quotient. Metrics that cannot be computed are "
         "omitted: an error relative to a reference of zero, a window beyond the end of the run.",

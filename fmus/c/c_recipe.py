@@ -20,9 +20,9 @@ from orchestrator.fmu.binary import platform
 from vocabulary.roles import ROLES
 
 from ..compiler import compile_library, compiler_command, compiler_tools, compiler_version
-from ..evidence import SourceDigests
 from ..packing import DESCRIPTION
 from ..presentation import PAGE, icon
+from ..source_digests import SourceDigests
 from .declaration import header, read_declaration
 
 HERE = Path(__file__).resolve().parent

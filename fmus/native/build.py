@@ -1,7 +1,7 @@
-"""Native library of a component: translated to C and checked by the gate, or the reason why there is none.
+"""Native library of a component: translated to C and compared with Python, or the reason why there is none.
 
 What was compiled and let through is kept in the cache by the C text (which has the GUID, and so follows from
-the component's sources), the headers, the compilers, the gate and the Python beside which it was driven. A
+the component's sources), the headers, the compilers, the comparison and the Python it was compared with. A
 change of the translator that leaves a text as it was compiles nothing.
 """
 
@@ -25,7 +25,7 @@ from orchestrator.errors import BuildError
 
 from .. import usual_ranges
 from ..compiler import compile_library, compiler_command, compiler_version
-from . import gate
+from . import compare_with_python
 from .emit import emit
 from .specialise import specialise
 from .values import Refused
@@ -73,9 +73,11 @@ def toolchain() -> str:
     return _compilers(tuple(compiler_command())) + _digests(*sorted(HERE.glob("*.py")))
 
 
-def _gate() -> str:
+def _comparison() -> str:
     """Return a text that changes with whatever compiles or checks."""
-    return _compilers(tuple(compiler_command())) + _digests(Path(gate.__file__), Path(usual_ranges.__file__))
+    return _compilers(tuple(compiler_command())) + _digests(
+        Path(compare_with_python.__file__), Path(usual_ranges.__file__)
+    )
 
 
 @cache
@@ -102,7 +104,7 @@ def native(
     resources: Path,
     translated: type[Any] | None = None,
     hurry: bool = False,
-    limit: int = gate.LIMIT,
+    limit: int = compare_with_python.LIMIT,
 ) -> Native:
     """Return the native libraries of a component, or why there are none.
 
@@ -114,7 +116,7 @@ def native(
         resources: folder passed to an instance.
         translated: a class for the translator that gives the same; default: the component.
         hurry: leave it for later if it took longer than `LONGEST` the last time.
-        limit: processor time [s] that the gate may take.
+        limit: processor time [s] that the comparison may take.
     """
     if sys.platform != "linux" or platform.machine() != "x86_64":
         return Native(why_not=f"native units are built on Linux on x86-64, this is {platform.system()}")
@@ -145,7 +147,7 @@ def _let_through(
     text: str, component: type[Any], guid: str, resources: Path, limit: int
 ) -> tuple[Native, bool]:
     """Return what the cache has for a text, or else make it; and whether it was made."""
-    key = hashlib.sha256(f"{text}{_gate()}{limit}".encode()).hexdigest()[:32]
+    key = hashlib.sha256(f"{text}{_comparison()}{limit}".encode()).hexdigest()[:32]
     kept = recall(STORE, key)
     if kept is not None:
         length = int.from_bytes(kept[:8], "little")
@@ -177,7 +179,7 @@ def _made(text: str, component: type[Any], guid: str, resources: Path, limit: in
         library = Path(folder, f"{name}.so")
         library.write_bytes(files[f"binaries/linux64/{NATIVE_LIBRARY}"])
         try:
-            difference = gate.differences(library, guid, component, resources, limit)
+            difference = compare_with_python.differences(library, guid, component, resources, limit)
         except TimeoutError as error:
             return Native(why_not=str(error))
     if difference:

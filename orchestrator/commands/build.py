@@ -35,7 +35,7 @@ Force = Annotated[bool, typer.Option("--force", help="Also build FMUs whose sour
 def build(components: Components = None, out: BuildFolder = None, force: Force = False) -> None:
     """Build the FMUs whose sources have changed."""
     from fmus.build import HERE, build_all, build_component, find_recipes
-    from fmus.upkeep import build_folder
+    from fmus.rebuild_stale import build_folder
 
     target = out or build_folder(HERE)
     if out is None and target != HERE:
@@ -233,7 +233,7 @@ def _further_folders(*, build: bool) -> Sequence[Path]:
 def _folder_of_fmus(folder: Path | None) -> Path:
     """Return the given or the nearest folder of FMUs; if there is none, build the project's FMUs."""
     from fmus.build import build_all
-    from fmus.upkeep import build_folder
+    from fmus.rebuild_stale import build_folder
 
     from ..errors import ModelDescriptionError
     from ..fmu.opener import HOME, Opener, find_folder

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..experiments.execution import Executor
     from ..experiments.experiment import LoadedExperiment
     from ..experiments.experiment_result import Each, ExperimentResult
-    from ..experiments.planning import PlannedExperiment
+    from ..experiments.plan_experiment import PlannedExperiment
     from ..figures.style import LabelledRun
     from ..pages.viewer import View
 
@@ -50,7 +50,7 @@ def concluded(experiment: LoadedExperiment, execute: Executor, options: RunOptio
     from ..errors import YawbenchError
     from ..experiments.experiment_result import judge_results, kept_cases
     from ..experiments.figures import draw_all
-    from ..experiments.record import write_findings
+    from ..experiments.result_files import write_findings
     from ..messages import changed
 
     if options.quick and experiment.spec.repeats:
@@ -91,7 +91,7 @@ def print_forecasts(options: RunOptions, forecasts: Callable[[Pace], Sequence[Fo
 
 def data_of(findings: ExperimentResult, folder: Path) -> dict[str, Any]:
     """Return an experiment's result for programs: how many runs there are, which failed, and its record."""
-    from ..experiments.record import record_of
+    from ..experiments.result_files import record_of
 
     runs = {
         "runs": len(findings.records),
@@ -116,7 +116,7 @@ def _over_region(
 ) -> ExperimentResult:
     """Return the findings with the verdicts over the region added; the journal has the runs already made."""
     from ..experiments.execution import left_to_do
-    from ..experiments.region import judge_region, next_jobs, plan_region
+    from ..experiments.open_value_regions import judge_region, next_jobs, plan_region
 
     plan = plan_region(planned, execute.folder, planner=execute.planner)
     records = execute.journal.records

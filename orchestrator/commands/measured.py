@@ -96,7 +96,7 @@ def effects_table(measurement: Measurement) -> Table:
     from ..experiments.tables import Table
     from ..measured.measurement import MEASURABLE
     from ..measured.single_track import CHANGE, SEEN, effects_in
-    from ..metrics.run_metrics import MetricValue
+    from ..metrics.expressions import MetricValue
 
     headings = [f"rms change of {name}" for name in SEEN]
     table = Table(
@@ -153,7 +153,7 @@ def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
     from ..experiments.fit import load_fit
     from ..experiments.fit_result import make_fit
     from ..files import write_whole
-    from ..measured.estimate import CONVERGED
+    from ..measured.least_squares import CONVERGED
     from ..pages.fit_page import fit_page, parameter_table, score_table
     from ..planner import Planner
     from ..results.run_folder import default_folder

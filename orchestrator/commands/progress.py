@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ..experiments.execution import Executor
     from ..experiments.experiment_result import Each
     from ..experiments.jobs import Job, Outcome
-    from ..experiments.planning import PlannedExperiment
+    from ..experiments.plan_experiment import PlannedExperiment
     from ..experiments.tables import Table
     from .options import RunOptions
 

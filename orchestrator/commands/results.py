@@ -283,7 +283,7 @@ def plot(
     """
     import matplotlib
 
-    from ..experiments.comparison import FIGURES
+    from ..experiments.comparison_and_convergence import FIGURES
     from ..figures.panels import check_panels, shown_by
     from ..figures.plots import OVERVIEW, draw
     from ..figures.style import KINDS, LabelledRun, save

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..coupling import ALGORITHMS
+from ..coupling_algorithms import ALGORITHMS
 from ..messages import hint, listed, printable
 from . import output
 from .experiments import chapter_of, command_of, conduct, data_of, say_page, write_page
@@ -69,9 +69,9 @@ def run(
     plan = plan_of_scenario(scenario, options)
     output.note(plan.diagnostics)
     if named := [name for name in metric or () if name != "standard"]:
-        from ..metrics import run_metrics
+        from ..metrics import expressions
 
-        run_metrics.check_metrics(plan, map(run_metrics.metric, named))
+        expressions.check_metrics(plan, map(expressions.metric, named))
     folder = options.out or default_folder(scenario, plan.changes, name=name)
     refuse_below_others(folder)
     for note in (*plan.diagnostics, size_note(plan, folder, options.format_)):
@@ -105,8 +105,8 @@ def run(
     )
     if metrics:
         from ..experiments.tables import metrics_of_run
+        from ..metrics.expressions import columns_for, evaluate_all
         from ..metrics.measures import si
-        from ..metrics.run_metrics import columns_for, evaluate_all
         from ..results.reader import load_results
         from .progress import print_tables
 
@@ -131,7 +131,7 @@ def _metric_names(texts: Sequence[str]) -> list[str]:
     """Return the metrics given by `--metric`, each once."""
     if not texts:
         return []
-    from ..metrics.run_metrics import STANDARD, metric
+    from ..metrics.expressions import STANDARD, metric
 
     names = [name for text in texts for name in (STANDARD if text == "standard" else [metric(text).name])]
     return list(dict.fromkeys(names))
@@ -190,7 +190,7 @@ def compare(
     Without --out, results go to results/<folder of the scenario>/<its name>-compare. A run that
     fails is reported; the other runs continue.
     """
-    from ..experiments.comparison import comparison, comparison_table
+    from ..experiments.comparison_and_convergence import comparison, comparison_table
     from ..pages.comparison import comparison_facts
     from ..results.run_folder import default_folder
 
@@ -257,7 +257,7 @@ def converge(
     from dataclasses import replace
 
     from ..errors import ScenarioError
-    from ..experiments.comparison import (
+    from ..experiments.comparison_and_convergence import (
         columns_of,
         convergence_figure,
         convergence_table,

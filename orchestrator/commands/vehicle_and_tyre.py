@@ -64,7 +64,7 @@ def vehicle(
     from ..results.run_folder import below_results
     from ..scenario import find_and_load, yaml_lines
     from ..scenario.schema import Vehicle
-    from ..scenario.validation import validate
+    from ..scenario.schema_validation import validate
     from ..vehicles.handling import TestTrack, draw_cars, fitting_plant, handling_of
     from ..wiring.warnings import suspicious_vehicle
     from .progress import print_tables, save_figure, say

@@ -29,8 +29,8 @@ from vocabulary.signals import SIGNALS
 from ..errors import ResultsError
 from ..measured.segment import LowPass, even_grid, resample
 from ..messages import with_changes
+from ..metrics.expressions import columns_of
 from ..metrics.measures import si_of
-from ..metrics.run_metrics import columns_of
 from ..results.reader import Results
 from ..results.run_record import FmuRecord
 from .standard_tests import NotJudged

@@ -43,7 +43,7 @@ from ..metrics.verdict import Verdict, apart, compare, not_judged, worst
 from ..results.reader import Results
 from ..scenario import find_and_load, yaml_lines
 from ..scenario.quantities import convert
-from ..scenario.validation import StrictModel, validate
+from ..scenario.schema_validation import StrictModel, validate
 from ..scenario.yaml_lines import Document
 from .trace import Trace, trace_of
 

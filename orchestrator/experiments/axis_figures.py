@@ -18,14 +18,14 @@ import numpy as np
 
 from ..errors import ResultsError
 from ..figures.style import QUIET, line_style, literal, shown, shown_unit
+from ..metrics.expressions import MetricValue, metric
 from ..metrics.measures import variable_of, words
-from ..metrics.run_metrics import MetricValue, metric
 from ..names import Target
-from .axes import RUN, Level, names_of
+from .axes_and_sampling import RUN, Level, names_of
 from .claim_schema import si_number, text_of
 from .experiment import Case
 from .experiment_result import ExperimentResult, limits_of
-from .grids import cells
+from .published_tables import cells
 from .schema import FigureSpec
 
 if TYPE_CHECKING:

@@ -32,11 +32,11 @@ from pydantic import (
 
 from ..errors import ScenarioError
 from ..messages import listed, short
+from ..metrics.expressions import during, metric, window_of
 from ..metrics.measures import MEASURES
-from ..metrics.run_metrics import during, metric, window_of
 from ..metrics.verdict import SYMBOLS, Relation
 from ..scenario.quantities import convert
-from ..scenario.validation import StrictModel, exactly_one
+from ..scenario.schema_validation import StrictModel, exactly_one
 
 
 def text_of(value: object) -> str:

@@ -15,7 +15,7 @@ from itertools import pairwise
 
 from ..errors import ScenarioError
 from ..figures.style import DIGITS, digits_apart, digits_of, shown
-from ..metrics.run_metrics import MetricValue
+from ..metrics.expressions import MetricValue
 from ..metrics.verdict import Status, Verdict, compare, worst
 from .claim_schema import Assertion, Claim, Condition, MetricReference, si_number
 from .confidence import Bounds, Decision, SequentialTest

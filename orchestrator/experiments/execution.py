@@ -19,7 +19,7 @@ from typing import Any, Protocol, TypeVar
 
 from ..cache import warn_of_record
 from ..errors import ResultsError, ScenarioError
-from ..metrics.run_metrics import metric, results_to_be, unit_in
+from ..metrics.expressions import metric, results_to_be, unit_in
 from ..plan import Plan
 from ..planner import Planner
 from ..results.freshness import altered, staleness
@@ -39,7 +39,7 @@ from .jobs import (
     ready,
 )
 from .journal import Journal
-from .planning import PlannedExperiment, plan_experiment
+from .plan_experiment import PlannedExperiment, plan_experiment
 
 T = TypeVar("T")
 K = TypeVar("K")

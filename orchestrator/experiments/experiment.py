@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from ..errors import ScenarioError
 from ..files import reads
 from ..messages import hint, short
-from ..metrics.run_metrics import TimeWindow
+from ..metrics.expressions import TimeWindow
 from ..names import Target
 from ..plan import Override
 from ..scenario import find_and_load, overrides, yaml_lines
-from ..scenario.validation import validate
+from ..scenario.schema_validation import validate
 from ..scenario.yaml_lines import Document, KeyPath
-from .axes import DesignAxisSpec, DesignPoint, changes_at, changes_of_file, points
+from .axes_and_sampling import DesignAxisSpec, DesignPoint, changes_at, changes_of_file, points
 from .claim_schema import Claim, DerivedSpec, ValidationSpec
 from .jobs import TestRequest
 from .names_check import check_axes, check_names

@@ -15,18 +15,18 @@ from ..errors import Diagnostic
 from ..evaluation.validation import Validation, compare_run
 from ..figures.style import digits_of
 from ..messages import counted
-from ..metrics.run_metrics import MetricValue
+from ..metrics.expressions import MetricValue
 from ..metrics.verdict import Status, Verdict, not_judged, worst
 from ..results.reader import Results
 from ..results.run_folder import RUN_FILE
-from .axes import RUN, DesignPoint, Level
+from .axes_and_sampling import RUN, DesignPoint, Level
 from .claim_schema import Claim, LimitSpec, calculate
 from .claims import ClaimResult, Judgement, MetricTable, Region, judge
 from .confidence import interval, share_bounds
 from .experiment import Case, LoadedExperiment, NamedRun
-from .grids import correlation
 from .jobs import NOT_MADE, MeasuredRun, Outcome, measured, read_back
-from .planning import PlannedExperiment, metrics_of
+from .plan_experiment import PlannedExperiment, metrics_of
+from .published_tables import correlation
 from .schema import ExperimentSpec
 from .tables import Cell, Table
 

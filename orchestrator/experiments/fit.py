@@ -37,7 +37,7 @@ from vocabulary.vehicle import CAR
 
 from ..errors import ScenarioError, YawbenchError, code_of, text_of
 from ..files import reads
-from ..measured.estimate import Simulated, Window
+from ..measured.least_squares import Simulated, Window
 from ..measured.measurement import Measurement, load_measurement
 from ..measured.segment import LowPass, Segment
 from ..measured.single_track import start_states
@@ -49,7 +49,7 @@ from ..results.freshness import key_of
 from ..scenario import yaml_lines
 from ..scenario.quantities import convert, gain_and_offset, measure_of
 from ..scenario.schema import Scalar, SeriesSpec
-from ..scenario.validation import Instant, StrictModel, Time, validate
+from ..scenario.schema_validation import Instant, StrictModel, Time, validate
 from ..scenario.yaml_lines import Document
 from ..workers import Pool
 from .jobs import Job, execute
@@ -254,7 +254,7 @@ def run_window(job: Job) -> Simulated:
 
 
 class ScenarioModel:
-    """The runs of a scenario in windows, for `measured.estimate`.
+    """The runs of a scenario in windows, for `measured.least_squares`.
 
     Args:
         fit: its scenario and measurement.
@@ -311,7 +311,7 @@ class ScenarioModel:
         self._windows = [self._of_window(window) for window in windows]
 
     def __call__(self, sets: Sequence[Mapping[str, float]]) -> list[list[Simulated]]:
-        """Run all windows for sets of values; see `measured.estimate.Model`."""
+        """Run all windows for sets of values; see `measured.least_squares.Model`."""
         simulated: list[list[Simulated]] = [[None] * len(self.windows) for _ in sets]
         jobs, windows_of = [], []
         for number, values in enumerate(sets):

@@ -22,7 +22,7 @@ import numpy as np
 from vocabulary.signals import SIGNALS
 
 from ..errors import ScenarioError, code_of
-from ..measured.estimate import (
+from ..measured.least_squares import (
     CONFIDENCE,
     Estimate,
     NotIdentifiable,

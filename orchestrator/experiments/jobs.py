@@ -27,7 +27,7 @@ from ..errors import (
 )
 from ..interrupts import StopFlag, interrupts
 from ..messages import printable
-from ..metrics.run_metrics import evaluate, metric
+from ..metrics.expressions import evaluate, metric
 from ..plan import Override, Plan
 from ..planner import Planner
 from ..results.freshness import key_of
@@ -36,7 +36,7 @@ from ..results.run_folder import RunStatus
 from ..workers import Finished, Pool, retire
 
 if TYPE_CHECKING:
-    from ..master.run_loop import OpenInstance
+    from ..master.run_lifecycle import OpenInstance
     from ..scenario.schema import LoadedScenario
 
 MANY = 10
@@ -222,7 +222,7 @@ def run_job(job: Job, opener: OpenInstance | None = None) -> MeasuredRun:
         YawbenchError: the scenario is wrong or the run failed.
     """
     from ..master.isolation import opener_of
-    from ..master.run_loop import StepClock, timing
+    from ..master.run_lifecycle import StepClock, timing
     from ..master.simulate import simulate, simulate_in_memory
 
     plan, clock, run = job.plan or planned(job)[1], StepClock(), None

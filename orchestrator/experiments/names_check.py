@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from ..messages import hint
 from ..names import Target
 from ..scenario.yaml_lines import Document, KeyPath
-from .axes import RUN, levels_of, names_of
+from .axes_and_sampling import RUN, levels_of, names_of
 from .claim_schema import MetricReference, text_of
-from .grids import cells
+from .published_tables import cells
 from .schema import ExperimentSpec, FigureSpec
 
 if TYPE_CHECKING:

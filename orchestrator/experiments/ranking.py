@@ -41,13 +41,20 @@ from ..evaluation.standard_tests import Evaluation, NotJudged
 from ..evaluation.steering_tests import characteristic_angle
 from ..files import reads
 from ..messages import hint
-from ..metrics.run_metrics import TimeWindow
+from ..metrics.expressions import TimeWindow
 from ..names import Target
 from ..plan import Override, Plan
 from ..scenario import overrides, yaml_lines
 from ..scenario.schema import Scalar
-from ..scenario.validation import StrictModel, Time, validate
-from .axes import DesignAxisSpec, Level, OverrideSpec, VariantSpec, axis_of_levels, changes_of_file
+from ..scenario.schema_validation import StrictModel, Time, validate
+from .axes_and_sampling import (
+    DesignAxisSpec,
+    Level,
+    OverrideSpec,
+    VariantSpec,
+    axis_of_levels,
+    changes_of_file,
+)
 from .claim_schema import text_of
 from .execution import Executor
 from .experiment import LoadedExperiment, NamedRun, experiment_of

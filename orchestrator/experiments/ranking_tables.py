@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ..errors import ResultsError
 from ..evaluation.sine_with_dwell import percent
 from ..figures.style import QUIET, digits_of, frame, literal, new_figure, shown
-from ..metrics.run_metrics import MetricValue
+from ..metrics.expressions import MetricValue
 from .jobs import STEP_TIME
 from .ranking_scores import Digits, EntryScore, RankedRun, RankedState, RankingCell, deciding_digits
 from .tables import Cell, Column, Table, column

@@ -146,9 +146,9 @@ from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 from ..figures.plots import OVERVIEW
 from ..messages import listed
 from ..scenario.schema import Scalar
-from ..scenario.validation import OneOf, StrictModel, exactly_one
+from ..scenario.schema_validation import OneOf, StrictModel, exactly_one
 from ..scenario.yaml_lines import KeyPath
-from .axes import MOST, AxisSpec, DesignAxisSpec, OverrideSpec, RegionSpec
+from .axes_and_sampling import MOST, AxisSpec, DesignAxisSpec, OverrideSpec, RegionSpec
 from .claim_schema import (
     Alternatives,
     Assertion,

@@ -21,9 +21,9 @@ from ..figures.style import shown
 from ..fmu.archive import open_fmu
 from ..fmu.binary import runs_as
 from ..messages import changed, printable, star, with_changes
+from ..metrics.expressions import STANDARD, MetricValue, columns_of, evaluate_all, metric
 from ..metrics.measures import catalogue as measures
 from ..metrics.measures import si, symbol
-from ..metrics.run_metrics import STANDARD, MetricValue, columns_of, evaluate_all, metric
 from ..plan import Fmu, Plan
 from ..results.reader import FoundRun, Results
 from ..results.run_record import RunRecord

@@ -19,7 +19,7 @@ from ..names import Target
 from ..plan import Instance, Override
 from ..scenario.overrides import setting as setting_of
 from ..scenario.quantities import convert
-from .axes import DesignAxisSpec, Level, changes_of_file
+from .axes_and_sampling import DesignAxisSpec, Level, changes_of_file
 from .execution import Executor, Search, highest_passing, side_by_side
 from .experiment import LoadedExperiment, NamedRun, experiment_of
 from .jobs import MeasuredRun

@@ -47,8 +47,8 @@ from ..names import Target
 from ..plan import Override
 from ..scenario import yaml_lines
 from ..scenario.schema import Scalar
-from ..scenario.validation import StrictModel, validate
-from .axes import OverrideSpec, TargetText
+from ..scenario.schema_validation import StrictModel, validate
+from .axes_and_sampling import OverrideSpec, TargetText
 from .ranking import EntriesSpec, EntrySpec, LoadedRanking, load_ranking
 
 REFERENCE = "none"

@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING, Any
 
 from ..cache import checksums_of
 from ..errors import ScenarioError
-from ..metrics.run_metrics import MetricValue
+from ..metrics.expressions import MetricValue
 from ..names import Target
-from .axes import DesignAxisSpec, OverrideSpec, VariantSpec, level_at
+from .axes_and_sampling import DesignAxisSpec, OverrideSpec, VariantSpec, level_at
 from .claims import MetricTable
 from .experiment import LoadedExperiment
 from .experiment_result import ExperimentResult, derive

@@ -14,16 +14,16 @@ from ..evaluation.standard_tests import Evaluation, StandardTest, TestQuantity, 
 from ..evaluation.validation import Validation
 from ..figures.style import digits_of, shown
 from ..messages import changed
-from ..metrics.run_metrics import MetricValue, metric
+from ..metrics.expressions import MetricValue, metric
 from ..metrics.verdict import SYMBOLS, Status, Verdict
-from .axes import levels_of
+from .axes_and_sampling import levels_of
 from .claim_schema import GridSpec, MetricReference, MetricSpec, si_number
 from .claims import ClaimResult
 from .confidence import Bounds
 from .experiment import NamedRun
 from .experiment_result import ExperimentResult, limit_table
-from .grids import cells, grid_tables, side_by_side
 from .jobs import NOT_MADE
+from .published_tables import cells, grid_tables, side_by_side
 from .schema import TableSpec
 from .tables import Cell, Column, Table, marked, remarks
 

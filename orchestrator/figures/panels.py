@@ -20,8 +20,8 @@ from vocabulary.wheels import WHEEL_NAMES, wheels
 
 from ..errors import ScenarioError
 from ..messages import cut, fold, hint
+from ..metrics.expressions import columns_of, reference_of
 from ..metrics.measures import variable_of, words
-from ..metrics.run_metrics import columns_of, reference_of
 from .phase_portrait import curves_of, draw_portrait, signals_of, spread_rows
 from .style import (
     REFERENCE,

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..metrics.expressions import columns_of, reference_of
 from ..metrics.measures import variable_of, words
-from ..metrics.run_metrics import columns_of, reference_of
 from ..names import VARIABLE
 from ..results.reader import Results
 from .style import REFERENCE, LabelledRun, digits_of, in_formula, line_style, literal, note_above, shown_unit

@@ -22,7 +22,7 @@ from .archive import open_fmu
 from .search_path import PackagedComponent, further_folders, packaged, packaged_components
 
 if TYPE_CHECKING:
-    from fmus.upkeep import FmuUpdater
+    from fmus.rebuild_stale import FmuUpdater
 
 
 HOME = Path(fmus.__file__).resolve().parent
@@ -63,7 +63,7 @@ class Opener:
 
     @cached_property
     def _upkeep(self) -> FmuUpdater:
-        from fmus.upkeep import FmuUpdater
+        from fmus.rebuild_stale import FmuUpdater
 
         return FmuUpdater(self._report)
 

@@ -41,7 +41,7 @@ class PackagedComponent:
     @property
     def archive(self) -> Path:
         """Path of its FMU, which is built in the cache."""
-        from fmus.upkeep import in_cache
+        from fmus.rebuild_stale import in_cache
 
         return in_cache(self.source.parent) / f"{self.fmu}.fmu"
 

@@ -40,13 +40,13 @@ from ..messages import listed
 from ..plan import Plan, Value
 from ..processes import ForkedChild, die_with_parent
 from ..results.recorder import BLOCK, RowBlock
-from ..supervisor import LOG, REPLY, PipeChannel, ProcessLost, ProtocolError
+from ..supervised_process import LOG, REPLY, PipeChannel, ProcessLost, ProtocolError
 from .fmi import open_instance
 from .instance import CtypesInstance
 from .ipc import FmuProcess, LogRelay, error_record, rebuilt
 from .isolation import Isolation
 from .process_state import MASTER, WARNING, Log, flush_output
-from .run_loop import OpenInstance, RunLoop, RunProgress
+from .run_lifecycle import OpenInstance, RunLifecycle, RunProgress
 from .signal_pool import InstanceSlot
 from .step_loop import WORDS, EndRequested, Master
 
@@ -102,7 +102,7 @@ class _Others(list[list[Value]]):
 
 
 class _Rows:
-    """The run's rows (see `run_loop.RecordedRows`), passed to the parent block by block."""
+    """The run's rows (see `run_lifecycle.RecordedRows`), passed to the parent block by block."""
 
     def __init__(self, shared: SharedProgress, channel: PipeChannel) -> None:
         self._channel = channel
@@ -168,7 +168,7 @@ def _make(
     def progress(done: int, total: int) -> None:
         channel.send(PROGRESS, (done, total))
 
-    course = RunLoop(plan, rows, log, stop, progress, shared.completed, shared.returned)
+    course = RunLifecycle(plan, rows, log, stop, progress, shared.completed, shared.returned)
     _tell_where(channel, asking, stop)
     error = _go(course, opener)
     log.finish()
@@ -185,7 +185,7 @@ def _make(
     channel.send(REPLY, None)
 
 
-def _go(course: RunLoop, opener: OpenInstance) -> dict[str, Any] | None:
+def _go(course: RunLifecycle, opener: OpenInstance) -> dict[str, Any] | None:
     """Open, initialize, step; return a description of the error if that fails."""
     try:
         course.go(opener)
@@ -279,7 +279,7 @@ def can_be_apart() -> bool:
     return sys.platform == "linux" and threading.current_thread() is threading.main_thread()
 
 
-class ChildRun(RunLoop, FmuProcess):
+class ChildRun(RunLifecycle, FmuProcess):
     """Runs a plan in a child process."""
 
     unasked = (LOG, ROWS, PROGRESS, WHERE)
@@ -287,7 +287,7 @@ class ChildRun(RunLoop, FmuProcess):
     def __init__(
         self, plan: Plan, rows: RowBlock, log: Log, stop: StopFlag, progress: RunProgress | None
     ) -> None:
-        RunLoop.__init__(self, plan, rows, log, stop, progress)
+        RunLifecycle.__init__(self, plan, rows, log, stop, progress)
         self._rows: RowBlock = rows
         self._shared = SharedProgress(len(rows.rows[0]))
         self._blocks = 0  # written

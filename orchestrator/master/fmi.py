@@ -236,8 +236,9 @@ INSTANCE_TYPES: dict[int, type[CtypesInstance]] = {2: Fmi2Instance, 3: Fmi3Insta
 class KeptInstances:
     """Instances that this process keeps between runs: they are reset instead of made anew.
 
-    Only of native FMUs: the gate of their build has shown that after a reset they compute what new ones do.
-    They are known by checksum, folder and name, so an FMU that has changed is opened anew.
+    Only of native FMUs: when they were built, the comparison with Python showed that after a reset they
+    compute what new ones do. They are known by checksum, folder and name, so an FMU that has changed is
+    opened anew.
     """
 
     def __init__(self) -> None:

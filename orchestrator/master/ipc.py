@@ -6,9 +6,9 @@ core, most of it the two context switches; a pair of pipes was the fastest of th
 death of the other side at once. Everything else, and the messages that the FMU logs meanwhile, is a tagged
 record of a few hundred bytes.
 
-An FMU can write into the pipe to the master. So records from there are checked (see `supervisor`); a stray
-byte is recognized by comparison with the last answer and its number in shared memory; and waiting for a
-record is limited by the time limit of a call.
+An FMU can write into the pipe to the master. So records from there are checked (see `supervised_process`); a
+stray byte is recognized by comparison with the last answer and its number in shared memory; and waiting for
+a record is limited by the time limit of a call.
 
 The guardian is a process between master and isolated instance: nothing that the FMU has started outlives it.
 It is forked before the FMU is loaded and adds nothing to the cost of an exchange: it sleeps until the
@@ -36,7 +36,7 @@ import numpy as np
 
 from ..errors import Diagnostic, Interrupted, YawbenchError
 from ..processes import Child, die_with_parent, prctl
-from ..supervisor import LOG, PipeChannel, ProtocolError, SupervisedProcess
+from ..supervised_process import LOG, PipeChannel, ProtocolError, SupervisedProcess
 from .process_state import KEPT, Log
 
 SET, STEP, GET = 1, 2, 4

@@ -24,7 +24,7 @@ from ..errors import SimulationError, YawbenchError
 from ..interrupts import stop_requested_at
 from ..plan import Instance, Plan, Value, ValueRef
 from ..processes import start
-from ..supervisor import ANSWER, FAILED, LOG, REPLY, REQUEST, PipeChannel, ProcessLost
+from ..supervised_process import ANSWER, FAILED, LOG, REPLY, REQUEST, PipeChannel, ProcessLost
 from .fmi import INSTANCE_TYPES, open_instance
 from .instance import Buffers, CtypesInstance, ExperimentSetup, FmuInstance, Status, StepCalls
 from .ipc import (
@@ -280,7 +280,7 @@ _BYTES = [bytes([parts]) for parts in range(SET + STEP + GET + 1)]
 
 
 class Isolation(contextlib.ExitStack):
-    """A `run_loop.OpenInstance` that isolates instances; their processes end with the `with` block."""
+    """A `run_lifecycle.OpenInstance` that isolates instances; their processes end with the `with` block."""
 
     def __init__(self, units: Sequence[Instance], limit: float = CALL_LIMIT) -> None:
         """Remember the instances, so that their processes can start at the same time.

@@ -28,7 +28,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..coupling import ALGORITHMS, WireTiming
+from ..coupling_algorithms import ALGORITHMS, WireTiming
 from ..errors import SimulationError
 from ..fault_kinds import KINDS, Disturbance
 from ..fmu.binary import integer_limits

@@ -32,7 +32,7 @@ from ..results.run_record import DiagnosticRecord, EndRecord, ErrorRecord, Warni
 from .child_run import ChildRun, can_be_apart
 from .fmi import keeps, open_instance
 from .process_state import STATUS, Log, Message
-from .run_loop import OpenInstance, RunLoop, RunProgress
+from .run_lifecycle import OpenInstance, RunLifecycle, RunProgress
 
 WRITTEN = 100
 """Warnings written into run.json; further ones are only counted."""
@@ -154,8 +154,8 @@ class Simulation:
         self.record.id, self.record.key = uuid.uuid4().hex[:12], key_of(plan)
         self._apart = apart
         self._stop = StopFlag()
-        course = ChildRun if apart else RunLoop
-        self.course: RunLoop = course(plan, recorder, self.log, self._stop, progress)
+        course = ChildRun if apart else RunLifecycle
+        self.course: RunLifecycle = course(plan, recorder, self.log, self._stop, progress)
         self._saved = False
         self._ended_by: str | None = None  # instance
         self._began = time.perf_counter()

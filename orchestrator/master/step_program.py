@@ -20,7 +20,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from ..coupling import ALGORITHMS, CouplingWeights, delayed
+from ..coupling_algorithms import ALGORITHMS, CouplingWeights, delayed
 from ..plan import InputSeries, Plan, ValueRef, Variable
 from .compiled_loop import Kind, OperationData
 from .instance import PlainCall, Status

@@ -50,7 +50,7 @@ from ..files import reads
 from ..messages import hint, listed
 from ..scenario import yaml_lines
 from ..scenario.quantities import convert, measure_of, parse_unit
-from ..scenario.validation import StrictModel, quantities_in, text_in_unit, validate
+from ..scenario.schema_validation import StrictModel, quantities_in, text_in_unit, validate
 from ..scenario.yaml_lines import Document, KeyPath
 from .columns import (
     SECOND,

@@ -26,7 +26,7 @@ import numpy as np
 
 from vocabulary.gravity import G
 
-from .estimate import Simulated, Window
+from .least_squares import Simulated, Window
 from .measurement import Measurement
 from .segment import Segment
 

@@ -18,7 +18,7 @@ from vocabulary.wheels import WHEEL_NAMES, wheels
 
 from ..errors import Diagnostic, Location
 from ..plan import Plan
-from .run_metrics import columns_of, results_to_be
+from .expressions import columns_of, results_to_be
 
 SignalArrays = Sequence[np.ndarray]
 """The values of a check's signals over a block, in their order; shape (rows,) each."""

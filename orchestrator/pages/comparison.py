@@ -19,8 +19,8 @@ from ..experiments.experiment_result import ExperimentResult
 from ..experiments.tables import Table, marked, remarks
 from ..figures.style import LabelledRun, digits_of, shown, shown_unit
 from ..messages import changed, counted, star
+from ..metrics.expressions import MetricValue, metric
 from ..metrics.measures import variable_of
-from ..metrics.run_metrics import MetricValue, metric
 from ..names import SignalName
 from ..results.reader import Results
 from ..results.run_record import RunRecord

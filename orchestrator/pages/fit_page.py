@@ -14,7 +14,7 @@ from vocabulary.signals import SIGNALS
 from ..experiments.fit_result import PARTS, FitResult, FittedModel
 from ..experiments.tables import Table
 from ..figures.style import LabelledRun
-from ..metrics.run_metrics import MetricValue
+from ..metrics.expressions import MetricValue
 from ..results.measurement_results import MeasuredResults
 from ..results.reader import Results
 from ..results.run_record import RunRecord

@@ -20,7 +20,7 @@ from ..experiments.experiment import FIGURES
 from ..experiments.experiment_result import Each, ExperimentResult
 from ..experiments.figures import runs_of, title_of
 from ..experiments.jobs import Job
-from ..experiments.region import runs_of as runs_of_claim
+from ..experiments.open_value_regions import runs_of as runs_of_claim
 from ..experiments.schema import FigureSpec
 from ..experiments.tables import Cell, Table
 from ..experiments.verdict_tables import (
@@ -42,7 +42,7 @@ from ..experiments.verdict_tables import (
 from ..figures.phase_portrait import signals_of
 from ..figures.style import LabelledRun
 from ..messages import changed, counted, listed
-from ..metrics.run_metrics import evaluate, metric
+from ..metrics.expressions import evaluate, metric
 from ..plan import Plan
 from ..planner import Planner
 from ..results.freshness import run_record

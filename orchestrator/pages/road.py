@@ -17,7 +17,7 @@ from vocabulary.patches import Patch, Point, Span, patches_of
 from vocabulary.wheels import WHEELS
 
 from ..messages import listed
-from ..metrics.run_metrics import columns_of
+from ..metrics.expressions import columns_of
 from ..results.reader import Results
 from ..results.run_folder import RunStatus
 

@@ -17,15 +17,15 @@ from typing import Any
 from markupsafe import Markup
 
 from ..errors import ResultsError
-from ..experiments.axes import RUN, Level, changes_at
+from ..experiments.axes_and_sampling import RUN, Level, changes_at
 from ..experiments.claim_schema import MetricReference, si_number
 from ..experiments.experiment import Case
 from ..experiments.experiment_result import Each, ExperimentResult, limits_of
 from ..experiments.jobs import Job
 from ..figures.style import LabelledRun, digits_of, shown, shown_unit
 from ..messages import counted, listed
+from ..metrics.expressions import metric
 from ..metrics.measures import variable_of
-from ..metrics.run_metrics import metric
 from ..plan import Override
 from ..results.reader import load_results
 from ..results.run_folder import RUN_FILE

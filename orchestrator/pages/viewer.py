@@ -26,8 +26,8 @@ from ..figures.panels import spans_of
 from ..figures.style import LINES, MEASURED_LINE, LabelledRun, digits_apart, line_style, shown, shown_unit
 from ..files import write_whole
 from ..messages import listed
+from ..metrics.expressions import MetricValue, columns_of, evaluate, metric, reference_of
 from ..metrics.measures import words
-from ..metrics.run_metrics import MetricValue, columns_of, evaluate, metric, reference_of
 from ..results.measurement_results import MeasuredResults
 from ..results.reader import Results
 from ..results.run_folder import RunStatus

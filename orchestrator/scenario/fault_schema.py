@@ -16,7 +16,7 @@ from ..fault_kinds import KINDS, NO_FAULTS, WORDS, Fault, FaultList, FaultLocati
 from ..messages import listed, short
 from ..plan import Value
 from . import quantities, yaml_lines
-from .validation import Instant, OneOf, StrictModel, Time, in_unit, validate
+from .schema_validation import Instant, OneOf, StrictModel, Time, in_unit, validate
 
 _PLACE = re.compile(r"\s*(\w+)\.([^\s>]+?)\s*(?:->\s*(\w+)(?:\.(\S+))?\s*)?")
 

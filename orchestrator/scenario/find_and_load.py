@@ -14,10 +14,10 @@ from ..errors import ScenarioError
 from ..files import TEXT, read_bytes, reads
 from ..messages import hint, listed, short
 from ..plan import Override
-from . import overrides, quantities, validation, yaml_lines
+from . import overrides, quantities, schema_validation, yaml_lines
 from .schema import Connection, LoadedScenario, ScenarioSpec, Vehicle, endpoint
+from .schema_validation import KINDS
 from .tir import TyreFile, read_tir
-from .validation import KINDS
 from .yaml_lines import Document, KeyPath
 
 STEPS = 1_000_000_000
@@ -61,8 +61,8 @@ def load_scenario(
     if not validate:
         overrides.leave_unvalidated(document)
 
-    file = validation.validate(ScenarioSpec, document)
-    vehicle = validation.validate(Vehicle, vehicle_document)
+    file = schema_validation.validate(ScenarioSpec, document)
+    vehicle = schema_validation.validate(Vehicle, vehicle_document)
     if isinstance(document.data, dict):
         _check_time_grid(document)
         _check_unit_names(document)
@@ -253,7 +253,7 @@ def folders() -> list[Path]:
 
 
 def kind_of(path: Path) -> str:
-    """Guess the kind of a file (`validation.KINDS`) from its keys, without parsing it; "" if unknown."""
+    """Guess the kind of a file (`schema_validation.KINDS`) from its keys, unparsed; "" if unknown."""
     if path.suffix == ".ssp":
         return "a scenario"
     try:
@@ -268,7 +268,7 @@ def files(folder: Path, kinds: Collection[str], *, depth: int | None = None) -> 
 
     Args:
         folder: where to search; only the first `LOOKED_AT` entries are examined.
-        kinds: of `validation.KINDS`.
+        kinds: of `schema_validation.KINDS`.
         depth: 1: files in the folder itself, 2: files in its subfolders; None: all below.
     """
     for path in sorted(islice(_below(folder, depth), LOOKED_AT)):

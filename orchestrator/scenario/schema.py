@@ -37,13 +37,13 @@ from pydantic import (
 
 from vocabulary.vehicle import CAR
 
-from ..coupling import ALGORITHMS
+from ..coupling_algorithms import ALGORITHMS
 from ..messages import listed, short
 from ..names import RESERVED, SignalName
 from ..plan import Override, Value
 from .fault_schema import FaultSpec
+from .schema_validation import Instant, OneOf, StrictModel, Time, in_unit
 from .tir import TyreFile
-from .validation import Instant, OneOf, StrictModel, Time, in_unit
 from .yaml_lines import Document, KeyPath
 
 AXLES = ("front", "rear")

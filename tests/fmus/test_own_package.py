@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from fmus.build import build_component, recipe_of
-from fmus.evidence import SourceDigests
+from fmus.source_digests import SourceDigests
 from fmus.staging import staged
 from orchestrator.errors import BuildError
 from tests.fmus.bare import Fmu, Unit

@@ -13,15 +13,15 @@ from matplotlib.figure import Figure
 from orchestrator.commands.results import distinct
 from orchestrator.errors import Diagnostic, ScenarioError
 from orchestrator.experiments.claim_schema import MetricSpec
-from orchestrator.experiments.comparison import FIGURE_SPECS, comparison_table, variants
+from orchestrator.experiments.comparison_and_convergence import FIGURE_SPECS, comparison_table, variants
 from orchestrator.experiments.experiment import NamedRun, experiment_of
 from orchestrator.experiments.experiment_result import judge_results
 from orchestrator.experiments.figures import draw_all
 from orchestrator.experiments.jobs import Job, Outcome
-from orchestrator.experiments.record import write_findings
+from orchestrator.experiments.result_files import write_findings
 from orchestrator.experiments.schema import ExperimentSpec
 from orchestrator.figures.panels import LabelledRun, shown_by
-from orchestrator.metrics.run_metrics import MetricValue
+from orchestrator.metrics.expressions import MetricValue
 from orchestrator.pages.comparison import BEST, comparison_facts, metric_table
 from tests.changed import changed
 from tests.sentences import golden, refused

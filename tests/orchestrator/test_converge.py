@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import Diagnostic, ResultsError, ScenarioError
-from orchestrator.experiments.comparison import (
+from orchestrator.experiments.comparison_and_convergence import (
     columns_of,
     convergence_figure,
     convergence_table,

@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.master import child_run
-from orchestrator.metrics.run_metrics import evaluate, metric
+from orchestrator.metrics.expressions import evaluate, metric
 from orchestrator.results.freshness import staleness
 from orchestrator.results.reader import load_results
 from orchestrator.scenario.find_and_load import load_scenario

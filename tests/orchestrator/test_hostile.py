@@ -13,13 +13,13 @@ import sys
 import numpy as np
 import pytest
 
-from orchestrator import supervisor
+from orchestrator import supervised_process
 from orchestrator.master import isolation
 from orchestrator.master.isolation import InstanceProcess
 from orchestrator.master.process_state import Log
 from orchestrator.processes import Child
 from orchestrator.results.reader import load_results
-from orchestrator.supervisor import FAILED, LOG, REPLY, PipeChannel, ProcessLost, ProtocolError
+from orchestrator.supervised_process import FAILED, LOG, REPLY, PipeChannel, ProcessLost, ProtocolError
 from tests.sentences import golden_in
 
 from ..trials.hostile_fmus import VALUES_OF, Case, attack, make_files
@@ -94,7 +94,7 @@ def pretend(monkeypatch):
     def ask(said, *, stays=False, ask="ready"):
         monkeypatch.setattr(_Pretender, "said", said)
         monkeypatch.setattr(_Pretender, "stays", stays)
-        monkeypatch.setattr(supervisor, "LOOK_EVERY", 1)
+        monkeypatch.setattr(supervised_process, "LOOK_EVERY", 1)
         unit = InstanceProcess(3, limit=0.01)
         unit.log = Log()
         with pytest.raises(ProcessLost) as lost:

@@ -18,8 +18,8 @@ PRODUCT = ("components", "vocabulary", "fmus", "orchestrator", "yawbench")
 ROOT = Path(__file__).parents[2]
 ORCHESTRATOR = Path(__file__).parents[2] / "orchestrator"
 STAGES = (
-    {"errors", "messages", "names", "plan", "cache", "files"} | {"coupling", "fault_kinds"},
-    {"processes", "supervisor", "workers", "interrupts"},
+    {"errors", "messages", "names", "plan", "cache", "files"} | {"coupling_algorithms", "fault_kinds"},
+    {"processes", "supervised_process", "workers", "interrupts"},
     {"scenario"},
     {"measured"},
     {"fmu"},

@@ -212,7 +212,7 @@ def test_a_limit_that_is_no_time_is_refused(option, says, capsys):
 
 NOBODY = """
 import os, threading
-from orchestrator.supervisor import PipeChannel
+from orchestrator.supervised_process import PipeChannel
 from orchestrator.interrupts import StopFlag
 from orchestrator.master.child_run import _tell_where
 nobody, writing = os.pipe()

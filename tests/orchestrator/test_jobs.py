@@ -14,7 +14,7 @@ from orchestrator.errors import ResultsError, ScenarioError, SimulationError, Ya
 from orchestrator.experiments.jobs import Job, execute, read_back, ready
 from orchestrator.plan import Fmu, Variable
 from orchestrator.results.reader import load_results
-from orchestrator.supervisor import PipeChannel
+from orchestrator.supervised_process import PipeChannel
 from orchestrator.workers import Pool
 from tests.sentences import golden, golden_in, refused, texts_of
 
@@ -98,7 +98,7 @@ def test_when_the_caller_stops_all_runs_end(tmp_path, monkeypatch, why):
     def stop(outcome):
         raise why
 
-    monkeypatch.setattr("orchestrator.supervisor.GRACE", 0.0)
+    monkeypatch.setattr("orchestrator.supervised_process.GRACE", 0.0)
     os.mkfifo(tmp_path / "fifo")
     with pytest.raises(why):
         execute(jobs(tmp_path, "hangs", "waits"), workers=2, run=obey, done=stop)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.experiments.tables import runs_table
-from orchestrator.metrics.run_metrics import columns_for, evaluate_all
+from orchestrator.metrics.expressions import columns_for, evaluate_all
 from orchestrator.pages.comparison import differences
 from orchestrator.results.reader import found_runs, load_results
 from orchestrator.results.run_folder import RunStatus

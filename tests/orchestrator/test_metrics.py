@@ -11,8 +11,8 @@ from orchestrator.errors import ScenarioError
 from orchestrator.figures.panels import LabelledRun, shown_by
 from orchestrator.figures.style import digits_of, shown, shown_unit
 from orchestrator.metrics import measures
+from orchestrator.metrics.expressions import AT_A_TIME, STANDARD, MetricValue, evaluate, evaluate_all, metric
 from orchestrator.metrics.measures import catalogue
-from orchestrator.metrics.run_metrics import AT_A_TIME, STANDARD, MetricValue, evaluate, evaluate_all, metric
 from orchestrator.results.run_record import ConnectionRecord
 from tests.sentences import golden, golden_in, refused
 from vocabulary.wheels import WHEELS

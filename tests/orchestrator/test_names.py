@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from orchestrator.experiments.experiment import load_experiment
-from orchestrator.experiments.planning import plan_experiment
-from orchestrator.experiments.region import RegionRuns
+from orchestrator.experiments.open_value_regions import RegionRuns
+from orchestrator.experiments.plan_experiment import plan_experiment
 from orchestrator.figures.panels import panels_of
 from orchestrator.figures.style import LabelledRun
-from orchestrator.metrics.run_metrics import evaluate, metric
+from orchestrator.metrics.expressions import evaluate, metric
 from orchestrator.names import SignalName, Target, match, matching
 from orchestrator.pages.comparison import divergence
 from orchestrator.results.reader import load_results

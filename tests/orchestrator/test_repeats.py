@@ -15,10 +15,10 @@ from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.experiment_result import judge_records
 from orchestrator.experiments.figures import draw_over_axes
 from orchestrator.experiments.jobs import run_job
-from orchestrator.experiments.planning import plan_experiment
+from orchestrator.experiments.plan_experiment import plan_experiment
 from orchestrator.experiments.verdict_tables import limit_tables, run_tables, verdict
 from orchestrator.figures.style import shown
-from orchestrator.metrics.run_metrics import MetricValue
+from orchestrator.metrics.expressions import MetricValue
 from orchestrator.pages.report import study_page
 from tests.sentences import golden, texts_of
 

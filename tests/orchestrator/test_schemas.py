@@ -21,7 +21,7 @@ from orchestrator.experiments import fit, ranking, threats
 from orchestrator.measured import measurement
 from orchestrator.scenario import yaml_lines
 from orchestrator.scenario.find_and_load import kind_of
-from orchestrator.scenario.validation import validate
+from orchestrator.scenario.schema_validation import validate
 from orchestrator.scenario.yaml_lines import Document
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from orchestrator.experiments.axes import RegionSpec, hypercube
+from orchestrator.experiments.axes_and_sampling import RegionSpec, hypercube
 from orchestrator.experiments.claims import ONE_IN
 from orchestrator.experiments.confidence import Decision, SequentialTest, share_bounds
 from tests.checkout import ROOT

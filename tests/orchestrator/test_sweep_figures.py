@@ -14,8 +14,8 @@ from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.experiment_result import ExperimentResult, limit_table, limits_of
 from orchestrator.experiments.figures import draw_over_axes
 from orchestrator.experiments.jobs import Job, MeasuredRun, measured
-from orchestrator.experiments.planning import PlannedExperiment
-from orchestrator.experiments.record import columns_of, write_table
+from orchestrator.experiments.plan_experiment import PlannedExperiment
+from orchestrator.experiments.result_files import columns_of, write_table
 from orchestrator.experiments.tables import to_pandas
 from tests.sentences import golden, refused
 

@@ -18,7 +18,7 @@ from orchestrator.experiments.tables import (
     to_markdown,
     to_pandas,
 )
-from orchestrator.metrics.run_metrics import MetricValue
+from orchestrator.metrics.expressions import MetricValue
 
 
 @pytest.fixture

@@ -113,7 +113,7 @@ def test_the_figure_of_a_sweep_names_what_options_changed(yawbench, fmus, tmp_pa
     from orchestrator.experiments.experiment import load_experiment
     from orchestrator.experiments.experiment_result import judge_records
     from orchestrator.experiments.jobs import MeasuredRun
-    from orchestrator.experiments.planning import plan_experiment
+    from orchestrator.experiments.plan_experiment import plan_experiment
     from tests.changed import changed as given
 
     (tmp_path / "sweep.yaml").write_text(SWEEP)

@@ -12,7 +12,7 @@ from ruamel.yaml import YAML
 from orchestrator.cli import main
 from orchestrator.experiments.ranking import EntriesSpec
 from orchestrator.scenario import yaml_lines
-from orchestrator.scenario.validation import validate
+from orchestrator.scenario.schema_validation import validate
 from tests.sentences import golden, golden_in
 
 SCENARIO = """

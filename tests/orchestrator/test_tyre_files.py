@@ -13,7 +13,7 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.errors import ScenarioError, WiringError, warnings_in
 from orchestrator.experiments.experiment import load_experiment
-from orchestrator.experiments.planning import plan_experiment
+from orchestrator.experiments.plan_experiment import plan_experiment
 from orchestrator.interop.ssp_write import write_ssp
 from orchestrator.names import Target
 from orchestrator.pages.page_parts import groups_of

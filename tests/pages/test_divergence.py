@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orchestrator.metrics.run_metrics import MetricValue
+from orchestrator.metrics.expressions import MetricValue
 from orchestrator.pages.comparison import SAME, difference, divergence, parting_summary, targets_of
 from tests.orchestrator.recorded import car, noted, results
 from tests.sentences import golden, golden_in

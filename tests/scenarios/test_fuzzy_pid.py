@@ -11,7 +11,7 @@ from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.experiment_result import derive
 from orchestrator.experiments.jobs import Job, execute
 from orchestrator.figures.style import shown
-from orchestrator.metrics.run_metrics import MetricValue
+from orchestrator.metrics.expressions import MetricValue
 from orchestrator.results.reader import load_results
 from tests.changed import changed
 from tests.commands import status_of

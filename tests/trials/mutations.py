@@ -135,7 +135,7 @@ def case_of(group: str, number: int, seed: int, box: Sandbox) -> tuple[Path, str
 def load(file: Path, kind: str, planner: Any) -> None:
     """Read a file as the commands do, up to where runs would begin."""
     from orchestrator.experiments.experiment import load_experiment
-    from orchestrator.metrics.run_metrics import evaluate_all
+    from orchestrator.metrics.expressions import evaluate_all
     from orchestrator.plan import Override
     from orchestrator.results.reader import load_results
     from orchestrator.scenario.find_and_load import load_scenario

@@ -8,7 +8,7 @@ import pytest
 from pyarrow import parquet
 
 import yawbench as yb
-from orchestrator.experiments.record import columns_of, write_table
+from orchestrator.experiments.result_files import columns_of, write_table
 from tests.commands import status_of
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from fmus.build import recipe_of
 from fmus.compiler import compiler_command
-from fmus.native import gate
+from fmus.native import compare_with_python
 from fmus.native.build import FLAGS, HEADERS
 from fmus.native.emit import emit
 from fmus.native.specialise import specialise
@@ -81,4 +81,4 @@ def compare(text: str, folder: Path, steps: int = 150) -> None:
     """Translate a component, compile it, and drive it beside Python."""
     with component_of(text, folder) as (component, home):
         library = compiled(emit(specialise(component, home), "small.py", "{a}"), folder)
-        gate.compare(library, "{a}", component, home.parent, steps)
+        compare_with_python.compare(library, "{a}", component, home.parent, steps)

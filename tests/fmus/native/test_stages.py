@@ -1,4 +1,4 @@
-"""The stages of a translation, each by itself: read, evaluate, lower, emit; `test_gate` has the gate."""
+"""The stages of a translation, each by itself: read, evaluate, lower, emit."""
 
 from __future__ import annotations
 

@@ -1,12 +1,12 @@
-"""What is not the same as Python, in a bit, a status or a sentence, does not get through the gate."""
+"""A library that differs from Python in a bit, a status or a sentence is refused."""
 
 from __future__ import annotations
 
 import pytest
 
 from fmus.native import build
+from fmus.native.compare_with_python import differences
 from fmus.native.emit import emit
-from fmus.native.gate import differences
 from fmus.native.specialise import specialise
 from tests.sentences import golden
 

@@ -25,8 +25,8 @@ import numpy as np
 from ..errors import ResultsError, ScenarioError
 from ..figures.style import QUIET, frame, line_style, new_figure
 from ..messages import changed, with_changes
+from ..metrics.expressions import MetricValue, metric
 from ..metrics.measures import variable_of, words
-from ..metrics.run_metrics import MetricValue, metric
 from ..names import SignalName
 from ..plan import Override
 from ..plan import Value as Plain

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from fmus.evidence import SourceDigests
+from fmus.source_digests import SourceDigests
 from tests.checkout import ROOT, copy_checkout, run_in
 from tests.sentences import golden, golden_in
 
@@ -22,7 +22,7 @@ DRIVER = "title: Driver\nstop_time: 0.01\nstep_size: 0.001\nunits: {driver: {fmu
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the checkout, all FMUs that the tests use up to date, its modules compiled."""
-    folder = copy_checkout(tmp_path_factory.mktemp("upkeep"))
+    folder = copy_checkout(tmp_path_factory.mktemp("stale"))
     (folder / "driver.yaml").write_text(DRIVER)
     for command in ("build", "check driver.yaml", "run driver.yaml --out out"):
         done = yawbench(folder, *command.split())

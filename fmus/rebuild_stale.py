@@ -22,7 +22,7 @@ from orchestrator.errors import BuildError
 from orchestrator.plan import BuildInfo
 
 from .build_stamp import BuildStamp, read_stamp
-from .evidence import SourceDigests, content_digest
+from .source_digests import SourceDigests, content_digest
 
 if TYPE_CHECKING:
     from .build import Recipe

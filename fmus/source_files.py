@@ -26,7 +26,7 @@ import pythonfmu
 import vocabulary
 from orchestrator.errors import BuildError
 
-from .evidence import SourceDigests, content_digest
+from .source_digests import SourceDigests, content_digest
 
 Parts = tuple[str, ...]
 """A module's dotted name inside the package, split: ("controllers", "fnn")."""

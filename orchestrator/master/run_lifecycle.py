@@ -1,4 +1,4 @@
-"""The main loop of a run: open the FMUs, initialize them, step to the end, free them.
+"""The life of a run: open the FMUs, initialize them, step to the end, free them.
 
 `timing` wraps an instance to measure the processor time of its steps, by the clock of the thread that
 makes them.
@@ -45,7 +45,7 @@ REPORT_EVERY = 0.2
 """Time between two reports of progress [s], unless a single step takes longer."""
 
 
-class RunLoop:
+class RunLifecycle:
     """Runs a plan in this process.
 
     Args:

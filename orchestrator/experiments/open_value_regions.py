@@ -13,21 +13,28 @@ from pathlib import Path
 
 from ..errors import Diagnostic, Location, ScenarioError
 from ..messages import hint, listed
-from ..metrics.run_metrics import MetricValue
+from ..metrics.expressions import MetricValue
 from ..metrics.verdict import Verdict
 from ..names import Target
 from ..plan import Override
 from ..plan import Value as Given
 from ..planner import Planner
-from .axes import Level, OpenValueSpec, OpenVariantSpec, changes_at, extended_hypercube, levels_of
+from .axes_and_sampling import (
+    Level,
+    OpenValueSpec,
+    OpenVariantSpec,
+    changes_at,
+    extended_hypercube,
+    levels_of,
+)
 from .claim_schema import Claim, MetricReference
 from .claims import ONE_IN, TIMES, ClaimResult, LevelVerdict, OpenValueScan, Region, judge
 from .confidence import Decision, SequentialTest
 from .experiment import RUNS, LoadedExperiment, NamedRun
 from .experiment_result import ExperimentResult, derive
-from .grids import ranked
 from .jobs import Job, MeasuredRun, keyed, ready
-from .planning import PlannedExperiment, found_at, metrics_of, number_of
+from .plan_experiment import PlannedExperiment, found_at, metrics_of, number_of
+from .published_tables import ranked
 
 ORIGIN = "region"
 """Origin of overrides that open values make."""
@@ -420,16 +427,8 @@ def _judged(
                 judged.append(LevelVerdict(level.words, number, verdict))
         unit, factor = _shown(runs, name, question.runs) if open_value.numeric else ("", 1.0)
         at = runs.chosen_number(name, question.runs) if open_value.numeric else None
-        lines.append(
-            OpenValueScan(
-                name,
-                open_value.says or name,
-                unit,
-                factor,
-                LevelVerdict("as chosen", at, chosen.verdict),
-                tuple(judged),
-            )
-        )
+        as_chosen = LevelVerdict("as chosen", at, chosen.verdict)
+        lines.append(OpenValueScan(name, open_value.says or name, unit, factor, as_chosen, tuple(judged)))
     return Region(chosen.verdict, tuple(plan.verdicts[key]), tuple(lines), plan.test)
 
 

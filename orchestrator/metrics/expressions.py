@@ -1,4 +1,4 @@
-"""Metrics of runs: measures of signals over a run or a part of it, each with a definition and a unit.
+"""Metrics of runs, from expressions such as `peak(sideslip)`: parsed, evaluated over a run or a part of it.
 
 A metric is a measure of a signal, written `measure(signal)`: `relative_peak_error(sideslip)`,
 `total_variation_rate(wheel_torque_*)`. Signals are named as in the vocabulary, whatever the scenario calls

@@ -24,7 +24,7 @@ from ..scenario import overrides, yaml_lines
 from ..scenario.fault_schema import FaultSpec, by_location
 from ..scenario.quantities import parse_unit
 from ..scenario.schema import AlgorithmName, Scalar
-from ..scenario.validation import StrictModel, Time, exactly_one
+from ..scenario.schema_validation import StrictModel, Time, exactly_one
 from .claim_schema import LEVELS as VALUES
 from .claim_schema import Number, Patterns, is_finite, text_of
 

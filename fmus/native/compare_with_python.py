@@ -1,4 +1,4 @@
-"""The gate: drives a native unit and its Python twin through the same calls, and compares every bit.
+"""Comparison of a native unit with its Python twin: driven through the same calls, equal in every bit.
 
 Both are taken through 2,000 steps at each of three step lengths, with inputs in their usual ranges, a
 hundredth and three times of them; with every value of parameters that have choices, with parameters moved;
@@ -57,7 +57,7 @@ class Native:
         self.messages: list[str] = []
         self._callbacks = _Callbacks(_LOGGER(self._log))
         call = self.library.fmi2Instantiate
-        made = call(b"gate", c_int(1), guid.encode(), None, byref(self._callbacks), c_int(0), c_int(0))
+        made = call(b"native", c_int(1), guid.encode(), None, byref(self._callbacks), c_int(0), c_int(0))
         if made is None:
             raise Difference(f"the native unit does not start: {'; '.join(self.messages)}")
         self.instance = c_void_p(made)
@@ -131,7 +131,7 @@ class Twin:
                 messages.append(text)
 
         component.log = log
-        self._make: Callable[[], Any] = lambda: component(instance_name="gate", resources=str(resources))
+        self._make: Callable[[], Any] = lambda: component(instance_name="native", resources=str(resources))
         self.unit = self._make()
 
     def _answer(self, succeeded: Any = True, values: Sequence[float] = ()) -> Answer:

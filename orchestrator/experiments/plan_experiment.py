@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import Diagnostic, Location, ScenarioError
-from ..metrics.run_metrics import STANDARD, metric, results_to_be, unit_in
+from ..metrics.expressions import STANDARD, metric, results_to_be, unit_in
 from ..names import OF_RUN, SignalName, Target
 from ..plan import DEFAULT, Fmu, Instance, Plan, Variable
 from ..plan import Value as Given
@@ -17,7 +17,7 @@ from ..results.reader import Results
 from ..scenario import quantities
 from ..scenario.yaml_lines import dotted
 from ..wiring.context import FACTS
-from .axes import AxisSpec, Level
+from .axes_and_sampling import AxisSpec, Level
 from .claim_schema import MetricReference, MetricSpec, si_number
 from .experiment import RUNS, Case, LoadedExperiment, NamedRun
 from .jobs import Job, MetricRequests, keyed, ready

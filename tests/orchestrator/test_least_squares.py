@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from orchestrator.measured.estimate import (
+from orchestrator.measured.least_squares import (
     NotIdentifiable,
     Parameter,
     Residuals,
