@@ -12,6 +12,7 @@ from orchestrator.figures.style import LabelledRun
 from orchestrator.files import reason, write_whole
 from orchestrator.messages import counted, listed
 from orchestrator.metrics.expressions import columns_of
+from orchestrator.pages.page_parts import packed
 from orchestrator.pages.viewer import SETTINGS, Settings, page
 from orchestrator.pages.viewer import View as Selection
 
@@ -62,7 +63,7 @@ def view(
     settings = Settings((Selection(panels=wanted),)) if wanted else SETTINGS
     title = arguments.text(title, "title", empty=True)
     names = tuple(run.label for run in labelled)
-    html = page(labelled, settings, title=title or listed(names, last="and"))
+    html = packed(page(labelled, settings, title=title or listed(names, last="and")))
     return View(names, html, arguments.count(height, "height", least=LEAST, most=MOST))
 
 

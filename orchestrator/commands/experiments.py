@@ -180,11 +180,11 @@ def command_of(preset: str, path: Path, *, quick: bool = False, **options: Itera
 
 def write_page(facts: dict[str, Any], folder: Path) -> Path:
     """Write the page of an experiment into its folder; return its path."""
-    from ..files import write_whole
+    from ..pages.page_parts import save_page
     from ..pages.report import PAGE, study_page
 
     page = folder / PAGE
-    write_whole(page, study_page(facts))
+    save_page(page, study_page(facts))
     output.answer(page=page)
     return page
 
@@ -198,7 +198,7 @@ def write_overview(chapters: Sequence[dict[str, Any]], pages: Sequence[Path], fo
     """Write the overview of several experiments into a folder; return its path."""
     import os
 
-    from ..files import write_whole
+    from ..pages.page_parts import save_page
     from ..pages.report import PAGE, RANKING, overview_page
 
     def address(page: Path) -> str:
@@ -206,7 +206,7 @@ def write_overview(chapters: Sequence[dict[str, Any]], pages: Sequence[Path], fo
 
     page = folder / PAGE
     ranking = address(RANKING) if RANKING.is_file() else ""
-    write_whole(page, overview_page(chapters, [*map(address, pages)], folder, ranking))
+    save_page(page, overview_page(chapters, [*map(address, pages)], folder, ranking))
     output.answer(page=page)
     return page
 

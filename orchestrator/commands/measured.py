@@ -155,6 +155,7 @@ def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
     from ..files import write_whole
     from ..measured.least_squares import CONVERGED
     from ..pages.fit_page import fit_page, parameter_table, score_table
+    from ..pages.page_parts import save_page
     from ..planner import Planner
     from ..results.run_folder import default_folder
 
@@ -175,7 +176,7 @@ def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
     for model in result.models:
         if model.estimate.message != CONVERGED:
             say(f"note: {model.title}: the search ended early: {model.estimate.message} (most_sets)")
-    write_whole(folder / "fit.html", fit_page(result))
+    save_page(folder / "fit.html", fit_page(result))
     say(f"Written: {folder / 'fit.json'}, vehicle.yaml, fit.html")
 
 
@@ -242,6 +243,7 @@ def validate(
     from ..files import write_whole
     from ..measured.measurement import load_measurement
     from ..pages.evaluation_page import validation_page
+    from ..pages.page_parts import save_page
     from ..results.measurement_results import load_run
     from .results import recorded
 
@@ -261,7 +263,7 @@ def validate(
         say(f"{'note' if diagnostic.severity == 'info' else 'warning'}: {diagnostic}")
     written = [str(out / "validation.json"), *(path.name for path in drawing)]
     if page:
-        write_whole(out / "validation.html", validation_page(validation))
+        save_page(out / "validation.html", validation_page(validation))
         written.append("validation.html")
     say(", ".join(written))
     if not validation.holds:

@@ -131,6 +131,7 @@ def _rank_by_threats(
     from ..experiments.threat_scores import scored, table_of_scores
     from ..experiments.threats import load_threats
     from ..files import write_whole
+    from ..pages.page_parts import save_page
     from ..pages.report import PAGE
     from ..pages.threats_page import main_table, threats_page
     from ..results.run_folder import default_folder
@@ -154,7 +155,7 @@ def _rank_by_threats(
     write_whole(folder / "scores.csv", to_csv(table_of_scores(table)))
     page = folder / PAGE
     command = command_of("rank", file, quick=quick, controller=controller, condition=[*chosen])
-    write_whole(page, threats_page(result, table, folder, command))
+    save_page(page, threats_page(result, table, folder, command))
     say(f"The page: {page} ({page.stat().st_size / 1e6:.1f} MB)")
     output.answer(folder=folder, page=page, entries=records_in(table_of_scores(table)))
     print_tables([main_table(result, table)])
@@ -196,6 +197,7 @@ def _write(ranked: RankingResult, folder: Path, command: str, each: Each) -> Non
     from ..experiments.tables import to_csv
     from ..figures.style import save
     from ..files import write_whole
+    from ..pages.page_parts import save_page
     from ..pages.ranking_page import ranking_page
     from ..pages.report import PAGE
 
@@ -211,5 +213,5 @@ def _write(ranked: RankingResult, folder: Path, command: str, each: Each) -> Non
     except ResultsError as error:
         say(f"{FIGURES}/pareto: {error}")
     page = folder / PAGE
-    write_whole(page, ranking_page(ranked, folder, command, each))
+    save_page(page, ranking_page(ranked, folder, command, each))
     say(f"The page: {page} ({page.stat().st_size / 1e6:.1f} MB)")

@@ -363,8 +363,8 @@ def write_view(
     """
     from ..errors import ResultsError
     from ..figures.style import LabelledRun
-    from ..files import write_whole
     from ..messages import changed_each
+    from ..pages.page_parts import save_page
     from ..pages.viewer import SETTINGS, Settings, View, page
     from .progress import say
 
@@ -379,7 +379,7 @@ def write_view(
         text = page(runs, settings, below="; ".join(dict.fromkeys(titles)), changed=changed)
     file = out or folder_of_all(folders) / "view.html"
     try:
-        write_whole(file, text, named=out is not None)
+        save_page(file, text, named=out is not None)
     except OSError as error:
         raise ResultsError(
             f"{file}: cannot write the page: {error.strerror or error}", code="results-unwritable"

@@ -263,6 +263,7 @@ class EvaluatedRuns:
         from ..files import write_whole
         from ..messages import counted
         from ..pages.evaluation_page import evaluation_page
+        from ..pages.page_parts import save_page
         from .progress import print_tables, say
 
         drawn = self._draw(each=each, together=together)
@@ -280,7 +281,7 @@ class EvaluatedRuns:
             table = runs_table(self.series.runs if self.series else self.judged, self.test, self.series)
         print_tables([table])
         page = evaluation_page(self.test, self.traces, self.judged, self.series)
-        write_whole(self.folder / PAGE, page)
+        save_page(self.folder / PAGE, page)
         also = f", {counted(drawn, 'figure')}" if drawn else ""
         say(f"{self.folder / FILE}, {PAGE}{also}")
 

@@ -36,11 +36,8 @@ from ..results.measurement_results import MeasuredResults
 from ..results.reader import Results, load_results
 from ..results.run_record import RunRecord
 from .page_parts import document
-from .viewer import MOST, Settings, View, assets, viewer
+from .viewer import LARGEST, MOST, Settings, View, assets, viewer
 
-LARGEST = 2_000_000
-"""Size of the samples in a page [bytes]; beyond it, the page carries the signals of the test alone. Chosen:
-a series of sine with dwell opens in a second."""
 PANELS = ("steering_wheel_angle", "yaw_rate", "sideslip", "acceleration_y")
 """Signals shown first; chosen: what most tests judge."""
 

@@ -19,13 +19,11 @@ from ..results.measurement_results import MeasuredResults
 from ..results.reader import Results
 from ..results.run_record import RunRecord
 from .page_parts import document
-from .viewer import Settings, View, assets, viewer
+from .viewer import LARGEST, Settings, View, assets, viewer
 
 BINS = 4
 """Number of ranges of acceleration and speed, equal in samples. Chosen: enough to see a trend."""
 OVER = ("acceleration_y", "velocity_x")
-LARGEST = 2_000_000
-"""Size of the samples in the page [bytes]; chosen: as on evaluation pages."""
 
 
 def fit_page(result: FitResult) -> str:

@@ -6,7 +6,10 @@ default is in the FMU that has it.
 
 from __future__ import annotations
 
+import base64
 import functools
+import gzip
+import json
 import os
 import re
 from collections import Counter
@@ -26,6 +29,7 @@ from vocabulary.wheels import WHEEL_NAMES, WHEELS
 
 from ..experiments.tables import Table
 from ..experiments.verdict_tables import FAILS, HOLDS, NOT_JUDGED, SENSITIVE, UNDECIDED
+from ..files import write_whole
 from ..messages import fold, printable
 from ..metrics.verdict import Status
 from ..plan import (
@@ -179,6 +183,41 @@ def document(
     return render("document.html.j2", locals() | {"many": MANY})
 
 
+def save_page(file: Path, html: str, *, named: bool = False) -> None:
+    """Write a page, packed; `named`: see `write_whole`."""
+    write_whole(file, packed(html), named=named)
+
+
+PACKED = re.compile(
+    r"(?P<start><script(?: type=\"application/json\")?|</summary><template|<img(?= src=\"data:))"
+    r"(?: src=\"(?P<image>[^\"]*)\"|>(?P<text>.*?)(?P<end></script>|</template>))",
+    re.DOTALL,
+)
+"""Scripts, the data of viewers, folded parts and images: what needs JavaScript, or is not read at first."""
+
+
+def packed(html: str) -> str:
+    """Return a page with its scripts and what a reader does not see at first compressed."""
+    texts: list[str] = []
+
+    def emptied(part: re.Match[str]) -> str:
+        texts.append(part["text"] or part["image"] or "")
+        return f"{part['start']} data-packed" + (f">{part['end']}" if part["end"] else "")
+
+    head, opening, script = html.rpartition("<script>")  # the page's own, which unfolds
+    text = PACKED.sub(emptied, head)
+    text_of_all = json.dumps(texts, ensure_ascii=False).encode()
+    block = base64.b64encode(gzip.compress(text_of_all, 9, mtime=0)).decode()
+    carries = f'<script type="text/plain" id="packed">{block}</script>'
+    unpacks = f"<script>\n{static('unpack.js')}</script>\n"
+    return f"{text}{carries}\n{opening}{script.replace('</body>', unpacks + '</body>')}"
+
+
+def static(name: str) -> str:
+    """Return a style sheet or a script of all pages."""
+    return (files(__package__) / "static" / name).read_text(encoding="utf-8")
+
+
 @functools.cache
 def _templates() -> Environment:
     """Return the template environment; each template is compiled once."""
@@ -197,7 +236,7 @@ def _templates() -> Environment:
 
 def style() -> Markup:
     """Return the style sheet shared by all pages with text."""
-    return Markup((files(__package__) / "static" / "page.css").read_text(encoding="utf-8"))
+    return Markup(static("page.css"))
 
 
 def verdict_sign(word: str) -> Markup:

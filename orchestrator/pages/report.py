@@ -66,6 +66,7 @@ from .page_parts import (
 from .sweep_view import sweep_view, write_sides
 from .viewer import (
     DATA,
+    LARGEST,
     MOST,
     PANELS,
     Carried,
@@ -272,8 +273,6 @@ SEVERAL = {
 """Verdict -> its plural."""
 VIEW = "view"
 """Anchor of the viewer."""
-LARGEST = 1_500_000
-"""Size of the samples in a chapter [bytes]. Chosen: a page of 2.5 MB opens at once, also by mail."""
 
 
 def viewer_of(

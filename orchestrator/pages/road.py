@@ -37,6 +37,10 @@ MOTION = (
 )  # fmt: skip
 
 
+OF_WHEELS = ("force_along", "force_across", "load", "friction")
+"""What `road_of` has of each wheel."""
+
+
 @dataclass(frozen=True)
 class CarOutline:
     """A car seen from above: its axles and ends from the centre of mass, its widths [m]."""
@@ -85,6 +89,11 @@ def road_of(run: Results, grounds: list[Any]) -> dict[str, Any] | None:
     road["ground"] = grounds.index(ground) if ground else None
     road["sized"] = known
     return road
+
+
+def without_tyres(road: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the columns that the road needs without forces and friction circles of the wheels."""
+    return {key: column for key, column in road.items() if key[:-3] not in OF_WHEELS}
 
 
 def notes_of(run: Results, road: Mapping[str, Any] | None) -> list[str]:

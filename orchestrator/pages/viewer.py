@@ -31,8 +31,8 @@ from ..metrics.measures import words
 from ..results.measurement_results import MeasuredResults
 from ..results.reader import Results
 from ..results.run_folder import RunStatus
-from .page_parts import document, render
-from .road import legend_of, notes_of, road_of
+from .page_parts import document, render, static
+from .road import legend_of, notes_of, road_of, without_tyres
 from .viewer_data import PackedRun, is_numeric, pack
 
 SCRIPTS = (
@@ -47,6 +47,9 @@ METRICS = ("peak(sideslip)", "peak(yaw_rate)", "peak(acceleration_y)", "peak(yaw
 """Metrics in the table of runs, by default."""
 FEW = 4
 """Runs that a page's sentence names each. Chosen: more are read better in the table of runs."""
+LARGEST = 2_200_000
+"""Size of the samples in a page [bytes]. Chosen: with its text a page of 2.5 MB, which opens at once, also by
+mail."""
 STILL = ("sideslip", "yaw_rate")
 """Signals whose largest value sets the cursor at first."""
 
@@ -79,7 +82,7 @@ class Settings:
         marks: instants [s] with a text, as vertical lines.
         limits: signal, bound in SI units and a text, as horizontal lines.
         largest: size of the samples [bytes]; beyond it, the page carries the signals of the views and of the
-            road alone. 0: no limit.
+            road alone, and still beyond it, of the road without the forces of the tyres. 0: no limit.
         ghosts: numbers of runs that are drawn faintly behind the others.
         bands: numbers of runs whose closed line is filled, behind all others; not over time.
     """
@@ -177,9 +180,13 @@ def carried(
     drawn = [_drawn(view, results) for view in settings.views]
     views = [view for view in drawn if view["panels"]] or drawn[:1]
     packed = packed or pack(results)
-    if partial := 0 < settings.largest < sum(len(run.block) for run in packed):
-        needed = _needed(views, roads)
-        packed = [run.only(needed) for run in packed]
+    notes = [notes_of(run.results, road) for run, road in zip(runs, roads, strict=True)]
+    every, sparse = packed, [road and without_tyres(road) for road in roads]
+    for kept in (roads, sparse):
+        if not 0 < settings.largest < sum(len(run.block) for run in packed):
+            break
+        roads, needed = kept, _needed(views, kept)
+        packed = [run.only(needed) for run in every]
     carried = {name for run in packed for name in run.columns}
     data = {
         "views": views,
@@ -197,12 +204,12 @@ def carried(
             [metric(name).title, values] for name in settings.metrics if any(values := _values(runs, name))
         ],
         "key": legend_of(roads, grounds),
-        "partial": partial,
+        "partial": packed is not every,
         "runs": [
             {
                 "label": run.label,
                 "faults": [[span.begin, span.end, span.label] for span in spans_of([run])],
-                "notes": notes_of(run.results, road),
+                "notes": notes[number],
                 "road": road,
                 "ghost": number in settings.ghosts,
                 "band": number in settings.bands,
@@ -217,13 +224,12 @@ def carried(
 
 def assets(*scripts: str) -> Markup:
     """Return the style and the scripts that all viewers of a page share, and further scripts of `static/`."""
-    static = files(__package__) / "static"
     foreign = Path(str(distribution("uplot-python").locate_file("uplot/static")))
     plotter = (foreign / "uPlot.iife.js").read_text(encoding="utf-8")
     styles = [(foreign / "uPlot.min.css").read_text(encoding="utf-8")]
     sheets = ["viewer.css", *(name.replace(".js", ".css") for name in scripts)]
-    styles += [_static(static, name) for name in sheets if (static / name).is_file()]
-    script = "\n".join(_static(static, name) for name in (*SCRIPTS, *scripts))
+    styles += [static(name) for name in sheets if (files(__package__) / "static" / name).is_file()]
+    script = "\n".join(map(static, (*SCRIPTS, *scripts)))
     return Markup(
         "<style>\n{}</style>\n<script>\n(() => {{\n'use strict';\n"
         "const makeUPlot = (devicePixelRatio) => {{\n{}\nreturn uPlot;\n}};\n{}}})();\n</script>"
@@ -290,10 +296,6 @@ def _compared(runs: Sequence[LabelledRun], values: Sequence[MetricValue]) -> str
         return listed(texts)
     ends = (texts[numbers.index(pick(numbers))] for pick in (min, max))
     return f"{' to '.join(ends)}, of {len(texts)} runs"
-
-
-def _static(folder: Any, name: str) -> str:
-    return str((folder / name).read_text(encoding="utf-8"))
 
 
 def _dash(number: int) -> Sequence[float]:

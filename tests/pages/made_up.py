@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -57,8 +60,26 @@ def without(recorded: Results, *parts: str) -> Results:
     return replace(recorded, columns=kept)
 
 
+def unpacked(page: Path | str) -> str:
+    """Return a page as a browser has it once its script has filled what was packed."""
+    html = page if isinstance(page, str) else page.read_text(encoding="utf-8")
+    block = re.search(r'<script type="text/plain" id="packed">(.*?)</script>', html)
+    if block is None:
+        return html
+    texts = iter(json.loads(gzip.decompress(base64.b64decode(block[1]))))
+    head, rest = html[: block.start()], html[block.end() :]
+
+    def filled(place: re.Match[str]) -> str:
+        return f' src="{next(texts)}"' if place["image"] else f">{next(texts)}"
+
+    head = re.sub(r"(?P<image>(?<=<img) data-packed)| data-packed>", filled, head)
+    assert next(texts, None) is None
+    return head + rest
+
+
 def data_in(html: str) -> dict[str, Any]:
     """Return what a page carries."""
+    html = unpacked(html)
     found = re.search(r'<script type="application/json">(.*?)</script>', html, re.DOTALL)
     assert found
     return json.loads(found[1])

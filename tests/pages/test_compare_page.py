@@ -13,7 +13,7 @@ from tests.sentences import golden, golden_in
 
 from .browser import DESK, PHONE
 from .flaws import flaws, inaccessible, open_all
-from .made_up import data_in
+from .made_up import data_in, unpacked
 
 ROOT = Path(__file__).parents[2]
 UNITS = (
@@ -40,7 +40,7 @@ def page(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def tree(page):
-    return html.fromstring(page.read_text(encoding="utf-8"))
+    return html.fromstring(unpacked(page))
 
 
 def texts(tree, path: str) -> list[str]:

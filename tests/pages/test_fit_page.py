@@ -15,7 +15,7 @@ from tests.orchestrator.test_fit import TRUTH, folder, run
 
 from .browser import DESK, PHONE, Browser
 from .flaws import check_whole
-from .made_up import data_in
+from .made_up import data_in, unpacked
 
 VIEWER = "const viewer = document.querySelector('.yv').viewer;"
 __all__ = ["folder"]
@@ -30,7 +30,7 @@ def page(folder: Path) -> Path:
 
 def test_every_number_of_its_tables_is_that_of_the_file(page):
     data = json.loads(page.with_name("fit.json").read_text(encoding="utf-8"))
-    tree = html.fromstring(page.read_text(encoding="utf-8"))
+    tree = html.fromstring(unpacked(page))
     scores, *tables = tree.cssselect("main table:not(.yv *)")
     rows = [[cell.text_content().strip() for cell in row] for row in scores.cssselect("tbody tr")]
     wanted = [(name, title) for name in ("yaw_rate", "acceleration_y") for title in data["models"]]

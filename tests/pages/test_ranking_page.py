@@ -12,6 +12,7 @@ from tests.orchestrator.test_ranking import SMALL
 
 from .browser import DESK, PHONE, Browser
 from .flaws import inaccessible
+from .made_up import unpacked
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +37,7 @@ def test_the_first_cell_is_open_and_all_of_it_can_be_read_by_everyone(chromium: 
 
 
 def test_every_count_is_that_of_its_table(page):
-    tree = html.fromstring(page.read_text(encoding="utf-8"))
+    tree = html.fromstring(unpacked(page))
     rows = tree.cssselect("table.matrix tbody tr")
     conditions = tree.cssselect("table.matrix th.leaning")
     answer = tree.xpath("string(//p[@class='said'])")

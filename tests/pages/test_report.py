@@ -21,7 +21,7 @@ from tests.sentences import golden, golden_in, refused
 
 from .browser import DESK, PHONE
 from .flaws import flaws, inaccessible, open_all
-from .made_up import HALF_A_CAR, data_in
+from .made_up import HALF_A_CAR, data_in, unpacked
 
 ROOT = Path(__file__).parents[2]
 UNITS = (
@@ -96,7 +96,7 @@ def paper(tmp_path_factory, fmus):
         study=study,
         folder=folder,
         page=page,
-        tree=html.fromstring(page.read_text(encoding="utf-8")),
+        tree=html.fromstring(unpacked(page)),
         record=json.loads((folder / "experiment.json").read_text(encoding="utf-8")),
     )
 
@@ -255,7 +255,7 @@ def test_stale_results_are_shown_as_such_where_nothing_may_run(report, half):
     report()
     (half / "half.yaml").write_text(HALF_A_CAR.replace("velocity_x: 20", "velocity_x: 25"))
     assert report("--no-run")[0] == 0
-    tree = html.fromstring(Path("results/half/study/report.html").read_text(encoding="utf-8"))
+    tree = html.fromstring(unpacked(Path("results/half/study/report.html")))
     assert golden_in(texts(tree, ".verdict.bad"))
     assert golden_in(tree.text_content())
 
@@ -266,7 +266,7 @@ def test_an_edit_after_the_run_does_not_change_where_the_page_says_that_values_c
     report()
 
     def parameters():
-        tree = html.fromstring(Path("results/half/study/report.html").read_text(encoding="utf-8"))
+        tree = html.fromstring(unpacked(Path("results/half/study/report.html")))
         return texts(tree, "table.parameters tr")
 
     before = parameters()
@@ -285,7 +285,7 @@ def test_a_run_that_failed_is_named_and_its_claims_are_not_judged(report, half):
     record |= {"status": "failed", "error": {"message": "the wheel came off"}}
     Path("results/half/study/amplitude/0.05/run.json").write_text(record_text(record))
     assert report("--no-run")[0] == 1
-    tree = html.fromstring(Path("results/half/study/report.html").read_text(encoding="utf-8"))
+    tree = html.fromstring(unpacked(Path("results/half/study/report.html")))
     assert golden_in(tree.text_content())
     verdicts = [text.split(maxsplit=1)[1] for text in texts(tree, "table.claims .verdict")]
     assert golden(verdicts)
@@ -300,14 +300,14 @@ def test_several_studies_make_one_page_with_an_overview(report, half):
     status, said = report()
     assert status == 0
     assert golden(said.splitlines()[-1].partition(" (")[0])
-    tree = html.fromstring(Path("results/report.html").read_text(encoding="utf-8"))
+    tree = html.fromstring(unpacked(Path("results/report.html")))
     titles = ["A paper before", "A paper before, more", "Half a paper"]
     assert texts(tree, "section > h2") == titles
     claims = len(tree.cssselect("ul.plain > li"))
     assert tree.xpath("string(//p[@class='said'])").startswith(f"Of {claims} claims in 3 studies, ")
     for title, link in zip(titles, tree.cssselect("section > h2 > a"), strict=True):
         page = Path("results", link.get("href"))
-        study = html.fromstring(page.read_text(encoding="utf-8"))
+        study = html.fromstring(unpacked(page))
         assert study.findtext(".//h1") == title
         places = {element.get("id") for element in study.cssselect("[id]")}
         links = {link.get("href")[1:].partition("?")[0] for link in study.cssselect("a[href^='#']")}

@@ -15,6 +15,7 @@ from orchestrator.pages.threats_page import compared_settings, threats_page
 
 from .browser import DESK, Browser
 from .flaws import inaccessible, open_all
+from .made_up import unpacked
 from .test_sweep_page import MOST_ELEMENTS
 
 
@@ -44,7 +45,7 @@ def test_it_keeps_its_budget_and_can_be_read_by_everyone(chromium: Browser, page
 
 
 def test_every_level_is_on_the_page_and_counts_are_those_of_its_tables(published, page):
-    tree = html.fromstring(page.read_text(encoding="utf-8"))
+    tree = html.fromstring(unpacked(page))
     entries = published.complete[published.threats.main]
     settings = tree.xpath("//h2[@id='settings']/following-sibling::details[following::h2[@id='cars']]")
     assert len(settings) == len(compared_settings(published)) > 0

@@ -23,7 +23,7 @@ from tests.orchestrator.test_validation import line, write, write_study
 
 from .browser import DESK, PHONE, Browser
 from .flaws import check_whole, flaws, inaccessible
-from .made_up import data_in, whole_car
+from .made_up import data_in, unpacked, whole_car
 
 VIEWER = "const viewer = document.querySelector('.yv').viewer;"
 
@@ -56,7 +56,7 @@ def page(made) -> Path:
 
 def test_it_has_the_verdict_the_conditions_and_the_source_of_the_bands(made, page):
     _, _, validation = made
-    tree = html.fromstring(page.read_text(encoding="utf-8"))
+    tree = html.fromstring(unpacked(page))
     (verdict,) = validation.verdicts.values()
     signals, conditions = tree.cssselect("main > table")
     rows = [row.text_content() for row in signals.cssselect("tbody tr")]
@@ -164,7 +164,7 @@ def test_a_study_has_a_chapter_on_its_validations(chromium: Browser, tmp_path, w
     page.write_text(
         study_page(chapter(findings, command="yawbench study", stale={}, folder=tmp_path)), "utf-8"
     )
-    tree = html.fromstring(page.read_text(encoding="utf-8"))
+    tree = html.fromstring(unpacked(page))
     assert len(tree.cssselect("#validations ~ h3")) == len(findings.validations) == 2
     near, far = findings.validations
     assert "2 tests of the car" in tree.text_content()

@@ -193,6 +193,6 @@ class Bench {
   }
 }
 
-document.addEventListener('DOMContentLoaded', () => {
+ready(() => {
   for (const form of document.querySelectorAll('form.bench')) form.bench = new Bench(form);
 });

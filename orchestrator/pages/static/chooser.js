@@ -42,5 +42,4 @@ function startChooser() {
   show();
 }
 
-if (document.readyState === 'loading') document.addEventListener('DOMContentLoaded', startChooser);
-else startChooser();
+ready(startChooser);

@@ -598,5 +598,4 @@ function startSweeps() {
   for (const root of document.querySelectorAll('.ys:not(.ys-ready)')) root.sweep = new Sweep(root);
 }
 
-if (document.readyState === 'loading') document.addEventListener('DOMContentLoaded', startSweeps);
-else startSweeps();
+ready(startSweeps);

@@ -575,5 +575,4 @@ async function startAll() {
   for (const root of document.querySelectorAll('.yv:not(.yv-started)')) await startViewer(root);
 }
 
-if (document.readyState === 'loading') document.addEventListener('DOMContentLoaded', startAll);
-else startAll();
+ready(startAll);

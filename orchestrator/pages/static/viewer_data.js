@@ -1,5 +1,11 @@
 // Recorded runs as the page carries them (`viewer_data.py` packs them), and values at a time.
 
+// Start a part of the page when all of it, and all scripts, have been read.
+function ready(start) {
+  if (document.readyState === 'loading') document.addEventListener('DOMContentLoaded', start);
+  else queueMicrotask(start);
+}
+
 const WHEELS = ['fl', 'fr', 'rl', 'rr'];
 
 async function inflate(text) {
