@@ -34,6 +34,11 @@ def listed(items: Iterable[object], *, last: str = "and") -> str:
     return f"{', '.join(words[:-1])} {last} {words[-1]}"
 
 
+def in_text(title: str) -> str:
+    """Return a title as part of a sentence: in quotes if it has a comma of its own."""
+    return f"“{title}”" if "," in title else title
+
+
 def short(value: object) -> str:
     """Return a value for use in a message: its repr in one line, shortened, or its type if repr fails."""
     if value is None:

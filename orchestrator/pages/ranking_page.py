@@ -42,7 +42,7 @@ from ..experiments.ranking_tables import (
 )
 from ..experiments.tables import Table
 from ..figures.style import LabelledRun
-from ..messages import changed, counted, listed
+from ..messages import changed, counted, in_text, listed
 from ..results.reader import Results, load_results
 from .page_parts import FigureImage, anchor, image_of, option_of, render
 from .viewer import DATA, Settings, View, assets, carried, embedded, tidy_sides, write_side
@@ -118,8 +118,8 @@ def answer(ranked: RankingResult) -> str:
     first = [score for score in placed if score.rank == 1]
     others = [score for score in placed if score.rank != 1][:1]
     others += [score for score in placed if score.spec.fmu == IDLE and score not in (*first, *others)]
-    names = listed((score.spec.title for score in first), last="and")
-    rest = "".join(f"; {score.spec.title} {score.count(RankedState.PASSED)}" for score in others)
+    names = listed((in_text(score.spec.title) for score in first), last="and")
+    rest = "".join(f", {in_text(score.spec.title)} {score.count(RankedState.PASSED)}" for score in others)
     apart, pairs = told_apart(placed)
     share = f"{sharing} share the first place, as their intervals overlap; " if sharing > len(first) else ""
     surely = f" Of {pairs} pairs, {apart} can be told apart." if pairs else ""

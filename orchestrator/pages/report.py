@@ -232,8 +232,12 @@ def of_all(chapters: Sequence[dict[str, Any]]) -> str:
     if not counts:
         return ""
     parts = [f"{n} {word if n == 1 else SEVERAL.get(word, word)}" for word, n in counts.items()]
+    judged = [facts for facts in chapters if facts["counts"]]
+    alone = sum(not facts["region"] for facts in judged)
+    where = f", {'all' if alone == len(judged) else f'{alone} of the studies'} at the chosen point only"
     return (
-        f"Of {sum(counts.values())} claims in {counted(len(chapters), 'study', 'studies')}, {listed(parts)}."
+        f"Of {sum(counts.values())} claims in {counted(len(judged), 'study', 'studies')}, {listed(parts)}"
+        f"{where if alone else ''}."
     )
 
 

@@ -26,7 +26,7 @@ from ..experiments.threat_scores import (
 )
 from ..experiments.threats import LANE_CHANGE, REFERENCE, LoadedThreats, SearchPlace, ThreatSpec
 from ..figures.style import digits_of, shown_unit
-from ..messages import counted
+from ..messages import counted, in_text
 from .page_parts import render
 from .report import PAGE, RANKING
 
@@ -81,7 +81,7 @@ def _other_order(titles: Mapping[str, str], table: ScoreTable) -> str:
 
 
 def _moved(titles: Mapping[str, str], moves: Moves) -> str:
-    return f"{titles[moves.farthest]}, {moves.before} to {moves.after}" if moves.moved else "none"
+    return f"{in_text(titles[moves.farthest])}: {moves.before} to {moves.after}" if moves.moved else "none"
 
 
 def answer(result: ThreatResult, table: ScoreTable) -> str:
@@ -89,11 +89,12 @@ def answer(result: ThreatResult, table: ScoreTable) -> str:
     titles = titles_of(result)
     first = [score for score in table.scores if score.place == 1]
     if len(first) == 1:
-        who = f"{titles[first[0].entry]} is first"
+        who = f"{in_text(titles[first[0].entry])} is first"
     else:
+        best = in_text(titles[first[0].entry])
         who = (
             f"{len(first)} share the first place with scores from {first[-1].score:.0f} to "
-            f"{first[0].score:.0f}, as their intervals overlap; {titles[first[0].entry]} has the best score"
+            f"{first[0].score:.0f}, as their intervals overlap; {best} has the best score"
         )
     apart = f"{table.groups} of their 95 % intervals lie apart from each other"
     if table.groups < GROUPS:
@@ -198,21 +199,33 @@ def threats_table(result: ThreatResult) -> Table:
 
 
 def orders_table(result: ThreatResult, table: ScoreTable) -> Table:
-    """Return the orders without each threat and each car."""
+    """Return how the order changes without each threat and each car."""
     threats, titles = result.threats, titles_of(result)
     names = {"threat": threats.threats_in(threats.main), "car": threats.cars_in(threats.main)}
-    headings = ["without", "first", "rank correlation", "entries that move", "farthest move", "order"]
+    headings = ["without", "first", "rank correlation", "entries that move", "farthest move"]
     orders = Table("", headings, numbers={2, 3})
     entries = result.complete[threats.main]
     without = scores_without(entries, result.positions(threats.main, entries), REFERENCE)
     for (word, k), scores in without.items():
         moves = moves_between(table.by_entry(), scores, REFERENCE)
-        order = [titles[entry] for entry in scores]
         orders.rows.append([
-            f"{word} {names[word][k]}", order[0], f"{moves.correlation:.2f}", str(moves.moved),
-            _moved(titles, moves), " > ".join(order),
+            f"{word} {names[word][k]}", titles[next(iter(scores))], f"{moves.correlation:.2f}",
+            str(moves.moved), _moved(titles, moves),
         ])  # fmt: skip
     return orders
+
+
+def places_table(result: ThreatResult, table: ScoreTable) -> Table:
+    """Return where each entry comes in the orders with all threats and cars, and without each."""
+    threats, titles = result.threats, titles_of(result)
+    names = {"threat": threats.threats_in(threats.main), "car": threats.cars_in(threats.main)}
+    entries = result.complete[threats.main]
+    without = scores_without(entries, result.positions(threats.main, entries), REFERENCE)
+    orders = [table.order(), *([*scores] for scores in without.values())]
+    headings = ["controller", "all", *(names[word][k] for word, k in without)]
+    rows = [[titles[entry], *(str(order.index(entry) + 1) for order in orders)] for entry in table.order()]
+    note = "Places by the score; every column but the first leaves out its threat or car."
+    return Table("", headings, [*rows], [note], {*range(1, len(headings))})
 
 
 def settings_table(result: ThreatResult, settings: Sequence[str]) -> Table:
@@ -387,7 +400,7 @@ def overview(result: ThreatResult, table: ScoreTable) -> Table:
         )
         notes.append(f"Rank correlation with the order by threats (Spearman): {', '.join(agreements)}.")
     headings = ["controller", "matrix", *(title for title, _ in columns)]
-    return Table("All disciplines", headings, [*rows], notes, {*range(1, len(headings))})
+    return Table("", headings, [*rows], notes, {*range(1, len(headings))})
 
 
 def compared_settings(result: ThreatResult) -> list[str]:
@@ -431,6 +444,7 @@ def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command:
         main=main_table(result, table),
         levels=levels_table(result, order),
         orders=orders_table(result, table),
+        places=places_table(result, table),
         moves=settings_table(result, others),
         settings=[setting_table(result, name) for name in others],
         gains=[gains_table(result, gains), seeds_table(result, gains)] if gains else [],

@@ -118,7 +118,7 @@ def _axe() -> str:
 
 def flaws(chromium: Browser) -> list[str]:
     """Return all that is wrong with the page that is open, as sentences."""
-    chromium.wait_for("document.querySelectorAll('.yv:not(.yv-ready)').length === 0")
+    chromium.wait_for("!document.querySelector('.yv:not(.yv-ready), [data-packed]')")
     found = [f"console: {said}" for said in chromium.console()]
     found += [f"fetched: {name[:60]}" for name in chromium.requests() if not name.startswith("data:")]
     if (wide := chromium.overflow()) > 0:

@@ -12,7 +12,7 @@ from tests.fmu_copies import put_fmus
 from tests.sentences import golden, golden_in
 
 from .browser import DESK, PHONE
-from .flaws import flaws, inaccessible, open_all
+from .flaws import check_whole, flaws
 from .made_up import data_in, unpacked
 
 ROOT = Path(__file__).parents[2]
@@ -86,9 +86,19 @@ def test_it_shows_the_system_its_parameters_and_how_to_repeat_it(tree):
 def test_nothing_is_cut_overlapping_or_empty_at_any_width(chromium, page, width):
     chromium.open(page, width=width)
     assert flaws(chromium) == []
-    open_all(chromium)
-    assert flaws(chromium) == []
-    assert inaccessible(chromium) == []
+    check_whole(chromium, page, width)
+
+
+def test_the_page_of_four_runs_of_eight_seconds_keeps_its_budget(tmp_path, fmus):
+    laws = "controller_off,controller_fuzzy_sideslip,controller_fnn,controller_fnn:learning=false"
+    scenario = str(ROOT / "scenarios/fnn_sideslip/25mps.yaml")
+    with pytest.raises(SystemExit) as ended:
+        main(["compare", scenario, "--swap", f"controller={laws}", "--out", str(tmp_path / "out")])
+    assert not ended.value.code
+    page = tmp_path / "out/report.html"
+    runs = data_in(page.read_text(encoding="utf-8"))["runs"]
+    assert [run["rows"] for run in runs] == 4 * [8001]
+    assert page.stat().st_size <= 1_200_000
 
 
 def test_the_viewer_comes_first_with_the_signals_that_differ_most(chromium, page):

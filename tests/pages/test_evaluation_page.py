@@ -13,10 +13,11 @@ from orchestrator.evaluation.standard_tests import TESTS, Evaluation
 from orchestrator.evaluation.trace import trace_of
 from orchestrator.metrics.verdict import compare, not_judged
 from orchestrator.pages.evaluation_page import criteria_table, evaluation_page, results_of
+from orchestrator.pages.page_parts import save_page
 from tests.orchestrator.recorded import write
 
 from .browser import DESK, PHONE, Browser
-from .flaws import flaws, inaccessible, open_all
+from .flaws import check_whole
 from .made_up import data_in, whole_car
 
 TEST = TESTS["sine-with-dwell"]
@@ -103,8 +104,5 @@ def test_a_test_without_criteria_has_its_quantities(traces):
 def test_the_page_has_no_flaws(chromium: Browser, traces, tmp_path: Path, width: int):
     file = tmp_path / "evaluation.html"
     runs = [judged("slow", 0.1, 2.0), judged("fast", 0.42)]
-    file.write_text(evaluation_page(TEST, traces, runs, None), "utf-8")
-    chromium.open(file, width=width)
-    open_all(chromium)
-    assert flaws(chromium) == []
-    assert inaccessible(chromium) == []
+    save_page(file, evaluation_page(TEST, traces, runs, None))
+    check_whole(chromium, file, width)

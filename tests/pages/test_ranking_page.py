@@ -8,11 +8,15 @@ import pytest
 from lxml import html
 
 from orchestrator.cli import main
+from orchestrator.experiments.ranking import load_ranking
 from tests.orchestrator.test_ranking import SMALL
 
 from .browser import DESK, PHONE, Browser
 from .flaws import inaccessible
 from .made_up import unpacked
+from .test_sweep_page import MOST_ELEMENTS
+
+RANKING = Path(__file__).parents[2] / "scenarios/proving_ground/ranking.yaml"
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +38,17 @@ def test_the_first_cell_is_open_and_all_of_it_can_be_read_by_everyone(chromium: 
     assert chromium.overflow() <= 0
     assert chromium.run("return document.querySelectorAll('main').length") == 1
     assert inaccessible(chromium) == []
+
+
+def test_the_whole_ranking_would_keep_its_budgets(chromium: Browser, page):
+    whole = load_ranking(RANKING)
+    entries, cells = len(whole.entries), len(whole.entries) * len(whole.conditions)
+    text, tree = page.read_text(encoding="utf-8"), html.fromstring(unpacked(page))
+    size, elements = len(text.encode()), len(tree.xpath("//*[not(ancestor::template)]"))
+    rows = tree.xpath("//tr[not(ancestor::template)]")
+    a_cell, a_row = tree.cssselect("td.cell")[0], max(rows, key=lambda row: len(html.tostring(row)))
+    assert size + cells * len(html.tostring(a_cell)) + 3 * entries * len(html.tostring(a_row)) <= 400_000
+    assert elements + 2 * cells + 2 * entries * len(a_row.xpath(".//*")) <= MOST_ELEMENTS
 
 
 def test_every_count_is_that_of_its_table(page):

@@ -336,6 +336,7 @@ def test_every_page_of_the_server_can_be_read_by_everyone(server, chromium: Brow
     chromium.open(Path("/"))
     chromium.driver.get(f"{server.address}{address}")
     chromium.wait_for("document.querySelectorAll('.yv:not(.yv-ready)').length === 0")
+    assert chromium.run("return document.querySelectorAll('*').length") <= 2000
     assert inaccessible(chromium) == []
 
 

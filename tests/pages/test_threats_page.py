@@ -11,6 +11,7 @@ from docs.generate.threat_tables import FILE
 from orchestrator.experiments.threat_runs import published_result
 from orchestrator.experiments.threat_scores import scored
 from orchestrator.experiments.threats import load_threats
+from orchestrator.pages.page_parts import save_page
 from orchestrator.pages.threats_page import compared_settings, threats_page
 
 from .browser import DESK, Browser
@@ -28,14 +29,16 @@ def published():
 def page(published, tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("threats")
     text = threats_page(published, scored(published), folder, "yawbench rank proving_ground/threats")
-    (folder / "report.html").write_text(text, encoding="utf-8")
+    save_page(folder / "report.html", text)
     return folder / "report.html"
 
 
 @pytest.mark.parametrize("width", [390, DESK])
 def test_it_keeps_its_budget_and_can_be_read_by_everyone(chromium: Browser, page, width):
     chromium.open(page, width=width)
+    chromium.wait_for("!document.querySelector('[data-packed]')")
     assert chromium.run("return document.querySelectorAll('*').length") <= MOST_ELEMENTS
+    assert page.stat().st_size < 250_000
     assert chromium.overflow() <= 0
     open_all(chromium)
     chromium.wait_for("!document.querySelector('details > template')")

@@ -16,6 +16,7 @@ from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.experiment_result import judge_results
 from orchestrator.metrics.verdict import apart
 from orchestrator.pages.evaluation_page import validation_page, validation_sentence
+from orchestrator.pages.page_parts import save_page
 from orchestrator.pages.report import chapter, study_page
 from tests.commands import status_of
 from tests.orchestrator.recorded import write as write_run
@@ -50,7 +51,7 @@ def made(tmp_path_factory):
 def page(made) -> Path:
     folder, _, validation = made
     file = folder / "validation.html"
-    file.write_text(validation_page(validation), "utf-8")
+    save_page(file, validation_page(validation))
     return file
 
 

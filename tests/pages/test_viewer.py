@@ -16,6 +16,7 @@ from orchestrator.errors import ResultsError
 from orchestrator.figures.panels import LabelledRun
 from orchestrator.figures.style import LINES, digits_of, shown_unit
 from orchestrator.pages.viewer import MOST, PANELS, Settings, View, answer_of, assets, page, still_of, viewer
+from orchestrator.pages.viewer_data import pack
 from orchestrator.results.reader import Results
 from tests.orchestrator.recorded import car, noted, write
 from tests.sentences import golden, golden_in
@@ -85,12 +86,15 @@ def test_beyond_the_largest_size_the_signals_of_the_views_and_the_road_remain():
     runs = (whole_car(), whole_car(2.0))
     every = data_of(*runs)["runs"][0]["columns"]
     view = View("few", ["sideslip"])
-    few = data_of(*runs, settings=Settings([view], largest=10))["runs"][0]["columns"]
+    of_all = sum(len(run.block) for run in pack(runs))
+    few = data_of(*runs, settings=Settings([view], largest=of_all - 1))["runs"][0]["columns"]
     assert set(few) < set(every)
-    assert {"plant.sideslip", "plant.position_x", "tyre.tyre_force_x_fl", "plant.vertical_load_rr"} <= set(
-        few
-    )
+    of_tyres = {"tyre.tyre_force_x_fl", "plant.vertical_load_rr"}
+    assert {"plant.sideslip", "plant.position_x", *of_tyres} <= set(few)
     assert "plant.acceleration_y" not in few
+    fewer = data_of(*runs, settings=Settings([view], largest=10))["runs"][0]
+    assert {"plant.sideslip", "plant.position_x"} <= set(fewer["columns"]) <= set(few) - of_tyres
+    assert not any("tyre" in note for note in fewer["notes"])
     assert data_of(*runs, settings=Settings([view], largest=10))["partial"]
     assert not data_of(*runs, settings=Settings([view], largest=10**9))["partial"]
 

@@ -1,7 +1,9 @@
 // Fill what `packed` of `page_parts.py` emptied: folded parts, images, data, and last the scripts that use them.
 (async () => {
   const places = [...document.querySelectorAll('[data-packed]')];
-  const bytes = Uint8Array.from(atob(document.getElementById('packed').textContent), (one) => one.charCodeAt(0));
+  const block = document.getElementById('packed');
+  const bytes = Uint8Array.from(atob(block.textContent), (one) => one.charCodeAt(0));
+  block.remove();
   const texts = await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream('gzip'))).json();
   places.forEach((place, k) => {
     if (place.tagName === 'TEMPLATE') place.innerHTML = texts[k];

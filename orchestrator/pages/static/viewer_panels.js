@@ -142,7 +142,7 @@ class Panel {
       },
       axes: [
         {...axis, size: last ? 22 : 6, values: last ? ticks : () => [], label: last ? viewer.axisLabel : undefined, labelSize: 16, labelGap: 0, labelFont: '12px system-ui, sans-serif'},
-        {...axis, size: 56, values: ticks, space: 22},
+        {...axis, size: 56, values: ticks, space: 17},
       ],
       series: [{}, ...shown.map(({run, values, xs, reference}) => ({
         stroke: reference ? theme.pale : viewer.colour(run),
