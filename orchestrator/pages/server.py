@@ -135,6 +135,7 @@ class Request(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     server_version, sys_version = "yawbench", ""
     timeout = 60  # of an idle connection [s]; chosen: the browser opens another
+    disable_nagle_algorithm = True  # an answer's content would wait 40 ms for its header to be acknowledged
 
     def do_GET(self) -> None:
         """Answer a request for a page or a file."""

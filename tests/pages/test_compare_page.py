@@ -12,7 +12,7 @@ from tests.fmu_copies import put_fmus
 from tests.sentences import golden, golden_in
 
 from .browser import DESK, PHONE
-from .flaws import check_whole, flaws
+from .flaws import check_whole, flaws, open_all
 from .made_up import data_in, unpacked
 
 ROOT = Path(__file__).parents[2]
