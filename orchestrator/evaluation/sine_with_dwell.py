@@ -412,9 +412,8 @@ def judge_series(runs: Sequence[Evaluation], angle: float) -> TestSeries:
     status = Status.PASSED if passed else Status.FAILED
     data = {name: verdict.as_data() for name, verdict in criteria.items()}
     series_data = {"A": angle, "verdict": status, "criteria": data}
-    return TestSeries(
-        ordered, f"A = {shown(angle, 'rad')}; the series has {status.value}.", series_data, criteria
-    )
+    sentence = f"The series has {status.value}, with A = {shown(angle, 'rad')}."
+    return TestSeries(ordered, sentence, series_data, criteria)
 
 
 def _over_runs(criterion: str, runs: Sequence[Evaluation], missing: Sequence[float]) -> Verdict:
