@@ -20,7 +20,7 @@ from tests.orchestrator.recorded import record_text
 from tests.sentences import golden, golden_in, refused
 
 from .browser import DESK, PHONE
-from .flaws import check_budgets, flaws, inaccessible
+from .flaws import check_budgets, flaws, inaccessible, open_all
 from .made_up import HALF_A_CAR, data_in, unpacked
 
 ROOT = Path(__file__).parents[2]
