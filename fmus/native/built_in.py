@@ -19,6 +19,7 @@ from .values import (
     Bytes,
     Closure,
     Dict,
+    Each,
     Failure,
     Instance,
     List,
@@ -108,15 +109,24 @@ class BuiltIn(Looping):
 
     def _of_dict(self, owner: Dict, name: str, args: list[Any]) -> Any:
         held = self.read(owner)
-        if name == "items":
-            return tuple(held.items())
-        if name in ("keys", "values"):
-            return tuple(getattr(held, name)())
+        if name == "keys":
+            return tuple(held)
+        if name in ("items", "values"):
+            return self._view(owner, tuple(held), with_keys=name == "items")
         if name == "get":
             return held.get(self._key(args[0]), args[1] if len(args) > 1 else None)
         if name == "copy":
             return Dict(held)
         raise Refused(f"the method {name} of a dictionary")
+
+    def _view(self, owner: Dict, keys: tuple[Any, ...], with_keys: bool) -> Each:
+        def item(k: int) -> Any:
+            if tuple(self.read(owner)) != keys:
+                raise Refused("a dictionary whose keys change while it is gone through")
+            value = self.read(owner)[keys[k]]
+            return (keys[k], value) if with_keys else value
+
+        return Each(len(keys), item, once=False)
 
     # ---- what Python has built in -----------------------------------------------------------
 
@@ -230,16 +240,16 @@ class BuiltIn(Looping):
         return self.total(items, start)
 
     def _python_any(self, values: Any) -> Any:
-        return self._decided(self.items(values), True)
+        return self._decided(self.each(values), True)
 
     def _python_all(self, values: Any) -> Any:
-        return self._decided(self.items(values), False)
+        return self._decided(self.each(values), False)
 
-    def _decided(self, items: list[Any], by: bool) -> Any:
-        if not items:
+    def _decided(self, each: Each, by: bool, k: int = 0) -> Any:
+        if k == each.count:
             return not by
-        test = self.truth_of(items[0])
-        on = lambda: self._decided(items[1:], by)  # noqa: E731
+        test = self.truth_of(each.item(k))
+        on = lambda: self._decided(each, by, k + 1)  # noqa: E731
         return self.branch(test, *((lambda: True, on) if by else (on, lambda: False)))
 
     def _python_sorted(self, values: Any) -> Any:
@@ -256,24 +266,26 @@ class BuiltIn(Looping):
         return List(items)
 
     def _python_zip(self, *values: Any, strict: bool = False) -> Any:
-        lists = [x if isinstance(x, Repeated) else self.items(x) for x in values]
-        counts = {len(x) for x in lists if not isinstance(x, Repeated)}
+        rows = [x if isinstance(x, Repeated) else self.each(x) for x in values]
+        counts = {x.count for x in rows if isinstance(x, Each)}
         if strict and len(counts) > 1:
             self.fail("ValueError", "zip() arguments differ in length")
             raise Unreachable
-        n = min(counts)
-        return tuple(zip(*[[x.value] * n if isinstance(x, Repeated) else x[:n] for x in lists], strict=True))
+        return Each(min(counts), lambda k: tuple(x.item(k) if isinstance(x, Each) else x.value for x in rows))
 
     def _python_map(self, function: Any, *values: Any) -> Any:
-        return tuple(self.call(function, row, {}) for row in self._python_zip(*values))
+        rows = self._python_zip(*values)
+        return Each(rows.count, lambda k: self.call(function, rows.item(k), {}))
 
     def _python_enumerate(self, values: Any, start: int = 0) -> Any:
         if isinstance(values, (Ring, Span)):
             raise Refused("enumerate of a list whose length changes")
-        return tuple(enumerate(self.items(values), start))
+        each = self.each(values)
+        return Each(each.count, lambda k: (start + k, each.item(k)), each.end)
 
     def _python_reversed(self, values: Any) -> Any:
-        return tuple(reversed(self.items(values)))
+        each = self.each(values)
+        return Each(each.count, lambda k: each.item(each.count - 1 - k))
 
     def _python_pairwise(self, values: Any) -> Any:
         if isinstance(values, Ring):
@@ -283,14 +295,23 @@ class BuiltIn(Looping):
             def pair(k: ir.Operand) -> tuple[Any, Any]:
                 return self.ring_item(ring, k), self.ring_item(ring, self.binary("+", k, 1))
 
-            return Span(0, last, pair)
-        return tuple(itertools.pairwise(self.items(values)))
+            return Span(0, last, pair, ring)
+        each = self.each(values)
+        before: list[Any] = []
+
+        def following(k: int) -> tuple[Any, Any]:
+            first = before.pop() if k else each.item(0)
+            before.append(each.item(k + 1))
+            return first, before[0]
+
+        return Each(max(each.count - 1, 0), following)
 
     def _python_repeat(self, value: Any, times: int | None = None) -> Any:
         return Repeated(value) if times is None else (value,) * times
 
     def _python_chain(self, *values: Any) -> Any:
-        return tuple(x for value in values for x in self.items(value))
+        rows = [(each, k) for each in map(self.each, values) for k in range(each.count)]
+        return Each(len(rows), lambda i: rows[i][0].item(rows[i][1]))
 
     def _python_range(self, *ends: Any) -> Any:
         if not any(isinstance(x, ir.Var) for x in ends):

@@ -22,6 +22,7 @@ from .values import (
     Bytes,
     Closure,
     Dict,
+    Each,
     Failure,
     Frame,
     Instance,
@@ -212,6 +213,31 @@ class Evaluation(Merging):
             raise Refused("a key that is known at run time only")
         return value
 
+    def each(self, value: Any) -> Each:
+        """Return the items of what can be gone through, read as their turn comes.
+
+        Raises:
+            Refused: how many there are is known at run time only.
+        """
+        value = self.narrowed(value)
+        if isinstance(value, Each):
+            if self.facts.known(self.read(value)["used"]) is True:
+                raise Refused("an iterator that is gone through twice")
+            if value.once:
+                self.write(value, "used", True)
+            return value
+        if not isinstance(value, List):
+            items = self.items(value)
+            return Each(len(items), items.__getitem__)
+        count = len(self.read(value))
+
+        def content() -> list[Any]:
+            if len(self.read(value)) != count:
+                raise Refused("a list that grows or shrinks while it is gone through")
+            return self.read(value)  # type: ignore[no-any-return]
+
+        return Each(count, lambda k: content()[k], content)
+
     def items(self, value: Any) -> list[Any]:
         """Return the items of what can be gone through.
 
@@ -219,6 +245,9 @@ class Evaluation(Merging):
             Refused: how many there are is known at run time only.
         """
         value = self.narrowed(value)
+        if isinstance(value, Each):
+            each = self.each(value)
+            return [each.item(k) for k in range(each.count)]
         if isinstance(value, List):
             return list(self.read(value))
         if isinstance(value, Dict):

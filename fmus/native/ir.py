@@ -14,6 +14,8 @@ REAL, INT, BOOL, WORD, WIDE = "real", "int", "bool", "word", "wide"
 
 EXACT = 2**53
 """Up to which an integer is exact as a double."""
+INEXACT = "an integer beyond 2^53, which Python alone computes exactly: set YAWBENCH_UNITS=python"
+"""Error of a native unit whose integer becomes larger."""
 
 
 @dataclass(frozen=True, eq=False)

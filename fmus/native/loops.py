@@ -16,6 +16,7 @@ from .values import (
     UNSET,
     Box,
     Bytes,
+    Each,
     List,
     Refused,
     Ring,
@@ -53,22 +54,29 @@ class Looping(Execution):
         over = self.narrowed(self.evaluate(node.iter))
         if isinstance(over, Ring):
             ring = over
-            over = Span(0, self.ring_length(ring), lambda k: self.ring_item(ring, k))
+            over = Span(0, self.ring_length(ring), lambda k: self.ring_item(ring, k), ring)
         if isinstance(over, range) and len(over) > UNROLLED and over.step == 1:
             over = Span(over.start, over.stop, lambda k: k)
         if isinstance(over, Bytes):
             self._for_bytes(node, over)
         elif isinstance(over, Span):
+            start = len(self.out)
             self._for_span(node, over)
+            if over.ring and any(
+                isinstance(s, (ir.Push, ir.Drop)) and s.ring == over.ring.number
+                for s in ir.every(self.out[start:])
+            ):
+                raise Refused("a list that grows or shrinks while it is gone through")
         else:
-            self._unrolled(node, self.items(over))
+            self._unrolled(node, self.each(over))
 
-    def _unrolled(self, node: ast.For, items: list[Any]) -> None:
+    def _unrolled(self, node: ast.For, each: Each) -> None:
         def go(k: int) -> None:
-            if k == len(items):
+            if k == each.count:
+                each.end()
                 self.leave(OVER)
                 return
-            self.assign(node.target, items[k])
+            self.assign(node.target, each.item(k))
             self.block(node.body)
             on = self._goes_on(self.exit)
             self.branch(on, lambda: further(k + 1), lambda: None)
@@ -111,7 +119,7 @@ class Looping(Execution):
             raise Refused("leaving a loop over a text")
         for part in over.text.parts:
             if isinstance(part, str):
-                self._unrolled(node, list(part.encode()))
+                self._unrolled(node, self.each(part.encode()))
                 continue
             value, _ = part
             if ir.type_of(value) != ir.INT:

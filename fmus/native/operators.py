@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
 from . import ir
-from .evaluate import Evaluation
+from .evaluate import Call, Evaluation
 from .lower import OPERATORS
 from .values import (
     Box,
     Closure,
     Dict,
+    Each,
     Frame,
     List,
     Picked,
@@ -30,6 +32,8 @@ BINARY = {
 COMPARED = {
     ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
 }  # fmt: skip
+SMALL = 2**20
+"""Below which two integers are known to give one that a double holds."""
 
 
 class Operating(Evaluation):
@@ -37,37 +41,68 @@ class Operating(Evaluation):
 
     # ---- comprehensions ---------------------------------------------------------------------
 
-    def _comprehended(self, generators: list[ast.comprehension], make: Any) -> list[Any]:
-        call, elements = self.calls[-1], []
-        inner = replace(call, frame=Frame({}, call.frame))
+    def _comprehended(self, generators: list[ast.comprehension], make: Callable[[], Any]) -> list[Any]:
+        return [self._within(frame, make) for frame in self._frames(generators)]
 
-        def go(k: int) -> None:
+    def _frames(self, generators: list[ast.comprehension]) -> Iterator[Frame]:
+        """Yield the names of each element of a comprehension."""
+
+        def go(k: int, frame: Frame) -> Iterator[Frame]:
             if k == len(generators):
-                elements.append(make())
+                yield frame
                 return
-            for item in self.items(self.evaluate(generators[k].iter)):
-                self.assign(generators[k].target, item)  # type: ignore[attr-defined]
-                for condition in generators[k].ifs:
-                    holds = self.facts.known(self.truth_of(self.evaluate(condition)))
-                    if holds is None:
-                        raise Refused("a filter that is known at run time only")
-                    if not holds:
-                        break
-                else:
-                    go(k + 1)
+            each = self.each(self._within(frame, lambda: self.evaluate(generators[k].iter)))
+            for i in range(each.count):
+                inner = Frame({}, frame)
+                if self._within(inner, lambda: self._passes(generators[k], each.item(i))):  # noqa: B023
+                    yield from go(k + 1, inner)
 
-        self.calls.append(inner)
+        return go(0, self.calls[-1].frame)
+
+    def _within(self, frame: Frame, evaluated: Callable[[], Any]) -> Any:
+        self.calls.append(replace(self.calls[-1], frame=frame))
         try:
-            go(0)
+            return evaluated()
         finally:
             self.calls.pop()
-        return elements
+
+    def _passes(self, generator: ast.comprehension, item: Any) -> bool:
+        self.assign(generator.target, item)  # type: ignore[attr-defined]
+        for condition in generator.ifs:
+            holds = self.facts.known(self.truth_of(self.evaluate(condition)))
+            if holds is None:
+                raise Refused("a filter that is known at run time only")
+            if not holds:
+                return False
+        return True
 
     def _listcomp(self, node: ast.ListComp) -> Any:
         return List(self._comprehended(node.generators, lambda: self.evaluate(node.elt)))
 
     def _generatorexp(self, node: ast.GeneratorExp) -> Any:
-        return tuple(self._comprehended(node.generators, lambda: self.evaluate(node.elt)))
+        call, generator = self.calls[-1], node.generators[0]
+        if len(node.generators) > 1 or generator.ifs:
+            frames = list(self._frames(node.generators))
+            return Each(len(frames), lambda k: self._resumed(call, frames[k], node.elt))
+        each = self.each(self.evaluate(generator.iter))
+
+        def element(k: int) -> Any:
+            frame = Frame({}, call.frame)
+            item = each.item(k)
+            return self._resumed(call, frame, node.elt, lambda: self._passes(generator, item))
+
+        return Each(each.count, element)
+
+    def _resumed(
+        self, call: Call, frame: Frame, element: ast.expr, first: Callable[[], Any] = lambda: None
+    ) -> Any:
+        """Evaluate the next element of a generator, where it was written."""
+        self.calls.append(replace(call, frame=frame))
+        try:
+            first()
+            return self.evaluate(element)
+        finally:
+            self.calls.pop()
 
     def _setcomp(self, node: ast.SetComp) -> Any:
         return frozenset(self._comprehended(node.generators, lambda: self._key(self.evaluate(node.elt))))
@@ -90,7 +125,7 @@ class Operating(Evaluation):
         if isinstance(a, Union) or isinstance(b, Union):
             return self.by_form(a, lambda x: self.by_form(b, lambda y: self.operate(op, x, y)))
         if is_number(a) and is_number(b):
-            return self.binary(op, a, b)
+            return self._exact(op, self.binary(op, a, b), a, b)
         if isinstance(a, (List, list)) and op == "+" and isinstance(b, (List, list)):
             return List([*self.items(a), *self.items(b)])
         if isinstance(a, List) and op == "*" and isinstance(b, int):
@@ -107,6 +142,20 @@ class Operating(Evaluation):
             types = f"'{_type_name(a)}' and '{_type_name(b)}'"
             self.end("TypeError", f"unsupported operand type(s) for {op}: {types}")
         raise Refused(f"{op} of a {type(a).__name__} and a {type(b).__name__}")
+
+    def _exact(self, op: str, result: ir.Operand, a: ir.Operand, b: ir.Operand) -> ir.Operand:
+        """Raise where an integer becomes larger than a double holds exactly: Python's have no end."""
+        grows = op in ("+", "-", "*", "**", "//") and isinstance(result, ir.Var) and result.type == ir.INT
+        if grows and not (self._is_small(a) and self._is_small(b)):
+            size = self.size(result)
+            self.require(self.compare("<=", size, float(ir.EXACT)), "OverflowError", ir.INEXACT)
+        return result
+
+    def _is_small(self, a: ir.Operand) -> bool:
+        if not isinstance(a, ir.Var):
+            return abs(a) < SMALL
+        values = self.facts.domains.get(a)
+        return a.type == ir.BOOL or (values is not None and max(map(abs, values), default=0) < SMALL)
 
     def _unaryop(self, node: ast.UnaryOp) -> Any:
         value = self.evaluate(node.operand)
@@ -182,9 +231,7 @@ class Operating(Evaluation):
             contained = self._contained(a, b)
             return contained if isinstance(op, ast.In) else self.negation(contained)
         if isinstance(op, (ast.Is, ast.IsNot)):
-            if isinstance(a, ir.Var) and isinstance(b, ir.Var):
-                raise Refused("whether two numbers are the same object")
-            return (a is b) == isinstance(op, ast.Is)
+            return self._same(a, b) if isinstance(op, ast.Is) else self.negation(self._same(a, b))
         if is_number(a) and is_number(b):
             return self.compare(COMPARED[type(op)], a, b)
         if isinstance(op, (ast.Eq, ast.NotEq)):
@@ -196,6 +243,15 @@ class Operating(Evaluation):
         if is_plain(a) and is_plain(b):
             return bool(OPERATORS[COMPARED[type(op)]](a, b))
         raise Refused(f"comparing a {type(a).__name__} and a {type(b).__name__}")
+
+    def _same(self, a: Any, b: Any) -> ir.Operand:
+        if is_number(a) and is_number(b) and (isinstance(a, ir.Var) or isinstance(b, ir.Var)):
+            types = {ir.type_of(a), ir.type_of(b)}
+            if types == {ir.BOOL}:
+                return self.compare("==", a, b)
+            if ir.BOOL not in types:
+                raise Refused("whether two numbers are the same object")
+        return a is b
 
     def _equal(self, a: Any, b: Any) -> ir.Operand:
         if isinstance(a, Union) or isinstance(b, Union):
@@ -220,12 +276,12 @@ class Operating(Evaluation):
     def _contained(self, a: Any, b: Any) -> ir.Operand:
         if is_plain(a) and isinstance(b, (str, dict, set, frozenset, range)):
             return a in b
-        items = self.items(b)
+        each = self.each(b)
 
         def go(k: int) -> ir.Operand:
-            if k == len(items):
+            if k == each.count:
                 return False
-            return self.branch(self._equal(a, items[k]), lambda: True, lambda: go(k + 1))  # type: ignore
+            return self.branch(self._equal(a, each.item(k)), lambda: True, lambda: go(k + 1))  # type: ignore
 
         return go(0)
 

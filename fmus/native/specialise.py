@@ -220,7 +220,7 @@ class _Specialising:
         return shape_of(me, lambda box: box.slots, "self", memo)
 
     def _numbers(self, shape: Shape, me: Instance, machine: Outlining) -> list[ir.Operand]:
-        return numbers_of(shape, me, lambda box: box.slots, machine)
+        return numbers_of(shape, me, machine.read, machine)
 
     def _attributes(self, shape: Shape, leaves: list[ir.Var]) -> dict[str, Any]:
         made = build(shape, iter(leaves))

@@ -118,19 +118,28 @@ class Execution(Operating):
             before = self.evaluate(ast.copy_location(ast.Name(target.id, ast.Load()), target))
             value = self.evaluate(node.value)
             self.at(node)
-            self.assign(target, self.operate(op, before, value))
+            self.assign(target, self._in_place(op, before, value))
         elif isinstance(target, ast.Attribute):
             owner = self.evaluate(target.value)
             before = self.attribute(owner, target.attr)
             value = self.evaluate(node.value)
             self.at(node)
-            self.set_attribute(owner, target.attr, self.operate(op, before, value))
+            self.set_attribute(owner, target.attr, self._in_place(op, before, value))
         else:
             owner, index = self.evaluate(target.value), self.evaluate(target.slice)
             before = self.subscript(owner, index)
             value = self.evaluate(node.value)
             self.at(node)
-            self.set_item(owner, index, self.operate(op, before, value))
+            self.set_item(owner, index, self._in_place(op, before, value))
+
+    def _in_place(self, op: str, before: Any, value: Any) -> Any:
+        if not isinstance(before, List):
+            return self.operate(op, before, value)
+        if before.path is not None or not (op == "+" or (op == "*" and isinstance(value, int))):
+            raise Refused(f"{op}= of a list")
+        held = self.open(before)  # whoever else holds the list sees the change, too
+        held[:] = [*held, *self.items(value)] if op == "+" else held * value
+        return before
 
     def _do_return(self, node: ast.Return) -> None:
         value = None if node.value is None else self.evaluate(node.value)

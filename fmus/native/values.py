@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ast
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -95,6 +95,25 @@ class List(Box):
         self.path: str | None = None  # in the state, of a list that was there when the call began
 
 
+class Each(Box):
+    """Items of a known number, each made when its turn comes: item(k) for k below `count`.
+
+    An iterator gives them once, a view of a dictionary (`once` false) again and again. `end` is called
+    where a loop comes to the end: it refuses a list that has grown meanwhile.
+    """
+
+    def __init__(
+        self,
+        count: int,
+        item: Callable[[int], Any],
+        end: Callable[[], object] = lambda: None,
+        once: bool = True,
+    ) -> None:
+        super().__init__()
+        self.count, self.item, self.end, self.once = count, item, end, once
+        self.slots = {"used": False}
+
+
 class Dict(Box):
     """A dictionary with known keys."""
 
@@ -172,6 +191,7 @@ class Span:
     first: ir.Operand
     end: ir.Operand
     item: Any
+    ring: Ring | None = None
 
 
 @dataclass(frozen=True, eq=False)

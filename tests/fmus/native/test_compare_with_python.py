@@ -7,6 +7,7 @@ import pytest
 from fmus.native import build
 from fmus.native.compare_with_python import differences
 from fmus.native.emit import emit
+from fmus.native.ir import INEXACT
 from fmus.native.specialise import specialise
 from tests.sentences import golden
 
@@ -43,6 +44,20 @@ def test_a_translation_that_is_wrong_is_found_out(what, tmp_path):
         library = compiled(broken(text, what), tmp_path)
         found = differences(library, "{a}", component, home.parent)
     assert BROKEN[what][2] in found
+
+
+def test_an_integer_beyond_2_to_53_is_an_error_and_no_wrong_number(tmp_path):
+    law = """
+def start(self, t, u):
+    self.n = 12345
+def advance(self, t, h, u):
+    self.n = (self.n * 1103515245 + 12345) % 2**31
+def output(self, t, u):
+    return (self.n / 2**31,)
+"""
+    with component_of(source(law), tmp_path) as (component, home):
+        library = compiled(emit(specialise(component, home), "small.py", "{a}"), tmp_path)
+        assert INEXACT in differences(library, "{a}", component, home.parent)
 
 
 def test_a_translation_that_loops_for_ever_is_given_up(tmp_path):

@@ -7,6 +7,73 @@ import pytest
 from .small import compare, source
 
 CONSTRUCTS = {
+    "a list changed while it is gone through": """
+def start(self, t, u):
+    self.a = [1.0, 2.0, 3.0]
+    self.last = 0.0
+def advance(self, t, h, u):
+    for k, x in enumerate(self.a):
+        if k < 2:
+            self.a[k + 1] = 0.5 * x + u[0]
+    for x in reversed(self.a):
+        self.a[0] = 0.5 * x + u[1]
+    for x, y in pairwise(self.a):
+        self.a[2] = 0.5 * (x + y)
+    for x, y in zip(self.a, chain(self.a, u)):
+        self.a[1] = 0.3 * (x + y)
+    self.a = [self.moved(x) for x in self.a]
+    self.last = sum(self.moved(x) for x in self.a)
+def moved(self, x):
+    self.a[2] = 0.5 * x
+    return x
+def output(self, t, u):
+    named = {"x": u[0], "y": u[1]}
+    for _, x in named.items():
+        named["y"] = 0.5 * x
+    return (sum(self.a) + self.a[2] + self.last + named["y"],)
+""",
+    "items that are made as far as they are asked for": """
+def start(self, t, u):
+    self.n = 0
+def counted(self, x):
+    self.n += 1
+    return x
+def advance(self, t, h, u):
+    self.n += 10 * any(self.counted(x) > 0.5 for x in u)
+    self.n += 100 * all(self.counted(x * y) > 0.2 for x in u for y in (0.5, 1.0) if y)
+    for x in (self.counted(x) for x in u):
+        if x > 0.4:
+            break
+    for x in map(self.counted, u):
+        if x > 0.3:
+            break
+    if 1 in (int(3.0 * self.counted(x)) for x in u):
+        self.n += 1000
+    self.n %= 100000
+def output(self, t, u):
+    factor = 1.0
+    late = (x * factor for x in u)
+    factor = u[1]
+    return (self.n + sum(late) + any(math.sqrt(x + 4.0) > 2.05 for x in u),)
+""",
+    "whole numbers of inputs that may be huge": """
+def output(self, t, u):
+    n = round(20.0 * u[0])
+    return (3 * n + n // 2 - (n + 1) % 5,)
+""",
+    "a list made longer in place": """
+def output(self, t, u):
+    a = [u[0]]
+    b = a
+    a += [u[1], 2.0]
+    a *= 2
+    return (sum(b) + len(b),)
+""",
+    "whether a switch is set": """
+def output(self, t, u):
+    on = u[0] > 0.5
+    return ((on is True) + 2.0 * (on is not self.p.on) + 4.0 * (on is False),)
+""",
     "enumerate from one": """
 def output(self, t, u):
     total = 0.0

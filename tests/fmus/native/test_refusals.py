@@ -36,6 +36,16 @@ REFUSED = {
         "a slice whose ends are known at run time only",
         2,
     ),
+    "a list that grows in its loop": (
+        "def output(self, t, u):\n    a = [u[0]]\n    for x in a:\n        a.append(x)\n    return (sum(a),)",
+        "a list that grows or shrinks while it is gone through",
+        3,
+    ),
+    "an iterator used up": (
+        "def output(self, t, u):\n    z = zip(u, u)\n    a = list(z)\n    return (len(a) + len(list(z)),)",
+        "an iterator that is gone through twice",
+        4,
+    ),
     "a function of another module": (
         "def output(self, t, u):\n    return (math.gamma(u[0]),)",
         "math.gamma",
