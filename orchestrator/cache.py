@@ -127,11 +127,11 @@ def alone_in(folder: Path) -> Iterator[bool]:
 
 def _user_folder() -> Path | None:
     """Return the folder from YAWBENCH_CACHE, else the user's cache folder; None without a home directory."""
-    from platformdirs import user_cache_path
-
     chosen = os.environ.get("YAWBENCH_CACHE")
     if chosen:
         return Path(chosen).absolute()
+    from platformdirs import user_cache_path
+
     try:
         folder = user_cache_path("yawbench")
     except RuntimeError:

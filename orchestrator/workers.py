@@ -58,6 +58,10 @@ class Finished(NamedTuple):
     died: str = ""
 
 
+COMMON = (__name__, "platformdirs")
+"""Modules that every worker needs; platformdirs finds the cache."""
+
+
 class Worker(SupervisedProcess):
     """A process that calls functions, one at a time."""
 
@@ -65,7 +69,7 @@ class Worker(SupervisedProcess):
     child: ServedChild
 
     def __init__(self, preload: Sequence[str]) -> None:
-        super().__init__(lambda *pipes: start(__name__, *pipes, preload=[__name__, *preload]))
+        super().__init__(lambda *pipes: start(__name__, *pipes, preload=[*COMMON, *preload]))
         self.calls = 0
         self.busy = False
         self.retires = False  # see `retire`
@@ -140,7 +144,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
         waiting = deque(enumerate(calls))
         while True:
             look()
-            while waiting and (worker := self._idle()) is not None:
+            while waiting and (worker := self._idle(function.__module__)) is not None:
                 number, arguments = waiting.popleft()
                 worker.give(number, function, arguments)
             busy = [worker for worker in self._workers if worker.busy]
@@ -176,14 +180,14 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
             raise
         return [results[number] for number in range(len(results))]
 
-    def _idle(self) -> Worker | None:
-        """Return an idle process, started if need be; None if all are busy."""
+    def _idle(self, module: str) -> Worker | None:
+        """Return an idle process, started if need be with the module of its function; None if all are busy."""
         for worker in self._workers:
             if not worker.busy:
                 return worker
         if len(self._workers) == self._limit:
             return None
-        self._workers.append(Worker(self._preload))
+        self._workers.append(Worker((*self._preload, module)))
         return self._workers[-1]
 
     def end(self, *, terminate: bool = True) -> None:

@@ -27,6 +27,13 @@ LONGEST_FIRST = (
 
 gc.set_threshold(50_000, 20, 20)
 """Python looks for garbage less often: thousands of tests keep much, and leave little."""
+gc.disable()  # until all tests are collected
+
+
+def pytest_collection_finish() -> None:
+    """Look for garbage from now on, but never among modules and tests, which all last."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import functools
 import random
 import re
 from pathlib import Path
@@ -17,6 +18,7 @@ PAGE = (ROOT / "docs" / "ranking.md").read_text(encoding="utf-8")
 RANKING = ROOT / "scenarios" / "proving_ground" / "ranking.yaml"
 
 
+@functools.cache
 def matrix() -> dict[tuple[str, str], str]:
     """Return (entry, condition) -> what stands in its cell."""
     ranking = load_ranking(RANKING)
