@@ -181,7 +181,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
         return [results[number] for number in range(len(results))]
 
     def _idle(self, module: str) -> Worker | None:
-        """Return an idle process, started if need be with the module of its function; None if all are busy."""
+        """Return an idle process, started with the module of its function if need be; None: all busy."""
         for worker in self._workers:
             if not worker.busy:
                 return worker
