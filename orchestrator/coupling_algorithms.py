@@ -28,6 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 
 @dataclass(frozen=True)
@@ -41,8 +42,7 @@ class WireTiming:
     discrete: bool  # the source holds its value between its steps
 
 
-@dataclass(frozen=True)
-class CouplingWeights:
+class CouplingWeights(NamedTuple):
     """Weights of the source's last sample, of the one before, and of the one at the target's last step."""
 
     now: float = 1.0

@@ -45,7 +45,7 @@ ConditionOption = Annotated[
 ]
 Quick = Annotated[
     bool,
-    typer.Option("--quick", help="Run only the last amplitude of a few conditions, as a trial (minutes)."),
+    typer.Option("--quick", help="Run only the last amplitude of a few conditions, as a trial (seconds)."),
 ]
 
 

@@ -94,7 +94,7 @@ class InstanceSlot:
         """Whether any Real input may change during a run."""
         return any(self.wires) or any(v.name in self.instance.series for v in self.inputs)
 
-    @property
+    @functools.cached_property
     def sampled(self) -> bool:
         """Whether it is a sampled system: it has outputs and all of them are discrete."""
         outputs = self.instance.fmu.of("output")
@@ -237,8 +237,14 @@ class SignalPool:
                     values[variable.name] = self.other(wire)
         return values
 
-    def relation(self, target: InstanceSlot, variable: Variable, wire: Wire) -> WireTiming:
-        """Return the properties of a wire that its weights depend on."""
+    def timings(self, target: InstanceSlot) -> list[WireTiming | None]:
+        """Return what the weights of each wire to a Real input of an instance depend on; None: no wire."""
+        return [
+            None if wire is None else self._timing(target, variable, wire)
+            for variable, wire in zip(target.inputs, target.wires, strict=True)
+        ]
+
+    def _timing(self, target: InstanceSlot, variable: Variable, wire: Wire) -> WireTiming:
         source = self.of[wire.source]
         return WireTiming(
             source_period=source.instance.period,

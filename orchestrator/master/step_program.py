@@ -20,7 +20,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from ..coupling_algorithms import ALGORITHMS, CouplingWeights, delayed
+from ..coupling_algorithms import ALGORITHMS, CouplingWeights, WireTiming, delayed
 from ..plan import InputSeries, Plan, ValueRef, Variable
 from .compiled_loop import Kind, OperationData
 from .instance import PlainCall, Status
@@ -122,6 +122,11 @@ class StepProgram:
         self._of_outputs = {s.name: _acting(s, s.output_faults, s.y) for s in signals.slots}
         self._of_inputs = {s.name: _acting(s, s.input_faults, s.u) for s in signals.slots}
 
+    @functools.cached_property
+    def _timings(self) -> dict[str, list[WireTiming | None]]:
+        """Instance -> timing of the wire of each Real input; every phase needs the same."""
+        return {s.name: self._signals.timings(s) for s in self._signals.slots}
+
     def at(self, k: int) -> list[Operation]:
         """Return the operations that lead from communication point `k` - 1 to `k`."""
         phase = k % self.cycle
@@ -170,13 +175,13 @@ class StepProgram:
         if not s.driven:
             return []
         per_input = []
-        for variable, wire in zip(s.inputs, s.wires, strict=True):
-            if wire is None:
+        for wire, timing in zip(s.wires, self._timings[s.name], strict=True):
+            if wire is None or timing is None:
                 per_input.append(CouplingWeights())
             else:
                 weights = delayed if wire.delayed else self._algorithm.weights
                 # `k` is a phase; shifted so that no sample lies before the start
-                per_input.append(weights(m.relation(s, variable, wire), k + 2 * self.cycle))
+                per_input.append(weights(timing, k + 2 * self.cycle))
         key = (s.name, *per_input)
         if key not in self._gathers:
             _make_room(self._gathers)
