@@ -1,5 +1,6 @@
 """Types of what the library takes and returns, for annotations and `isinstance`; users make few of them.
 
+import yawbench as yb
 from yawbench.types import Instance
 
 plan = yb.load("fnn_sideslip/25mps").plan()
