@@ -9,7 +9,7 @@ from functools import cached_property
 from math import copysign
 from operator import is_
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 if TYPE_CHECKING:
     import numpy as np
@@ -21,6 +21,23 @@ from .fault_kinds import FaultList, FaultySignal
 from .messages import cut
 from .names import SignalName, Target
 
+Causality = Literal[
+    "parameter", "input", "output", "local", "independent", "calculatedParameter", "structuralParameter"
+]
+"""What a variable is to its FMU, as in FMI 2.0 and 3.0."""
+Variability = Literal["constant", "fixed", "tunable", "discrete", "continuous"]
+"""When the value of a variable may change, as in FMI 2.0 and 3.0."""
+VariableType = Literal["Real", "Integer", "Boolean", "String", "Enumeration"]
+"""Type of a variable, as in FMI 2.0; `Variable.encoding` has that of FMI 3.0."""
+OverrideOrigin = Literal[
+    "--set", "--swap", "--fault", "--vehicle", "--controller", "set", "swap", "fault",
+    "study", "sweep", "ranking", "region", "fit", "converge", "second-opinion",
+    "sine with dwell", "slowly increasing steer", "entry speed",
+]  # fmt: skip
+"""What made an override: an option, a method of the library, a file of many runs, a command or a test."""
+OriginKind = Literal["default", "vehicle", "derived", "scenario", "file"] | OverrideOrigin
+"""Where a value comes from: its FMU, the vehicle file, a formula, the scenario, a file, or an override."""
+SourceKind = Literal["paper", "literature", "chosen", "erratum", "varied", "neutral"]
 Value = float | int | bool | str
 """Value of a variable, a parameter or an override."""
 SENSING = {"sensor": "measurement", "estimator": "estimate"}
@@ -51,9 +68,9 @@ class Variable:
 
     name: str
     reference: int
-    type: str  # "Real", "Integer", "Boolean", "String" or "Enumeration"
-    causality: str
-    variability: str
+    type: VariableType
+    causality: Causality
+    variability: Variability
     unit: str | None
     start: Value | None
     minimum: float | None
@@ -195,23 +212,28 @@ class InputSeries:
         return value
 
 
-PAPER, LITERATURE, CHOSEN, ERRATUM, VARIED, NEUTRAL = (
-    "paper", "literature", "chosen", "erratum", "varied", "neutral",
-)  # fmt: skip
+PAPER: Final = "paper"
+LITERATURE: Final = "literature"
+CHOSEN: Final = "chosen"
+ERRATUM: Final = "erratum"
+VARIED: Final = "varied"
+NEUTRAL: Final = "neutral"
 """Kinds of sources: `VARIED` is an override, `NEUTRAL` has no source of its own."""
+STATED: tuple[SourceKind, ...] = PAPER, ERRATUM, CHOSEN
+"""Kinds that a source in words begins with."""
 
 
 @dataclass(frozen=True)
 class ValueSource:
     """The source of a value: its kind, the source in words, and the file and line that give the value."""
 
-    kind: str
+    kind: SourceKind
     says: str = ""
     file: str = ""
     line: int = 0
 
     @classmethod
-    def parse(cls, text: str, otherwise: str = "") -> ValueSource:
+    def parse(cls, text: str, otherwise: SourceKind | None = None) -> ValueSource:
         """Return the source with this text, whose first word may be the kind, which else is `otherwise`."""
         return cls(_first_word(text) or otherwise or (LITERATURE if text else NEUTRAL), text)
 
@@ -223,16 +245,16 @@ class ValueSource:
         return cls.parse("; ".join(parts[begin:]), _first_word(file_source) or NEUTRAL)
 
 
-def _first_word(source: str) -> str:
+def _first_word(source: str) -> SourceKind | None:
     word = re.match(r"[a-z]*", source)
-    return word[0] if word and word[0] in (PAPER, ERRATUM, CHOSEN) else ""
+    return next((kind for kind in STATED if word and word[0] == kind), None)
 
 
 @dataclass(frozen=True)
 class ValueOrigin:
     """Where the value of a parameter or constant comes from."""
 
-    kind: str  # "default" (of the FMU), "vehicle", "derived", "scenario", "file", or an override's: "--set"
+    kind: OriginKind
     detail: str = ""  # the formula of a derived value, the name of a file
     source: ValueSource | None = field(default=None, compare=False)  # None: the FMU's default
 
@@ -305,10 +327,10 @@ class Override:
 
     target: Target
     value: Value | FaultList
-    origin: str  # "--set", "--swap", "study", "sweep", ...
+    origin: OverrideOrigin
 
     @classmethod
-    def of(cls, target: str, value: Value | FaultList, origin: str) -> Override:
+    def of(cls, target: str, value: Value | FaultList, origin: OverrideOrigin) -> Override:
         """Return the override of a target in text form.
 
         Raises:
@@ -365,7 +387,7 @@ class Plan:
     record: tuple[SignalName, ...]  # in column order
     step: Fraction  # communication step size [s]
     n_steps: int
-    algorithm: str  # of `coupling.ALGORITHMS`
+    algorithm: str  # of `coupling_algorithms.ALGORITHMS`
     start: Fraction = Fraction(0)  # time of communication point 0 [s]
     title: str = ""
     scenario: dict[str, Any] = field(default_factory=dict)  # as run, for run.json

@@ -19,7 +19,7 @@ from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, WithJso
 
 from ..messages import short
 from ..names import INPUTS, OF_RUN, VEHICLE, Target
-from ..plan import Override, Value
+from ..plan import Override, OverrideOrigin, Value
 from ..scenario import overrides, yaml_lines
 from ..scenario.fault_schema import FaultSpec, by_location
 from ..scenario.quantities import parse_unit
@@ -397,7 +397,9 @@ def level_at(axis: AxisSpec, position: float) -> Level:
     return _level((1 - position) * axis.start + position * axis.end)
 
 
-def changes_at(axis: AxisSpec, level: Level, folder: Path, origin: str = "sweep") -> list[Override]:
+def changes_at(
+    axis: AxisSpec, level: Level, folder: Path, origin: OverrideOrigin = "sweep"
+) -> list[Override]:
     """Return the overrides of one level of an axis; file names are relative to `folder`."""
     if axis.kind == "file":
         return [Override(axis.vary[0], str(folder / str(level.value)), origin)]
@@ -415,7 +417,7 @@ def _given(axis: AxisSpec, level: Level) -> Value:
     return yaml_lines.scalar(level.value) if isinstance(level.value, str) else level.value
 
 
-def changes_of_file(spec: OverrideSpec, folder: Path, origin: str) -> list[Override]:
+def changes_of_file(spec: OverrideSpec, folder: Path, origin: OverrideOrigin) -> list[Override]:
     """Return the overrides in one part of an experiment file; file names are relative to `folder`."""
     vehicle = [Override.of(VEHICLE, str(folder / spec.vehicle), origin)] if spec.vehicle else []
     of_run = overrides.changes_of_run(spec, origin)

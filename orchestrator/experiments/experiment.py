@@ -20,7 +20,7 @@ from ..files import reads
 from ..messages import hint, short
 from ..metrics.expressions import TimeWindow
 from ..names import Target
-from ..plan import Override
+from ..plan import Override, OverrideOrigin
 from ..scenario import find_and_load, overrides, yaml_lines
 from ..scenario.schema_validation import validate
 from ..scenario.yaml_lines import Document, KeyPath
@@ -207,7 +207,7 @@ class LoadedExperiment:
     by_options: tuple[Override, ...] = ()  # of all runs, on the command line
     design: tuple[tuple[str, DesignPoint], ...] = ()
     """Run and point of every case, where not all runs have the same points; empty: all runs at all points."""
-    origin: str = "sweep"
+    origin: OverrideOrigin = "sweep"
     """Origin of the overrides that the axes make."""
     all_repeats: int = 0
     """Number of repeats of the file if this is a quick look at a few of them, else 0."""
@@ -330,7 +330,7 @@ def experiment_of(
     changes: Sequence[Override] = (),
     axes: Mapping[str, DesignAxisSpec] | None = None,
     design: Sequence[tuple[str, DesignPoint]] = (),
-    origin: str = "sweep",
+    origin: OverrideOrigin = "sweep",
     **keys: Any,
 ) -> LoadedExperiment:
     """Return an experiment that is not read from an experiment file.

@@ -11,7 +11,7 @@ from collections.abc import Callable, Hashable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from ..cache import OF_METRICS, OF_TESTS, sources_hash
 from ..errors import (
@@ -81,6 +81,9 @@ class Job:
     key: str = ""  # see `keyed`
 
 
+MeasuredStatus = Literal["not made", "completed", "ended early", "failed"]
+
+
 @dataclass(frozen=True)
 class MeasuredRun:
     """Metrics of a run, or the reason why there are none."""
@@ -101,10 +104,10 @@ class MeasuredRun:
         return self.made and not self.ok
 
     @property
-    def status(self) -> str:
+    def status(self) -> MeasuredStatus:
         """One- or two-word status."""
         if not self.made:
-            return NOT_MADE.reason or ""
+            return "not made"
         return ("ended early" if self.ended else "completed") if self.ok else "failed"
 
     @property

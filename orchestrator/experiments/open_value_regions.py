@@ -10,6 +10,7 @@ from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Final
 
 from ..errors import Diagnostic, Location, ScenarioError
 from ..messages import hint, listed
@@ -36,7 +37,7 @@ from .jobs import Job, MeasuredRun, keyed, ready
 from .plan_experiment import PlannedExperiment, found_at, metrics_of, number_of
 from .published_tables import ranked
 
-ORIGIN = "region"
+ORIGIN: Final = "region"
 """Origin of overrides that open values make."""
 
 RegionPoint = tuple[tuple[str, Level], ...]

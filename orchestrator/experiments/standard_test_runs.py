@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Final
 
 from ..errors import ScenarioError
 from ..evaluation.sine_with_dwell import AMPLITUDE, SIDES
@@ -22,7 +23,7 @@ from .jobs import Job, planned
 
 SLOW_STEER = "slowly_increasing_steer"
 """Folder of the runs of slowly increasing steer."""
-STEERED = "slowly increasing steer"
+STEERED: Final = "slowly increasing steer"
 """Origin of their overrides."""
 
 

@@ -18,7 +18,7 @@ import zlib
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -40,7 +40,7 @@ class PackedColumn:
     ("c", value): a constant; of times also ("d",): 64-bit floats, and ("u", begin, end): evenly spaced.
     """
 
-    form: str
+    form: Literal["q", "f", "r", "c", "d", "u"]
     numbers: tuple[float, ...] = ()
     planes: bytes = b""
 

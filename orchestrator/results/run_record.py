@@ -10,7 +10,7 @@ import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, cast
 
 from pydantic import (
     BaseModel,
@@ -30,7 +30,7 @@ from ..errors import Diagnostic, Location, ResultsError, Severity, warnings_in
 from ..files import read_bytes, reading, reason
 from ..messages import short
 from ..names import SignalName
-from ..plan import NEUTRAL, Override, ValueSource
+from ..plan import NEUTRAL, Override, OverrideOrigin, SourceKind, ValueSource
 from .file_formats import FILES, RESULTS_FILE
 from .run_folder import FAILED, LARGEST, RUN_FILE, RunStatus, refuse_dead
 
@@ -287,7 +287,7 @@ class RunRecord(_Part):
         overrides = []
         for item in self.changes:
             with contextlib.suppress(ValueError):  # the record was edited
-                overrides.append(Override.of(item.place, item.value, item.origin))
+                overrides.append(Override.of(item.place, item.value, cast(OverrideOrigin, item.origin)))
         return tuple(overrides)
 
     def source(self, instance: str, name: str) -> ValueSource | None:
@@ -299,7 +299,7 @@ class RunRecord(_Part):
         if index >= len(self.sources):
             return NOT_RECORDED
         source = self.sources[index]
-        return ValueSource(source.kind, source.says, source.file, source.line)
+        return ValueSource(cast(SourceKind, source.kind), source.says, source.file, source.line)
 
     @property
     def all_diagnostics(self) -> tuple[Diagnostic, ...]:

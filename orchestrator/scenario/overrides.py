@@ -30,7 +30,7 @@ from ..errors import Diagnostic, Location, ScenarioError
 from ..fault_kinds import WORDS, FaultList
 from ..messages import hint, listed
 from ..names import FACTS, FAULTS, INPUTS, OF_RUN, TYRES, VEHICLE, Target
-from ..plan import Override, Value
+from ..plan import Override, OverrideOrigin, Value
 from . import yaml_lines
 from .fault_schema import location_of, parse_faults, read_line
 from .yaml_lines import Document, KeyPath
@@ -99,7 +99,7 @@ def _settable(text: str) -> Target | None:
     return None if target.kind in ("fmu", "vehicle_file") else target
 
 
-def setting(target: Target, value: Value, origin: str) -> Override:
+def setting(target: Target, value: Value, origin: OverrideOrigin) -> Override:
     """Return the override of a target; faults are parsed from their line.
 
     Raises:
@@ -110,7 +110,7 @@ def setting(target: Target, value: Value, origin: str) -> Override:
     return faults_at(target.variable, str(value), origin)
 
 
-def faults_at(place: str, stated: str | Mapping[str, Value], origin: str) -> Override:
+def faults_at(place: str, stated: str | Mapping[str, Value], origin: OverrideOrigin) -> Override:
     """Return the override of the faults of a location: all in one line, or one with its options as in a file.
 
     Raises:
@@ -133,7 +133,7 @@ def faults_at(place: str, stated: str | Mapping[str, Value], origin: str) -> Ove
 
 
 def changes_of(
-    swaps: Mapping[str, str], settings: Mapping[Target, Value], folder: Path, origin: str
+    swaps: Mapping[str, str], settings: Mapping[Target, Value], folder: Path, origin: OverrideOrigin
 ) -> list[Override]:
     """Return the overrides in a file of a folder: instance -> FMU (see `swap_of`) and target -> value."""
     changes = [
@@ -147,7 +147,7 @@ def changes_of(
     return changes
 
 
-def changes_of_run(spec: Any, origin: str) -> list[Override]:
+def changes_of_run(spec: Any, origin: OverrideOrigin) -> list[Override]:
     """Return the overrides in the fields `stop_time`, `step_size` and `algorithm` of a specification."""
     fields = [(name, getattr(spec, name, None)) for name in OF_RUN]
     return [
@@ -157,7 +157,7 @@ def changes_of_run(spec: Any, origin: str) -> list[Override]:
     ]
 
 
-def swap_of(unit: str, text: str, origin: str) -> list[Override]:
+def swap_of(unit: str, text: str, origin: OverrideOrigin) -> list[Override]:
     """Parse `fmu:parameter=value:parameter=value` for an instance into overrides, its FMU first."""
     match = re.fullmatch(r"(.*?)((?::\w+=[^:]*)*)", text, re.DOTALL)
     assert match is not None

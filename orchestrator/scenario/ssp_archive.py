@@ -21,7 +21,7 @@ from lxml.etree import _Element
 from ..errors import Diagnostic, Location
 from ..files import PACKED, TooLargeError, check_archive, read_bytes, reason
 from ..messages import short
-from ..plan import UnitDefinition
+from ..plan import Causality, UnitDefinition
 from .quantities import BASE_UNITS, Unit, measure_of
 
 LARGEST = 100_000_000
@@ -49,7 +49,7 @@ class SspError(Exception):
 class SspVariable(NamedTuple):
     """A variable or connector as declared by an FMU or an archive."""
 
-    causality: str
+    causality: Causality | None
     unit: str | None = None
     definition: UnitDefinition | None = None
 

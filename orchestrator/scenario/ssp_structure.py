@@ -83,7 +83,7 @@ class SspStructure:
 
     def connector(self, end: SspEnd) -> SspVariable:
         """Return the declaration of a connector, an empty one if the archive has none."""
-        return self.connectors[end.element].get(end.name, SspVariable(""))
+        return self.connectors[end.element].get(end.name, SspVariable(None))
 
     def upstream(self, end: SspEnd) -> list[SspEnd]:
         """Return the chain of sources of an end: connectors of systems, then a component's output, if any.
@@ -222,7 +222,7 @@ def _gives(structure: SspStructure, end: SspEnd, path: ElementPath) -> bool | No
     if end.element in structure.components:
         declared = structure.components[end.element].variables.get(end.name)
         kind = declared.causality if declared else kind
-    gives = _GIVES.get(kind)
+    gives = _GIVES.get(kind or "")
     return gives if gives is None or end.element != path else not gives
 
 

@@ -18,11 +18,14 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from math import atan, inf, isfinite, nan, pi, prod, sin, tan
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from ..errors import Diagnostic, Location, ScenarioError, Severity
 from ..files import TEXT, read_bytes, reads, reason
 from ..messages import listed, short
+
+Side = Literal["LEFT", "RIGHT"]
+SIDES: tuple[Side, ...] = ("LEFT", "RIGHT")
 
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _ENTRY = re.compile(r"(?P<key>[A-Za-z]\w*)\s*=\s*(?P<value>'[^']*'?|\"[^\"]*\"?|[^$!]*)", re.ASCII)
@@ -149,7 +152,7 @@ class TyreFile:
     path: Path
     sha256: str
     kind: str  # "MF-Tyre 6.2"
-    side: str  # "LEFT" or "RIGHT"
+    side: Side
     values: dict[str, float]
     """Parameter name without axle, such as pcx1 -> its value in SI units."""
     rolling_radius: float | None
@@ -279,11 +282,11 @@ class _Reading:
             )
         return lambda powers: prod(factors.get(name, 1.0) ** power for name, power in powers.items())
 
-    def _side(self) -> str:
+    def _side(self) -> Side:
         entry = self.texts.get("TYRESIDE")
-        side = (entry.text or "").upper() if entry else ""
-        if side in ("LEFT", "RIGHT"):
-            return side
+        for side in SIDES:
+            if entry and (entry.text or "").upper() == side:
+                return side
         if entry is None:
             self._say(None, "TYRESIDE is missing: read as LEFT", "warning")
         else:
@@ -347,7 +350,7 @@ class _Reading:
 
     # ---- values ---------------------------------------------------------------------------------------
 
-    def _complete(self, kind: int, side: str) -> dict[str, float]:
+    def _complete(self, kind: int, side: Side) -> dict[str, float]:
         """Return all parameters, with neutral values for missing ones."""
         values = {key: self._at(key, 1.0) for key in SCALINGS}
         values |= {key: self._at(key) for key in COEFFICIENTS}

@@ -22,7 +22,7 @@ from ..errors import code_of
 from ..files import TEXT, read_bytes
 from ..fmu.binary import integer_limits
 from ..messages import closest, fold, hint, listed, short
-from ..plan import DEFAULT, LITERATURE, VARIED, Fmu, Value, ValueOrigin, ValueSource, Variable
+from ..plan import DEFAULT, LITERATURE, VARIED, Fmu, OriginKind, Value, ValueOrigin, ValueSource, Variable
 from ..scenario import quantities
 from ..scenario.find_and_load import LoadedScenario
 from ..scenario.schema import TextSpec
@@ -129,7 +129,7 @@ def _in_vehicle_file(comment: str, unit: str, of_file: str, path: str, line: int
 
 
 @lru_cache(maxsize=10_000)
-def _in_file(kind: str, comment: str, of_file: str, path: str, line: int) -> ValueOrigin:
+def _in_file(kind: OriginKind, comment: str, of_file: str, path: str, line: int) -> ValueOrigin:
     source = ValueSource.of_comment(comment, of_file)
     return ValueOrigin(kind, source=replace(source, file=path, line=line))
 

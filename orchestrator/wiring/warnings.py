@@ -24,7 +24,7 @@ from vocabulary.vehicle import CAR, DYNAMIC_INDEX
 
 from ..errors import Diagnostic, Location
 from ..messages import fold, listed
-from ..plan import DEFAULT, SENSING, Instance, Value, Variable, Wire
+from ..plan import DEFAULT, SENSING, Instance, OriginKind, Value, Variable, Wire
 from ..scenario.find_and_load import LoadedScenario
 from ..scenario.quantities import meant_unit, number_and_unit
 from .context import FACTS
@@ -196,7 +196,7 @@ class GivenValue(NamedTuple):
     instance: str
     name: str
     value: Value
-    origin: str  # its kind
+    origin: OriginKind
     variable: Variable
 
 
