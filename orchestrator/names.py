@@ -129,7 +129,7 @@ class Target:
             return cls("vehicle_file" if text == VEHICLE else "tyres")
         holder, dot, name = text.partition(".")
         if not holder or (dot and not name):
-            wanted = "unit.parameter, vehicle.parameter, inputs.pattern or a unit"
+            wanted = "instance.parameter, vehicle.parameter, inputs.pattern or an instance"
             raise ValueError(f"must be {wanted} (got {short(text)})")
         if dot and holder in _PREFIXES:
             return cls(_PREFIXES[holder], variable=name)

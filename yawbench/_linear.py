@@ -124,7 +124,7 @@ def linearize(
     Args:
         scenario: what `load` returns, possibly changed.
         at: time of the operating point [s], rounded down to a step of all instances.
-        inputs: signals (`unit.output`, for all receivers) or inputs (`unit.input`) that deviate.
+        inputs: signals (`instance.output`, for all receivers) or inputs (`instance.input`) that deviate.
         outputs: signals that are observed.
         discrete: whether to return the sampled model.
 

@@ -99,7 +99,7 @@ class Run:
         return self.results.record.overrides
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """Return a column, shape (rows,): `unit.variable`, or the only variable of that name."""
+        """Return a column, shape (rows,): `instance.variable`, or the only variable of that name."""
         return self.results.columns[self.results.column(arguments.text(name, "name of a column"))]
 
     def __contains__(self, name: object) -> bool:

@@ -121,7 +121,7 @@ class Scenario:
         changes, programs = [*self._unswapped(units).changes], dict(self._programs)
         for unit, wanted in units.items():
             if unit not in existing:
-                text = f"there is no unit {short(unit)}{hint(unit, existing, lead='units')}"
+                text = f"there is no instance {short(unit)}{hint(unit, existing, lead='instances')}"
                 raise ScenarioError(Diagnostic("instance-unknown", text, location=Location(self.path)))
             if arguments.names_file(wanted):
                 changes.append(Override(Target.of_instance(unit), fmu_of(wanted, unit), "swap"))
@@ -168,8 +168,8 @@ class Scenario:
 
         Args:
             values: target -> value, in SI or with its unit. Targets are those of `--set`:
-                `unit.parameter`, `vehicle.parameter`, `inputs.pattern`, `unit.step_size`, `stop_time`,
-                `step_size` or `algorithm`.
+                `instance.parameter`, `vehicle.parameter`, `inputs.pattern`, `instance.step_size`,
+                `stop_time`, `step_size` or `algorithm`.
 
         Raises:
             ScenarioError: a target or value is invalid.
@@ -203,8 +203,8 @@ class Scenario:
             ['freeze from 1.5 s', 'bias 0.5 deg until 3 s']
 
         Args:
-            target: `unit.output` for all receivers and the results, `unit.output -> unit` for a single
-                receiver, or `unit.input`; `*` matches several signals.
+            target: `instance.output` for all receivers and the results, `instance.output -> instance` for a
+                single receiver, or `instance.input`; `*` matches several signals.
             kind: such as bias or freeze; the reference of scenario files lists all kinds.
             value: of the kind, in SI or with its unit.
             start, until: start and end [s]; default: those of the run.

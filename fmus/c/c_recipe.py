@@ -38,7 +38,7 @@ SHARED = (
     HERE.parent / "presentation.py",
     PAGE,
 )
-"""What has a say in the FMU of every unit in C."""
+"""Files that every FMU in C depends on."""
 FLAGS = ("-std=c11", "-O2", "-Wall", "-Wextra", "-Wno-unused-parameter", "-fPIC", "-shared")
 EXACT = ("-fvisibility=hidden", "-ffp-contract=off")  # no fused multiply-add: the same numbers everywhere
 LINUX = ("-Wl,--build-id=none", "-Wl,-z,defs", "-s")

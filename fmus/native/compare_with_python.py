@@ -31,7 +31,7 @@ FEW, FEWEST, IN_ALL = 100, 2, 3000
 MANY = 60
 """Numbers among parameters from which each is moved once only."""
 LIMIT = 240
-"""Processor time [s] that a unit has on its way: a wrong translation may go round for ever."""
+"""Processor time [s] of a comparison: a wrongly translated loop may never end."""
 _LOGGER = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 
 
@@ -43,7 +43,7 @@ class _Callbacks(ctypes.Structure):
 
 
 class Difference(Exception):
-    """What native unit and twin do not have in common."""
+    """A difference between a native unit and its twin."""
 
 
 Answer = tuple[bool, list[str], bytes]
@@ -358,7 +358,7 @@ def _choices(beside: _Beside, variables: Sequence[Any]) -> Iterator[tuple[str, C
 
 
 def differences(library: Path, guid: str, component: type[Any], resources: Path, limit: int = LIMIT) -> str:
-    """Return what tells a native unit from its twin, "" if nothing does, watched from another process.
+    """Return the first difference between a native unit and its twin, "" if none; in another process.
 
     Args:
         library, guid: of the native unit.

@@ -42,7 +42,7 @@ def _targets(value: object) -> list[Target]:
     texts = [value] if isinstance(value, str) else value
     if not isinstance(texts, list) or not texts or not all(isinstance(text, str) and text for text in texts):
         raise ValueError(
-            "must be unit.parameter, vehicle.parameter, inputs.pattern, a unit, vehicle or tyres "
+            "must be instance.parameter, vehicle.parameter, inputs.pattern, an instance, vehicle or tyres "
             f"(got {short(value)})"
         )
     return [Target.parse(text) for text in texts]
@@ -52,7 +52,9 @@ def _target(value: object) -> Target:
     if isinstance(value, Target):  # in data that another specification holds
         return value
     if not isinstance(value, str):
-        raise ValueError(f"must be unit.parameter, vehicle.parameter or inputs.pattern (got {short(value)})")
+        raise ValueError(
+            f"must be instance.parameter, vehicle.parameter or inputs.pattern (got {short(value)})"
+        )
     return Target.parse(value)
 
 
@@ -90,8 +92,8 @@ Levels = Annotated[dict[Any, str], PlainValidator(_levels), WithJsonSchema(VALUE
 class OverrideSpec(StrictModel):
     """Overrides of a scenario."""
 
-    swap: dict[str, str] = Field({}, description="Unit -> FMU, a name or a path")
-    set: dict[TargetText, Scalar] = Field({}, description="unit.parameter -> value")
+    swap: dict[str, str] = Field({}, description="Instance -> FMU, a name or a path")
+    set: dict[TargetText, Scalar] = Field({}, description="instance.parameter -> value")
     vehicle: str | None = Field(None, description="Vehicle file, relative to this file")
     faults: list[FaultSpec] = Field([], description="In place of the scenario's at these locations")
     stop_time: Time | None = Field(None, description="In place of the scenario's")
@@ -116,7 +118,7 @@ class AxisSpec(StrictModel):
     model_config = ConfigDict(json_schema_extra=exactly_one("vary", "variants"))
 
     vary: TargetList = Field(
-        [], description="unit.parameter, inputs.pattern, a unit (its FMU), vehicle or tyres (files)"
+        [], description="instance.parameter, inputs.pattern, an instance (its FMU), vehicle or tyres (files)"
     )
     variants: dict[str, VariantSpec] = Field({}, description="Words -> changes that belong together")
     values: Levels | None = Field(None, description="A list, or a mapping of values to words")
@@ -167,7 +169,7 @@ class AxisSpec(StrictModel):
         if Target.of_instance(INPUTS) in self.vary:
             raise ValueError("vary: inputs needs a name, for example inputs.friction*")
         if len(self.vary) > 1 and any(target.names_file for target in self.vary):
-            raise ValueError("vary: only several unit.parameter may share an axis")
+            raise ValueError("vary: only several instance.parameter may share an axis")
         ends = (self.start, self.end)
         if self.values is not None and (ends != (None, None) or self.count is not None):
             raise ValueError("give either values, or from, to and count")

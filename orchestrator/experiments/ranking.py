@@ -82,7 +82,7 @@ class ConditionSpec(OverrideSpec):
     dry: bool = Field(True, description="Responsiveness counts, which the regulation asks of dry roads")
     mirrored: bool = Field(True, description="Left and right are alike: left first stands for both")
     every: int | None = Field(None, ge=1, description="In place of the ranking's")
-    repeats: dict[str, list[Scalar]] = Field({}, description="unit.parameter -> values, such as seeds")
+    repeats: dict[str, list[Scalar]] = Field({}, description="instance.parameter -> values, such as seeds")
     seen: bool = Field(False, description="By the search that tuned gains")
     quick: bool = Field(False, description="Driven by --quick, with the last amplitude alone")
 
@@ -95,7 +95,7 @@ class ConditionSpec(OverrideSpec):
     @classmethod
     def _one_target(cls, levels: dict[str, list[Scalar]]) -> dict[str, list[Scalar]]:
         if len(levels) > 1 or not all(levels.values()):
-            raise ValueError("repeats: one unit.parameter with its values")
+            raise ValueError("repeats: one instance.parameter with its values")
         return levels
 
 

@@ -74,7 +74,9 @@ class ThreatSpec(OverrideSpec):
     )
     dry: bool = Field(True, description="Responsiveness counts, which the regulation asks of dry roads")
     mirrored: bool = Field(True, description="Left and right are alike: left first stands for both")
-    repeats: dict[str, list[Scalar]] = Field({}, description="unit.parameter -> values that all have to pass")
+    repeats: dict[str, list[Scalar]] = Field(
+        {}, description="instance.parameter -> values that all have to pass"
+    )
     cars: list[str] = Field([], description="Cars that it applies to; default: all")
 
     @model_validator(mode="after")

@@ -91,14 +91,14 @@ def lacking(library: bytes | None, fmi: int) -> tuple[str, ...]:
 REASON = "extra/org.yawbench.native/native.txt"
 """Path in an archive of why it has no native library; empty if it has one."""
 WANTED = "YAWBENCH_UNITS"
-"""Environment variable: `python` asks for units in Python at run time."""
+"""Environment variable: `python` asks for Python in place of native code."""
 
 
 PYTHON_WANTED = RunsAs(f"{WANTED} asks for it")
 
 
 def python_wanted() -> bool:
-    """Return whether the environment asks for units in Python."""
+    """Return whether the environment asks for Python in place of native code."""
     return os.environ.get(WANTED) == "python"
 
 

@@ -299,7 +299,7 @@ def groups_of(runs: Sequence[tuple[RunRecord, Plan]]) -> list[ParameterGroup]:
     """
     vehicles: dict[str, ParameterGroup] = {}
     units: dict[tuple[str, str], ParameterGroup] = {}
-    constants = ParameterGroup("Constant inputs", "no unit gives them")
+    constants = ParameterGroup("Constant inputs", "driven by no instance")
     order: dict[str, None] = {}
     for record, plan in runs:
         by_name = {unit.name: unit for unit in plan.instances if unit.name in record.fmus}

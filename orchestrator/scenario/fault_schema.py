@@ -30,7 +30,8 @@ def location_of(value: object) -> FaultLocation:
     parts = _PLACE.fullmatch(value) if isinstance(value, str) else None
     if parts is None or any((part or "").count("*") > 1 for part in parts.groups()):
         raise ValueError(
-            f"must be unit.output, unit.input or unit.output -> unit, with at most one * (got {short(value)})"
+            "must be instance.output, instance.input or instance.output -> instance, with at most one * "
+            f"(got {short(value)})"
         )
     return FaultLocation(parts[1], parts[2], parts[3] or "", parts[4] or "*")
 

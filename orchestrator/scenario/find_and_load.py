@@ -210,7 +210,9 @@ def _check_unit_names(document: Document) -> None:
         for unit in _units_in(value):
             if unit not in units and not (unit == "*" and key[0] == "record"):
                 document.report(
-                    key, f"there is no unit {unit!r}{hint(unit, units, lead='units')}", "instance-unknown"
+                    key,
+                    f"there is no instance {unit!r}{hint(unit, units, lead='instances')}",
+                    "instance-unknown",
                 )
 
 

@@ -49,7 +49,7 @@ def read_changes(
     Args:
         swaps: `unit=fmu`, as given to --swap; a path is relative to the working directory. An FMU may bring
             parameters along, `unit=fmu:parameter=value`.
-        settings: `unit.parameter=value`, as given to --set.
+        settings: `instance.parameter=value`, as given to --set.
         faults: `location: kind ...`, as given to --fault (see `fault_schema`); those of a location add up.
 
     Raises:
@@ -199,7 +199,7 @@ def apply_changes(
             differs = _put(document, (INPUTS, name), change)
         elif not isinstance(spec, dict):
             known = (*units, VEHICLE, INPUTS) if name else units
-            sentence = f"the scenario has no unit {holder!r}{hint(holder, known, lead='it has')}"
+            sentence = f"the scenario has no instance {holder!r}{hint(holder, known, lead='it has')}"
             document.add(Diagnostic("instance-unknown", sentence, location=Location(target=str(change))))
             continue
         elif kind == "fmu":

@@ -8,11 +8,11 @@ during wiring.
       - {on: sensor.yaw_rate, kind: freeze, from: 1.5, until: 3.0}
       - {on: plant.yaw_rate -> sensor, kind: bias, value: 0.5 deg/s}
 
-A fault's location is `unit.output`, which affects everything that the output feeds and the results;
-`unit.output -> unit` or `-> unit.input`, a wire to one target; or `unit.input`. A `*` matches several
-variables, such as those of four wheels. In one line, as for `--fault` and in experiments, the location is
-followed by `KIND VALUE share N every T seed N from T until T`, of which only the kind is required; several
-faults at one location are separated by `;` and act in this order.
+A fault's location is `instance.output`, which affects everything that the output feeds and the results;
+`instance.output -> instance` or `-> instance.input`, a wire to one target; or `instance.input`. A `*` matches
+several variables, such as those of four wheels. In one line, as for `--fault` and in experiments, the
+location is followed by `KIND VALUE share N every T seed N from T until T`, of which only the kind is needed;
+several faults at one location are separated by `;` and act in this order.
 """
 
 from __future__ import annotations
@@ -53,22 +53,22 @@ AlgorithmName = Annotated[str, OneOf(ALGORITHMS)]
 
 
 def endpoint(value: object) -> SignalName:
-    """Return the variable of an instance, or several with a `*`, named by 'unit.variable'.
+    """Return the variable of an instance, or several with a `*`, named by 'instance.variable'.
 
     Raises:
         ValueError: not of that form.
     """
     name = SignalName.parse(value) if isinstance(value, str) else None
     if name is None or not (name.instance and name.variable) or name.variable.count("*") > 1:
-        raise ValueError(f"must be unit.variable, with at most one * in variable (got {value!r})")
+        raise ValueError(f"must be instance.variable, with at most one * in variable (got {value!r})")
     return name
 
 
 def _unit_name(name: str) -> str:
     if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
-        raise ValueError(f"{name!r} cannot name a unit: use letters, digits and _")
+        raise ValueError(f"{name!r} cannot name an instance: use letters, digits and _")
     if name in RESERVED:
-        raise ValueError(f"a unit cannot be named {name!r}: --set {name}.NAME means something else")
+        raise ValueError(f"an instance cannot be named {name!r}: --set {name}.NAME means something else")
     return name
 
 
@@ -84,7 +84,7 @@ def _end(value: object) -> SignalName | list[str]:
     if not isinstance(value, list):
         return endpoint(value)
     if not value or not all(isinstance(name, str) and name and "." not in name for name in value):
-        raise ValueError(f"must be names of units (got {short(value)})")
+        raise ValueError(f"must be names of instances (got {short(value)})")
     return value
 
 
@@ -233,15 +233,17 @@ class Connection(StrictModel):
     def _check_ends(self) -> Connection:
         listed = isinstance(self.source, list), isinstance(self.target, list)
         if listed == (True, False) and "*" not in self.target[1]:
-            raise ValueError("from a list of units, 'to' must be one too, or unit.variable with a *")
+            raise ValueError(
+                "from a list of instances, 'to' must be a list, too, or instance.variable with a *"
+            )
         if listed == (False, True) and self.source is not None:
-            raise ValueError("from unit.variable, 'to' must be unit.variable")
+            raise ValueError("from instance.variable, 'to' must be instance.variable")
         if self.source is None and isinstance(self.target, list):
-            raise ValueError("with 'from: null', 'to' must be unit.variable")
+            raise ValueError("with 'from: null', 'to' must be instance.variable")
         if self.scale is not None and not isinstance(self.source, SignalName):
-            raise ValueError("gain and offset are for a connection of unit.variable to unit.variable")
+            raise ValueError("gain and offset are for a connection of instance.variable to instance.variable")
         if self.delay is not None and not isinstance(self.source, SignalName):
-            raise ValueError("a delay is for a connection of unit.variable to unit.variable")
+            raise ValueError("a delay is for a connection of instance.variable to instance.variable")
         return self
 
     @property

@@ -179,11 +179,11 @@ def _unit_names(structure: SspStructure, document: Document) -> dict[ElementPath
         if name[0].isdigit() or name in RESERVED:
             name = f"_{name}"
         if name in names.values():
-            raise SspError(f"two components would be called {name!r} as units", component.element)
+            raise SspError(f"two components would be called {name!r} as instances", component.element)
         names[path] = name
     renamed = [f"{name} ({'.'.join(path)})" for path, name in names.items() if path != (name,)]
     if renamed:
-        sentence = f"units renamed from their names in the archive: {listed(renamed)}"
+        sentence = f"instances renamed from their names in the archive: {listed(renamed)}"
         document.notes.append(Diagnostic("instance-renamed", sentence, "info"))
     return names
 

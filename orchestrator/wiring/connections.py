@@ -274,7 +274,7 @@ class Connector:
             driven = f"{wire.target}.{wire.input} is driven by {wire.source}.{wire.output}"
             self._report(
                 constant.key,
-                f"{driven}: a constant is for inputs that no unit drives{unless}",
+                f"{driven}: a constant is for inputs that no instance drives{unless}",
                 "constant-overruled",
             )
 
@@ -291,7 +291,7 @@ class Connector:
         connect = f"connect {listed(choices, last='or')}, or give" if 0 < len(choices) <= 8 else "give"
         measure = f" [{variable.unit}]" if variable.unit else ""
         return (
-            f"{instance}.{variable.name}{measure} has no source: no unit has an output of this name; "
+            f"{instance}.{variable.name}{measure} has no source: no instance has an output of this name; "
             f"{connect} a constant under 'inputs'"
         )
 

@@ -75,7 +75,7 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
         if not parts and system.had(instances, name_pattern, "input"):
             system.note(
                 "left-out-after-swap",
-                f"inputs.{pattern} is left out: no unit has such an input after the swap",
+                f"inputs.{pattern} is left out: no instance has such an input after the swap",
             )
         elif not parts:
             names = fold(list(dict.fromkeys(name for instance in instances for name in inputs[instance])))
@@ -124,10 +124,10 @@ def _of_facts(system: WiringContext) -> Iterator[tuple[Input, Constant]]:
         if fact.inputs and not takers:
             if not changed and any(system.had(known, variable, "input") for variable in fact.inputs):
                 system.note(
-                    "left-out-after-swap", f"{name} is left out: no unit has such an input after the swap"
+                    "left-out-after-swap", f"{name} is left out: no instance has such an input after the swap"
                 )
             else:
-                system.report(key, f"no unit has an input {name}", "variable-unknown")
+                system.report(key, f"no instance has an input {name}", "variable-unknown")
         refused: dict[str, list[str]] = {}
         for instance, variable in takers:
             value = raw

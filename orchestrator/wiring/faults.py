@@ -96,7 +96,7 @@ class _Finder:
         for unit in filter(None, (location.instance, location.target)):
             if unit not in self.system.fmus:
                 self._report(
-                    f"there is no unit {unit!r}{hint(unit, self.system.fmus, lead='units')}",
+                    f"there is no instance {unit!r}{hint(unit, self.system.fmus, lead='instances')}",
                     "instance-unknown",
                 )
                 return []
@@ -117,7 +117,7 @@ class _Finder:
         driven = {w.input for w in self.wires if w.target == unit}
         if names and not driven & set(names):
             self._report(
-                f"{unit}.{pattern} is on no wire: faults of inputs act on values that units give",
+                f"{unit}.{pattern} is on no wire: faults of inputs act on outputs of instances",
                 "fault-without-effect",
             )
         if not names and not matching(pattern, self.system.outputs[unit]):

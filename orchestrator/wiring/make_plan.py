@@ -91,7 +91,7 @@ def recorded(system: WiringContext) -> tuple[SignalName, ...]:
             continue
         usual, every = ([v.name for u in instances for v in of(fmus[u])] for of in (_usual, _all))
         names = every if closest(pattern, usual) is None and closest(pattern, every) else usual
-        who = "no unit has a" if instance == "*" else f"{instance} has no"
+        who = "no instance has a" if instance == "*" else f"{instance} has no"
         more = hint(pattern, fold(list(dict.fromkeys(names))), lead="its outputs are")
         system.report(("record", i), f"{who} variable {pattern!r} to record{more}", "variable-unknown")
     return tuple(chosen)
@@ -235,8 +235,8 @@ def make_plan(
         Diagnostic(
             "algebraic-loop",
             f"algebraic loop: {loop}; these values would define each other at one instant, so "
-            "one of these units has to give an output that does not follow its input directly, or one of the "
-            "connections needs 'delay: 1 step'",
+            "one of these instances has to give an output that does not follow its input directly, or one of "
+            "the connections needs 'delay: 1 step'",
         )
         for loop in evaluation.loops
     ]
@@ -286,7 +286,7 @@ def _take_from_tyres(
     tyres = [u for u in instances.values() if {v.name for v in u.fmu.of("output")} >= {*TYRE_FORCES}]
     try:
         if len(tyres) != 1 or measure is None:
-            raise ValueError("this needs exactly one unit that computes the tyre forces")
+            raise ValueError("this needs exactly one instance that computes the tyre forces")
         measured = measure(tyres[0], dict(zip(WHEELS[::2], loads, strict=True)))
     except (ValueError, YawbenchError) as error:
         return [
@@ -341,7 +341,7 @@ def _misplaced(scenario: LoadedScenario) -> list[Diagnostic]:
         name = Path(str(change.value)).stem
         others = [instance for instance, role in roles.items() if role == role_in(name)]
         if change.swaps and others and change.target.instance not in others:
-            sentence = f"by its name {name} is for the unit {others[0]!r}"
+            sentence = f"by its name {name} is for the instance {others[0]!r}"
             errors.append(Diagnostic("swap-role-mismatch", sentence, location=Location(target=str(change))))
     return errors
 

@@ -221,10 +221,10 @@ class Parameters:
             if before and not changed:
                 self._system.note(
                     "left-out-after-swap",
-                    f"{fact_name} is left out: no unit has such a parameter after the swap",
+                    f"{fact_name} is left out: no instance has such a parameter after the swap",
                 )
             else:
-                sentence = f"no unit has a parameter {listed(fact.parameters, last='or')}"
+                sentence = f"no instance has a parameter {listed(fact.parameters, last='or')}"
                 self._system.report((fact_name,), sentence, "parameter-unknown")
         return by_change
 
@@ -243,7 +243,7 @@ class Parameters:
                 )
             else:
                 document, key = place
-                sentence = "no unit is a tyre that takes such files; tyre_magic_formula_62 does"
+                sentence = "no instance is a tyre that takes such files; tyre_magic_formula_62 does"
                 self._system.report(key, sentence, "tyre-file-unused", document)
 
     def _from_vehicle(self) -> None:
@@ -266,14 +266,14 @@ class Parameters:
             elif any(_is_parameter(fmu, name) for fmu in self._system.before()):
                 self._system.note(
                     "left-out-after-swap",
-                    f"vehicle.{name} is left out: no unit has such a parameter after the swap",
+                    f"vehicle.{name} is left out: no instance has such a parameter after the swap",
                 )
             else:
                 known = {v.name for fmu in self._fmus.values() for v in fmu.of("parameter")}
                 likely = closest(name, sorted(known | CAR.keys()))
                 guess = f"; did you mean {likely!r}?" if likely else ""
                 self._system.report(
-                    key, f"no unit has a parameter {name!r}{guess}", "parameter-unknown", document
+                    key, f"no instance has a parameter {name!r}{guess}", "parameter-unknown", document
                 )
         for name, sentence in contradictions(numbers):
             self._system.report(("parameters", name), sentence, "vehicle-contradictory", document)
@@ -285,7 +285,7 @@ class Parameters:
         for name in idle:
             if name not in self.car.used and document.override(("parameters", name)):
                 self._system.note(
-                    "value-unused", f"vehicle.{name} changes nothing: no unit here takes it or what follows"
+                    "value-unused", f"vehicle.{name} changes nothing: no instance takes it or what follows"
                 )
 
     def _settle_stiffnesses(self) -> None:
@@ -319,7 +319,7 @@ class Parameters:
                     ("units", unit),
                     f"{fmu.name} takes its car from the vehicle file, which gives neither "
                     f"{listed(needed, last='nor')} nor what {'they' if len(needed) > 1 else 'it'} would "
-                    "follow from: give them there, or to this unit",
+                    "follow from: give them there, or to this instance",
                     "vehicle-incomplete",
                 )
 

@@ -66,7 +66,7 @@ def in_one_sentence(said, arguments, words):
         ((*RUN, "--metric", "peek(sideslip)"), [f"there is no measure 'peek'; {KNOWN} 'peak'?"]),
         ((*RUN, "--swap", "controler=controller_off"), [f"no unit 'controler'; {KNOWN} 'controller'?"]),
         ((*RUN, "--swap", "controller=controller_of"), [f"{KNOWN} 'controller_off'?"]),
-        ((*RUN, "--swap", "controller=tyre_dugoff"), ["by its name tyre_dugoff is for the unit 'tyre'"]),
+        ((*RUN, "--swap", "controller=tyre_dugoff"), ["by its name tyre_dugoff is for the instance 'tyre'"]),
         ((*RUN, "--swap", "controller"), ["write --swap INSTANCE=FMU"]),
         ((*RUN, "--swap", r"controller=C:\units\x.fmu"), ["no such FMU; write paths with /, not \\"]),
         ((*RUN, "--out", "a_file"), ["a_file: results cannot be written here", "name another with --out"]),

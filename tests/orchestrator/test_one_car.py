@@ -188,7 +188,7 @@ def test_a_change_that_reaches_no_unit_is_told(plan):
         (
             f"{CAR_TEXT}, trak_width: 1.5",
             "plant_x",
-            "no unit has a parameter 'trak_width'; did you mean 'track_",
+            "no instance has a parameter 'trak_width'; did you mean 'track_",
         ),
         ("sprung_mass: -5, unsprung_mass: 180", "plant_x", "sprung_mass: must be at least 0 kg (got -5)"),
     ],

@@ -213,7 +213,7 @@ REFUSED = [
     (AMPLITUDE, "{vary: driver.amplitude, values: [1], count: 3}", "give either values, or from"),
     (AMPLITUDE, "{values: [1]}", "needs either vary or variants"),
     (AMPLITUDE, "{vary: inputs, values: [1]}", "inputs needs a name, for example inputs.friction*"),
-    (AMPLITUDE, "{vary: [driver.a, controller], values: [1]}", "only several unit.parameter may share"),
+    (AMPLITUDE, "{vary: [driver.a, controller], values: [1]}", "only several instance.parameter may share"),
     (AMPLITUDE, "{vary: vehicle, values: [1]}", "vehicle takes names of files or FMUs"),
     (AMPLITUDE, "{vary: driver.amplitude, values: ['1 deg']}", "give plain numbers, and their unit in"),
     (AMPLITUDE, "{vary: driver.amplitude, values: [1], unit: furlong}", "'furlong' is not a unit"),
@@ -278,8 +278,8 @@ def test_figures_and_limits_must_name_what_there_is(old, new, sentence, sweep, t
 
 PLANS_REFUSED = [
     ("driver.amplitude", "driver.amplitud", "axes.amplitude: sweep driver.amplitud=0.01: "),
-    ("vary: driver.amplitude", "vary: drivr.amplitude", "the scenario has no unit 'drivr'; did you mean"),
-    ("vary: controller,", "vary: contrller,", "the scenario has no unit 'contrller'; did you mean"),
+    ("vary: driver.amplitude", "vary: drivr.amplitude", "the scenario has no instance 'drivr'; did you mean"),
+    ("vary: controller,", "vary: contrller,", "the scenario has no instance 'contrller'; did you mean"),
     ("controller_off:", "controller_of:", "no FMU 'controller_of'"),
     ("peak(yaw_moment)", "peak(roll_angle)", "metrics.moment: no run records the signals of peak"),
     ("scenario: half.yaml", "scenario: hlf.yaml", "no such scenario file; did you mean"),

@@ -847,11 +847,11 @@ def test_null_leaves_an_input_without_a_source(folder: Path) -> None:
     [
         (
             "{from: [plant], to: tyre.friction_fl}",
-            ": from a list of units, 'to' must be one too, or unit.variable with a *",
+            ": from a list of instances, 'to' must be a list, too, or instance.variable with a *",
         ),
         (
             "{from: plant.yaw_rate, to: [tyre]}",
-            ": from unit.variable, 'to' must be unit.variable",
+            ": from instance.variable, 'to' must be instance.variable",
         ),
         ("{from: [driver, driver], to: plant.*_angle}", ".from: names driver twice"),
         ("{from: [driver, plant], to: plant.*_angle}", ": connects plant to itself"),
@@ -859,18 +859,18 @@ def test_null_leaves_an_input_without_a_source(folder: Path) -> None:
             "{from: [driver], to: tyre.friction_*}",
             ": nothing matches: in 'from' the * can be steer_angle, in 'to' fl, fr, rl or rr",
         ),
-        ("{from: null, to: [tyre]}", ": with 'from: null', 'to' must be unit.variable"),
+        ("{from: null, to: [tyre]}", ": with 'from: null', 'to' must be instance.variable"),
         (
             "{from: [plant], to: [tyre], gain: 2}",
-            ": gain and offset are for a connection of unit.variable to unit.variable",
+            ": gain and offset are for a connection of instance.variable to instance.variable",
         ),
-        ("{from: [plant.x], to: [tyre]}", ".from: must be names of units (got ['plant.x'])"),
+        ("{from: [plant.x], to: [tyre]}", ".from: must be names of instances (got ['plant.x'])"),
         ("{from: [driver, driver], to: [plant]}", ".from: names driver twice"),
         (
             "{from: [tyre, driver], to: [tyre]}",
             ": nothing matches: no output of tyre or driver has the name of an input of tyre",
         ),
-        ("{from: [plnt], to: [tyre]}", ".from: there is no unit 'plnt'; did you mean 'plant'?"),
+        ("{from: [plnt], to: [tyre]}", ".from: there is no instance 'plnt'; did you mean 'plant'?"),
         (
             "{from: null, to: tyre.fricton_*}",
             ".to: tyre has no input 'fricton_*'; did you mean 'friction_*'?",

@@ -89,7 +89,7 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_others_are_made(base)
 @pytest.mark.parametrize(
     ("axes", "said"),
     [
-        ({"controlller": ["a"]}, "the scenario has no unit 'controlller'; did you mean 'controller'"),
+        ({"controlller": ["a"]}, "the scenario has no instance 'controlller'; did you mean 'controller'"),
         ({"driver.amplitude": []}, "axes.driver.amplitude.values: has no values"),
         (
             {"driver.amplitude": ["1 deg", 2]},
