@@ -63,7 +63,7 @@ from .page_parts import (
     programs_of,
     render,
 )
-from .sweep_view import sweep_view, write_sides
+from .sweep_view import sweep_sentence, sweep_view, write_sides
 from .viewer import (
     DATA,
     LARGEST,
@@ -125,7 +125,7 @@ def chapter(
         "changed": changed(experiment.by_options),
         "counts": counts_of(findings.claims),
         "reach": reach(findings),
-        "answer": answer(findings),
+        "answer": " ".join(filter(None, (answer(findings), sweep and sweep_sentence(findings)))),
         "claims": [judged(result) | {"link": link(result)} for result in findings.claims],
         "checks": [judged(result) | {"link": link(result)} for result in findings.checks],
         "region": region_table(findings) if findings.regions else None,
@@ -275,6 +275,8 @@ SEVERAL = {
     **{word: word.replace("does", "do", 1) for word in FAILS.values()},
 }
 """Verdict -> its plural."""
+LONG = 16
+"""Rows from which on a table is folded. Chosen: with the claims, a page stays below 2,000 elements."""
 VIEW = "view"
 """Anchor of the viewer."""
 
@@ -414,6 +416,7 @@ def study_page(facts: dict[str, Any]) -> str:
         "report.html.j2",
         facts,
         viewer=embedded(content, VIEW) if content else None,
+        long=LONG,
         assets=assets(*scripts) if content or scripts or facts["validations"] else "",
     )
 

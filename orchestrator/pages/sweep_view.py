@@ -51,7 +51,6 @@ def sweep_view(findings: ExperimentResult, name: str, sides: Mapping[int, str]) 
     text = render(
         "sweep.html.j2", name=name, data=_data(findings, sides) | {"folder": DATA},
         frame=embedded(None, f"{name}-run"), counts=status_counts(findings),
-        answer=limit_sentences(findings) or [range_sentence(findings)],
     )  # fmt: skip
     return Markup(text)
 
@@ -61,6 +60,11 @@ def status_counts(findings: ExperimentResult) -> str:
     counts = Counter(record.status for record in findings.records)
     words = [f"{count} {status}" for status, count in counts.items()]
     return f"{counted(len(findings.records), 'run')}: {listed(words)}"
+
+
+def sweep_sentence(findings: ExperimentResult) -> str:
+    """Return the limits of an experiment along axes, or else the range of its first metric."""
+    return " ".join(limit_sentences(findings)) or range_sentence(findings)
 
 
 def limit_sentences(findings: ExperimentResult) -> list[str]:
@@ -100,7 +104,7 @@ def _reach(limits: Sequence[Any], unit: str) -> str:
     ends = [most] if least.largest == most.largest else [least, most]
     texts = [("at least " if limit.beyond is None else "") + digits_of(limit.largest) for limit in ends]
     if len(known) < len(limits):
-        texts = ["none", texts[-1]]
+        texts = ["from none", texts[-1]]
     return f"{' to '.join(texts)} {unit}".rstrip()
 
 
@@ -118,7 +122,8 @@ def range_sentence(findings: ExperimentResult) -> str:
                 f"{shown(x, unit)} ({findings.words(findings.experiment.cases[number])})"
                 for x, number in (min(values), max(values))
             ]
-            return f"{spec.heading or metric(spec.metric).title}: {ends[0]} to {ends[1]}."
+            title = spec.heading or metric(spec.metric).title
+            return f"{title[:1].upper()}{title[1:]}: {ends[0]} to {ends[1]}."
     return ""
 
 

@@ -5,6 +5,7 @@ const SHADES = 7; // of a value within its range
 const MOST_NUMBERS = 450; // texts in the maps; chosen: a page has at most 2,000 elements
 const MOST_CELLS = 900; // beyond this one map is shown at first
 const LINES_HIGH = 330;
+const MOST_NAMES = 16; // on an axis, so that none touches the next
 const NEAR_LINE = 14; // pixels
 const BESIDE_RUNS = 7; // runs opened with a point: as many as there are colours
 
@@ -258,11 +259,12 @@ class Sweep {
       const title = panel ? `${panel.numbers ? `${panel.label} ` : ''}${panel.words[k]}${panel.unit ? ` ${panel.unit}` : ''}` : '';
       const label = (dim) => `${dim.label}${dim.unit ? ` in ${dim.unit}` : ''}`;
       const every = x ? Math.ceil((6.6 * Math.max(...x.words.map((word) => word.length)) + 6) / cw) : 1;
-      const below = x && this.data.grid ? x.words.map((word, i) => (i % every ? '' : `<text class="ys-quiet" x="${(x0 + (i + 0.5) * cw).toFixed(1)}" y="${(y0 + up * ch + 13).toFixed(1)}" text-anchor="middle" font-size="11">${escaped(word)}</text>`)).join('') : '';
+      const named = x && this.data.grid && every <= across / 2; // else they are cut at the sides
+      const below = named ? x.words.map((word, i) => (i % every ? '' : `<text class="ys-quiet" x="${(x0 + (i + 0.5) * cw).toFixed(1)}" y="${(y0 + up * ch + 13).toFixed(1)}" text-anchor="middle" font-size="11">${escaped(word)}</text>`)).join('') : '';
       const steps = Math.ceil(13 / ch);
       const aside = y && this.data.grid ? y.words.map((word, j) => (j % steps ? '' : `<text class="ys-quiet" x="${(x0 - 5).toFixed(1)}" y="${(y0 + (up - 0.5 - j) * ch + 4).toFixed(1)}" text-anchor="end" font-size="11">${escaped(word)}</text>`)).join('') : '';
       return `<text x="${x0}" y="${y0 - 8}" font-weight="600">${escaped(title)}${y ? `<tspan class="ys-quiet" font-weight="400">${title ? '; ' : ''}up: ${escaped(label(y))}</tspan>` : ''}</text>${below}${aside}`
-        + (x ? `<text class="ys-quiet" x="${x0}" y="${y0 + up * ch + 29}">right: ${escaped(label(x))}</text>` : '');
+        + (x ? `<text class="ys-quiet" x="${x0}" y="${y0 + up * ch + 29}">right: ${escaped(label(x))}${named || !this.data.grid ? '' : `, ${across} values`}</text>` : '');
     });
     const total = Math.ceil(maps.length / beside) * high;
     const words = this.metric ? `${this.metric.label}${this.metric.unit ? ` in ${this.metric.unit}` : ''}, stronger: larger` : '';
@@ -352,7 +354,8 @@ class Sweep {
       const room = Math.max(8, Math.floor((k === 0 || last ? edge + step / 2 - 8 : step - 6) / 6.6)); // characters beside the neighbours
       const lines = wrapped(label, room, 3);
       const named = dim.words && (!dim.numbers || dim.words.length <= 6);
-      const ends = named ? dim.words.map((word, i) => [dim.numbers ? dim.numbers[i] : i, word]) : dim.range.map((one, i) => [one, dim.words ? dim.words.at(-i) : signed(digitsOf(one, 3))]);
+      const every = Math.ceil((dim.words?.length ?? 0) / MOST_NAMES);
+      const ends = named ? dim.words.map((word, i) => [dim.numbers ? dim.numbers[i] : i, word]).filter((_, i) => i % every === 0) : dim.range.map((one, i) => [one, dim.words ? dim.words.at(-i) : signed(digitsOf(one, 3))]);
       const left = last && Math.max(...ends.map(([, word]) => word.length)) * 6.2 > edge - 8;
       const ticks = ends.map(([value, word]) => `<text x="${x + (left ? -6 : 6)}" y="${(this.high(dim, value) + (value === dim.range[0] ? -3 : value === dim.range[1] ? 11 : 4)).toFixed(1)}" font-size="11" text-anchor="${left ? 'end' : 'start'}" paint-order="stroke" stroke="var(--yv-ground)" stroke-width="3">${escaped(wrapped(word, Math.max(8, Math.floor((left || k === dims.length - 2 ? step / 2 : step) / 6.4)), 1)[0])}</text>`);
       const limit = dim === this.metric && this.state.limit !== null && this.state.limit >= dim.range[0] && this.state.limit <= dim.range[1]
