@@ -6,16 +6,27 @@ import textwrap
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
+from orchestrator.experiments.confidence import bootstrap, percentile_bounds
 from orchestrator.experiments.ranking_tables import gains_sentence, gains_table, seeds_table
 from orchestrator.experiments.tables import Table
 from orchestrator.experiments.threat_runs import ThreatResult, published_result
-from orchestrator.experiments.threat_scores import compared_gains, scored
-from orchestrator.experiments.threats import load_threats
+from orchestrator.experiments.threat_scores import (
+    ScoreTable,
+    compared_gains,
+    scored,
+    scores_of_positions,
+    scores_without,
+)
+from orchestrator.experiments.threats import REFERENCE, load_threats
 from orchestrator.pages import threats_page
 
 ROOT = Path(__file__).resolve().parents[2]
 FILE = ROOT / "scenarios" / "proving_ground" / "threats.yaml"
 PAGE = ROOT / "docs" / "ranking.md"
+TUNED = "tuned "
+"""Begin of the titles of tuned entries."""
 BEGIN, END = "<!-- written by docs.generate.threat_tables -->", "<!-- end of tables -->"
 
 
@@ -25,14 +36,17 @@ def tables_text(result: ThreatResult) -> str:
     scores = scored(result)
     order = scores.order()
     parts = [
+        "### Who can be told apart",
         _wrapped(threats_page.answer(result, scores)),
+        _wrapped(differences(result, scores)),
         _text(threats_page.main_table(result, scores)),
         "Highest levels survived:",
         _text(threats_page.levels_table(result, order)),
         "### The threats",
         _text(threats_page.threats_table(result)),
         "### Orders without a threat or a car",
-        _text(threats_page.orders_table(result, scores)),
+        _text(_without_orders(threats_page.orders_table(result, scores))),
+        *map(_text, order_tables(result, scores)),
     ]
     gains = compared_gains(result)
     if gains:
@@ -52,6 +66,67 @@ def tables_text(result: ThreatResult) -> str:
     for table in (threats_page.overview(result, scores), *driven):
         parts += [f"### {table.title}", _text(table)]
     return "\n\n".join(parts)
+
+
+def differences(result: ThreatResult, scores: ScoreTable) -> str:
+    """Return in sentences whom the best is not clearly better than, and which laws gain clearly by tuning."""
+    threats, titles = result.threats, threats_page.titles_of(result)
+    entries = result.complete[threats.main]
+    positions, none = result.positions(threats.main, entries), entries.index(REFERENCE)
+
+    def draw(drawn: np.ndarray, cars: np.ndarray) -> np.ndarray:
+        return scores_of_positions(positions[:, drawn][:, :, cars], none)
+
+    resampled = dict(zip(entries, bootstrap(draw, positions.shape[1:]).T, strict=True))
+
+    def clear(better: str, worse: str) -> bool:
+        return bool(percentile_bounds(resampled[better] - resampled[worse])[0] > 0.0)
+
+    best, *others = scores.order()
+    level = [titles[other] for other in others if not clear(best, other)]
+    own = {titles[name]: name for name in entries}
+    tuned = {title.removeprefix(TUNED): name for title, name in own.items() if title.startswith(TUNED)}
+    gain = [law for law, name in tuned.items() if clear(name, own[law])]
+    rest = [law for law in tuned if law not in gain]
+    return (
+        f"By these differences {titles[best]} is not clearly better than {_listed(level)}. Tuned gains are "
+        f"clearly better than those of the study for {_listed(gain)}; not for {_listed(rest)}."
+    )
+
+
+def _listed(names: list[str]) -> str:
+    *first, last = names or ["none"]
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def _without_orders(table: Table) -> Table:
+    """Return the table without its last column, names in a line: `order_tables` are easier to compare."""
+    return Table(table.title, table.columns[:-1], [row[:-1] for row in table.rows], table.notes)
+
+
+def order_tables(result: ThreatResult, scores: ScoreTable) -> list[Table]:
+    """Return the orders without each threat, then without each car: an entry per row, an order per column."""
+    threats, titles = result.threats, threats_page.titles_of(result)
+    names = {
+        "threat": [
+            spec.short or spec.title
+            for spec in (threats.spec.threats[name] for name in threats.threats_in(threats.main))
+        ],
+        "car": threats.cars_in(threats.main),
+    }
+    entries = result.complete[threats.main]
+    without = scores_without(entries, result.positions(threats.main, entries), REFERENCE)
+    tables = []
+    for word, left_out in names.items():
+        orders = [[*without[word, k]] for k in range(len(left_out))]
+        rows = [
+            [titles[entry], str(k + 1), *(str(order.index(entry) + 1) for order in orders)]
+            for k, entry in enumerate(scores.order())
+        ]
+        note = f"Order by the score: with every {word}, then without that of the column."
+        headings = [f"without the {word}", f"every {word}", *left_out]
+        tables.append(Table("", headings, [*rows], [note], range(1, len(headings))))
+    return tables
 
 
 def _text(table: Table) -> str:

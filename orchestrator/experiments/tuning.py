@@ -218,7 +218,7 @@ def entries_of(experiment: LoadedExperiment, tuned_laws: Sequence[TunedLaw]) -> 
         made = f"{experiment.identity}: {len(tuned.trials)} trials, seed {tuning.seed}"
         comes_to = f"{tuning.objective} {tuned.best.cost:.4g}, {tuned.trials[0].cost:.4g} amid the ranges"
         entries[re.sub(r"\W+", "_", f"{tuned.law.lower()}_tuned")] = {
-            "title": f"{tuned.law}, tuned",
+            "title": f"tuned {tuned.law}",
             "fmu": law.swap[tuning.entries],
             "gains": "tuned",
             "parameters": {target.variable: value for target, value in settings.items()},

@@ -86,7 +86,7 @@ def test_the_least_of_all_trials_is_found_written_down_and_not_sought_twice(yawb
     assert validate(EntriesSpec, written).edited == ""
     (entry,) = YAML(typ="safe").load((tmp_path / "out/entries.yaml").read_text())["entries"].items()
     made = {"amplitude": f"{float(best['driver.amplitude'])!r} deg"}
-    wanted = {"title": "big wheel, tuned", "fmu": "driver_sine", "gains": "tuned", "parameters": made}
+    wanted = {"title": "tuned big wheel", "fmu": "driver_sine", "gains": "tuned", "parameters": made}
     source = entry[1].pop("source")
     assert entry == ("big_wheel_tuned", wanted)
     assert golden(source)

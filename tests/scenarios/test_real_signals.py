@@ -88,6 +88,9 @@ def test_the_documentation_has_what_the_studies_measure(name, rows, page, tmp_pa
     assert {check["verdict"] for check in study["checks"]} <= {"holds"}
     written = (ROOT / "docs" / f"{page}.md").read_text("utf-8")
     assert [row for row in rows(study) if row not in written] == []
+    if name == "latency":
+        wanted = yb.open(tmp_path / "15mps/0ms/conventional")["ideal.sideslip_ref"]
+        assert f"that peak is {np.degrees(np.abs(wanted).max()):.2f}°" in written
 
 
 @pytest.mark.parametrize(("name", "noisy"), [("degradation", 6 * 4), ("faults", 177)])
@@ -106,8 +109,30 @@ def test_the_page_on_real_signals_has_no_row_that_the_study_does_not_measure(tmp
     with pytest.raises(SystemExit) as exit_:
         main(["study", str(ROOT / "scenarios/real_signals/degradation.yaml"), "--out", str(tmp_path)])
     assert not exit_.value.code
-    measured = step_by_step(json.loads((tmp_path / "experiment.json").read_text("utf-8")))
+    study = json.loads((tmp_path / "experiment.json").read_text("utf-8"))
+    measured = step_by_step(study)
     begin = tuple(" ".join(row.split(" | ")[:1]) for row in measured)
     lines = (ROOT / "docs" / "real_signals.md").read_text("utf-8").splitlines()
     numbers = [line for line in lines if line.startswith(begin) and line.count(" | ") > 1]
     assert [line for line in numbers if line not in measured] == []
+    text, runs = " ".join(" ".join(lines).split()), study["runs"]
+
+    def rises(law: str) -> str:
+        late, exact = (
+            100 * runs[f"A/{law}/{step}"]["metrics"]["error"]["value"] for step in ("late", "exact")
+        )
+        return f"from {exact:.1f} to {late:.{0 if late > 100 else 1}f} %"
+
+    assert (
+        f"its largest error rises {rises('learning')}. With frozen weights it rises {rises('frozen')}" in text
+    )
+    assert f"with conventional fuzzy control {rises('conventional')}" in text
+    share = {
+        name: (100 * number["value"], 100 * (number.get("half") or 0.0))
+        for name, number in study["derived"].items()
+    }
+    for name in ("kept/A/learning/sideslip", "kept/C/friction", "kept/B/friction", "kept/D/friction"):
+        value, half = share[name]
+        assert f"{value:.1f} ± {half:.1f} %" in text, name
+    (before, _), (after, _) = share["kept/C/friction"], share["kept/C/biases"]
+    assert f"Biases cost paper C another {before - after:.0f} percentage points" in text

@@ -10,7 +10,9 @@ import pytest
 
 from docs.generate import threat_tables
 from orchestrator.experiments.threat_runs import ThreatResult, published_result
-from orchestrator.experiments.threats import load_threats
+from orchestrator.experiments.threat_scores import compared_gains, compared_setting, moves_between, scored
+from orchestrator.experiments.threats import REFERENCE, load_threats
+from orchestrator.pages import threats_page
 from tests.commands import status_of
 
 FILE, LANE_CHANGE = threat_tables.FILE, "lane_change"
@@ -28,6 +30,53 @@ def test_every_entry_has_every_level_of_the_main_setting(published):
 
 def test_the_tables_of_the_docs_follow_from_the_published_levels():
     assert threat_tables.page_with_tables() == threat_tables.PAGE.read_text(encoding="utf-8")
+
+
+def test_every_threat_of_the_main_setting_has_six_cars(published):
+    threats = published.threats
+    faced = {name: threats.cars_facing(threats.main, name) for name in threats.threats_in(threats.main)}
+    assert len(faced) == 13
+    assert {len(cars) for cars in faced.values()} == {6}
+
+
+def test_the_sentences_on_threats_have_the_numbers_of_the_tables(published):
+    text = " ".join(threat_tables.PAGE.read_text(encoding="utf-8").partition("### Who can be")[0].split())
+    scores = scored(published)
+    _, gains = compared_gains(published).groups.values()
+    assert (
+        f"varies by {100 * gains.gains.value:.1f} % of a threat's range, between these laws by "
+        f"{100 * gains.between.value:.1f} % (difference {_spread(gains.difference, 100)})"
+    ) in text
+    assert (
+        f"they vary by {100 * gains.laws.value:.1f} %, no more than luck may make them: seeds of the search "
+        f"vary by {100 * gains.seeds.value:.1f} %, and the ratio is {gains.ratio.value:.1f} "
+        f"({gains.ratio.bounds.low:.1f} to {gains.ratio.bounds.high:.1f})"
+    ) in text
+    moved = {
+        name: 100 * compared_setting(published, name).moved
+        for name in threats_page.compared_settings(published)
+    }
+    assert f"levels fall by {-moved['bound_15']:.0f} % of a range" in text
+    assert f"levels rise by {moved['bound_30']:.0f} %" in text
+    assert f"levels fall by {-moved['unguarded']:.1f} % of a range" in text
+    assert f"lower levels by {-moved['authors']:.1f} % of a range" in text
+    correlations = {
+        test.title: moves_between(scores.by_entry(), test.scores.by_entry(), REFERENCE).correlation
+        for test in threats_page.disciplines(published)
+    }
+    speed, braking, step, wind = (f"{x + 0.0:.1f}".replace("-0.0", "0.0") for x in correlations.values())
+    assert (
+        f"side wind has a rank correlation of {wind}, step steer of {step}, split friction of {braking}, the "
+        f"entry speed of {speed}"
+    ) in text
+    apart = {test.title: test.scores.told_apart for test in threats_page.disciplines(published)}
+    assert f"*Step steer*: {apart['Step steer']} of 210 pairs differ" in text
+    assert f"of 210 pairs {apart['Gust of side wind']} differ" in text
+
+
+def _spread(spread, scale: float) -> str:
+    low, high = (f"{scale * x:.1f}" for x in spread.bounds)
+    return f"{scale * spread.value:.1f}, {low} to {high}"
 
 
 def test_every_entry_has_driven_every_discipline(published):

@@ -19,7 +19,7 @@ from tests.checkout import ROOT
 HERE = SHIPPED / "proving_ground"
 TUNING = tuning_of(load_experiment(HERE / "tuning.yaml"))
 ENTRIES = YAML(typ="safe").load((HERE / "tuned.yaml").read_text(encoding="utf-8"))["entries"]
-FOUND = {entry["title"].removesuffix(", tuned"): entry for entry in ENTRIES.values()}
+FOUND = {entry["title"].removeprefix("tuned "): entry for entry in ENTRIES.values()}
 """Law -> its entry."""
 
 
