@@ -17,7 +17,6 @@ from orchestrator.experiments.threat_scores import (
     compared_gains,
     scored,
     scores_of_positions,
-    scores_without,
 )
 from orchestrator.experiments.threats import REFERENCE, load_threats
 from orchestrator.pages import threats_page
@@ -45,8 +44,8 @@ def tables_text(result: ThreatResult) -> str:
         "### The threats",
         _text(threats_page.threats_table(result)),
         "### Orders without a threat or a car",
-        _text(_without_orders(threats_page.orders_table(result, scores))),
-        *map(_text, order_tables(result, scores)),
+        _text(threats_page.orders_table(result, scores)),
+        _text(threats_page.places_table(result, scores)),
     ]
     gains = compared_gains(result)
     if gains:
@@ -97,36 +96,6 @@ def differences(result: ThreatResult, scores: ScoreTable) -> str:
 def _listed(names: list[str]) -> str:
     *first, last = names or ["none"]
     return f"{', '.join(first)} and {last}" if first else last
-
-
-def _without_orders(table: Table) -> Table:
-    """Return the table without its last column, names in a line: `order_tables` are easier to compare."""
-    return Table(table.title, table.columns[:-1], [row[:-1] for row in table.rows], table.notes)
-
-
-def order_tables(result: ThreatResult, scores: ScoreTable) -> list[Table]:
-    """Return the orders without each threat, then without each car: an entry per row, an order per column."""
-    threats, titles = result.threats, threats_page.titles_of(result)
-    names = {
-        "threat": [
-            spec.short or spec.title
-            for spec in (threats.spec.threats[name] for name in threats.threats_in(threats.main))
-        ],
-        "car": threats.cars_in(threats.main),
-    }
-    entries = result.complete[threats.main]
-    without = scores_without(entries, result.positions(threats.main, entries), REFERENCE)
-    tables = []
-    for word, left_out in names.items():
-        orders = [[*without[word, k]] for k in range(len(left_out))]
-        rows = [
-            [titles[entry], str(k + 1), *(str(order.index(entry) + 1) for order in orders)]
-            for k, entry in enumerate(scores.order())
-        ]
-        note = f"Order by the score: with every {word}, then without that of the column."
-        headings = [f"without the {word}", f"every {word}", *left_out]
-        tables.append(Table("", headings, [*rows], [note], range(1, len(headings))))
-    return tables
 
 
 def _text(table: Table) -> str:
