@@ -19,7 +19,7 @@ from .evaluate import Promote
 from .outline import Library, Outlining
 from .read import Sources
 from .shapes import Growing, Memo, Shape, Widening, build, numbers_of, shape_of, types_of
-from .values import Instance, List, Refused, Union, is_number
+from .values import Instance, List, Refused, Union, Unreachable, is_number
 
 WIDEST = 40
 """Times a step is followed until the state has its form."""
@@ -152,7 +152,7 @@ class _Specialising:
         me, machine = self._run("configure", {})
         configured = self._shape(me, fixed)
         program.functions["configure"] = ir.Function(
-            machine.out, _placed("c->c", self._numbers(configured, me, machine))
+            machine.out, _placed("c->c", self._numbers(configured, me, machine, "configure"))
         )
         program.configured = list(types_of(configured))
         leaves = self._leaves(program, program.configured, "c")
@@ -173,9 +173,9 @@ class _Specialising:
         else:
             raise Refused("a state that takes ever new forms")
         program.functions["start"] = ir.Function(
-            started.out, _placed("s->s", self._numbers(state, at_start, started))
+            started.out, _placed("s->s", self._numbers(state, at_start, started, "start"))
         )
-        changes = _placed("s->s", self._numbers(state, me, advanced))
+        changes = _placed("s->s", self._numbers(state, me, advanced, "advance"))
         program.functions["advance"] = ir.Function(
             advanced.out,
             [change for change, leaf in zip(changes, leaves, strict=True) if change[1] is not leaf],
@@ -191,7 +191,7 @@ class _Specialising:
         me, machine = self._run("output", self._attributes(state, leaves), self.t, List(self.inputs))
         widening = Widening()
         widening.of(state, self._shape(me, fixed))
-        after = self._numbers(state, me, machine)
+        after = self._numbers(state, me, machine, "output")
         if widening.grew or any(x is not leaf for x, leaf in zip(after, leaves, strict=True)):
             raise Refused("output() changes what the unit keeps", self._line_of("output"))
         outputs = self.returned
@@ -212,15 +212,21 @@ class _Specialising:
         machine = Outlining(self.sources, fixed, self.libraries[method == "configure"])
         machine.facts.domains |= self.domains
         machine.choosers |= set(self.domains)
-        self.returned = machine.call(machine.attribute(me, method), list(args), {})
+        try:
+            self.returned = machine.call(machine.attribute(me, method), list(args), {})
+        except Unreachable:
+            raise Refused(f"{method}() fails whatever its inputs are", self._line_of(method)) from None
         return me, machine
 
     def _shape(self, me: Instance, fixed: set[ir.Var]) -> Shape:
         memo = Memo(fixed, self.growing)
         return shape_of(me, lambda box: box.slots, "self", memo)
 
-    def _numbers(self, shape: Shape, me: Instance, machine: Outlining) -> list[ir.Operand]:
-        return numbers_of(shape, me, machine.read, machine)
+    def _numbers(self, shape: Shape, me: Instance, machine: Outlining, method: str) -> list[ir.Operand]:
+        try:
+            return numbers_of(shape, me, machine.read, machine)
+        except Refused as refused:
+            raise Refused(refused.text, refused.where or self._line_of(method)) from None
 
     def _attributes(self, shape: Shape, leaves: list[ir.Var]) -> dict[str, Any]:
         made = build(shape, iter(leaves))

@@ -41,6 +41,18 @@ REFUSED = {
         "a list that grows or shrinks while it is gone through",
         3,
     ),
+    "what always fails": (
+        "def output(self, t, u):\n    raise ValueError('never')",
+        "output() fails whatever its inputs are",
+        1,
+    ),
+    "one list of two": (
+        "def start(self, t, u):\n    self.a, self.b = [0.0], [1.0]\n"
+        "def advance(self, t, h, u):\n    kept = self.a if u[0] > 0.5 else self.b\n    kept[0] += u[1]\n"
+        "def output(self, t, u):\n    return (self.a[0] + self.b[0],)",
+        "an object that has two names is changed",
+        3,
+    ),
     "an iterator used up": (
         "def output(self, t, u):\n    z = zip(u, u)\n    a = list(z)\n    return (len(a) + len(list(z)),)",
         "an iterator that is gone through twice",
