@@ -19,6 +19,7 @@ import re
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import pythonfmu
@@ -219,7 +220,7 @@ class Sources:
         try:
             content = file.read_bytes()
             text = content.decode("utf-8").replace("\r\n", "\n")
-            tree = ast.parse(text)
+            statements, host_packages = _syntax(text)
         except SyntaxError as error:
             raise BuildError(
                 f"{name}:{error.lineno}: {type(error).__name__}: {error.msg}", code="component-unreadable"
@@ -230,7 +231,7 @@ class Sources:
         lines = text.split("\n")
         imports: list[tuple[Parts, str]] = []
         outside: list[tuple[str, str]] = []
-        for node in sorted(_imports(tree), key=lambda node: (-node.lineno, -node.col_offset)):
+        for node in statements:
             where = f"{name}:{node.lineno}"
             resolved = self.resolve(node, package, where, is_entry=parts == self.entry)
             imports += [(module, f"{where}: ") for module in reversed(resolved.modules)]
@@ -241,7 +242,7 @@ class Sources:
             "\n".join(lines),
             tuple(reversed(imports)),
             tuple(reversed(outside)),
-            _declared_packages(tree),
+            host_packages,
             file,
             content_digest(content),
         )
@@ -349,6 +350,14 @@ def _replace(lines: list[str], node: ast.Import | ast.ImportFrom, text: str) -> 
 _FROM = re.compile(r"from\s+[.\w]+")
 
 
+@lru_cache(maxsize=1024)  # chosen: several times the modules of all components
+def _syntax(text: str) -> tuple[tuple[ast.Import | ast.ImportFrom, ...], tuple[str, ...]]:
+    """Return the imports of a module, the last first, and the `host_packages` that it declares."""
+    tree = ast.parse(text)
+    imports = sorted(_imports(tree), key=lambda node: (-node.lineno, -node.col_offset))
+    return tuple(imports), _declared_packages(tree)
+
+
 def _imports(tree: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:
     """Yield all imports that run, so none below `if TYPE_CHECKING:`."""
     for node in ast.iter_child_nodes(tree):
@@ -357,7 +366,7 @@ def _imports(tree: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:
         elif isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
             for other in node.orelse:
                 yield from _imports(ast.Module([other], []))
-        else:
+        elif not isinstance(node, ast.expr):  # in which there are no statements
             yield from _imports(node)
 
 
