@@ -44,8 +44,7 @@ def tables_text(result: ThreatResult) -> str:
         "### The threats",
         _text(threats_page.threats_table(result)),
         "### Orders without a threat or a car",
-        _text(threats_page.orders_table(result, scores)),
-        _text(threats_page.places_table(result, scores)),
+        *map(_text, threats_page.orders_tables(result, scores)),
     ]
     gains = compared_gains(result)
     if gains:

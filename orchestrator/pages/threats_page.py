@@ -198,34 +198,24 @@ def threats_table(result: ThreatResult) -> Table:
     return table
 
 
-def orders_table(result: ThreatResult, table: ScoreTable) -> Table:
-    """Return how the order changes without each threat and each car."""
-    threats, titles = result.threats, titles_of(result)
+def orders_tables(result: ThreatResult, table: ScoreTable) -> tuple[Table, Table]:
+    """Return how the order changes without each threat and car, and each entry's place in every order."""
+    threats, titles, entries = result.threats, titles_of(result), result.complete[result.threats.main]
     names = {"threat": threats.threats_in(threats.main), "car": threats.cars_in(threats.main)}
-    headings = ["without", "first", "rank correlation", "entries that move", "farthest move"]
-    orders = Table("", headings, numbers={2, 3})
-    entries = result.complete[threats.main]
+    of_changes = ["without", "first", "rank correlation", "entries that move", "farthest move"]
+    changes = Table("", of_changes, numbers={2, 3})
     without = scores_without(entries, result.positions(threats.main, entries), REFERENCE)
     for (word, k), scores in without.items():
         moves = moves_between(table.by_entry(), scores, REFERENCE)
-        orders.rows.append([
+        changes.rows.append([
             f"{word} {names[word][k]}", titles[next(iter(scores))], f"{moves.correlation:.2f}",
             str(moves.moved), _moved(titles, moves),
         ])  # fmt: skip
-    return orders
-
-
-def places_table(result: ThreatResult, table: ScoreTable) -> Table:
-    """Return where each entry comes in the orders with all threats and cars, and without each."""
-    threats, titles = result.threats, titles_of(result)
-    names = {"threat": threats.threats_in(threats.main), "car": threats.cars_in(threats.main)}
-    entries = result.complete[threats.main]
-    without = scores_without(entries, result.positions(threats.main, entries), REFERENCE)
     orders = [table.order(), *([*scores] for scores in without.values())]
     headings = ["controller", "all", *(names[word][k] for word, k in without)]
     rows = [[titles[entry], *(str(order.index(entry) + 1) for order in orders)] for entry in table.order()]
-    note = "Places by the score; every column but the first leaves out its threat or car."
-    return Table("", headings, [*rows], [note], {*range(1, len(headings))})
+    notes = ["Places by the score; every column but the first leaves out its threat or car."]
+    return changes, Table("", headings, [*rows], notes, {*range(1, len(headings))})
 
 
 def settings_table(result: ThreatResult, settings: Sequence[str]) -> Table:
@@ -429,6 +419,7 @@ def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command:
     """
     threats = result.threats
     order = table.order()
+    orders, places = orders_tables(result, table)
     gains = compared_gains(result)
     others = compared_settings(result)
     matrix = folder.parent / RANKING.parent.name / PAGE
@@ -443,8 +434,8 @@ def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command:
         published=_published(result, order),
         main=main_table(result, table),
         levels=levels_table(result, order),
-        orders=orders_table(result, table),
-        places=places_table(result, table),
+        orders=orders,
+        places=places,
         moves=settings_table(result, others),
         settings=[setting_table(result, name) for name in others],
         gains=[gains_table(result, gains), seeds_table(result, gains)] if gains else [],
