@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 MOST = 100_000
-"""Largest number of runs in an experiment; chosen: more is a typo, and would take an hour to plan."""
+"""Largest number of runs in an experiment; chosen: more is a typo, and its plans take more than 0.5 GB."""
 
 AxisKind = Literal["setting", "fmu", "file", "variant"]
 

@@ -16,6 +16,7 @@ from nbclient import NotebookClient
 
 import yawbench as yb
 from tests.checkout import ROOT
+from tests.pages.made_up import unpacked
 
 FOLDER = ROOT / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
@@ -67,11 +68,14 @@ def test_the_notebook_with_sliders_runs_as_a_program(tmp_path):
 
 @pytest.mark.exhaustive
 def test_what_the_sliders_say_is_what_is_run():
-    _, names = sliders().app.run()
+    outputs, names = sliders().app.run()
     runs = names["runs"]
     assert runs["no control"].metric("peak(sideslip)") > 2 * runs["controller_fnn"].metric("peak(sideslip)")
     assert runs["no control"]["plant.velocity_x"][0] == names["speed"].value
-    assert len(names["figure"].axes) == 2
+    view = outputs[-1]
+    assert view.labels == tuple(runs)
+    page = unpacked(view.html)
+    assert all(name in page for name in ("sideslip", "yaw_rate"))
 
 
 def test_every_controller_that_the_sliders_offer_can_be_connected():
