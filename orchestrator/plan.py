@@ -38,6 +38,7 @@ OverrideOrigin = Literal[
 OriginKind = Literal["default", "vehicle", "derived", "scenario", "file"] | OverrideOrigin
 """Where a value comes from: its FMU, the vehicle file, a formula, the scenario, a file, or an override."""
 SourceKind = Literal["paper", "literature", "chosen", "erratum", "varied", "neutral"]
+"""Kind of a source: "varied" is an override, "neutral" has no source of its own."""
 Value = float | int | bool | str
 """Value of a variable, a parameter or an override."""
 SENSING = {"sensor": "measurement", "estimator": "estimate"}
@@ -218,7 +219,6 @@ CHOSEN: Final = "chosen"
 ERRATUM: Final = "erratum"
 VARIED: Final = "varied"
 NEUTRAL: Final = "neutral"
-"""Kinds of sources: `VARIED` is an override, `NEUTRAL` has no source of its own."""
 STATED: tuple[SourceKind, ...] = PAPER, ERRATUM, CHOSEN
 """Kinds that a source in words begins with."""
 

@@ -16,16 +16,22 @@ from orchestrator.metrics.verdict import Relation, Status
 from orchestrator.names import SignalName, Target, TargetKind
 from orchestrator.plan import (
     BuildInfo,
+    Causality,
     Fmu,
     InputSeries,
     Instance,
+    OriginKind,
+    OverrideOrigin,
     RunsAs,
+    SourceKind,
     UnitDefinition,
     Value,
     ValueOrigin,
     ValueRef,
     ValueSource,
+    Variability,
     Variable,
+    VariableType,
     Wire,
 )
 from orchestrator.results.reader import Results
@@ -35,6 +41,7 @@ from ._controller import ControllerLike, Numbers
 
 __all__ = [
     "BuildInfo",
+    "Causality",
     "ComparedTest",
     "ControllerLike",
     "CrossPlot",
@@ -48,12 +55,15 @@ __all__ = [
     "Instance",
     "Messages",
     "Numbers",
+    "OriginKind",
+    "OverrideOrigin",
     "Relation",
     "Results",
     "RunRecord",
     "RunsAs",
     "Severity",
     "SignalName",
+    "SourceKind",
     "Status",
     "Target",
     "TargetKind",
@@ -63,7 +73,9 @@ __all__ = [
     "ValueOrigin",
     "ValueRef",
     "ValueSource",
+    "Variability",
     "Variable",
     "VariableSpec",
+    "VariableType",
     "Wire",
 ]

@@ -82,6 +82,7 @@ class Job:
 
 
 MeasuredStatus = Literal["not made", "completed", "ended early", "failed"]
+"""How a run of an experiment ended, if it was made."""
 
 
 @dataclass(frozen=True)

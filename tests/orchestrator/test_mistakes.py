@@ -64,7 +64,7 @@ def in_one_sentence(said, arguments, words):
         ((*RUN, "--set", "controller.step_size=0.0015"), ["nearest allowed: 0.001 s or 0.002 s"]),
         ((*RUN, "--metric", "peak_sideslp"), ["'peak_sideslp' is not a metric"]),
         ((*RUN, "--metric", "peek(sideslip)"), [f"there is no measure 'peek'; {KNOWN} 'peak'?"]),
-        ((*RUN, "--swap", "controler=controller_off"), [f"no unit 'controler'; {KNOWN} 'controller'?"]),
+        ((*RUN, "--swap", "controler=controller_off"), [f"no instance 'controler'; {KNOWN} 'controller'?"]),
         ((*RUN, "--swap", "controller=controller_of"), [f"{KNOWN} 'controller_off'?"]),
         ((*RUN, "--swap", "controller=tyre_dugoff"), ["by its name tyre_dugoff is for the instance 'tyre'"]),
         ((*RUN, "--swap", "controller"), ["write --swap INSTANCE=FMU"]),

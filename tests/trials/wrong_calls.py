@@ -195,8 +195,8 @@ def _parameters() -> Iterator[Parameter]:
              may={"dict"})  # fmt: skip
     yield of("Scenario.swap.units [controller]", lambda x: plan(b.base.swap(controller=x)), *names,
              may={"lambda", "builtin"})  # fmt: skip
-    yield of("Scenario.set.values", lambda x: b.base.set(x), "values", "has no unit", "set ")
-    yield of("Scenario.set.values [place]", lambda x: b.base.set({x: 1}), "values", "has no unit", "set ",
+    yield of("Scenario.set.values", lambda x: b.base.set(x), "values", "has no instance", "set ")
+    yield of("Scenario.set.values [place]", lambda x: b.base.set({x: 1}), "values", "has no instance", "set ",
              skip={"hostile text", "hostile hash", "hostile getattribute", *UNHASHABLE})  # fmt: skip
     for place in ("plant.initial_speed", "vehicle.mass", "stop_time", "step_size", "inputs.friction*",
                   "driver.amplitude", "friction", "speed", "controller.step_size"):  # fmt: skip
@@ -268,7 +268,7 @@ def _parameters() -> Iterator[Parameter]:
     speeds = {"driver.amplitude": [0.02]}
     yield of("experiment.base", lambda x: yb.experiment(x, speeds))
     yield of("experiment.axes", lambda x: yb.experiment(b.base, x), "axes", "levels")
-    yield of("experiment.axes [name]", lambda x: plan_all({x: [1.0]}), "axes", "has no unit",
+    yield of("experiment.axes [name]", lambda x: plan_all({x: [1.0]}), "axes", "has no instance",
              skip={"hostile text", "hostile hash", "hostile getattribute", *UNHASHABLE})  # fmt: skip
     yield of("experiment.axes [levels]", lambda x: plan_all({"driver.amplitude": x}), "driver.amplitude",
              right={"list", "array of 1 dimension"}, may={"tuple", "pair turned around"})  # fmt: skip
