@@ -20,6 +20,7 @@ from orchestrator.errors import Diagnostic, Location, RecordWarning, ResultsErro
 from orchestrator.experiments.jobs import MeasuredRun
 from orchestrator.experiments.journal import Journal
 from orchestrator.results.reader import load_results
+from tests.pages.made_up import unpacked
 from tests.sentences import golden, golden_in, refused
 
 UNIT = '''
@@ -163,7 +164,7 @@ def test_one_row_per_run_with_units_and_figures_and_a_page(moods, yawbench, tmp_
     assert golden_in(out)
     figures = {path.name for path in (tmp_path / "out" / "figures").iterdir()}
     assert figures == {f"{name}.{kind}" for name in ("curve", "map", "limit") for kind in ("png", "svg")}
-    page = html.fromstring((tmp_path / "out" / "report.html").read_text())
+    page = html.fromstring(unpacked(tmp_path / "out" / "report.html"))
     assert page.cssselect("h1")[0].text_content() == "Moods"
     assert page.cssselect("figure.chart") == []  # the map and the coordinates show them
     files = page.xpath("//details//li/code/text()")
@@ -204,7 +205,7 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_is_not_made_again(moods, 
     assert failed[0]["moment"] is None
     assert golden(failed[0]["reason"])
     assert golden_in(err)
-    assert golden_in((tmp_path / "out" / "report.html").read_text())
+    assert golden_in(unpacked(tmp_path / "out" / "report.html"))
     before = (tmp_path / "out" / "runs.jsonl").read_bytes()
     table = (tmp_path / "out" / "table.parquet").read_bytes()
     status, _, err = yawbench(file, "out")
@@ -487,7 +488,7 @@ def test_a_sweep_file_that_is_wrong_makes_no_run(moods, yawbench, tmp_path):
 
 
 def page_of(folder) -> html.HtmlElement:
-    return html.fromstring((folder / "report.html").read_text())
+    return html.fromstring(unpacked(folder / "report.html"))
 
 
 def words_of(element) -> str:

@@ -29,6 +29,7 @@ from orchestrator.pages.threats_page import car_tables, discipline_table, discip
 from orchestrator.scenario.find_and_load import SHIPPED
 from tests.checkout import ROOT
 from tests.commands import status_of
+from tests.pages.made_up import unpacked
 from tests.sentences import golden_in
 
 UNITS = (
@@ -336,7 +337,7 @@ def test_two_runs_from_nothing_give_the_same_tables(tmp_path, capsys, monkeypatc
     assert 0.1 < float(levels["fuzzy_pid"]["level"]) < 0.9
     scores = rows(tmp_path / "first" / "scores.csv")
     assert [(one["entry"], float(one["score"])) for one in scores] == [("fuzzy_pid", 100.0), ("none", 0.0)]
-    page = (tmp_path / "first" / "report.html").read_text(encoding="utf-8")
+    page = unpacked(tmp_path / "first" / "report.html")
     assert "fuzzy PID" in page
     assert "fails at 0.90" in page
 

@@ -15,6 +15,7 @@ import yawbench as yb
 from components.controllers.fnn import Fnn
 from orchestrator.cli import main
 from orchestrator.errors import warnings_in
+from tests.pages.made_up import unpacked
 from tests.sentences import golden, golden_in, refused, texts_of
 
 SCENARIO = "fnn_sideslip/25mps"
@@ -463,7 +464,7 @@ def test_a_viewer_shows_runs_by_their_labels(base, run, tmp_path):
     shown = yb.view(
         {"free": free, "held": run}, "yaw_rate", "plant.sideslip - reference.sideslip_ref", height=500
     )
-    data = json.loads(re.findall(r'application/json">(.*?)</script>', shown.html, re.DOTALL)[0])
+    data = json.loads(re.findall(r'application/json">(.*?)</script>', unpacked(shown.html), re.DOTALL)[0])
     assert [one["label"] for one in data["runs"]] == ["free", "held"] == list(shown.labels)
     assert data["views"][0]["panels"] == [
         "plant.yaw_rate,reference.yaw_rate_ref", "plant.sideslip - reference.sideslip_ref",
