@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from orchestrator.figures.panels import LabelledRun
+from orchestrator.pages.page_parts import save_page
 from orchestrator.pages.viewer import assets, carried, embedded, page, write_side
 
 from .browser import Firefox, start_firefox
@@ -34,7 +35,7 @@ def two(tmp_path_factory) -> Path:
     """The page of two runs."""
     file = tmp_path_factory.mktemp("firefox") / "two.html"
     runs = [LabelledRun("controlled", whole_car()), LabelledRun("off", whole_car(2.0))]
-    file.write_text(page(runs), encoding="utf-8")
+    save_page(file, page(runs))
     return file
 
 
