@@ -54,7 +54,7 @@ def project(tmp_path_factory):
     everything, *of_python, _ = printed["follow"]
     assert everything[1] == "build"
     assert everything[-2:] == ["--out", "fmus"]
-    assert {*everything[2:-2]} == {*UNITS} - {"controller_fuzzy_sideslip"}
+    assert {*everything[2:-2]} == {*UNITS} - {"controller_fnn", "controller_fuzzy_sideslip"}
     build_all(folder / "fmus", components=UNITS)  # quicker than everything
     for command in (*of_python, *printed["follow_c"][1:-1]):
         done = run_in(folder, *command)

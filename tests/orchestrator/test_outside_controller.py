@@ -29,7 +29,7 @@ def typed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     assert shown is not None
     *building, last = shown[1].strip().splitlines()
     subprocess.run(["sh", "-ec", "\n".join(building)], cwd=tmp_path, check=True)
-    monkeypatch.chdir(tmp_path / "yaw_guard")
+    monkeypatch.chdir(tmp_path)
     return last
 
 
@@ -37,7 +37,7 @@ def typed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 @pytest.mark.skipif(sys.platform != "linux" or shutil.which("cc") is None, reason="compiles for Linux")
 def test_an_fmu_in_c_is_ranked_by_the_command_of_the_docs(typed, tmp_path):
     program, command, *options = typed.split()
-    assert (program, command) == ("yawbench", "rank")
+    assert (program, command) == (".venv/bin/yawbench", "rank")
     file, out = tmp_path / "small.yaml", tmp_path / "out"
     file.write_text(SMALL)
     assert status_of("rank", file, *options, "--condition", "dry", "--jobs", 1, "--out", out) == 0
