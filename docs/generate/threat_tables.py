@@ -62,7 +62,7 @@ def tables_text(result: ThreatResult) -> str:
         parts += [f"### Setting: {title}", _text(threats_page.setting_table(result, name))]
     driven = [threats_page.discipline_table(result, test) for test in threats_page.disciplines(result)]
     for table in (threats_page.overview(result, scores), *driven):
-        parts += [f"### {table.title}", _text(table)]
+        parts += [f"### {table.title or 'All disciplines'}", _text(table)]
     return "\n\n".join(parts)
 
 
