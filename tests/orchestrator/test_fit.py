@@ -13,6 +13,7 @@ from orchestrator.cli import main
 from orchestrator.errors import ScenarioError
 from orchestrator.experiments.fit import load_fit
 from orchestrator.scenario import yaml_lines
+from tests.pages.made_up import unpacked
 
 from .test_output import ALWAYS, documented
 
@@ -102,7 +103,7 @@ def test_a_car_is_found_again_and_the_single_track_stands_beside(folder, capsys)
     assert data["verdict"].startswith("better than")
     assert "held-out" in answer["tables"][-1]["columns"][-1]["heading"]
     assert not (folder / "out" / "sets").exists()
-    page = (folder / "out" / "fit.html").read_text(encoding="utf-8")
+    page = unpacked(folder / "out" / "fit.html")
     for words in ("better than a single track", "Rms differences over |acceleration_y|", "over lateral"):
         assert words in page.replace("Better", "better")
     text = (folder / "out" / "vehicle.yaml").read_text()
@@ -213,4 +214,4 @@ def test_five_parameters_are_found_from_three_runs_near_the_limit(noise, within,
     found = yb.fit(tmp_path / "fit.yaml", workers=2)
     for name, (value, *_) in FIVE.items():
         assert found.values[name] == pytest.approx(value, rel=within)
-    assert found.result.scenario.estimate.sets <= most
+    assert found._result.scenario.estimate.sets <= most

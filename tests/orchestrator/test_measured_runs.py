@@ -13,6 +13,7 @@ from orchestrator.commands.results import read_runs
 from orchestrator.figures.plots import draw
 from orchestrator.figures.style import MEASURED_LINE, LabelledRun
 from tests.commands import status_of
+from tests.pages.made_up import unpacked
 from tests.sentences import golden
 
 TIME = np.arange(10.0, 16.0, 0.01)
@@ -66,7 +67,7 @@ def test_the_commands_take_measurements_beside_runs(places, tmp_path, capsys):
     assert (tmp_path / "fig.svg").is_file()
     assert status_of("animate", results, *options, "--out", tmp_path / "view.html") == 0
     assert f'"dash": {list(MEASURED_LINE[1])}'.replace(" ", "") in (
-        (tmp_path / "view.html").read_text(encoding="utf-8").replace(" ", "")
+        unpacked(tmp_path / "view.html").replace(" ", "")
     )
     capsys.readouterr()
     assert status_of("diff", results, car, "--from", "10 s") == 0
@@ -77,7 +78,7 @@ def test_compare_shows_a_recording_beside_all_runs(places, tmp_path):
     swaps = ("--swap", "controller=controller_off,controller_fnn", "--set", "stop_time=0.5 s")
     options = ("--measured", places[1], "--from", "10 s", "--out", tmp_path)
     assert status_of("compare", "fnn_sideslip/25mps", *swaps, *options) == 0
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    page = unpacked(tmp_path / "report.html")
     assert "--measured" in page and "--from" in page  # the command that repeats it
     assert page.replace(" ", "").count(f'"dash":{list(MEASURED_LINE[1])}'.replace(" ", "")) == 1
     assert status_of("compare", "fnn_sideslip/25mps", *swaps, "--measured", tmp_path / "none.yaml") == 2

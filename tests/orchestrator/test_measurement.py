@@ -18,6 +18,7 @@ from orchestrator.plan import InputSeries
 from orchestrator.planner import Planner
 from orchestrator.results.measurement_results import load_run
 from orchestrator.scenario.find_and_load import load_scenario
+from tests.pages.made_up import unpacked
 from tests.sentences import golden
 
 T = np.arange(0.0, 6.0, 0.01)
@@ -224,7 +225,7 @@ def test_a_recording_is_a_run(tmp_path):
     assert {axes.get_label() for axes in run.plot("yaw_rate", "acceleration_y").axes} == {
         "yaw_rate", "acceleration_y",
     }  # fmt: skip
-    assert "plant.yaw_rate" in yb.view({"measured": run, "again": run}, "yaw_rate").html
+    assert "plant.yaw_rate" in unpacked(yb.view({"measured": run, "again": run}, "yaw_rate").html)
 
 
 def test_missing_provenance_is_asked_for(tmp_path):

@@ -188,11 +188,11 @@ def _parameters() -> Iterator[Parameter]:
     yield of(
         "Scenario.swap.units",
         lambda x: b.base.swap(**{x: "controller_off"}),
-        "unit",
+        "instance",
         skip=set(WRONG) - set(TEXTS) | {"hostile text"},
     )
-    yield of("Scenario.swap.replacements", lambda x: b.base.swap(x), "replacements", "unit", right={"None"},
-             may={"dict"})  # fmt: skip
+    yield of("Scenario.swap.replacements", lambda x: b.base.swap(x), "replacements", "instance",
+             right={"None"}, may={"dict"})  # fmt: skip
     yield of("Scenario.swap.units [controller]", lambda x: plan(b.base.swap(controller=x)), *names,
              may={"lambda", "builtin"})  # fmt: skip
     yield of("Scenario.set.values", lambda x: b.base.set(x), "values", "has no instance", "set ")
