@@ -421,6 +421,14 @@ def test_the_address_reproduces_the_picture(chromium, two):
     assert chromium.run("return document.querySelectorAll('.yv-panel').length") == len(PANELS) + 1
 
 
+def test_a_link_is_followed_although_the_viewer_writes_its_address_at_that_moment(chromium, two):
+    opened(chromium, two)
+    chromium.run("location.hash = 'run?shown=[1]';" + VIEWER + "viewer.remember()")
+    chromium.wait_for("document.querySelector('.yv').viewer.state.shown.join() === '1'")
+    chromium.run(VIEWER + "viewer.seek(2.5); viewer.moveCursor(); viewer.remember();")
+    assert chromium.run("return location.hash") == "#run?shown=%5B1%5D&time=2.5"
+
+
 @pytest.mark.parametrize(
     "fragment",
     [

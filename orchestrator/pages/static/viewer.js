@@ -10,18 +10,24 @@ function plotter(ratio) {
   return plotters.get(ratio);
 }
 
+// The fragment that the parts of the page have heard of; a link sets another one before `hashchange` tells them.
+let heard = location.hash;
+addEventListener('hashchange', () => { heard = location.hash; });
+
 // The fragment of the address is the state of each part of the page: key?name=value&&key?...; null: it says nothing.
 function readAddress(key) {
   const own = location.hash.slice(1).split('&&').find((part) => part.startsWith(key + '?'));
   return own === undefined ? null : new URLSearchParams(own.slice(key.length + 1));
 }
 
-// Write the state of a part of the page into the address, and return the fragment.
+// Write the state of a part of the page into the address, and return the fragment; not over a link just followed.
 function writeAddress(key, words) {
+  if (location.hash !== heard) return null;
   const others = location.hash.slice(1).split('&&').filter((part) => part.includes('?') && !part.startsWith(key + '?'));
   const all = [...others, ...(words.size || others.length || location.hash.includes('?') ? [`${key}?${words}`] : [])];
   const written = '#' + all.join('&&');
   if (all.length && location.hash !== written) history.replaceState(null, '', written);
+  heard = location.hash;
   return written;
 }
 
