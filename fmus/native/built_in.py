@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from . import ir
-from .evaluate import joined_text
 from .loops import Looping
 from .values import (
     UNSET,
@@ -32,6 +31,7 @@ from .values import (
     Unreachable,
     is_number,
     is_plain,
+    joined_text,
 )
 
 _OPERATORS = {

@@ -16,6 +16,7 @@ from .merge import Merging, alike
 from .read import Source, Sources
 from .shapes import Shape, build, numbers_of, shape_of, types_of
 from .values import (
+    RESIZED,
     UNSET,
     Bound,
     Box,
@@ -36,6 +37,7 @@ from .values import (
     Unreachable,
     is_number,
     is_plain,
+    joined_text,
     like,
     same,
 )
@@ -233,7 +235,7 @@ class Evaluation(Merging):
 
         def content() -> list[Any]:
             if len(self.read(value)) != count:
-                raise Refused("a list that grows or shrinks while it is gone through")
+                raise Refused(RESIZED)
             return self.read(value)  # type: ignore[no-any-return]
 
         return Each(count, lambda k: content()[k], content)
@@ -248,9 +250,7 @@ class Evaluation(Merging):
         if isinstance(value, Each):
             each = self.each(value)
             return [each.item(k) for k in range(each.count)]
-        if isinstance(value, List):
-            return list(self.read(value))
-        if isinstance(value, Dict):
+        if isinstance(value, (List, Dict)):
             return list(self.read(value))
         if isinstance(value, Picked):
             return [self.subscript(value, k) for k in range(len(value.items[0]))]
@@ -441,17 +441,4 @@ def _beyond(items: Any) -> str:
     return f"{'tuple' if isinstance(items, tuple) else 'list'} index out of range"
 
 
-def joined_text(parts: Sequence[ir.Part]) -> str | Text:
-    """Return parts as a text, known where all of them are."""
-    together: list[ir.Part] = []
-    for part in parts:
-        if isinstance(part, str) and together and isinstance(together[-1], str):
-            together[-1] += part
-        else:
-            together.append(part)
-    if all(isinstance(part, str) for part in together):
-        return "".join(part for part in together if isinstance(part, str))
-    return Text(tuple(together))
-
-
-__all__ = ["Call", "Evaluation", "Failure", "Promote", "joined_text"]
+__all__ = ["Call", "Evaluation", "Failure", "Promote"]

@@ -13,6 +13,7 @@ from .read import kinds_within, names_within
 from .shapes import Memo, Shape, Widening, build, numbers_of, shape_of, types_of
 from .statements import CONTINUE, EXIT, ON, OVER, RESULT, RETURN, Execution
 from .values import (
+    RESIZED,
     UNSET,
     Box,
     Bytes,
@@ -66,7 +67,7 @@ class Looping(Execution):
                 isinstance(s, (ir.Push, ir.Drop)) and s.ring == over.ring.number
                 for s in ir.every(self.out[start:])
             ):
-                raise Refused("a list that grows or shrinks while it is gone through")
+                raise Refused(RESIZED)
         else:
             self._unrolled(node, self.each(over))
 

@@ -42,25 +42,28 @@ class Operating(Evaluation):
     # ---- comprehensions ---------------------------------------------------------------------
 
     def _comprehended(self, generators: list[ast.comprehension], make: Callable[[], Any]) -> list[Any]:
-        return [self._within(frame, make) for frame in self._frames(generators)]
+        call = self.calls[-1]
+        return [self._within(call, frame, make) for frame in self._frames(generators)]
 
     def _frames(self, generators: list[ast.comprehension]) -> Iterator[Frame]:
         """Yield the names of each element of a comprehension."""
+        call = self.calls[-1]
 
         def go(k: int, frame: Frame) -> Iterator[Frame]:
             if k == len(generators):
                 yield frame
                 return
-            each = self.each(self._within(frame, lambda: self.evaluate(generators[k].iter)))
+            each = self.each(self._within(call, frame, lambda: self.evaluate(generators[k].iter)))
             for i in range(each.count):
                 inner = Frame({}, frame)
-                if self._within(inner, lambda: self._passes(generators[k], each.item(i))):  # noqa: B023
+                if self._within(call, inner, lambda: self._passes(generators[k], each.item(i))):  # noqa: B023
                     yield from go(k + 1, inner)
 
-        return go(0, self.calls[-1].frame)
+        return go(0, call.frame)
 
-    def _within(self, frame: Frame, evaluated: Callable[[], Any]) -> Any:
-        self.calls.append(replace(self.calls[-1], frame=frame))
+    def _within(self, call: Call, frame: Frame, evaluated: Callable[[], Any]) -> Any:
+        """Evaluate a part of a comprehension where it was written, also when its turn comes later."""
+        self.calls.append(replace(call, frame=frame))
         try:
             return evaluated()
         finally:
@@ -83,26 +86,14 @@ class Operating(Evaluation):
         call, generator = self.calls[-1], node.generators[0]
         if len(node.generators) > 1 or generator.ifs:
             frames = list(self._frames(node.generators))
-            return Each(len(frames), lambda k: self._resumed(call, frames[k], node.elt))
+            return Each(len(frames), lambda k: self._within(call, frames[k], lambda: self.evaluate(node.elt)))
         each = self.each(self.evaluate(generator.iter))
 
         def element(k: int) -> Any:
-            frame = Frame({}, call.frame)
-            item = each.item(k)
-            return self._resumed(call, frame, node.elt, lambda: self._passes(generator, item))
+            self.assign(generator.target, each.item(k))  # type: ignore[attr-defined]
+            return self.evaluate(node.elt)
 
-        return Each(each.count, element)
-
-    def _resumed(
-        self, call: Call, frame: Frame, element: ast.expr, first: Callable[[], Any] = lambda: None
-    ) -> Any:
-        """Evaluate the next element of a generator, where it was written."""
-        self.calls.append(replace(call, frame=frame))
-        try:
-            first()
-            return self.evaluate(element)
-        finally:
-            self.calls.pop()
+        return Each(each.count, lambda k: self._within(call, Frame({}, call.frame), lambda: element(k)))
 
     def _setcomp(self, node: ast.SetComp) -> Any:
         return frozenset(self._comprehended(node.generators, lambda: self._key(self.evaluate(node.elt))))

@@ -27,6 +27,10 @@ class Refused(Exception):
         return f"{self.text} ({self.where})" if self.where else self.text
 
 
+RESIZED = "a list that grows or shrinks while it is gone through"
+"""Refused: Python's loop would see the list's new length, the translated one the old."""
+
+
 class Unreachable(Exception):
     """The path that is being followed has raised an exception."""
 
@@ -238,6 +242,19 @@ def same(first: Any, second: Any) -> bool:
 def like(value: tuple[Any, ...], items: Sequence[Any]) -> tuple[Any, ...]:
     """Return a tuple of the same class with other items."""
     return type(value)(*items) if hasattr(value, "_fields") else tuple(items)
+
+
+def joined_text(parts: Sequence[ir.Part]) -> str | Text:
+    """Return parts as a text, known where all of them are."""
+    together: list[ir.Part] = []
+    for part in parts:
+        if isinstance(part, str) and together and isinstance(together[-1], str):
+            together[-1] += part
+        else:
+            together.append(part)
+    if all(isinstance(part, str) for part in together):
+        return "".join(part for part in together if isinstance(part, str))
+    return Text(tuple(together))
 
 
 def keys_of(box: Box) -> Iterator[Any]:
