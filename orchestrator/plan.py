@@ -438,6 +438,7 @@ def _shared(new: Any, old: Any) -> Any:
         if all(map(is_, fields.values(), before.values())):
             return old
         copied = object.__new__(kind)
-        vars(copied).update(fields)
+        for name, value in fields.items():  # attribute by attribute: `vars` would give it a dictionary
+            object.__setattr__(copied, name, value)
         return copied
     return new

@@ -149,7 +149,7 @@ class Executor(AbstractContextManager["Executor"]):
         return [job.plan for job in ready(jobs, planner=self.planner) if job.plan]
 
     def run(self, title: str, jobs: Sequence[Job], *, journaled: bool) -> list[Outcome]:
-        """Execute those of the jobs that are not finished, and return their outcomes.
+        """Execute those of the jobs that are not finished; return their outcomes if not journaled.
 
         Args:
             title: describes the jobs.
@@ -310,7 +310,7 @@ def _units(plan: Plan, metrics: MetricRequests) -> dict[str, str]:
 def finish(
     left: Sequence[Job], journal: Journal | None, *, runner: Runner, on_outcome: OnOutcome = lambda _: None
 ) -> list[Outcome]:
-    """Execute jobs, add each to the journal (if any) as it ends, and return the outcomes.
+    """Execute jobs and add each to the journal as it ends; without a journal, return the outcomes.
 
     Raises:
         KeyboardInterrupt: Ctrl-C; finished runs are in the journal.
@@ -322,7 +322,8 @@ def finish(
         final = outcome.ok or (outcome.exit_status == 1 and not outcome.died)  # else try again
         if journal:
             journal.add(outcome.job.key, outcome.record, last=final)
-        outcomes.append(outcome)
+        else:
+            outcomes.append(outcome)
         on_outcome(outcome)
 
     runner(left, done)

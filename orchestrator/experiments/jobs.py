@@ -85,7 +85,7 @@ MeasuredStatus = Literal["not made", "completed", "ended early", "failed"]
 """How a run of an experiment ended, if it was made."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class MeasuredRun:
     """Metrics of a run, or the reason why there are none."""
 
@@ -126,7 +126,7 @@ NOT_MADE = MeasuredRun({}, (Diagnostic("run-not-made", "not made"),), made=False
 """Record of a run that has not been executed yet."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Outcome:
     """Outcome of a job; `diagnostics` is empty if it succeeded."""
 
