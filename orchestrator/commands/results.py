@@ -285,7 +285,7 @@ def plot(
 
     from ..experiments.comparison_and_convergence import FIGURES
     from ..figures.panels import check_panels, shown_by
-    from ..figures.plots import OVERVIEW, draw
+    from ..figures.plots import OVERVIEW, draw, size_of_style
     from ..figures.style import KINDS, LabelledRun, save
     from .progress import say
 
@@ -313,6 +313,8 @@ def plot(
     for name, panels in figures.items():
         folder = file.parent if file else options.out or folder_of_all(folders)
         kinds = [format or file.suffix[1:]] if file else [format] if format else ["svg", "png"]
+        if style and size is None:
+            settings["figure.figsize"] = size_of_style(style, shown_by(runs, panels))
         with matplotlib.rc_context(settings):
             first, *others = save(draw(runs, panels), folder / name, kinds)
         say(", ".join([str(first), *(path.name for path in others)]))

@@ -24,7 +24,6 @@ from ..metrics.expressions import columns_of, reference_of
 from ..metrics.measures import variable_of, words
 from .phase_portrait import curves_of, draw_portrait, signals_of, spread_rows
 from .style import (
-    REFERENCE,
     ROW,
     WIDTH,
     LabelledRun,
@@ -33,6 +32,7 @@ from .style import (
     line_style,
     literal,
     note_above,
+    reference_style,
     shown_unit,
     style_of_run,
 )
@@ -204,7 +204,7 @@ def _draw_signal(axes: Axes, runs: Sequence[LabelledRun], name: str, whole: bool
         own = (
             {} if len(group) > 1 or len(lines) == 1 else {"color": line_style(number)["color"], "alpha": 0.28}
         )
-        style = {**REFERENCE, **own, "label": "reference"}
+        style = {**reference_style(), **own, "label": "reference"}
         _line(axes, run.results.time, references[group[0]], run.results.units[reference], style)
     unit = ""
     for number, run, column, _ in lines:

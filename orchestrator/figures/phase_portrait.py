@@ -17,7 +17,16 @@ from ..metrics.expressions import columns_of, reference_of
 from ..metrics.measures import variable_of, words
 from ..names import VARIABLE
 from ..results.reader import Results
-from .style import REFERENCE, LabelledRun, digits_of, in_formula, line_style, literal, note_above, shown_unit
+from .style import (
+    LabelledRun,
+    digits_of,
+    in_formula,
+    line_style,
+    literal,
+    note_above,
+    reference_style,
+    shown_unit,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -83,7 +92,7 @@ def draw_portrait(axes: Axes, runs: Sequence[LabelledRun], x: str, y: str) -> No
     for curve in curves:
         if curve.reference and not any(_alike(curve.reference, other) for other in drawn):
             drawn.append(curve.reference)
-            axes.plot(*curve.reference, **REFERENCE, label="reference")
+            axes.plot(*curve.reference, **reference_style(), label="reference")
     for curve in curves:
         style: dict[str, Any] = line_style(curve.number)
         axes.plot(curve.x, curve.y, **style)

@@ -16,13 +16,16 @@ from ..results.run_folder import RunStatus
 from .panels import SPAN, Panel, in_legend, shown_by, spans_of
 from .style import (
     NARROW,
-    REFERENCE,
+    PANEL_LINES,
     ROW,
+    STYLES,
+    WIDTH,
     LabelledRun,
     digits_of,
     frame,
     new_figure,
     own_size,
+    reference_style,
     reference_words,
     style_of_run,
 )
@@ -75,7 +78,7 @@ def draw(
             f"{where}: nothing to draw, no run recorded any of {', '.join(panels)}.", code="nothing-to-draw"
         )
     size = own_size()
-    rows = [[panel] for panel in selected] if size and size[0] < NARROW else _rows(selected)
+    rows = rows_of(selected, size[0] if size else WIDTH)
     with new_figure() as figure:
         heights = [max(panel.rows for panel in row) for row in rows]
         grid = figure.add_gridspec(len(rows), 2, height_ratios=heights)
@@ -109,14 +112,22 @@ def nothing_recorded(run: LabelledRun) -> str:
     return f"{run.results.folder}: nothing to draw, this run ended at its start{why}."
 
 
-def _rows(panels: Sequence[Panel]) -> list[list[Panel]]:
+def rows_of(panels: Sequence[Panel], width: float) -> list[list[Panel]]:
+    """Return the rows of panels in a figure of a width [inches]."""
     rows: list[list[Panel]] = []
     for panel in panels:
-        if rows and len(rows[-1]) == 1 and _pair(rows[-1][0], panel):
+        if width >= NARROW and rows and len(rows[-1]) == 1 and _pair(rows[-1][0], panel):
             rows[-1].append(panel)
         else:
             rows.append([panel])
     return rows
+
+
+def size_of_style(style: str, panels: Sequence[Panel]) -> tuple[float, float]:
+    """Return the size of a figure [inches] in a style, which grows with the rows of its panels."""
+    width, height = STYLES[style]["figure.figsize"]
+    rows = sum(max(panel.rows for panel in row) for row in rows_of(panels, width))
+    return width, max(height, rows * PANEL_LINES * STYLES[style]["font.size"] / 72)
 
 
 def _pair(left: Panel, right: Panel) -> bool:
@@ -128,7 +139,7 @@ def legend_of(runs: Sequence[LabelledRun], drawn: Iterable[Axes]) -> list[tuple[
     """Return labels and line styles of a legend: runs if there are several, reference lines, fault spans."""
     styles = [(run.label, style_of_run(k, run.results)) for k, run in enumerate(runs) if len(runs) > 1]
     if label := reference_words(line for axes in drawn for line in axes.get_lines()):
-        styles.append((label, REFERENCE))
+        styles.append((label, reference_style()))
     return styles + [(label, SPAN) for label in in_legend(spans_of(runs))]
 
 

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import io
 import math
+import re
 import sys
 import textwrap
+import unicodedata
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -98,6 +100,10 @@ STYLES: dict[str, dict[str, Any]] = {
 chosen."""
 NARROW = 6.0
 """Width [inches] below which panels are not placed side by side; chosen: two columns of a paper."""
+PANEL_LINES = 12
+"""Smallest height of a row of panels in a style, in lines of text; chosen: six rows fill a page."""
+CHARACTER = 0.5
+"""Mean width of a character over the size of its font; chosen: that of common fonts, rounded up."""
 QUIET = "#666666"
 """Colour of secondary text and lines: provenance, guides."""
 CHANGED = "#A33B00"
@@ -114,15 +120,29 @@ def line_style(number: int) -> dict[str, Any]:
 
     Widths, and colours if the caller has set a cycle of them, are matplotlib's in use.
     """
-    style = dict(LINES[number % len(LINES)])
+    style = _scaled(LINES[number % len(LINES)])
     if "matplotlib" in sys.modules:
         from matplotlib import rcParams, rcParamsDefault
 
-        style["linewidth"] *= rcParams["lines.linewidth"] / rcParamsDefault["lines.linewidth"]
         if rcParams["axes.prop_cycle"] != rcParamsDefault["axes.prop_cycle"]:
             cycle = list(rcParams["axes.prop_cycle"])
             style |= cycle[number % len(cycle)]
     return style
+
+
+def reference_style() -> dict[str, Any]:
+    """Return the line style of references; their width follows matplotlib's in use."""
+    return _scaled(REFERENCE)
+
+
+def _scaled(style: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a line style with its width in proportion to matplotlib's in use."""
+    if "matplotlib" not in sys.modules:
+        return dict(style)
+    from matplotlib import rcParams, rcParamsDefault
+
+    ratio = rcParams["lines.linewidth"] / rcParamsDefault["lines.linewidth"]
+    return {**style, "linewidth": style["linewidth"] * ratio}
 
 
 def style_of_run(number: int, results: Results) -> dict[str, Any]:
@@ -163,22 +183,30 @@ def save(figure: Figure, stem: Path, kinds: Sequence[str] = ("svg", "png")) -> l
     """Write a figure in some formats of `KINDS` and return the paths; equal figures give equal files.
 
     Raises:
-        ResultsError: they cannot be written, or PGF is asked for and there is no LaTeX.
+        ResultsError: they cannot be written, panels have no room, or there is no LaTeX for PGF.
     """
     paths = [stem.with_name(f"{stem.name}.{kind}") for kind in kinds]
     import matplotlib
 
     with matplotlib.rc_context(_own()), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from font")  # it is shown as a box
-        if (layout := figure.get_layout_engine()) is not None:
-            layout.execute(figure)  # once, not once per file
-            figure.set_layout_engine("none")
+        warnings.filterwarnings("error", "constrained_layout not applied")
         try:
+            if (layout := figure.get_layout_engine()) is not None:
+                layout.execute(figure)  # once, not once per file
+                figure.set_layout_engine("none")
             for path, kind in zip(paths, kinds, strict=True):
                 content = io.BytesIO()
                 known: dict[str, Any] = {"metadata": KINDS[kind]} if KINDS[kind] else {}  # PGF takes none
                 figure.savefig(content, format=kind, **known)
-                write_whole(path, content.getvalue())
+                write_whole(path, content.getvalue() if kind != "pgf" else _portable(content.getvalue()))
+        except UserWarning:
+            wide, high = (25.4 * side for side in figure.get_size_inches())
+            raise ResultsError(
+                f"{stem}: the panels have no room in {wide:.0f} x {high:.0f} mm: fewer panels (--panel) or a "
+                "larger figure (--size)",
+                code="option-invalid",
+            ) from None
         except RuntimeError as error:  # of matplotlib, which measures texts with LaTeX
             raise ResultsError(
                 f"{stem}.pgf: PGF needs LaTeX (xelatex), which is not installed", code="package-missing"
@@ -190,6 +218,28 @@ def save(figure: Figure, stem: Path, kinds: Sequence[str] = ("svg", "png")) -> l
     return paths
 
 
+LATEX = {"\N{MINUS SIGN}": "-", "°": r"^\circ", "²": "^2", "³": "^3", "·": r"\cdot"}
+"""Characters in units and numbers -> mathematics in LaTeX, whose fonts may lack them."""
+
+
+def _portable(pgf: bytes) -> bytes:
+    """Return PGF that all of LaTeX's engines read, without comments on the fonts of this computer."""
+    text = re.sub(r"^%%.*\\detokenize.*\n", "", pgf.decode("utf-8"), flags=re.MULTILINE)
+    return re.sub(
+        f"[α-ω{''.join(LATEX)}]",
+        lambda match: rf"\ensuremath{{{LATEX.get(match[0]) or in_latex(match[0])}}}",
+        text,
+    ).encode()
+
+
+def in_latex(letter: str) -> str:
+    """Return a Greek letter as a command of LaTeX, which matplotlib knows, too; others as they are."""
+    kind, _, name = unicodedata.name(letter).lower().rpartition(" ")
+    if not kind.startswith("greek small"):
+        return letter
+    return f"\\{'var' * (name == 'phi')}{name}"
+
+
 def reference_words(lines: Iterable[Line2D]) -> str | None:
     """Return the legend entry of the reference lines among those drawn; None if there are none."""
     pale = [line for line in lines if line.get_label() == "reference"]
@@ -197,9 +247,17 @@ def reference_words(lines: Iterable[Line2D]) -> str | None:
     return ("wide and pale: the run's own reference" if own else "reference") if pale else None
 
 
+def _characters(axes: Axes) -> int:
+    """Return how many characters fit above a panel, in a figure whose size is set."""
+    from matplotlib import rcParams
+
+    wide = axes.get_position().width * rcParams["figure.figsize"][0]  # inches
+    return int(wide * 72 / (CHARACTER * rcParams["font.size"]))
+
+
 def note_above(axes: Axes, note: str) -> None:
     """Write a note between a panel and its title."""
-    rows = textwrap.wrap(literal(note), NOTE_WIDTH)
+    rows = textwrap.wrap(literal(note), _characters(axes) if own_size() else NOTE_WIDTH)
     axes.set_title(axes.get_title(loc="left"), pad=6 + 10 * len(rows))
     axes.annotate(
         "\n".join(rows), (0, 1), (0, 4), xycoords="axes fraction",
@@ -258,8 +316,12 @@ def _frame_bare(figure: Figure, size: tuple[float, float], handles: Sequence[Art
     from matplotlib import rcParams
 
     figure.set_size_inches(*size)
+    for axes in figure.axes:
+        title = textwrap.wrap(axes.get_title(loc="left"), _characters(axes))
+        if len(title) > 1:
+            axes.set_title("\n".join(title))
     line = rcParams["font.size"] / 72  # inches
-    widths = [0.5 * line * len(str(handle.get_label())) + 5 * line for handle in handles]
+    widths = [CHARACTER * line * len(str(handle.get_label())) + 5 * line for handle in handles]
     columns = max(1, min(len(handles), int(size[0] / max(widths, default=1.0))))
     head = 1.5 * line * math.ceil(len(handles) / columns) / size[1]
     figure.get_layout_engine().set(rect=(0, 0, 1, 1 - head))  # type: ignore[union-attr, call-arg]
@@ -291,6 +353,7 @@ def in_formula(signal: str) -> str:
     if symbol(name) == name:
         return ""
     head, _, index = symbol(name).partition("_")
+    head = "".join(map(in_latex, head))
     return f"${head}_\\mathrm{{{index}}}$" if index else f"${head}$"
 
 

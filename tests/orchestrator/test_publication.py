@@ -78,11 +78,37 @@ def test_outputs_that_contradict_each_other_are_refused(run, capsys):
     assert not [path for path in Path().iterdir() if path.name.startswith("fig")]
 
 
-@pytest.mark.exhaustive  # LaTeX measures every text: half a minute
+@pytest.mark.parametrize("style", ["ieee", "elsevier"])
+def test_a_style_grows_with_its_panels(run, style):
+    assert status_of("plot", run, "--style", style, "--format", "png", "--out", "all") == 0
+    wide, high = Image.open("all/overview.png").size
+    assert status_of("plot", run, *SINGLE, "--style", style, "--format", "png", "--out", "single") == 0
+    single = Image.open("single/overview.png").size
+    assert wide == single[0] and high > 2 * single[1]
+
+
+def test_panels_without_room_are_refused(run, capsys):
+    assert status_of("plot", run, "--style", "ieee", "--size", "88x40mm", "--out", "fig.pdf") == 2
+    assert golden(capsys.readouterr().err)
+    assert not Path("fig.pdf").exists()
+
+
+LATEX = r"\documentclass{article}\usepackage{pgf}\begin{document}\input{fig.pgf}\end{document}"
+
+
+@pytest.mark.exhaustive  # LaTeX measures every text
 @pytest.mark.skipif(not shutil.which("xelatex"), reason="LaTeX is not installed")
-def test_pgf_is_written_with_latex(run):
-    assert status_of("plot", run, *SINGLE, "--style", "ieee", "--out", "fig.pgf") == 0
-    assert Path("fig.pgf").read_text(encoding="utf-8").count(r"\begin{pgfpicture}") == 1
+@pytest.mark.parametrize("panel", ["sideslip", "yaw_rate(sideslip)"])
+def test_pgf_is_a_figure_in_every_engine_of_latex(run, panel):
+    label = ("--label", "τ = −20 ms")
+    assert status_of("plot", run, "--panel", panel, *label, "--style", "ieee", "--out", "fig.pgf") == 0
+    text = Path("fig.pgf").read_text(encoding="utf-8")
+    assert text.count(r"\begin{pgfpicture}") == 1 and r"\beta" in text and str(Path.home()) not in text
+    for engine in filter(shutil.which, ("pdflatex", "xelatex", "lualatex")):
+        command = [engine, "-interaction=nonstopmode", "-halt-on-error", "-jobname=doc", LATEX]
+        done = subprocess.run(command, capture_output=True, text=True, errors="replace")
+        assert done.returncode == 0, done.stdout[-1500:]
+        assert "Missing character" not in Path("doc.log").read_text(errors="replace")
 
 
 @pytest.mark.skipif(bool(shutil.which("xelatex")), reason="LaTeX is installed")
