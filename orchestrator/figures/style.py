@@ -187,6 +187,7 @@ def save(figure: Figure, stem: Path, kinds: Sequence[str] = ("svg", "png")) -> l
     """
     paths = [stem.with_name(f"{stem.name}.{kind}") for kind in kinds]
     import matplotlib
+    from matplotlib.text import Text
 
     with matplotlib.rc_context(_own()), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from font")  # it is shown as a box
@@ -198,8 +199,11 @@ def save(figure: Figure, stem: Path, kinds: Sequence[str] = ("svg", "png")) -> l
             for path, kind in zip(paths, kinds, strict=True):
                 content = io.BytesIO()
                 known: dict[str, Any] = {"metadata": KINDS[kind]} if KINDS[kind] else {}  # PGF takes none
+                for text in figure.findobj(Text) if kind == "pgf" else ():
+                    text.set_text(_for_latex(text.get_text()))
                 figure.savefig(content, format=kind, **known)
-                write_whole(path, content.getvalue() if kind != "pgf" else _portable(content.getvalue()))
+                written = content.getvalue()
+                write_whole(path, OWN_FONTS.sub(b"", written) if kind == "pgf" else written)
         except UserWarning:
             wide, high = (25.4 * side for side in figure.get_size_inches())
             raise ResultsError(
@@ -218,26 +222,21 @@ def save(figure: Figure, stem: Path, kinds: Sequence[str] = ("svg", "png")) -> l
     return paths
 
 
+OWN_FONTS = re.compile(rb"^%%.*\\detokenize.*\n", re.MULTILINE)
+"""Comments in PGF on the files of this computer's fonts."""
 LATEX = {"\N{MINUS SIGN}": "-", "°": r"^\circ", "²": "^2", "³": "^3", "·": r"\cdot"}
 """Characters in units and numbers -> mathematics in LaTeX, whose fonts may lack them."""
 
 
-def _portable(pgf: bytes) -> bytes:
-    """Return PGF that all of LaTeX's engines read, without comments on the fonts of this computer."""
-    text = re.sub(r"^%%.*\\detokenize.*\n", "", pgf.decode("utf-8"), flags=re.MULTILINE)
-    return re.sub(
-        f"[α-ω{''.join(LATEX)}]",
-        lambda match: rf"\ensuremath{{{LATEX.get(match[0]) or in_latex(match[0])}}}",
-        text,
-    ).encode()
+def _for_latex(text: str) -> str:
+    """Return a text that all engines of LaTeX read: mathematics in place of `LATEX` and Greek letters."""
 
+    def command(match: re.Match[str]) -> str:
+        name = unicodedata.name(match[0]).lower().rpartition(" ")[2]
+        letter = "\\" + "var" * (name == "phi") + name
+        return rf"\ensuremath{{{LATEX.get(match[0], letter)}}}"
 
-def in_latex(letter: str) -> str:
-    """Return a Greek letter as a command of LaTeX, which matplotlib knows, too; others as they are."""
-    kind, _, name = unicodedata.name(letter).lower().rpartition(" ")
-    if not kind.startswith("greek small"):
-        return letter
-    return f"\\{'var' * (name == 'phi')}{name}"
+    return re.sub(f"[α-ω{''.join(LATEX)}]", command, text)
 
 
 def reference_words(lines: Iterable[Line2D]) -> str | None:
@@ -353,7 +352,6 @@ def in_formula(signal: str) -> str:
     if symbol(name) == name:
         return ""
     head, _, index = symbol(name).partition("_")
-    head = "".join(map(in_latex, head))
     return f"${head}_\\mathrm{{{index}}}$" if index else f"${head}$"
 
 
