@@ -95,15 +95,15 @@ class Firefox:
         )
 
 
-def start_firefox() -> Firefox:
-    """Return a window of Firefox; skip the test where there is none."""
+def start_firefox(logs: Path) -> Firefox:
+    """Return a window of Firefox, which keeps its log in a folder; skip the test where there is none."""
     found = (shutil.which(name) for name in ("firefox", "firefox-esr"))
     programs = [str(Path(path).resolve()) for path in found if path]
     program = next((path for path in programs if Path(path).with_name("application.ini").is_file()), None)
     if not program:  # a script that starts another program tells its client nothing about it
         pytest.skip("firefox is not installed: pages are tested in Chromium alone")
     marionette = pytest.importorskip("marionette_driver.marionette", reason="needs marionette-driver")
-    client = marionette.Marionette(bin=program, headless=True, gecko_log=os.devnull)
+    client = marionette.Marionette(bin=program, headless=True, gecko_log=str(logs), port=0)  # 0: any free one
     client.start_session()
     return Firefox(client)
 

@@ -22,8 +22,8 @@ SETTLED = f"{READY} && {READY}.viewer.wide === {READY}.clientWidth"
 
 
 @pytest.fixture(scope="module")
-def firefox() -> Iterator[Firefox]:
-    browser = start_firefox()
+def firefox(tmp_path_factory) -> Iterator[Firefox]:
+    browser = start_firefox(tmp_path_factory.mktemp("logs"))
     try:
         yield browser
     finally:
