@@ -9,7 +9,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from . import commands, evidence, library, metrics, schemas, signals, units, vehicles
+from . import (
+    blind_tables,
+    commands,
+    evidence,
+    library,
+    matrix_tables,
+    metrics,
+    monitor_tables,
+    schemas,
+    signals,
+    threat_tables,
+    units,
+    vehicles,
+)
 
 DOCS = Path(__file__).resolve().parents[1]
 PAGES: dict[str, Callable[[], str]] = {
@@ -26,6 +39,8 @@ PAGES: dict[str, Callable[[], str]] = {
     "reference/vehicles.md": vehicles.page,
 }
 """Path in the docs -> what returns its text."""
+PUBLISHED = (blind_tables, matrix_tables, monitor_tables, threat_tables)
+"""Modules of tables from published runs, which are parts of pages."""
 
 
 def text_of(path: str) -> str:
@@ -35,10 +50,13 @@ def text_of(path: str) -> str:
 
 
 def main() -> None:
-    """Write all pages."""
+    """Write all pages, and the tables in others."""
     for path in PAGES:
         (DOCS / path).parent.mkdir(exist_ok=True)
         (DOCS / path).write_text(text_of(path), encoding="utf-8")
+    for tables in PUBLISHED:
+        for page, text in tables.pages_with_tables().items():
+            page.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

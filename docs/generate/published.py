@@ -8,6 +8,8 @@ import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from orchestrator.experiments.tables import Table
+
 
 def replaced(page: str, name: str, text: str) -> str:
     """Return a page with the text between the marks of that name replaced."""
@@ -21,6 +23,16 @@ def replaced(page: str, name: str, text: str) -> str:
 def wrapped(text: str) -> str:
     """Return a paragraph in lines."""
     return "\n".join(textwrap.wrap(text, 118, break_on_hyphens=False))
+
+
+def markdown(table: Table) -> str:
+    """Return a table in Markdown, with its notes below."""
+    lines = [
+        f"| {' | '.join(heading or ' ' for heading in table.headings)} |",
+        f"|{'|'.join('---:' if table.is_number(k) else '---' for k in range(len(table.headings)))}|",
+        *(f"| {' | '.join(cell.replace(chr(10), '; ') for cell in row)} |" for row in table.text()),
+    ]
+    return "\n\n".join(["\n".join(lines), *map(wrapped, table.notes)])
 
 
 def write_pages(

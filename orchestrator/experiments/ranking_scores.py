@@ -19,7 +19,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
-from itertools import combinations, pairwise
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -27,7 +27,15 @@ from ..errors import ResultsError
 from ..evaluation.sine_with_dwell import FROM, RATIOS, SLIGHT, SPUN
 from ..figures.style import digits_apart
 from ..plan import Value
-from .confidence import Bounds, ConfidenceInterval, bootstrap, interval, percentile_bounds
+from .confidence import (
+    Bounds,
+    ConfidenceInterval,
+    bootstrap,
+    interval,
+    pairs_apart,
+    percentile_bounds,
+    shared_places,
+)
 from .execution import Executor
 from .experiment_result import ExperimentResult
 from .jobs import STEP_TIME, Job, MeasuredRun
@@ -180,9 +188,15 @@ class RankingCell:
         return min(self.runs, key=rank)
 
     @property
+    def counts(self) -> tuple[int, int]:
+        """The number of runs that passed, and of all."""
+        return sum(run.passed for run in self.runs), len(self.runs)
+
+    @property
     def share(self) -> float:
         """Share of the runs that passed."""
-        return sum(run.passed for run in self.runs) / len(self.runs)
+        passed, number = self.counts
+        return passed / number
 
     def _over_repeats(self, number: Callable[[list[RankedRun]], float]) -> ConfidenceInterval | None:
         """Average over repeats a number computed from the runs of each."""
@@ -316,16 +330,12 @@ def placed(every: Sequence[EntryScore]) -> list[EntryScore]:
     whole = sorted((entry for entry in every if not entry.missing), key=lambda entry: entry.order)
     lows, highs = percentile_bounds(_resampled(whole)) if whole else ((), ())
     ordered: list[EntryScore] = []
-    for number, (entry, low, high) in enumerate(zip(whole, lows, highs, strict=True), start=1):
+    places = shared_places(lows, highs)
+    for number, (entry, place, low, high) in enumerate(zip(whole, places, lows, highs, strict=True), 1):
         before = ordered[-1] if ordered else None
-        ordered.append(
-            replace(
-                entry,
-                rank=before.rank if before and before.order == entry.order else number,
-                place=max(before.place or 1 if before else 1, 1 + int(sum(other > high for other in lows))),
-                bounds=Bounds(float(low), float(high)),
-            )
-        )
+        rank = before.rank if before and before.order == entry.order else number
+        bounds = Bounds(float(low), float(high))
+        ordered.append(replace(entry, rank=rank, place=place, bounds=bounds))
     return ordered + [entry for entry in every if entry.missing]
 
 
@@ -339,10 +349,7 @@ def _resampled(scores: Sequence[EntryScore]) -> np.ndarray:
 
 def told_apart(scores: Sequence[EntryScore]) -> tuple[int, int]:
     """Return how many pairs of ranked entries differ with one sign in 95 % of resamples, and of how many."""
-    resampled = _resampled([score for score in scores if score.place])
-    pairs = list(combinations(range(resampled.shape[1]), 2))
-    ends = [percentile_bounds(resampled[:, i] - resampled[:, k]) for i, k in pairs]
-    return sum(bool(low > 0.0 or high < 0.0) for low, high in ends), len(pairs)
+    return pairs_apart(_resampled([score for score in scores if score.place]))
 
 
 @dataclass(frozen=True)

@@ -43,8 +43,8 @@ def sign_of(cell: RankingCell) -> str:
         return "–"
     if cell.state is RankedState.PASSED:
         return "✓"
-    passed = sum(run.passed for run in cell.runs)
-    return f"{passed}/{len(cell.runs)}"
+    passed, number = cell.counts
+    return f"{passed}/{number}"
 
 
 def state_words(run: RankedRun) -> str:
@@ -308,8 +308,8 @@ def columns_of_cells(ranked: RankingResult) -> Table:
             _text("entry", (cell.entry for cell in cells)),
             _text("condition", (cell.condition for cell in cells)),
             _text("state", (cell.state.value for cell in cells)),
-            _counts("runs", (len(cell.runs) for cell in cells)),
-            _counts("passed", (sum(run.passed for run in cell.runs) for cell in cells)),
+            _counts("runs", (cell.counts[1] for cell in cells)),
+            _counts("passed", (cell.counts[0] for cell in cells)),
             *numbers[:4],
             least,
             *numbers[4:],

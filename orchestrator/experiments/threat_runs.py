@@ -24,7 +24,7 @@ from .execution import Executor, Search, highest_passing, side_by_side
 from .experiment import LoadedExperiment, NamedRun, experiment_of
 from .jobs import MeasuredRun
 from .ranking import CONTROLLER, RECORDED, SERIES, angle_experiment, angles_of
-from .ranking_scores import RankedRun
+from .ranking_scores import RankedRun, RankedState
 from .tables import Table, column
 from .threats import LANE_CHANGE, REFERENCE, LoadedThreats, SearchPlace, ThreatSpec
 
@@ -430,5 +430,9 @@ def _published_quantities(
 
 @reads("table of a ranking", ScenarioError)
 def _published_matrix(path: Path | str) -> dict[str, tuple[int, int]]:
+    cells: dict[str, list[str]] = {}
     with Path(path).open(encoding="utf-8", newline="") as lines:
-        return {row["entry"]: (int(row["passed"]), int(row["conditions"])) for row in csv.DictReader(lines)}
+        for row in csv.DictReader(lines):
+            cells.setdefault(row["entry"], []).append(row["state"])
+    passed = RankedState.PASSED.value
+    return {entry: (states.count(passed), len(states)) for entry, states in cells.items()}

@@ -27,7 +27,15 @@ from typing import NamedTuple
 import numpy as np
 
 from . import claim_schema
-from .confidence import CONFIDENCE, DRAWS, Bounds, bootstrap, percentile_bounds
+from .confidence import (
+    CONFIDENCE,
+    DRAWS,
+    Bounds,
+    bootstrap,
+    pairs_apart,
+    percentile_bounds,
+    shared_places,
+)
 from .tables import Table, column
 from .threat_runs import ThreatResult
 from .threats import REFERENCE
@@ -53,6 +61,15 @@ def scores_of_positions(positions: np.ndarray, reference: int) -> np.ndarray:
     best = gained.max()
     scores: np.ndarray = 100.0 * gained / best if best > 0.0 else np.zeros_like(gained)
     return scores
+
+
+def resampled_scores(positions: np.ndarray, reference: int, draws: int = DRAWS) -> np.ndarray:
+    """Return the scores of all entries in draws of threats and cars; shape (draws, entries)."""
+
+    def draw(threats: np.ndarray, cars: np.ndarray) -> np.ndarray:
+        return scores_of_positions(positions[:, threats][:, :, cars], reference)
+
+    return bootstrap(draw, positions.shape[1:], draws=draws)
 
 
 def mean_ranks(positions: np.ndarray) -> np.ndarray:
@@ -115,31 +132,23 @@ def score_table(
     """
     none = entries.index(reference)
     scores, ranks = scores_of_positions(positions, none), mean_ranks(positions)
-
-    def draw(threats: np.ndarray, cars: np.ndarray) -> np.ndarray:
-        return scores_of_positions(positions[:, threats][:, :, cars], none)
-
-    resampled = bootstrap(draw, positions.shape[1:], draws=draws)
+    resampled = resampled_scores(positions, none, draws)
     low, high = percentile_bounds(resampled)
     order = order_of(scores)
-    places = np.maximum.accumulate([1 + int((low > high[i]).sum()) for i in order])
+    places = shared_places(low[order], high[order])
     leaders = np.bincount(resampled.argmax(axis=1), minlength=len(entries)) / len(resampled)
     by_rank = {i: place for place, i in enumerate(order_of(-ranks), start=1)}
     means = mean_positions(positions)
-    pairs = [(i, k) for i in range(len(entries)) for k in range(i)]
-    apart = 0
-    for i, k in pairs:
-        least, most = percentile_bounds(resampled[:, i] - resampled[:, k])
-        apart += bool(least > 0.0 or most < 0.0)
+    apart, pairs = pairs_apart(resampled)
     return ScoreTable(
         [
             ThreatScore(
-                entries[i], float(scores[i]), Bounds(float(low[i]), float(high[i])), int(place),
+                entries[i], float(scores[i]), Bounds(float(low[i]), float(high[i])), place,
                 float(means[i]), float(ranks[i]), by_rank[i], float(leaders[i]),
             )
             for i, place in zip(order, places, strict=True)
         ],
-        groups_of(list(zip(low, high, strict=True))), len(pairs), apart,
+        groups_of(list(zip(low, high, strict=True))), pairs, apart,
     )  # fmt: skip
 
 

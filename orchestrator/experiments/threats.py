@@ -165,7 +165,7 @@ class PublishedSpec(StrictModel):
 
     levels: str = Field(min_length=1, description="Of levels survived, as levels.csv")
     quantities: str = Field("", description="Of the disciplines, as quantities.csv")
-    matrix: str = Field("", description="Of the ranking's conditions passed, as its table.csv")
+    matrix: str = Field("", description="Of the ranking, as its cells.csv")
 
 
 class ThreatsSpec(StrictModel):

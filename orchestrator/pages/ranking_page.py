@@ -41,6 +41,9 @@ from ..experiments.ranking_tables import (
     words_of,
 )
 from ..experiments.tables import Table
+from ..experiments.threat_runs import published_result
+from ..experiments.threat_scores import scored
+from ..experiments.threats import load_threats
 from ..figures.style import LabelledRun
 from ..messages import changed, counted, in_text, listed
 from ..results.reader import Results, load_results
@@ -109,7 +112,7 @@ def ranking_page(ranked: RankingResult, folder: Path, command: str, each: Each =
 
 
 def answer(ranked: RankingResult) -> str:
-    """Return the result in one sentence: what the first places and the car without control pass."""
+    """Return the result in sentences: who can be told apart, and what the first and no control pass."""
     number = len(ranked.ranking.conditions)
     placed = [score for score in ranked.scores if score.place]
     if not placed:
@@ -118,14 +121,36 @@ def answer(ranked: RankingResult) -> str:
     first = [score for score in placed if score.rank == 1]
     others = [score for score in placed if score.rank != 1][:1]
     others += [score for score in placed if score.spec.fmu == IDLE and score not in (*first, *others)]
-    names = listed((in_text(score.spec.title) for score in first), last="and")
+    names = listed(in_text(score.spec.title) for score in first)
     rest = "".join(f", {in_text(score.spec.title)} {score.count(RankedState.PASSED)}" for score in others)
     apart, pairs = told_apart(placed)
-    share = f"{sharing} share the first place, as their intervals overlap; " if sharing > len(first) else ""
-    surely = f" Of {pairs} pairs, {apart} can be told apart." if pairs else ""
+    best, whole = f"{first[0].count(RankedState.PASSED)} of {counted(number, 'condition')}", len(placed)
+    if sharing > len(first):
+        result = (
+            f"By the conditions passed, {sharing} of {counted(whole, 'controller')} cannot be told apart: "
+            f"their intervals overlap, so they share the first place. In the order, {names} "
+            f"{'comes' if len(first) == 1 else 'come'} first with {best} passed{rest}."
+        )
+    else:
+        is_best = "is best" if len(first) == 1 else "are best"
+        result = f"Of {counted(whole, 'controller')}, {names} {is_best}: {best} passed{rest}."
+    surely = f"The difference of two is clear in {apart} of {counted(pairs, 'pair')}." if pairs else ""
+    return " ".join(filter(None, (result, surely, _of_threats(ranked))))
+
+
+def _of_threats(ranked: RankingResult) -> str:
+    """Return how many the published levels of threats tell apart; "" without any."""
+    if not (file := ranked.ranking.spec.threat_file):
+        return ""
+    result = published_result(load_threats(ranked.ranking.path.parent / file))
+    if not result.complete[result.threats.main]:
+        return ""
+    table = scored(result)
+    sharing = sum(score.place == 1 for score in table.scores)
     return (
-        f"Of {counted(len(placed), 'controller')}, {share}{names} {'is' if len(first) == 1 else 'are'} best: "
-        f"{first[0].count(RankedState.PASSED)} of {counted(number, 'condition')} passed{rest}.{surely}"
+        f"By threats turned up until the car is lost (published levels) it is clear in {table.told_apart} of "
+        f"{counted(table.pairs, 'pair')}, and {counted(sharing, 'controller')} "
+        f"{'is first' if sharing == 1 else 'share the first place'}."
     )
 
 
@@ -170,7 +195,7 @@ def _side(
     """Return the arguments of `_write_side` for a cell."""
     condition, worst = ranked.ranking.conditions[cell.condition], cell.worst
     sums = {
-        "runs that pass": f"{sum(run.passed for run in cell.runs)} of {len(cell.runs)}",
+        "runs that pass": "{} of {}".format(*cell.counts),
         "headroom below the limits": spread(cell.headroom, lambda x: f"{x:.1f} points"),
         "peak sideslip": spread(cell.sideslip, lambda x: f"{math.degrees(x):.1f}°"),
         "displacement": _text(cell.displacement, "m"),

@@ -1,66 +1,139 @@
-"""The matrix of the docs against runs made now, of some of its cells."""
+"""The matrix of the docs against published cells, and those against runs made now."""
 
 from __future__ import annotations
 
 import csv
-import functools
-import random
-import re
-from pathlib import Path
+import math
 
 import pytest
 
-from orchestrator.cli import main
+from docs.generate import matrix_tables
 from orchestrator.experiments.ranking import load_ranking
+from orchestrator.experiments.ranking_scores import EntryScore, RankedState, RankingResult
+from tests.commands import status_of
 
-ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "ranking.md").read_text(encoding="utf-8")
-RANKING = ROOT / "scenarios" / "proving_ground" / "ranking.yaml"
-
-
-@functools.cache
-def matrix() -> dict[tuple[str, str], str]:
-    """Return (entry, condition) -> what stands in its cell."""
-    ranking = load_ranking(RANKING)
-    titles = {spec.title: name for name, (spec, _) in ranking.entries.items()}
-    found = {}
-    for line in PAGE.partition("## The matrix")[2].splitlines():
-        cells = [cell.strip() for cell in line.strip("|").split("|")]
-        if len(cells) == len(ranking.conditions) + 3 and cells[1] in titles:
-            found |= {
-                (titles[cells[1]], name): cell
-                for name, cell in zip(ranking.conditions, cells[3:], strict=True)
-            }
-    return found
+RANKING = load_ranking(matrix_tables.FILE)
+MODES = ("sliding_mode", "fuzzy_sliding_mode", "sliding_mode_tuned", "fuzzy_sliding_mode_tuned")
+BY_SIDESLIP = ("controller_fuzzy_sideslip", "controller_fnn", "controller_off")
+"""FMUs that do not use the yaw rate."""
 
 
-def words(cell: dict[str, str]) -> str:
-    """Return what the docs say of a row of cells.csv."""
-    if cell["state"] == "passed":
-        return "✓"
-    return f"{cell['passed']}/{cell['runs']}" + (" spun" if cell["state"] == "spun" else "")
+@pytest.fixture(scope="module")
+def published() -> RankingResult:
+    return matrix_tables.published()
 
 
-def test_the_matrix_of_the_docs_has_a_cell_for_every_controller_and_condition():
-    ranking = load_ranking(RANKING)
-    assert set(matrix()) == {(entry, name) for entry in ranking.entries for name in ranking.conditions}
-    assert all(re.fullmatch(r"✓|\d+/\d+( spun)?", cell) for cell in matrix().values())
+@pytest.fixture(scope="module")
+def by_name(published: RankingResult) -> dict[str, EntryScore]:
+    return {score.entry: score for score in published.scores}
 
 
-def test_the_conditions_passed_that_pages_of_threats_show_are_those_of_the_matrix():
-    ranking = load_ranking(RANKING)
-    with (RANKING.parent / "matrix.csv").open(encoding="utf-8", newline="") as lines:
-        passed = {row["entry"]: (int(row["passed"]), int(row["conditions"])) for row in csv.DictReader(lines)}
-    cells = {entry: [matrix()[entry, name] for name in ranking.conditions] for entry in ranking.entries}
-    assert passed == {entry: (row.count("✓"), len(row)) for entry, row in cells.items()}
+@pytest.fixture(scope="module")
+def conclusions() -> str:
+    page = matrix_tables.PAGE.read_text(encoding="utf-8")
+    return " ".join(page.partition("Conclusions:")[2].partition("In numbers")[0].split())
+
+
+def passed(score: EntryScore) -> set[str]:
+    return {name for name, cell in score.cells.items() if cell.passed}
+
+
+def slides(score: EntryScore, condition: str) -> float:
+    """Return the sideslip under a condition [deg]."""
+    slip = score.cells[condition].number("sideslip")
+    assert slip is not None
+    return math.degrees(slip)
+
+
+def between(numbers: list[float], digits: int = 1) -> str:
+    return f"{min(numbers):.{digits}f} to {max(numbers):.{digits}f}"
+
+
+def test_the_tables_of_the_docs_follow_from_the_published_cells():
+    for page, text in matrix_tables.pages_with_tables().items():
+        assert text == page.read_text(encoding="utf-8")
+
+
+def test_the_published_cells_are_in_the_order_of_the_ranking(published):
+    with matrix_tables.RUNS.open(encoding="utf-8", newline="") as lines:
+        order = list(dict.fromkeys(row["entry"] for row in csv.DictReader(lines)))
+    assert order == [score.entry for score in published.scores]
+
+
+def test_the_conclusions_on_passes_are_those_of_the_table(published, by_name, conclusions):
+    tuned = [
+        len(passed(score))
+        for score in published.scores
+        if score.spec.gains == "tuned" and score.spec.fmu not in BY_SIDESLIP
+    ]
+    assert len(tuned) == 8
+    assert f"pass {between(tuned, 0)} of {len(RANKING.conditions)} conditions" in conclusions
+    (few,) = {len(passed(by_name[name])) for name in ("pid", "lqr", "mpc")}
+    assert f"PID, LQR and the predictive law pass {few}." in conclusions
+    alike = [score for score in published.scores if passed(score) == passed(published.scores[1])]
+    assert [score.rank for score in alike] == [*range(2, 2 + len(alike))]
+    assert (
+        f"Rows 2 to {alike[-1].rank} pass the same {len(passed(alike[0]))} conditions, among them the "
+        "sliding modes and fuzzy feedback, untuned"
+    ) in conclusions
+    assert {"sliding_mode", "fuzzy_sliding_mode", "fuzzy_feedback"} <= {score.entry for score in alike}
+    assert f"passes {len(passed(by_name['dead_band']))} with its untuned gains" in conclusions
+    whole = {name for name, score in by_name.items() if "hard" in passed(score)}
+    assert whole.isdisjoint({"fuzzy_sideslip", "fuzzy_sideslip_tuned"})
+    still = sum("hard_sensors" in passed(by_name[name]) for name in whole)
+    cost = [slides(by_name[name], "hard_sensors") - slides(by_name[name], "hard") for name in whole]
+    assert f"cost the {len(whole)} entries that pass on `hard` {between(cost)}° of sideslip" in conclusions
+    assert f"{still} still pass" in conclusions
+    assert [score.spec.fmu for score in published.scores[-3:]] == [BY_SIDESLIP[1]] * 2 + [BY_SIDESLIP[2]]
+
+
+def test_the_conclusions_on_conditions_are_those_of_the_table(published):
+    passing = {
+        name: {score.entry for score in published.scores if name in passed(score)}
+        for name in RANKING.conditions
+    }
+    assert passing["hard_unknown"] == {"fuzzy_sideslip_tuned"}
+    assert passing["saloon75_unknown"] == {"fuzzy_sideslip", "fuzzy_sideslip_tuned", "dead_band"}
+    assert passing["hard_slow"] == passing["hard_split"] == set()
+    by_yaw_rate = {score.entry for score in published.scores if score.spec.fmu not in BY_SIDESLIP}
+    assert by_yaw_rate <= passing["saloon75_slow"]
+    split = {score.cells["hard_split"].state for score in published.scores}
+    assert split == {RankedState.SPUN, RankedState.FAILED}
+
+
+def test_the_conclusions_on_sideslip_and_effort_are_those_of_the_table(published, by_name, conclusions):
+    alike = [score for score in published.scores if passed(score) == passed(published.scores[1])]
+    means = [math.degrees(score.mean("sideslip")) for score in alike]
+    assert f"they differ by {max(means) - min(means):.1f}° of mean peak sideslip" in conclusions
+    late = by_name["sliding_mode_tuned"]
+    worn, heavy = ([slides(score, f"hard_{word}") for score in alike] for word in ("worn", "heavy"))
+    assert (
+        f"worn rear tyres they slide by {between(worn)}°, with 20 % more mass by {between(heavy)}°, the "
+        f"tuned sliding mode, with {len(passed(late))} conditions in row {late.rank}, by "
+        f"{slides(late, 'hard_worn'):.1f}° and {slides(late, 'hard_heavy'):.1f}°"
+    ) in conclusions
+    band = by_name["dead_band"]
+    further = [slides(band, "hard") - slides(by_name[name], "hard") for name in MODES]
+    assert f"on `hard`, dry, it slides {between(further)}° further" in conclusions
+    chatter = [100 * band.mean("chatter") / by_name[name].mean("chatter") for name in MODES]
+    assert f"with {between(chatter, 0)} % of their chatter" in conclusions
+    rivals = [score for score in published.scores if score.spec.fmu not in BY_SIDESLIP and score is not band]
+    assert all(score.mean("intervention") > band.mean("intervention") for score in rivals)
+    cheap = [
+        s for s in published.scores if s is not band and s.mean("intervention") <= band.mean("intervention")
+    ]
+    assert all(score.mean("headroom") < band.mean("headroom") for score in cheap)
 
 
 @pytest.mark.exhaustive
-@pytest.mark.parametrize("entry, condition", random.Random(16).sample(sorted(matrix()), 8))
-def test_cells_of_the_docs_are_what_runs_come_to(entry, condition, tmp_path):
-    with pytest.raises(SystemExit) as ended:
-        main(["rank", str(RANKING), "--only", entry, "--condition", condition, "--out", str(tmp_path)])
-    assert not ended.value.code
-    rows = csv.DictReader((tmp_path / "cells.csv").open())
-    (cell,) = (row for row in rows if row["entry"] == entry)
-    assert words(cell) == matrix()[entry, condition]
+@pytest.mark.parametrize("entry", sorted(RANKING.entries))
+def test_cells_of_the_docs_are_what_runs_come_to(entry, published, request):
+    """The journal of the runs is in pytest's cache, so that what was interrupted goes on."""
+    out = request.config.cache.mkdir("matrix") / entry
+    assert status_of("rank", matrix_tables.FILE, "--only", entry, "--out", out) == 0
+    with (out / "cells.csv").open(encoding="utf-8", newline="") as lines:
+        made = {row["condition"]: row for row in csv.DictReader(lines) if row["entry"] == entry}
+    (score,) = (score for score in published.scores if score.entry == entry)
+    for condition, cell in score.cells.items():
+        for column in matrix_tables.COLUMNS[:-1]:  # but the time per step
+            assert made[condition][column] == cell.row[column], (condition, column)

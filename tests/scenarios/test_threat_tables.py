@@ -3,24 +3,42 @@
 from __future__ import annotations
 
 import csv
+import math
 import random
+from dataclasses import replace
 from pathlib import Path
+from statistics import median
 
 import pytest
 
 from docs.generate import threat_tables
-from orchestrator.experiments.threat_runs import ThreatResult, published_result
-from orchestrator.experiments.threat_scores import compared_gains, compared_setting, moves_between, scored
-from orchestrator.experiments.threats import REFERENCE, load_threats
+from orchestrator.experiments.execution import Executor, runner_of
+from orchestrator.experiments.ranking import angle_experiment, angles_of
+from orchestrator.experiments.threat_runs import Survived, ThreatResult, published_result, survivals
+from orchestrator.experiments.threat_scores import (
+    compared_gains,
+    compared_setting,
+    moves_between,
+    scored,
+    scores_without,
+)
+from orchestrator.experiments.threats import REFERENCE, SearchPlace, load_threats
 from orchestrator.pages import threats_page
 from tests.commands import status_of
 
 FILE, LANE_CHANGE = threat_tables.FILE, "lane_change"
+WITHOUT_MODEL = [
+    f"{law}_tuned"
+    for law in ("pid", "fuzzy_pid", "fuzzy_feedback", "sliding_mode", "fuzzy_sliding_mode", "dead_band")
+]
+"""Tuned laws that use the yaw rate, but no model of the car's tyres."""
+THREATS = load_threats(FILE)
+ENTRIES = THREATS.entries_in(THREATS.main)
 
 
 @pytest.fixture(scope="module")
 def published() -> ThreatResult:
-    return published_result(load_threats(FILE))
+    return published_result(THREATS)
 
 
 def test_every_entry_has_every_level_of_the_main_setting(published):
@@ -29,7 +47,8 @@ def test_every_entry_has_every_level_of_the_main_setting(published):
 
 
 def test_the_tables_of_the_docs_follow_from_the_published_levels():
-    assert threat_tables.page_with_tables() == threat_tables.PAGE.read_text(encoding="utf-8")
+    for page, text in threat_tables.pages_with_tables().items():
+        assert text == page.read_text(encoding="utf-8")
 
 
 def test_every_threat_of_the_main_setting_has_six_cars(published):
@@ -39,8 +58,13 @@ def test_every_threat_of_the_main_setting_has_six_cars(published):
     assert {len(cars) for cars in faced.values()} == {6}
 
 
-def test_the_sentences_on_threats_have_the_numbers_of_the_tables(published):
-    text = " ".join(threat_tables.PAGE.read_text(encoding="utf-8").partition("### Who can be")[0].split())
+@pytest.fixture(scope="module")
+def text() -> str:
+    """The sentences above the tables."""
+    return " ".join(threat_tables.PAGE.read_text(encoding="utf-8").partition("### Who can be")[0].split())
+
+
+def test_the_sentences_on_threats_have_the_numbers_of_the_tables(published, text):
     scores = scored(published)
     _, gains = compared_gains(published).groups.values()
     assert (
@@ -74,6 +98,103 @@ def test_the_sentences_on_threats_have_the_numbers_of_the_tables(published):
     assert f"of 210 pairs {apart['Gust of side wind']} differ" in text
 
 
+def test_the_sentences_on_who_is_first_are_those_of_the_tables(published, text):
+    scores, titles = scored(published), threats_page.titles_of(published)
+    known = threat_tables.differences(published, scores)
+    assert f"is not clearly better than {len(known.equals)} entries" in text
+    laws = len(known.helped) + len(known.others)
+    assert f"Tuning helps {len(known.helped)} of the {laws} laws clearly" in text
+    entries = published.complete[THREATS.main]
+    without = scores_without(entries, published.positions(THREATS.main, entries), REFERENCE)
+    assert scores.order()[0] == next(score.entry for score in scores.scores if score.by_rank == 1)
+    others = {
+        place: first for place, order in without.items() if (first := next(iter(order))) != scores.order()[0]
+    }
+    ((place, first),) = others.items()
+    assert place == ("car", THREATS.cars_in(THREATS.main).index("van"))
+    assert f"if any one car is left out but the van; then {titles[first]} leads" in text
+
+
+def test_the_sentences_on_settings_are_those_of_the_tables(published, text):
+    lost = [
+        sum(score.score == 0.0 for score in table.scores)
+        for compared in [compared_setting(published, "bound_15")]
+        for table in (compared.table, compared.main)
+    ]
+    assert f"{lost[0]} instead of {lost[1]} of {len(ENTRIES)} entries lose all cars at the easy end" in text
+    for bound in ("bound_15", "bound_30"):
+        compared = compared_setting(published, bound)
+        assert compared.table.order()[0] == compared.main.order()[0] == "pid_tuned"
+    compared = compared_setting(published, "unguarded")
+    moves = moves_between(compared.main.by_entry(), compared.table.by_entry(), REFERENCE)
+    title = threats_page.titles_of(published)[moves.farthest]
+    assert f"{title} goes from place {moves.before} to {moves.after}; levels fall" in text
+
+
+def test_the_sentence_on_wrong_stiffness_is_that_of_the_table(published, text):
+    def survived(entry: str) -> list[Survived]:
+        return [
+            published.survived[SearchPlace(THREATS.main, "model", car, entry)] for car in THREATS.spec.cars
+        ]
+
+    spec = THREATS.spec.threats["model"]
+    assert all(level.end == "hard" for name in WITHOUT_MODEL for level in survived(name))
+    assert f"survive {spec.hard:g} times the stiffness, the end of the range, on every car" in text
+    mpc, lqr = (
+        [spec.level(level.position) for level in survived(name)]
+        for name in ("model_predictive_tuned", "lqr_tuned")
+    )
+    assert (
+        f"the predictive law survives {min(mpc):.1f} to {max(mpc):.1f} times, LQR {min(lqr):.1f} to "
+        f"{max(lqr):.0f}"
+    ) in text
+
+
+def test_the_sentences_on_disciplines_are_those_of_the_tables(published, text):
+    (threat,), cars = THREATS.threats_in(LANE_CHANGE), THREATS.cars_in(LANE_CHANGE)
+    spec, laws = THREATS.spec.threats[threat], [name for name in ENTRIES if name != REFERENCE]
+    speeds = {
+        car: {
+            name: spec.level(published.survived[SearchPlace(LANE_CHANGE, threat, car, name)].position)
+            for name in ENTRIES
+        }
+        for car in cars
+    }
+    gained = {car: [of[name] - of[REFERENCE] for name in laws] for car, of in speeds.items()}
+    raised = gained.pop("hard") + gained.pop("van")
+    assert f"of `hard` and the van by {min(raised):.1f} to {max(raised):.1f} km/h" in text
+    assert max(abs(gain) for gains in gained.values() for gain in gains) < 1.0
+    spreads = {car: max(of[n] for n in laws) - min(of[n] for n in laws) for car, of in speeds.items()}
+    assert (
+        f"laws differ by {spreads.pop('van'):.1f} km/h on the van, by {max(spreads.values()):.1f} at most on "
+        "the others"
+    ) in text
+
+    def of_cars(name: str, entry: str, key: str) -> list[float]:
+        return [published.quantities[name, car, entry][key] for car in cars]
+
+    distances = {entry: median(of_cars("braking", entry, "distance")) for entry in ENTRIES}
+    straight = [
+        distances[entry]
+        for entry in ENTRIES
+        if math.degrees(median(of_cars("braking", entry, "yaw_angle"))) < 2.0
+    ]
+    assert (
+        f"need {min(straight):.0f} to {max(straight):.0f} m (medians over cars), no control, which spins, "
+        f"{distances[REFERENCE]:.0f} m"
+    ) in text
+    spins = sum(angle > math.pi / 2 for angle in of_cars("braking", "pid", "yaw_angle"))
+    assert f"spins on {spins} of {len(cars)} cars, too" in text
+    late = sum(published.quantities["step_steer", "small_car", e]["yaw_rate_response"] > 4.0 for e in ENTRIES)
+    assert f"the yaw rate of {late} entries grows until the end" in text
+    firm = {entry: median(of_cars("wind", entry, "deviation")) for entry in ENTRIES}
+    assert sorted(firm, key=firm.__getitem__)[:2] == ["sliding_mode", "fuzzy_feedback"]
+    assert (
+        f"with {firm['sliding_mode']:.1f} and {firm['fuzzy_feedback']:.1f} m of deviation against "
+        f"{firm[REFERENCE]:.1f} m without control"
+    ) in text
+
+
 def _spread(spread, scale: float) -> str:
     low, high = (f"{scale * x:.1f}" for x in spread.bounds)
     return f"{scale * spread.value:.1f}, {low} to {high}"
@@ -92,7 +213,7 @@ def test_every_entry_has_driven_every_discipline(published):
 
 
 @pytest.mark.exhaustive
-@pytest.mark.parametrize("entry", random.Random(5).sample(sorted(load_threats(FILE).ranking.spec.entries), 2))
+@pytest.mark.parametrize("entry", random.Random(5).sample(ENTRIES, 2))
 def test_published_disciplines_are_what_runs_come_to(entry, published, tmp_path: Path):
     names = [LANE_CHANGE, *published.threats.spec.disciplines]
     chosen = (word for name in names for word in ("--condition", name))
@@ -116,14 +237,16 @@ def test_published_disciplines_are_what_runs_come_to(entry, published, tmp_path:
 
 
 @pytest.mark.exhaustive
-@pytest.mark.parametrize(
-    "entry", random.Random(27).sample(sorted(load_threats(FILE).ranking.spec.entries), 2)
-)
-def test_published_levels_are_what_runs_come_to(entry, published, tmp_path: Path):
-    assert status_of("rank", FILE, "--quick", "--only", entry, "--out", tmp_path) == 0
-    made = {tuple(row.values())[:4]: row for row in csv.DictReader((tmp_path / "levels.csv").open())}
-    main = published.threats.main
-    known = {place: one for place, one in published.survived.items() if place[::3] == (main, entry)}
-    assert known
-    for place, one in known.items():
-        assert float(made[tuple(place)]["position"]) == one.position, place
+@pytest.mark.parametrize("car", THREATS.spec.cars)
+@pytest.mark.parametrize("entry", ENTRIES)
+def test_published_levels_are_what_runs_come_to(entry, car, published, request):
+    """The journal of the runs is in pytest's cache, so that what was interrupted goes on."""
+    threats = load_threats(FILE, quick=True)
+    threats = replace(threats, spec=threats.spec.model_copy(update={"cars": [car]}))
+    folder = request.config.cache.mkdir("threats") / f"{entry}_{car}"
+    with Executor(folder, threats.identity, runner_of(1, None)) as execute:
+        slow = execute(angle_experiment(threats.ranking, execute, [car]), keep=False)
+        angles = angles_of(threats.ranking, slow, [car])
+        found = survivals(threats, angles, execute, only=[entry])
+    assert len(found) == len(threats.threats_in(threats.main))
+    assert found == {place: published.survived[place] for place in found}

@@ -1,0 +1,157 @@
+"""The matrix of docs/ranking.md from published cells: `python -m docs.generate.matrix_tables`.
+
+They come from scenarios/proving_ground/matrix.csv, every cell of `yawbench rank`, which `--runs TABLE` takes
+from the ranking's cells.csv.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from orchestrator.experiments.confidence import ConfidenceInterval
+from orchestrator.experiments.jobs import STEP_TIME
+from orchestrator.experiments.ranking import load_ranking
+from orchestrator.experiments.ranking_scores import (
+    EntryScore,
+    RankedState,
+    RankingCell,
+    RankingResult,
+    placed,
+)
+from orchestrator.experiments.ranking_tables import interval_words, sign_of
+from orchestrator.experiments.tables import Table
+from orchestrator.pages import ranking_page
+
+from .published import markdown, replaced, wrapped, write_pages
+
+ROOT = Path(__file__).resolve().parents[2]
+FILE = ROOT / "scenarios" / "proving_ground" / "ranking.yaml"
+RUNS = FILE.parent / "matrix.csv"
+PAGE = ROOT / "docs" / "ranking.md"
+NOISY = "hard_sensors"
+"""The condition whose seeds are told in a sentence."""
+TOLD = ("pid_tuned", "sliding_mode", "dead_band", "fnn")
+"""Entries in that sentence: the first, and three kinds of laws."""
+COLUMNS = (
+    "entry", "condition", "state", "runs", "passed", "headroom [points]", "headroom_half_width [points]",
+    "sideslip [rad]", "sideslip_half_width [rad]", "speed_lost [m/s]", "intervention [N.m.s]",
+    "chatter [N.m/s]", f"{STEP_TIME} [s]",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class PublishedCell(RankingCell):
+    """A cell as it is published, without its runs."""
+
+    row: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def state(self) -> RankedState:
+        """The published state."""
+        return RankedState(self.row["state"])
+
+    @property
+    def passed(self) -> bool:
+        """Whether all runs passed."""
+        return self.state is RankedState.PASSED
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """The number of runs that passed, and of all."""
+        return int(self.row["passed"]), int(self.row["runs"])
+
+    def number(self, key: str) -> float | None:
+        """Return a published number in SI units, or points."""
+        column = next(name for name in COLUMNS if name.partition(" ")[0] == key)
+        return float(self.row[column]) if self.row[column] else None
+
+    def over_seeds(self, key: str) -> ConfidenceInterval:
+        """Return the mean of headroom or sideslip over seeds with its interval."""
+        return ConfidenceInterval(self.number(key) or 0.0, self.number(f"{key}_half_width") or 0.0)
+
+
+def published() -> RankingResult:
+    """Return the ranking that follows from the published cells."""
+    ranking = load_ranking(FILE)
+    with RUNS.open(encoding="utf-8", newline="") as lines:
+        cells = {
+            (row["entry"], row["condition"]): PublishedCell(row["entry"], row["condition"], [], row)
+            for row in csv.DictReader(lines)
+        }
+    scores = placed([
+        EntryScore(name, spec, {key: cells[name, key] for key in ranking.conditions})
+        for name, (spec, _) in ranking.entries.items()
+    ])  # fmt: skip
+    return RankingResult(ranking, {}, [], scores)
+
+
+def matrix(result: RankingResult) -> Table:
+    """Return who passes which condition: a row per controller, the first of the order at the top."""
+    conditions = result.ranking.conditions
+    rows = []
+    for score in result.scores:
+        cells = (sign_of(cell) + _spun(cell) for cell in score.cells.values())
+        passed = str(score.count(RankedState.PASSED))
+        rows.append([str(score.rank), score.spec.title, passed, interval_words(score), *cells])
+    headings = [condition.heading.replace("*", r"\*") for condition in conditions.values()]
+    return Table("", ["", "controller", "passed", "95 % interval", *headings], [*rows], numbers={0, 2})
+
+
+def _spun(cell: RankingCell) -> str:
+    return " spun" if cell.state is RankedState.SPUN else ""
+
+
+def numbers(result: RankingResult) -> Table:
+    """Return the means over conditions."""
+    headings = [
+        "", "controller", "runs that pass", "headroom", "peak sideslip [°]", "speed lost [km/h]",
+        "intervention [N·m·s]", "chatter [kN·m/s]", "time per step [µs]",
+    ]  # fmt: skip
+    rows = []
+    for score in result.scores:
+        mean = {key: score.mean(key) or 0.0 for key in ("headroom", "speed_lost", "intervention", "chatter")}
+        rows.append([
+            str(score.rank), score.spec.title, f"{100 * score.share:.0f} %", f"{mean['headroom']:.1f}",
+            f"{math.degrees(score.mean('sideslip') or 0.0):.1f}", f"{3.6 * mean['speed_lost']:.1f}",
+            f"{mean['intervention']:.0f}", f"{1e-3 * mean['chatter']:.1f}",
+            f"{1e6 * (score.step_time or 0.0):.0f}",
+        ])  # fmt: skip
+    return Table("", headings, [*rows], numbers={0, *range(2, len(headings))})
+
+
+def seeds_sentence(result: RankingResult) -> str:
+    """Return the peak sideslip of some entries over seeds of the sensors' noise."""
+    ranking = result.ranking
+    (seeds,) = ranking.conditions[NOISY].repeats.values()
+    by_name = {score.entry: score for score in result.scores}
+    told = []
+    for name in TOLD:
+        cell = by_name[name].cells[NOISY]
+        assert isinstance(cell, PublishedCell)
+        mean, half = map(math.degrees, cell.over_seeds("sideslip"))
+        told.append(f"{mean:.1f}° ± {half:.1f}° for {by_name[name].spec.title}")
+    return (
+        f"Largest sideslip on `hard` with sensors, mean over {len(seeds)} seeds with 95 % confidence: "
+        f"{', '.join(told)}."
+    )
+
+
+def pages_with_tables() -> dict[Path, str]:
+    """Return the page with its tables written anew."""
+    result = published()
+    page = PAGE.read_text(encoding="utf-8")
+    for name, text in {
+        "first": wrapped(ranking_page.answer(result)),
+        "matrix": markdown(matrix(result)),
+        "means": f"{markdown(numbers(result))}\n\n{wrapped(seeds_sentence(result))}",
+    }.items():
+        page = replaced(page, name, text)
+    return {PAGE: page}
+
+
+if __name__ == "__main__":
+    write_pages(__doc__, RUNS, COLUMNS, pages_with_tables)
