@@ -150,7 +150,9 @@ class RankingSpec(StrictModel):
     conditions: dict[str, ConditionSpec] = Field(min_length=1, description="Name -> condition")
     entries: dict[str, EntrySpec] = Field({}, description="Name -> controller")
     more_entries: list[str] = Field([], description="Files of entries, relative to this one")
-    threat_file: str = Field("", description="Its published levels the page quotes, relative to this one")
+    threat_file: str = Field(
+        "", description="Threats whose published levels the page quotes, if the file is there"
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> RankingSpec:
@@ -282,10 +284,6 @@ def load_ranking(
                     f"{file}: entries.{key}: there is already an entry {key!r}", code="name-duplicate"
                 )
             entries[key] = (entry, file.parent)
-    if spec.threat_file and not (path.parent / spec.threat_file).is_file():
-        raise ScenarioError(
-            f"{path}: threat_file: there is no file {spec.threat_file!r}", code="file-missing"
-        )
     for key, entry in (more or {}).items():
         if key in entries:
             raise ScenarioError(

@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..errors import ResultsError
+from ..errors import ResultsError, ScenarioError
 from ..evaluation.sine_with_dwell import RATIOS, SPUN, course_of
 from ..evaluation.standard_tests import NotJudged
 from ..evaluation.trace import trace_of
@@ -135,14 +135,19 @@ def answer(ranked: RankingResult) -> str:
         is_best = "is best" if len(first) == 1 else "are best"
         result = f"Of {counted(whole, 'controller')}, {names} {is_best}: {best} passed{rest}."
     surely = f"The difference of two is clear in {apart} of {counted(pairs, 'pair')}." if pairs else ""
-    return " ".join(filter(None, (result, surely, _of_threats(ranked))))
+    quoted = ranked.ranking.spec.threat_file
+    threats = result_of_threats(ranked.ranking.path.parent / quoted) if quoted else ""
+    return " ".join(filter(None, (result, surely, threats)))
 
 
-def _of_threats(ranked: RankingResult) -> str:
-    """Return how many the published levels of threats tell apart; "" without any."""
-    if not (file := ranked.ranking.spec.threat_file):
+def result_of_threats(file: Path) -> str:
+    """Return how many the published levels of a threat file tell apart; "" without any."""
+    if not file.is_file():
         return ""
-    result = published_result(load_threats(ranked.ranking.path.parent / file))
+    try:
+        result = published_result(load_threats(file))
+    except ScenarioError as error:  # the runs are made: the page is written without them
+        return f"How many are told apart by threats is not known: {error}."
     if not result.complete[result.threats.main]:
         return ""
     table = scored(result)

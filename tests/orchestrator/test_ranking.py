@@ -253,11 +253,6 @@ def test_noisy_sensors_give_a_headroom_with_its_confidence(tmp_path):
         ((), ("--condition", "wet"), "there is no condition 'wet'"),
         ((), ("--controller", "nowhere/my.fmu"), "--controller nowhere/my.fmu: there is no such file"),
         ((), ("--controller", "none"), "there is already an entry 'none'"),
-        (
-            ("title: small", "title: small\nthreat_file: none.yaml"),
-            (),
-            "threat_file: there is no file 'none.yaml'",
-        ),
         ((), ("--fresh", "--no-run"), "--fresh and --no-run are mutually exclusive"),
         ((), ("--no-run",), "contains no A of 's' for these FMUs; rank without --no-run"),
     ],
@@ -271,7 +266,7 @@ def test_what_is_wrong_with_a_ranking_is_said_before_any_run(wrong, options, sen
 
 
 def edited_ranking(folder: Path, old: str = "", new: str = ""):
-    for name in ("ranking.yaml", "tuned.yaml", "threats.yaml"):
+    for name in ("ranking.yaml", "tuned.yaml"):
         shutil.copy(GROUND / name, folder)
     text = (folder / "tuned.yaml").read_text()
     assert old in text

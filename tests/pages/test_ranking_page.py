@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from lxml import html
 
 from orchestrator.cli import main
 from orchestrator.experiments.ranking import load_ranking
+from orchestrator.pages.ranking_page import result_of_threats
 from tests.orchestrator.test_ranking import SMALL
 
 from .browser import DESK, PHONE, Browser
@@ -60,6 +62,13 @@ def test_every_count_is_that_of_its_table(page):
     assert f"of {len(conditions)} conditions" in answer
     assert len(tree.cssselect("td.cell")) == len(rows) * len(conditions)
     assert len(list((page.parent / "data").glob("*.js"))) == len(rows) * len(conditions)
+
+
+def test_threats_are_quoted_where_they_can_be_read(tmp_path):
+    assert "is clear in" in result_of_threats(RANKING.parent / "threats.yaml")
+    assert result_of_threats(tmp_path / "threats.yaml") == ""
+    shutil.copy(RANKING.parent / "threats.yaml", tmp_path)  # without its published levels
+    assert "is not known" in result_of_threats(tmp_path / "threats.yaml")
 
 
 def test_a_cell_shows_its_worst_run_while_the_matrix_stays_in_sight(chromium: Browser, page):
