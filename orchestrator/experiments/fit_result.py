@@ -122,7 +122,8 @@ class FitResult:
         if self.single_track is None:
             return f"no single track beside it: {self.without}"
         own, other = self.loss(self.scenario, part), self.loss(self.single_track, part)
-        seen = f"on {PARTS[part]} windows: mean square {own:.3g} against {other:.3g}"
+        of = "mean square of differences, each over the expected"
+        seen = f"on {PARTS[part]} windows: {of}, {own:.3g} against {other:.3g}"
         if own < other:
             return f"better than a single track with Fiala tyres {seen}"
         return f"not better than a single track with Fiala tyres {seen}"

@@ -229,7 +229,7 @@ def _templates() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["verdict"] = verdict_sign
+    environment.filters |= {"verdict": verdict_sign, "minus": with_minus}
     environment.globals |= {"style": style(), "program": f"yawbench {versions()['yawbench']}", "now": now}
     return environment
 
@@ -237,6 +237,11 @@ def _templates() -> Environment:
 def style() -> Markup:
     """Return the style sheet shared by all pages with text."""
     return Markup(static("page.css"))
+
+
+def with_minus(text: str) -> str:
+    """Return a text with a minus before its negative numbers; a hyphen is shorter, and ends a line."""
+    return re.sub(r"(?<![^\s(])-(?=\.?\d)", "−", text)
 
 
 def verdict_sign(word: str) -> Markup:

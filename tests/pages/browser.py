@@ -36,9 +36,11 @@ class Browser:
 
     def __init__(self, driver: Any) -> None:
         self.driver = driver
+        self.width = DESK
 
     def open(self, file: Path, *, width: int = DESK, height: int = 900, calm: bool = True) -> None:
         """Open a page in a window of that size; `calm`: the reader has asked for less motion."""
+        self.width = width
         metrics = {"width": width, "height": height, "deviceScaleFactor": 2, "mobile": width < 600}
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
         wish = {"name": "prefers-reduced-motion", "value": "reduce" if calm else "no-preference"}
@@ -69,8 +71,11 @@ class Browser:
         return self.run("return performance.getEntriesByType('resource').map((entry) => entry.name)")
 
     def overflow(self) -> float:
-        """Return by how many pixels the page is wider than the window."""
-        return self.run("return document.documentElement.scrollWidth - window.innerWidth")
+        """Return by how many pixels the page is wider than its window was made.
+
+        `innerWidth` tells nothing: on a phone it grows with a page that is too wide.
+        """
+        return self.run("return document.documentElement.scrollWidth") - self.width
 
 
 class Firefox:

@@ -10,6 +10,9 @@ from pathlib import Path
 from .browser import Browser
 
 CUT = """
+const scrolls = (e) => ['auto', 'scroll'].includes(getComputedStyle(e).overflowX);
+const boxed = (e) => e !== document.body && (scrolls(e) || boxed(e.parentElement));
+const edge = document.documentElement.clientWidth + 1;
 const hidden = (e) => e.closest('thead') && getComputedStyle(e.closest('thead')).position === 'absolute';
 return [...document.querySelectorAll('body *')].filter((e) => {
   const box = e.getBoundingClientRect();
@@ -19,7 +22,7 @@ return [...document.querySelectorAll('body *')].filter((e) => {
   const shortened = style.textOverflow === 'ellipsis' && e.title;
   const clips = ['hidden', 'clip'].includes(style.overflowX) && !shortened;
   const clipped = clips && e.scrollWidth > e.clientWidth + 1;
-  return box.right > innerWidth + 1 || box.left < -1 || clipped;
+  return (!boxed(e.parentElement) && (box.right > edge || box.left < -1)) || clipped;
 }).map((e) => `${e.tagName} ${e.className}: ${e.textContent.trim().slice(0, 60)}`);
 """
 OVERLAPPING = """

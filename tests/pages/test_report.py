@@ -16,6 +16,7 @@ from orchestrator.cli import main
 from orchestrator.errors import ScenarioError
 from orchestrator.experiments.experiment import found_studies, load_experiment
 from orchestrator.experiments.verdict_tables import share
+from orchestrator.pages.page_parts import with_minus
 from tests.orchestrator.recorded import record_text
 from tests.sentences import golden, golden_in, refused
 
@@ -114,9 +115,9 @@ def test_every_claim_stands_beside_what_was_measured_with_its_verdict(paper):
         says, measured, verdict = (" ".join(cell.text_content().split()) for cell in row)
         conditions = texts(row, "details li")
         assert says.startswith(claim["says"])
-        assert all(" ".join(number.split()) in measured for number in claim["measured"])
+        assert all(" ".join(number.split()) in measured.replace("−", "-") for number in claim["measured"])
         assert conditions == [" ".join(condition.split()) for condition in claim["holds_if"]]
-        assert f"{claim['verdict']} margin {share(claim['margin'])}" in verdict
+        assert with_minus(f"{claim['verdict']} margin {share(claim['margin'])}") in verdict
 
 
 def test_every_fmu_is_named_with_its_whole_hash(paper):

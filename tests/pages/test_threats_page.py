@@ -50,9 +50,9 @@ def test_it_keeps_its_budget_and_can_be_read_by_everyone(chromium: Browser, page
 def test_every_level_is_on_the_page_and_counts_are_those_of_its_tables(published, page):
     tree = html.fromstring(unpacked(page))
     entries = published.complete[published.threats.main]
-    settings = tree.xpath("//h2[@id='settings']/following-sibling::details[following::h2[@id='cars']]")
+    settings = tree.xpath("//h2[@id='settings']/following-sibling::details[following::h2[@id='disciplines']]")
     assert len(settings) == len(compared_settings(published)) > 0
-    folded = tree.xpath("//h2[@id='cars']/following-sibling::details/template/table")
+    folded = tree.xpath("//h2[@id='cars']/following-sibling::details/template//table")
     assert len(folded) == len(published.threats.threats_in(published.threats.main))
     assert all(len(table.xpath("tbody/tr")) == len(entries) for table in folded)
     scores = scored(published)
