@@ -31,8 +31,8 @@ from pathlib import Path
 from typing import Any
 
 from .errors import Diagnostic, ModelDescriptionError, RecordWarning
-from .files import fcntl, open_regular, write_whole
 from .messages import listed, short
+from .safe_files import fcntl, open_regular, write_whole
 
 _PLAIN_PATH = re.compile(r"[A-Za-z0-9_.~/\\: -]+")
 KEEP_DAYS = 60

@@ -21,7 +21,7 @@ import time
 from collections.abc import Callable
 from typing import Any, ClassVar
 
-from .processes import Child, how_it_ended
+from .fork_server import Child, how_it_ended
 
 ANSWER = 0x7F
 """Largest byte that is an answer by itself."""

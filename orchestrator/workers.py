@@ -22,8 +22,8 @@ from dataclasses import fields
 from typing import Any, NamedTuple, TypeVar
 
 from .errors import RecordWarning, YawbenchError
+from .fork_server import ServedChild, start
 from .plan import Fmu
-from .processes import ServedChild, start
 from .supervised_process import LOOK_EVERY, REPLY, REQUEST, PipeChannel, ProcessLost, SupervisedProcess
 
 T = TypeVar("T")

@@ -23,8 +23,8 @@ from orchestrator.master.process_state import OK, WARNING, Log
 from orchestrator.master.step_loop import Master
 from orchestrator.master.step_program import SeriesFeed
 from orchestrator.messages import hint, short
-from orchestrator.names import SignalName
 from orchestrator.plan import Plan
+from orchestrator.signals_and_targets import SignalName
 
 from ._controller import PythonComponent
 from ._scenario import Scenario

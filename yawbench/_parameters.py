@@ -21,8 +21,8 @@ import numpy as np
 from components.fmi.component import Component
 from components.fmi.variables import VariableSpec, parameter, parameter_class
 from orchestrator.messages import short
-from orchestrator.names import SETTINGS
 from orchestrator.plan import Value
+from orchestrator.signals_and_targets import SETTINGS
 
 from . import arguments
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from components.fmi.component import Component
 from orchestrator.errors import ScenarioError
-from orchestrator.experiments.execution import Executor
+from orchestrator.experiments.executor import Executor
 from orchestrator.experiments.jobs import Job, OnOutcome, Outcome, run_job
 from orchestrator.experiments.ranking import CONTROLLER, EntrySpec, load_ranking
 from orchestrator.experiments.ranking_scores import RankingResult, run_ranking

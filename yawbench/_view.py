@@ -9,12 +9,12 @@ from pathlib import Path
 
 from orchestrator.errors import ResultsError
 from orchestrator.figures.style import LabelledRun
-from orchestrator.files import reason, write_whole
 from orchestrator.messages import counted, listed
 from orchestrator.metrics.expressions import columns_of
 from orchestrator.pages.page_parts import packed
 from orchestrator.pages.viewer import SETTINGS, Settings, page
 from orchestrator.pages.viewer import View as Selection
+from orchestrator.safe_files import reason, write_whole
 
 from . import arguments
 from ._run import Run

@@ -13,7 +13,6 @@ from orchestrator.evaluation.standard_tests import TestName
 from orchestrator.evaluation.validation import ComparedTest, CrossPlot
 from orchestrator.fault_kinds import Fault, FaultList, FaultLocation, FaultName, FaultySignal
 from orchestrator.metrics.verdict import Relation, Status
-from orchestrator.names import SignalName, Target, TargetKind
 from orchestrator.plan import (
     BuildInfo,
     Causality,
@@ -36,6 +35,7 @@ from orchestrator.plan import (
 )
 from orchestrator.results.reader import Results
 from orchestrator.results.run_record import RunRecord
+from orchestrator.signals_and_targets import SignalName, Target, TargetKind
 
 from ._controller import ControllerLike, Numbers
 

@@ -16,8 +16,8 @@ from orchestrator.experiments import ranking as ranking
 from orchestrator.experiments import schema as experiment
 from orchestrator.experiments import threats as threats
 from orchestrator.fault_kinds import KINDS, FaultLocation
-from orchestrator.names import SignalName, Target
 from orchestrator.scenario import schema as scenario
+from orchestrator.signals_and_targets import SignalName, Target
 
 from .text import NOTE, cell, code, docstring, table
 

@@ -16,11 +16,11 @@ from .options import CHANGES, MAKING, RunOptions, named, takes
 from .progress import executor_of, hold, pooled, print_tables, say, say_failed, stoppable
 
 if TYPE_CHECKING:
+    from ..experiments.cases_to_jobs import PlannedExperiment
     from ..experiments.dry_run import Forecast, Pace
-    from ..experiments.execution import Executor
+    from ..experiments.executor import Executor
     from ..experiments.experiment import LoadedExperiment
     from ..experiments.experiment_result import Each, ExperimentResult
-    from ..experiments.plan_experiment import PlannedExperiment
     from ..figures.style import LabelledRun
     from ..pages.viewer import View
 
@@ -115,7 +115,7 @@ def _over_region(
     planned: PlannedExperiment, findings: ExperimentResult, execute: Executor
 ) -> ExperimentResult:
     """Return the findings with the verdicts over the region added; the journal has the runs already made."""
-    from ..experiments.execution import left_to_do
+    from ..experiments.executor import left_to_do
     from ..experiments.open_value_regions import judge_region, next_jobs, plan_region
 
     plan = plan_region(planned, execute.folder, planner=execute.planner)
@@ -150,7 +150,7 @@ def chapter_of(
     **more: Any,
 ) -> dict[str, Any]:
     """Return the template data of an experiment's page in its folder; `more`: further data."""
-    from ..pages.report import chapter
+    from ..pages.study_page import chapter
     from ..results.freshness import staleness
     from ..results.run_folder import RUN_FILE
 
@@ -180,8 +180,8 @@ def command_of(preset: str, path: Path, *, quick: bool = False, **options: Itera
 
 def write_page(facts: dict[str, Any], folder: Path) -> Path:
     """Write the page of an experiment into its folder; return its path."""
-    from ..pages.page_parts import save_page
-    from ..pages.report import PAGE, study_page
+    from ..pages.page_parts import PAGE, save_page
+    from ..pages.study_page import study_page
 
     page = folder / PAGE
     save_page(page, study_page(facts))
@@ -198,8 +198,8 @@ def write_overview(chapters: Sequence[dict[str, Any]], pages: Sequence[Path], fo
     """Write the overview of several experiments into a folder; return its path."""
     import os
 
-    from ..pages.page_parts import save_page
-    from ..pages.report import PAGE, RANKING, overview_page
+    from ..pages.overview_page import overview_page
+    from ..pages.page_parts import PAGE, RANKING, save_page
 
     def address(page: Path) -> str:
         return Path(os.path.relpath(page, folder)).as_posix()
@@ -376,9 +376,9 @@ def tune(context: typer.Context, file: TuningFile, options: RunOptions, seed: Tu
         with_seed,
     )
     from ..figures.style import save
-    from ..files import write_whole
     from ..pages.page_parts import image_of
     from ..results.run_folder import default_folder
+    from ..safe_files import write_whole
 
     experiment = load_experiment(file, changes=options.changes)
     folder = options.out or default_folder(file, options.changes)

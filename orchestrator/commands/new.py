@@ -196,7 +196,7 @@ def write_new(files: dict[PurePosixPath, str], folder: Path, *, also: Iterable[P
 
 def write_schemas(files: Iterable[PurePosixPath], folder: Path) -> None:
     """Write the JSON Schemas that YAML files below `folder` name in their first line."""
-    from ..files import write_whole
+    from ..safe_files import write_whole
     from .schema import schema_text
 
     for path in files:

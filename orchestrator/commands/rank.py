@@ -73,7 +73,7 @@ def rank(
     from ..experiments.ranking_scores import run_ranking
     from ..experiments.ranking_tables import columns_of_entries, table_of
     from ..experiments.tables import records_in
-    from ..pages.report import PAGE
+    from ..pages.page_parts import PAGE
     from ..results.run_folder import default_folder
     from ..scenario import yaml_lines
 
@@ -130,11 +130,10 @@ def _rank_by_threats(
     from ..experiments.threat_runs import run_threats, table_of_levels, table_of_quantities
     from ..experiments.threat_scores import scored, table_of_scores
     from ..experiments.threats import load_threats
-    from ..files import write_whole
-    from ..pages.page_parts import save_page
-    from ..pages.report import PAGE
+    from ..pages.page_parts import PAGE, save_page
     from ..pages.threats_page import main_table, threats_page
     from ..results.run_folder import default_folder
+    from ..safe_files import write_whole
 
     threats = load_threats(file, more=more, quick=quick)
     _check("--only", "entry", only, threats.ranking.entries)
@@ -196,10 +195,9 @@ def _write(ranked: RankingResult, folder: Path, command: str, each: Each) -> Non
     )
     from ..experiments.tables import to_csv
     from ..figures.style import save
-    from ..files import write_whole
-    from ..pages.page_parts import save_page
+    from ..pages.page_parts import PAGE, save_page
     from ..pages.ranking_page import ranking_page
-    from ..pages.report import PAGE
+    from ..safe_files import write_whole
 
     for name, columns in (
         ("table", columns_of_entries),

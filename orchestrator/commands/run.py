@@ -266,9 +266,9 @@ def converge(
     )
     from ..experiments.tables import to_csv
     from ..figures.style import save
-    from ..files import write_whole
     from ..pages.page_parts import image_of
     from ..results.run_folder import default_folder
+    from ..safe_files import write_whole
 
     for name in algorithm or ():
         if name not in ALGORITHMS:

@@ -19,7 +19,7 @@ from .progress import executor_of, hold, say, stoppable
 
 if TYPE_CHECKING:
     from ..evaluation.trace import Trace
-    from ..experiments.execution import Executor
+    from ..experiments.executor import Executor
     from ..experiments.experiment import NamedRun
     from ..experiments.jobs import Job
     from ..plan import Override
@@ -260,10 +260,10 @@ class EvaluatedRuns:
             together: write figures into the folder instead of next to the results.
         """
         from ..experiments.verdict_tables import run_table, runs_table
-        from ..files import write_whole
         from ..messages import counted
         from ..pages.evaluation_page import evaluation_page
         from ..pages.page_parts import save_page
+        from ..safe_files import write_whole
         from .progress import print_tables, say
 
         drawn = self._draw(each=each, together=together)

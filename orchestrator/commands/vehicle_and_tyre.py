@@ -60,13 +60,13 @@ def vehicle(
     frequency and damping over speed.
     """
     from ..errors import ScenarioError
-    from ..planner import Planner
+    from ..load_and_plan import Planner
     from ..results.run_folder import below_results
     from ..scenario import find_and_load, yaml_lines
     from ..scenario.schema import Vehicle
     from ..scenario.schema_validation import validate
     from ..vehicles.handling import TestTrack, draw_cars, fitting_plant, handling_of
-    from ..wiring.warnings import suspicious_vehicle
+    from ..wiring.suspicious_values import suspicious_vehicle
     from .progress import print_tables, save_figure, say
 
     file = find_and_load.find(file, "a vehicle file")

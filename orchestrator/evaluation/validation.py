@@ -34,13 +34,13 @@ from vocabulary.signals import SIGNALS
 
 from ..errors import Diagnostic, ResultsError, ScenarioError, code_of, warnings_in
 from ..figures.style import CHANGED, frame, line_style, new_figure, shown_unit
-from ..files import reads
 from ..measured.measurement import Measurement
 from ..measured.segment import Segment
 from ..messages import counted, hint
 from ..metrics.measures import words
 from ..metrics.verdict import Verdict, apart, compare, not_judged, worst
 from ..results.reader import Results
+from ..safe_files import reads
 from ..scenario import find_and_load, yaml_lines
 from ..scenario.quantities import convert
 from ..scenario.schema_validation import StrictModel, validate

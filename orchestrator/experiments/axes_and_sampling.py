@@ -18,13 +18,13 @@ import numpy as np
 from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, WithJsonSchema, model_validator
 
 from ..messages import short
-from ..names import INPUTS, OF_RUN, VEHICLE, Target
 from ..plan import Override, OverrideOrigin, Value
 from ..scenario import overrides, yaml_lines
 from ..scenario.fault_schema import FaultSpec, by_location
 from ..scenario.quantities import parse_unit
 from ..scenario.schema import AlgorithmName, Scalar
 from ..scenario.schema_validation import StrictModel, Time, exactly_one
+from ..signals_and_targets import INPUTS, OF_RUN, VEHICLE, Target
 from .claim_schema import LEVELS as VALUES
 from .claim_schema import Number, Patterns, is_finite, text_of
 

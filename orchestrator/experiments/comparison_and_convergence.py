@@ -27,12 +27,12 @@ from ..figures.style import QUIET, frame, line_style, new_figure
 from ..messages import changed, with_changes
 from ..metrics.expressions import MetricValue, metric
 from ..metrics.measures import variable_of, words
-from ..names import SignalName
 from ..plan import Override
 from ..plan import Value as Plain
 from ..results.reader import Results
 from ..scenario.find_and_load import load_scenario
 from ..scenario.overrides import is_path, swap_of
+from ..signals_and_targets import SignalName
 from .claim_schema import text_of
 from .experiment import LoadedExperiment, NamedRun, experiment_of
 from .experiment_result import ExperimentResult

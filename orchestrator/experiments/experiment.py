@@ -16,14 +16,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import ScenarioError
-from ..files import reads
 from ..messages import hint, short
 from ..metrics.expressions import TimeWindow
-from ..names import Target
 from ..plan import Override, OverrideOrigin
+from ..safe_files import reads
 from ..scenario import find_and_load, overrides, yaml_lines
 from ..scenario.schema_validation import validate
 from ..scenario.yaml_lines import Document, KeyPath
+from ..signals_and_targets import Target
 from .axes_and_sampling import DesignAxisSpec, DesignPoint, changes_at, changes_of_file, points
 from .claim_schema import Claim, DerivedSpec, ValidationSpec
 from .jobs import TestRequest

@@ -17,9 +17,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..cache import KEY, changed_since, has_checksums, warn_of_record, with_checksums
 from ..errors import Diagnostic, ResultsError
-from ..files import open_own, reason, write_whole
 from ..messages import counted
 from ..results.run_record import EARLIER
+from ..safe_files import open_own, reason, write_whole
 from .jobs import MeasuredRun
 
 FILE = "runs.jsonl"

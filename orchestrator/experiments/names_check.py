@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from ..messages import hint
-from ..names import Target
 from ..scenario.yaml_lines import Document, KeyPath
+from ..signals_and_targets import Target
 from .axes_and_sampling import RUN, levels_of, names_of
 from .claim_schema import MetricReference, text_of
 from .published_tables import cells

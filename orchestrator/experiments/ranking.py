@@ -39,14 +39,14 @@ from ..errors import ResultsError, ScenarioError
 from ..evaluation.sine_with_dwell import AMPLITUDE, SIDES, amplitudes
 from ..evaluation.standard_tests import Evaluation, NotJudged
 from ..evaluation.steering_tests import characteristic_angle
-from ..files import reads
 from ..messages import hint
 from ..metrics.expressions import TimeWindow
-from ..names import Target
 from ..plan import Override, Plan
+from ..safe_files import reads
 from ..scenario import overrides, yaml_lines
 from ..scenario.schema import Scalar
 from ..scenario.schema_validation import StrictModel, Time, validate
+from ..signals_and_targets import Target
 from .axes_and_sampling import (
     DesignAxisSpec,
     Level,
@@ -56,7 +56,7 @@ from .axes_and_sampling import (
     changes_of_file,
 )
 from .claim_schema import text_of
-from .execution import Executor
+from .executor import Executor
 from .experiment import LoadedExperiment, NamedRun, experiment_of
 from .experiment_result import ExperimentResult
 from .standard_test_runs import slow_steer_amplitude

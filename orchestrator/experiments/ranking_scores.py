@@ -36,7 +36,7 @@ from .confidence import (
     percentile_bounds,
     shared_places,
 )
-from .execution import Executor
+from .executor import Executor
 from .experiment_result import ExperimentResult
 from .jobs import STEP_TIME, Job, MeasuredRun
 from .ranking import (

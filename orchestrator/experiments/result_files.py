@@ -14,11 +14,11 @@ from typing import Any
 
 from ..cache import changed_since, warn_of_record, with_checksums
 from ..errors import ResultsError
-from ..files import read_bytes, reason, write_whole
 from ..metrics.expressions import MetricValue, metric
 from ..metrics.measures import si
 from ..results.reader import Results
 from ..results.run_folder import LARGEST
+from ..safe_files import read_bytes, reason, write_whole
 from .claim_schema import si_number, text_of
 from .claims import ClaimResult, Region
 from .experiment_result import ExperimentResult, limits_of

@@ -12,12 +12,12 @@ from ..errors import ScenarioError
 from ..evaluation.sine_with_dwell import AMPLITUDE, SIDES
 from ..evaluation.standard_tests import Evaluation, SeriesRun, StandardTest
 from ..evaluation.trace import Trace, trace_of
-from ..names import Target
 from ..plan import Override, Plan
 from ..results.reader import load_results
 from ..scenario.find_and_load import LoadedScenario
 from ..scenario.quantities import convert
-from .execution import Executor, highest_passing, side_by_side
+from ..signals_and_targets import Target
+from .executor import Executor, highest_passing, side_by_side
 from .experiment import NamedRun
 from .jobs import Job, planned
 

@@ -14,13 +14,13 @@ import numpy as np
 
 from ..errors import ResultsError, ScenarioError
 from ..evaluation.sine_with_dwell import AMPLITUDE, amplitudes
-from ..files import reads
-from ..names import Target
 from ..plan import Instance, Override
+from ..safe_files import reads
 from ..scenario.overrides import setting as setting_of
 from ..scenario.quantities import convert
+from ..signals_and_targets import Target
 from .axes_and_sampling import DesignAxisSpec, Level, changes_of_file
-from .execution import Executor, Search, highest_passing, side_by_side
+from .executor import Executor, Search, highest_passing, side_by_side
 from .experiment import LoadedExperiment, NamedRun, experiment_of
 from .jobs import MeasuredRun
 from .ranking import CONTROLLER, RECORDED, SERIES, angle_experiment, angles_of

@@ -41,13 +41,13 @@ from pydantic import Field, model_validator
 
 from ..errors import ScenarioError
 from ..evaluation.sine_with_dwell import AMPLITUDE, SIDES, SPUN
-from ..files import reads
 from ..messages import hint
-from ..names import Target
 from ..plan import Override
+from ..safe_files import reads
 from ..scenario import yaml_lines
 from ..scenario.schema import Scalar
 from ..scenario.schema_validation import StrictModel, validate
+from ..signals_and_targets import Target
 from .axes_and_sampling import OverrideSpec, TargetText
 from .ranking import EntriesSpec, EntrySpec, LoadedRanking, load_ranking
 

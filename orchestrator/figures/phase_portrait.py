@@ -15,8 +15,8 @@ import numpy as np
 
 from ..metrics.expressions import columns_of, reference_of
 from ..metrics.measures import variable_of, words
-from ..names import VARIABLE
 from ..results.reader import Results
+from ..signals_and_targets import VARIABLE
 from .style import (
     LabelledRun,
     digits_of,

@@ -21,11 +21,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from vocabulary.units import SHOWN
 
 from ..errors import ResultsError
-from ..files import reason, write_whole
 from ..messages import cut, printable
 from ..metrics.measures import si_of, symbol, variable_of
 from ..results.measurement_results import MeasuredResults
 from ..results.reader import Results
+from ..safe_files import reason, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

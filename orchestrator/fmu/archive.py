@@ -33,9 +33,9 @@ from typing import Any
 
 from ..cache import KEEP_DAYS, cache_folders, content_of, hold
 from ..errors import ModelDescriptionError
-from ..files import PACKED, TooLargeError, check_archive, read_bytes, reason
 from ..messages import closest, listed
 from ..plan import Fmu
+from ..safe_files import PACKED, TooLargeError, check_archive, read_bytes, reason
 from . import description as fmu_description
 from .binary import binary_problem
 

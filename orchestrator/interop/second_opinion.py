@@ -21,8 +21,8 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import WiringError
+from ..fork_server import how_it_ended, python
 from ..plan import Plan
-from ..processes import how_it_ended, python
 from .masters import Recording, Request
 from .ssp_write import write_ssp
 

@@ -31,10 +31,10 @@ from lxml import etree
 from lxml.etree import SubElement, _Element
 
 from ..errors import ResultsError, WiringError
-from ..files import write_whole
 from ..fmu.archive import read_archive
 from ..messages import fold, listed, with_changes
 from ..plan import Fmu, Instance, Plan, Value, Variable, Wire
+from ..safe_files import write_whole
 from ..scenario.quantities import BASE_UNITS, Unit, measure_of
 from ..scenario.ssp_archive import (
     DESCRIPTION_FILE,
@@ -51,7 +51,7 @@ from ..scenario.ssp_archive import (
     SSD,
     SSV,
 )
-from ..wiring.compatibility import conversion_between
+from ..wiring.unit_and_type_checks import conversion_between
 
 _FILE_TIME = (1980, 1, 1, 0, 0, 0)
 

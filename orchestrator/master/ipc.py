@@ -35,7 +35,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..errors import Diagnostic, Interrupted, YawbenchError
-from ..processes import Child, die_with_parent, prctl
+from ..fork_server import Child, die_with_parent, prctl
 from ..supervised_process import LOG, PipeChannel, ProtocolError, SupervisedProcess
 from .process_state import KEPT, Log
 

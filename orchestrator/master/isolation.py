@@ -21,9 +21,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..errors import SimulationError, YawbenchError
+from ..fork_server import start
 from ..interrupts import stop_requested_at
 from ..plan import Instance, Plan, Value, ValueRef
-from ..processes import start
 from ..supervised_process import ANSWER, FAILED, LOG, REPLY, REQUEST, PipeChannel, ProcessLost
 from .fmi import INSTANCE_TYPES, open_instance
 from .instance import Buffers, CtypesInstance, ExperimentSetup, FmuInstance, Status, StepCalls

@@ -73,7 +73,7 @@ def simulate(
     before the instances are terminated and freed.
 
     Args:
-        plan: made by `wiring.make_plan`.
+        plan: made by `wiring.wire_instances`.
         out: folder of the results; made if it does not exist.
         progress: called with the number of communication points done and their total.
         opener: creates the instances; tests pass their own.

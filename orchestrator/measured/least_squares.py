@@ -33,7 +33,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from ..files import write_whole
+from ..safe_files import write_whole
 
 PIECE = 5.0
 """Duration of a piece [s]; chosen: longer than a bend, ten times a correlation of 0.5 s."""

@@ -46,13 +46,13 @@ from vocabulary.vehicle import CAR
 from vocabulary.wheels import wheels
 
 from ..errors import Diagnostic, InvalidValueError, Location, ScenarioError, code_of
-from ..files import reads
 from ..messages import hint, listed
+from ..safe_files import reads
 from ..scenario import yaml_lines
 from ..scenario.quantities import convert, measure_of, parse_unit
 from ..scenario.schema_validation import StrictModel, quantities_in, text_in_unit, validate
 from ..scenario.yaml_lines import Document, KeyPath
-from .columns import (
+from .recording_formats import (
     SECOND,
     ColumnFile,
     FileColumn,

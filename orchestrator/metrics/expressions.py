@@ -29,9 +29,9 @@ from vocabulary.wheels import WHEELS, wheels
 
 from ..errors import ScenarioError
 from ..messages import closest, fold, hint, listed, short
-from ..names import VARIABLE, SignalName
 from ..plan import SENSING
 from ..scenario.quantities import convert
+from ..signals_and_targets import VARIABLE, SignalName
 from .measures import MEASURES, Measure, si_of, symbol, variable_of, words
 
 if TYPE_CHECKING:

@@ -19,8 +19,8 @@ import numpy as np
 from vocabulary.signals import SIGNALS
 from vocabulary.wheels import WHEEL_NAMES
 
-from ..names import SignalName
 from ..scenario.quantities import conversion, measure_of, parse_unit
+from ..signals_and_targets import SignalName
 
 SETTLING_BAND = 0.05
 """Half-width of the band of a settled signal, relative to the reference's peak."""

@@ -21,9 +21,9 @@ from ..figures.style import LabelledRun, digits_of, shown, shown_unit
 from ..messages import changed, counted, star
 from ..metrics.expressions import MetricValue, metric
 from ..metrics.measures import variable_of
-from ..names import SignalName
 from ..results.reader import Results
 from ..results.run_record import RunRecord
+from ..signals_and_targets import SignalName
 from .viewer import View
 
 SAME = 1e-9

@@ -29,7 +29,6 @@ from vocabulary.wheels import WHEEL_NAMES, WHEELS
 
 from ..experiments.tables import Table
 from ..experiments.verdict_tables import FAILS, HOLDS, NOT_JUDGED, SENSITIVE, UNDECIDED
-from ..files import write_whole
 from ..messages import fold, printable
 from ..metrics.verdict import Status
 from ..plan import (
@@ -49,9 +48,14 @@ from ..plan import (
 from ..results.freshness import versions
 from ..results.reader import Results
 from ..results.run_record import NOT_RECORDED, RunRecord
+from ..safe_files import write_whole
 
 CURLY = str.maketrans("'\"", "’”")
 """Typographic quotes for text, so that straight ones occur only in the markup."""
+PAGE = "report.html"
+"""File name of the page of a study, a ranking or several studies."""
+RANKING = Path("results/proving_ground/ranking", PAGE)
+"""Default path of the ranking's page."""
 
 
 def address_of(svg: str) -> Markup:

@@ -31,11 +31,11 @@ from urllib.parse import parse_qs, quote, unquote, urlsplit
 
 from ..errors import ResultsError, YawbenchError
 from ..figures.style import LabelledRun
-from ..files import NO_FOLLOW
 from ..messages import changed_each, printable
 from ..results.file_formats import FILES
 from ..results.reader import FoundRun, found_runs, load_results
 from ..results.run_folder import RUN_FILE
+from ..safe_files import NO_FOLLOW
 from ..scenario import find_and_load
 from .page_parts import render
 from .sliders import Bench, Superseded, wanted_of

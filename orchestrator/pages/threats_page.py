@@ -27,8 +27,7 @@ from ..experiments.threat_scores import (
 from ..experiments.threats import LANE_CHANGE, REFERENCE, LoadedThreats, SearchPlace, ThreatSpec
 from ..figures.style import digits_of, shown_unit
 from ..messages import counted, in_text
-from .page_parts import render
-from .report import PAGE, RANKING
+from .page_parts import PAGE, RANKING, render
 
 RULE = (
     "Score: the geometric mean of the highest levels survived, over threats and cars, each threat's range "

@@ -24,13 +24,13 @@ from markupsafe import Markup
 from ..errors import ResultsError
 from ..figures.panels import spans_of
 from ..figures.style import LINES, MEASURED_LINE, LabelledRun, digits_apart, line_style, shown, shown_unit
-from ..files import write_whole
 from ..messages import listed
 from ..metrics.expressions import MetricValue, columns_of, evaluate, metric, reference_of
 from ..metrics.measures import words
 from ..results.measurement_results import MeasuredResults
 from ..results.reader import Results
 from ..results.run_folder import RunStatus
+from ..safe_files import write_whole
 from .page_parts import document, render, static
 from .road import legend_of, notes_of, road_of, without_tyres
 from .viewer_data import PackedRun, is_numeric, pack

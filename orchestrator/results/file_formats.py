@@ -26,8 +26,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from ..errors import ResultsError, ScenarioError
-from ..files import open_regular
 from ..messages import hint, short
+from ..safe_files import open_regular
 
 if TYPE_CHECKING:
     import numpy as np

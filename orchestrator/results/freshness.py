@@ -22,8 +22,8 @@ from typing import Any
 from ..cache import OF_RESULTS, checksum, sources_hash
 from ..errors import ResultsError
 from ..fmu.binary import runs_as
-from ..names import SignalName
 from ..plan import DEFAULT, Fmu, InputSeries, Instance, Plan, ValueSource, Wire
+from ..signals_and_targets import SignalName
 from .reader import load_results
 from .run_folder import RUN_FILE, RunStatus, is_dead
 from .run_record import (

@@ -19,10 +19,10 @@ import numpy as np
 
 from ..cache import checksum
 from ..errors import ResultsError
-from ..files import check_regular, reads, reason
 from ..messages import fold, listed, short
-from ..names import SignalName
+from ..safe_files import check_regular, reads, reason
 from ..scenario.quantities import conversion, measure_of
+from ..signals_and_targets import SignalName
 from .file_formats import FILES, source_of
 from .run_folder import (
     PART,

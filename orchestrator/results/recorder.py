@@ -22,8 +22,8 @@ import numpy as np
 
 from ..cache import checksum, shown
 from ..errors import ResultsError
-from ..files import reason, write_whole
 from ..plan import Value
+from ..safe_files import reason, write_whole
 from .file_formats import RESULTS_FILE, plain, recorder_of, rows_text
 from .reader import Results
 from .run_folder import PART, RUN_FILE, FolderLock, put_in_place, tidy

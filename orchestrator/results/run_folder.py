@@ -37,7 +37,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ResultsError, ScenarioError
-from ..files import (
+from ..messages import cut
+from ..plan import Override, Value
+from ..safe_files import (
     LOCK_FILE,
     NEW,
     claim,
@@ -48,8 +50,6 @@ from ..files import (
     refuse_link,
     refuse_links_within,
 )
-from ..messages import cut
-from ..plan import Override, Value
 from .file_formats import FILES, RESULTS_FILE
 
 RUN_FILE = "run.json"

@@ -27,10 +27,10 @@ from vocabulary.roles import role_of
 
 from ..cache import KEY, changed_since, warn_of_record, with_checksums
 from ..errors import Diagnostic, Location, ResultsError, Severity, warnings_in
-from ..files import read_bytes, reading, reason
 from ..messages import short
-from ..names import SignalName
 from ..plan import NEUTRAL, Override, OverrideOrigin, SourceKind, ValueSource
+from ..safe_files import read_bytes, reading, reason
+from ..signals_and_targets import SignalName
 from .file_formats import FILES, RESULTS_FILE
 from .run_folder import FAILED, LARGEST, RUN_FILE, RunStatus, refuse_dead
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..cache import KEY, checksum
 from ..errors import ResultsError
-from ..files import open_own, reason, write_whole
+from ..safe_files import open_own, reason, write_whole
 from .file_formats import FILES, RESULTS_FILE, CsvFile
 from .run_folder import (
     PART,

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ScenarioError
-from ..files import TEXT, read_bytes, reads
 from ..messages import hint, listed, short
 from ..plan import Override
+from ..safe_files import TEXT, read_bytes, reads
 from . import overrides, quantities, schema_validation, yaml_lines
 from .schema import Connection, LoadedScenario, ScenarioSpec, Vehicle, endpoint
 from .schema_validation import KINDS

@@ -21,8 +21,8 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 from ..errors import Diagnostic, Location, ScenarioError, Severity
-from ..files import TEXT, read_bytes, reads, reason
 from ..messages import listed, short
+from ..safe_files import TEXT, read_bytes, reads, reason
 
 Side = Literal["LEFT", "RIGHT"]
 SIDES: tuple[Side, ...] = ("LEFT", "RIGHT")

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import Diagnostic, Location, ScenarioError
-from ..files import TEXT, read_bytes, reason
 from ..messages import closest, listed, short, unprintable
 from ..plan import Override
+from ..safe_files import TEXT, read_bytes, reason
 
 MOST_ERRORS = 200
 """Maximum number of reported errors of a file. Chosen: users check again before correcting more."""

@@ -16,14 +16,21 @@ from graphlib import CycleError
 from itertools import pairwise
 
 from ..messages import fold, hint, listed
-from ..names import SignalName, matching
 from ..plan import Variable, Wire
 from ..scenario.find_and_load import Connection
 from ..scenario.yaml_lines import KeyPath, dotted
-from .compatibility import DIFFERENCES, alike, contradicts_its_name, conversion_between, difference, fits
+from ..signals_and_targets import SignalName, matching
 from .constants import Constant, Input
-from .context import WiringContext
+from .facts_and_state import WiringContext
 from .order import in_order
+from .unit_and_type_checks import (
+    DIFFERENCES,
+    alike,
+    contradicts_its_name,
+    conversion_between,
+    difference,
+    fits,
+)
 
 
 class Connector:

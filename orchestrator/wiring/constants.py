@@ -11,19 +11,19 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InvalidValueError, ScenarioError, code_of, text_of
 from ..messages import fold, hint
-from ..names import SignalName
 from ..plan import InputSeries, Value, ValueOrigin, Variable
 from ..scenario.find_and_load import LoadedScenario
 from ..scenario.quantities import measure_of
 from ..scenario.schema import SeriesSpec
 from ..scenario.yaml_lines import KeyPath
-from .context import WiringContext, facts_of
+from ..signals_and_targets import SignalName
+from .facts_and_state import WiringContext, facts_of
 from .parameters import origin, value_for
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from ..measured.columns import FileColumn
+    from ..measured.recording_formats import FileColumn
 
 Input = tuple[str, str]  # instance, variable
 
@@ -153,8 +153,12 @@ def _series_reader(scenario: LoadedScenario) -> Reader:
     The reader raises ValueError if the file or a column is missing or unusable, the unit is incompatible, or
     the times do not cover the run.
     """
-    from ..measured.columns import ColumnFile, numbers_in, reading_series  # NumPy takes long to import
     from ..measured.measurement import ENDINGS, Measurement, load_measurement
+    from ..measured.recording_formats import (  # NumPy takes long to import
+        ColumnFile,
+        numbers_in,
+        reading_series,
+    )
 
     @cache
     def opened(file: str) -> ColumnFile | Measurement:
@@ -195,7 +199,7 @@ def _values(column: FileColumn, name: str, variable: Variable) -> np.ndarray:
     """Convert the values of a column to the type and unit of a variable."""
     import numpy as np
 
-    from ..measured.columns import numbers_in
+    from ..measured.recording_formats import numbers_in
 
     if variable.type == "Real":
         wanted = measure_of(variable.unit, variable.definition)

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 
 from ..fault_kinds import KINDS, Fault, FaultLocation, FaultySignal
 from ..messages import fold, hint, listed
-from ..names import match, matching
 from ..plan import Variable, Wire
 from ..scenario.find_and_load import LoadedScenario
 from ..scenario.quantities import convert
 from ..scenario.yaml_lines import KeyPath, dotted
-from .context import WiringContext
+from ..signals_and_targets import match, matching
+from .facts_and_state import WiringContext
 
 
 def faults_of(

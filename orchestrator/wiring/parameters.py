@@ -19,16 +19,16 @@ from vocabulary.patches import patches_of
 from vocabulary.vehicle import CAR
 
 from ..errors import code_of
-from ..files import TEXT, read_bytes
 from ..fmu.binary import integer_limits
 from ..messages import closest, fold, hint, listed, short
 from ..plan import DEFAULT, LITERATURE, VARIED, Fmu, OriginKind, Value, ValueOrigin, ValueSource, Variable
+from ..safe_files import TEXT, read_bytes
 from ..scenario import quantities
 from ..scenario.find_and_load import LoadedScenario
 from ..scenario.schema import TextSpec
 from ..scenario.yaml_lines import Document, KeyPath
-from .context import WiringContext, facts_of
 from .derivations import CarQuantities, car_of, contradictions
+from .facts_and_state import WiringContext, facts_of
 
 STIFFNESSES = ("cornering_stiffness_front", "cornering_stiffness_rear")
 STATIC_LOADS = ("static_load_front", "static_load_rear")

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from fmus.build import find_recipes
 from orchestrator.commands.build import build
 from orchestrator.errors import BuildError
-from orchestrator.files import claim
+from orchestrator.safe_files import claim
 from tests.sentences import golden, golden_in
 
 APP = typer.Typer()

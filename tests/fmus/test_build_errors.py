@@ -14,7 +14,7 @@ from fmus import check
 from fmus.build import COMPONENTS, build_all, build_component
 from fmus.check import defects
 from orchestrator.errors import BuildError, ModelDescriptionError
-from orchestrator.fmu.opener import Opener, host_needs
+from orchestrator.fmu.find_and_open import Opener, host_needs
 from tests.fmus.bare import Fmu, Unit
 from tests.orchestrator.fake_fmus import make_fmu
 from tests.sentences import golden, golden_in, refused, texts_of
@@ -318,7 +318,7 @@ def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path, monkeypatch):
     def refuse(*args, **kwargs):
         raise PermissionError(13, "Permission denied", str(tmp_path))
 
-    monkeypatch.setattr("orchestrator.files.claim", refuse)
+    monkeypatch.setattr("orchestrator.safe_files.claim", refuse)
     with pytest.raises(BuildError) as caught:
         build_all(tmp_path, components=["tyre_linear"], force=True)
     assert golden(texts_of(caught.value))

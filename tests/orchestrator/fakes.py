@@ -10,8 +10,8 @@ from typing import Any
 from orchestrator.fault_kinds import FaultySignal
 from orchestrator.master.instance import ExperimentSetup, FmuInstance, StepCalls
 from orchestrator.master.process_state import ERROR, OK, Log
-from orchestrator.names import SignalName
 from orchestrator.plan import Fmu, Instance, Plan, ValueRef, Variable, Wire
+from orchestrator.signals_and_targets import SignalName
 
 
 class Behaviour:

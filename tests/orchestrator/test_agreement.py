@@ -8,8 +8,8 @@ import pytest
 
 from orchestrator.errors import WiringError, warnings_in
 from orchestrator.scenario.find_and_load import load_scenario
-from orchestrator.wiring.make_plan import make_plan
-from orchestrator.wiring.warnings import seen_as
+from orchestrator.wiring.suspicious_values import seen_as
+from orchestrator.wiring.wire_instances import make_plan
 from tests.changed import changed
 from tests.sentences import golden, refused
 from vocabulary.wheels import WHEELS

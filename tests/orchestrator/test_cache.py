@@ -11,8 +11,8 @@ import pytest
 
 from orchestrator.cache import cache_folder, keep, recall
 from orchestrator.cli import main
-from orchestrator.files import write_whole
 from orchestrator.fmu.archive import open_fmu
+from orchestrator.safe_files import write_whole
 from tests.sentences import golden, golden_in, refused
 
 from .fake_fmus import make_fmu

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from orchestrator import files
+from orchestrator import safe_files
 from orchestrator.cache import KEEP_DAYS, cache_folder
 from orchestrator.errors import ModelDescriptionError
 from orchestrator.fmu import archive as fmu_archive
@@ -249,10 +249,10 @@ def test_an_archive_that_reaches_out_of_its_folder_is_refused(name: str, tmp_pat
     assert not list(tmp_path.rglob("evil.txt"))
 
 
-@pytest.mark.parametrize("nested", [files.DEPTH, files.DEPTH + 1, 1500])
+@pytest.mark.parametrize("nested", [safe_files.DEPTH, safe_files.DEPTH + 1, 1500])
 def test_folders_in_each_other_are_unpacked_up_to_a_depth(nested: int, tmp_path: Path, cache: Path) -> None:
     path = make_fmu(tmp_path / "a.fmu", files={f"{'d/' * nested}x": b"here"})
-    if nested <= files.DEPTH:
+    if nested <= safe_files.DEPTH:
         assert next(open_fmu(path).directory.rglob("x")).read_bytes() == b"here"
     else:
         assert golden(problem(path))
@@ -424,7 +424,7 @@ def test_an_archive_that_unpacks_without_limit_is_refused_before_it_is_unpacked(
 ) -> None:
     path = make_fmu(tmp_path / "bomb.fmu", files={"resources/zeros": bytes(3_000_000)})
     assert path.stat().st_size < 10_000
-    monkeypatch.setattr(files, "UNPACKED", 2_000_000)
+    monkeypatch.setattr(safe_files, "UNPACKED", 2_000_000)
     monkeypatch.setattr(zipfile.ZipFile, "read", lambda *_: pytest.fail("a member was unpacked"))
     with refused(ModelDescriptionError, "fmu-damaged"):
         open_fmu(path)
@@ -432,7 +432,7 @@ def test_an_archive_that_unpacks_without_limit_is_refused_before_it_is_unpacked(
 
 @pytest.mark.usefixtures("cache")
 def test_an_archive_of_very_many_files_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(files, "MEMBERS", 20)
+    monkeypatch.setattr(safe_files, "MEMBERS", 20)
     path = make_fmu(tmp_path / "many.fmu", files={f"resources/{i}": b"" for i in range(20)})
     with refused(ModelDescriptionError, "fmu-damaged"):
         open_fmu(path)

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from orchestrator import supervised_process
+from orchestrator.fork_server import Child
 from orchestrator.master import isolation
 from orchestrator.master.isolation import InstanceProcess
 from orchestrator.master.process_state import Log
-from orchestrator.processes import Child
 from orchestrator.results.reader import load_results
 from orchestrator.supervised_process import FAILED, LOG, REPLY, PipeChannel, ProcessLost, ProtocolError
 from tests.sentences import golden_in

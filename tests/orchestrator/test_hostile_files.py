@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator import files
+from orchestrator import safe_files
 from orchestrator.cli import main
 from orchestrator.commands.check import show
 from orchestrator.commands.progress import print_tables, say
@@ -19,12 +19,12 @@ from orchestrator.experiments.experiment import LoadedExperiment, load_experimen
 from orchestrator.experiments.experiment_result import judge_results
 from orchestrator.experiments.schema import ExperimentSpec
 from orchestrator.experiments.tables import Table
-from orchestrator.files import reading
-from orchestrator.pages.report import chapter, study_page
+from orchestrator.pages.study_page import chapter, study_page
+from orchestrator.safe_files import reading
 from orchestrator.scenario import yaml_lines
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.scenario.overrides import read_changes
-from orchestrator.wiring.make_plan import make_plan
+from orchestrator.wiring.wire_instances import make_plan
 from tests.sentences import golden, golden_in, places_of, refused, texts_of
 
 from .fake_fmus import Var, make_fmu
@@ -260,7 +260,7 @@ def test_a_bad_address_in_an_ssp_archive_is_refused_with_its_line() -> None:
 
 
 def test_an_ssp_archive_that_unpacks_without_limit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(files, "UNPACKED", 1_000_000)
+    monkeypatch.setattr(safe_files, "UNPACKED", 1_000_000)
     with zipfile.ZipFile("a.ssp", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("SystemStructure.ssd", bytes(3_000_000))
     with refused(ScenarioError, "file-unreadable"):

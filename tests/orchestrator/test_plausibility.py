@@ -13,9 +13,9 @@ import pytest
 from orchestrator.errors import Diagnostic, Location, warnings_in
 from orchestrator.experiments.tables import MARK, marked, remarks
 from orchestrator.metrics.plausibility import CHECKS, PlausibilityWatch
-from orchestrator.names import SignalName
 from orchestrator.plan import Fmu, Instance, Plan, Variable, Wire
 from orchestrator.results.run_record import RunRecord
+from orchestrator.signals_and_targets import SignalName
 from tests.sentences import golden
 from vocabulary.wheels import WHEELS
 

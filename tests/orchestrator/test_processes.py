@@ -12,8 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator import processes
-from orchestrator.processes import ForkServer, python, start
+from orchestrator.fork_server import ForkServer, python, start
 
 SCENARIO = "fuzzy_feedback/single_sine"
 SHADOWED = ("json", "numpy", "socket", "selectors", "struct", "signal", "pickle", "multiprocessing", "random")
@@ -100,7 +99,7 @@ def test_how_a_forked_process_ended_is_known(started, capfd):
 
 def test_a_server_that_is_killed_takes_its_children_along_and_is_replaced(started):
     started("pass")
-    server = processes._server
+    server = fork_server._server
     reading, writing = os.pipe()
     child = start("time", writing)  # `time` has no `main`
     assert child.collect() == 1
@@ -109,7 +108,7 @@ def test_a_server_that_is_killed_takes_its_children_along_and_is_replaced(starte
     assert waiting.ended(10)
     assert waiting.collect() == -signal.SIGKILL
     assert started(SAY, "say(1)") == ("1", 0)
-    assert processes._server is not server
+    assert fork_server._server is not server
     for descriptor in (reading, writing):
         os.close(descriptor)
 

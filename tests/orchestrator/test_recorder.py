@@ -11,13 +11,13 @@ import pytest
 from pydantic import BaseModel
 
 from orchestrator.errors import ResultsError, SimulationError
-from orchestrator.files import write_whole
 from orchestrator.master.simulate import simulate
 from orchestrator.results import file_formats
 from orchestrator.results import recorder as module
 from orchestrator.results.reader import load_results
 from orchestrator.results.recorder import BLOCK, Recorder
 from orchestrator.results.run_record import RunRecord
+from orchestrator.safe_files import write_whole
 from tests.sentences import golden, refused, texts_of
 
 from .fakes import Clock, Function, Stage, make_plan

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from orchestrator.errors import Diagnostic, ScenarioError
-from orchestrator.names import SignalName
 from orchestrator.scenario.find_and_load import ScenarioSpec, load_scenario
+from orchestrator.signals_and_targets import SignalName
 from tests.changed import changed
 from tests.sentences import golden, golden_in, places_of
 

@@ -16,12 +16,12 @@ from orchestrator.cli import main
 from orchestrator.errors import RecordWarning, ResultsError, YawbenchError
 from orchestrator.interop.ssp_write import write_ssp
 from orchestrator.master.simulate import simulate
-from orchestrator.measured.columns import ColumnFile
+from orchestrator.measured.recording_formats import ColumnFile
 from orchestrator.plan import InputSeries, Plan
 from orchestrator.results.freshness import staleness
 from orchestrator.results.reader import load_results
 from orchestrator.scenario.find_and_load import load_scenario
-from orchestrator.wiring.make_plan import make_plan
+from orchestrator.wiring.wire_instances import make_plan
 from tests.sentences import golden, golden_in, refused, texts_of
 from vocabulary.wheels import WHEELS
 

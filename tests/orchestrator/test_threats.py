@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import ScenarioError
-from orchestrator.experiments.execution import side_by_side
+from orchestrator.experiments.executor import side_by_side
 from orchestrator.experiments.threat_runs import RESOLUTION, Attempt, Survived, ThreatResult, _search
 from orchestrator.experiments.threat_scores import (
     compared_gains,

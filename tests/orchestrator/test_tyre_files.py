@@ -12,17 +12,17 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.errors import ScenarioError, WiringError, warnings_in
+from orchestrator.experiments.cases_to_jobs import plan_experiment
 from orchestrator.experiments.experiment import load_experiment
-from orchestrator.experiments.plan_experiment import plan_experiment
 from orchestrator.interop.ssp_write import write_ssp
-from orchestrator.names import Target
 from orchestrator.pages.page_parts import groups_of
 from orchestrator.results.freshness import key_of, run_record
 from orchestrator.results.reader import load_results
 from orchestrator.results.run_folder import default_folder
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.scenario.overrides import changes_of, read_changes
-from orchestrator.wiring.make_plan import make_plan
+from orchestrator.signals_and_targets import Target
+from orchestrator.wiring.wire_instances import make_plan
 from tests.changed import changed
 from tests.sentences import golden, golden_in, refused, texts_of
 

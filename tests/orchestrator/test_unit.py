@@ -13,9 +13,9 @@ from orchestrator.errors import ModelDescriptionError, SimulationError
 from orchestrator.master.fmi import open_instance
 from orchestrator.master.isolation import Isolation
 from orchestrator.master.simulate import simulate
-from orchestrator.names import SignalName
 from orchestrator.plan import Fmu, Instance, Plan, Variable, Wire
 from orchestrator.results.reader import load_results
+from orchestrator.signals_and_targets import SignalName
 from tests.sentences import golden, golden_in, refused
 
 HERE = Path(__file__).parent

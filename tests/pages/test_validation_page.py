@@ -17,7 +17,7 @@ from orchestrator.experiments.experiment_result import judge_results
 from orchestrator.metrics.verdict import apart
 from orchestrator.pages.evaluation_page import validation_page, validation_sentence
 from orchestrator.pages.page_parts import save_page
-from orchestrator.pages.report import chapter, study_page
+from orchestrator.pages.study_page import chapter, study_page
 from tests.commands import status_of
 from tests.orchestrator.recorded import write as write_run
 from tests.orchestrator.test_validation import line, write, write_study

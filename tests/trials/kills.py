@@ -24,9 +24,9 @@ from pathlib import Path
 
 from fmus.build import build_all
 from orchestrator.errors import ResultsError
-from orchestrator.files import LOCK_FILE, NEW
 from orchestrator.results.reader import load_results
 from orchestrator.results.run_folder import PART, RUN_FILE
+from orchestrator.safe_files import LOCK_FILE, NEW
 from tests.orchestrator.test_batch_commands import SCENARIO, STUDY, UNITS
 from tests.orchestrator.test_ranking import SMALL
 from tests.orchestrator.test_tuning import SCENARIO as WHEEL

@@ -33,10 +33,10 @@ from typing import Any
 import yawbench as yb
 from orchestrator.cli import main as yawbench
 from orchestrator.errors import YawbenchError
-from orchestrator.files import LOCK_FILE
 from orchestrator.messages import printable
 from orchestrator.results.file_formats import FILES
 from orchestrator.results.recorder import write_results
+from orchestrator.safe_files import LOCK_FILE
 from tests.orchestrator import recorded
 from tests.trees import snapshot
 

@@ -1,6 +1,4 @@
-"""State shared by all steps of wiring: the scenario, its opened FMUs, errors and notes so far.
-
-Also *facts*, values that reach all instances which need them.
+"""Facts, values that reach all instances that need them; the state of a wiring: FMUs, errors, notes so far.
 
     friction: 0.65         # every parameter `base_friction` of a road, and every input `friction`,
                            # `friction_fl` .. `friction_rr` that no wire drives
@@ -8,7 +6,8 @@ Also *facts*, values that reach all instances which need them.
 
 In a scenario file, a value given by its own name takes precedence over a fact; as an override
 (`--set friction=0.3`), a fact takes precedence over the file, so that one override reaches all instances. To
-add a fact, add a row to `FACTS`, its name to `names.FACTS`, and a key to the schema of scenarios.
+add a fact, add a row to `FACTS`, its name to `signals_and_targets.FACTS`, and a key to the schema of
+scenarios.
 """
 
 from __future__ import annotations
@@ -21,11 +20,11 @@ from vocabulary.wheels import WHEELS, wheels
 
 from ..errors import Diagnostic, Severity, WiringError
 from ..messages import fold_sentences
-from ..names import FACTS as NAMES
-from ..names import match, matching
 from ..plan import Fmu, Instance, Value, ValueOrigin, Variable
 from ..scenario.find_and_load import LoadedScenario
 from ..scenario.yaml_lines import MOST_ERRORS, Document, KeyPath
+from ..signals_and_targets import FACTS as NAMES
+from ..signals_and_targets import match, matching
 
 
 @dataclass(frozen=True)
@@ -118,7 +117,7 @@ class WiringContext:
         """Return whether a replaced FMU of one of the instances has such a variable.
 
         Args:
-            units: names of the instances.
+            instances: their names.
             pattern: of the variable's name.
             causality: of the variable; None: any.
         """

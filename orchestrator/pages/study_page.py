@@ -1,8 +1,6 @@
-"""The page of an experiment, a single HTML file, and the overview of several.
+"""The page of an experiment, a single HTML file.
 
-A page has the verdicts, runs, system, tables and parameters of an experiment, and how to repeat it. The
-overview has the verdicts of all experiments, each with a link to its page; a click on a claim loads its runs
-from a side file.
+It has the verdicts, runs, system, tables and parameters of the experiment, and how to repeat it.
 """
 
 from __future__ import annotations
@@ -41,10 +39,10 @@ from ..experiments.verdict_tables import (
 )
 from ..figures.phase_portrait import signals_of
 from ..figures.style import LabelledRun
+from ..load_and_plan import Planner
 from ..messages import changed, counted, listed
 from ..metrics.expressions import evaluate, metric
 from ..plan import Plan
-from ..planner import Planner
 from ..results.freshness import run_record
 from ..results.measurement_results import filtered_alike
 from ..results.reader import Results
@@ -65,7 +63,6 @@ from .page_parts import (
 )
 from .sweep_view import sweep_sentence, sweep_view, write_sides
 from .viewer import (
-    DATA,
     LARGEST,
     MOST,
     PANELS,
@@ -76,8 +73,6 @@ from .viewer import (
     assets,
     carried,
     embedded,
-    tidy_sides,
-    write_side,
 )
 
 
@@ -222,23 +217,6 @@ def answer(findings: ExperimentResult) -> str:
     ]
     where = reach(findings)
     return f"Of {len(results)} {kind}, {listed(counts, last='and')}{f', {where}' if where else ''}."
-
-
-def of_all(chapters: Sequence[dict[str, Any]]) -> str:
-    """Return in a sentence how many claims of all studies hold; "" without claims."""
-    counts: Counter[str] = Counter()
-    for facts in chapters:
-        counts.update(facts["counts"])
-    if not counts:
-        return ""
-    parts = [f"{n} {word if n == 1 else SEVERAL.get(word, word)}" for word, n in counts.items()]
-    judged = [facts for facts in chapters if facts["counts"]]
-    alone = sum(not facts["region"] for facts in judged)
-    where = f", {'all' if alone == len(judged) else f'{alone} of the studies'} at the chosen point only"
-    return (
-        f"Of {sum(counts.values())} claims in {counted(len(judged), 'study', 'studies')}, {listed(parts)}"
-        f"{where if alone else ''}."
-    )
 
 
 def judged(result: ClaimResult) -> dict[str, Any]:
@@ -402,42 +380,13 @@ def grid_of_times(runs: Iterable[Results | Plan]) -> list[str]:
     return [f"{text} ({counted(count, 'run')})" for text, count in counts.items()]
 
 
-PAGE = "report.html"
-"""File name of the page."""
-RANKING = Path("results/proving_ground/ranking", PAGE)
-"""Default path of the ranking's page."""
-TITLE = "Yaw-stability control: what papers say, and what comes out"
-
-
 def study_page(facts: dict[str, Any]) -> str:
     """Return the page of an experiment."""
     content, scripts = facts["content"], ["sweep.js"] if facts["sweep"] else []
     return render(
-        "report.html.j2",
+        "study.html.j2",
         facts,
         viewer=embedded(content, VIEW) if content else None,
         long=LONG,
         assets=assets(*scripts) if content or scripts or facts["validations"] else "",
     )
-
-
-def overview_page(
-    chapters: Sequence[dict[str, Any]], pages: Sequence[str], folder: Path, ranking: str = ""
-) -> str:
-    """Return the page on several experiments; write side files with their runs.
-
-    Args:
-        chapters: of the experiments.
-        pages: their addresses.
-        folder: of the overview.
-        ranking: address of the ranking's page; "": there is none.
-    """
-    shown = {facts["id"]: facts["content"] for facts in chapters if facts["content"]}
-    for key, content in shown.items():
-        write_side(folder, key, content)
-    tidy_sides(folder, shown.keys())
-    return render(
-        "overview.html.j2", title=TITLE, chapters=[*zip(chapters, pages, strict=True)], ranking=ranking,
-        answer=of_all(chapters), folder=DATA, first=next(iter(shown), ""), frame=embedded(None, VIEW),
-        assets=assets("chooser.js"),
-    )  # fmt: skip

@@ -25,8 +25,8 @@ from vocabulary.signals import SignalEntry
 
 from ..cache import changed_since, has_checksums, warn_of_record
 from ..errors import ScenarioError
-from ..files import read_bytes, reading, reason
 from ..messages import hint, listed
+from ..safe_files import read_bytes, reading, reason
 from ..scenario.quantities import Unit, gain_and_offset, meant_unit, measure_of, spellings
 
 LARGEST = 1_000_000_000

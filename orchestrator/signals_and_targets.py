@@ -19,7 +19,7 @@ TIMES = ("start_time", "stop_time", "step_size")
 OF_RUN = (*TIMES, "algorithm")
 """Override targets that concern the whole run, not an instance."""
 FACTS = ("friction", "speed")
-"""Override targets that reach all instances with a matching input or parameter (see `wiring.context`)."""
+"""Override targets that reach all instances with such an input or parameter: `wiring.facts_and_state`."""
 VEHICLE = "vehicle"
 """Override target of the vehicle file, and prefix of its parameters."""
 INPUTS = "inputs"
