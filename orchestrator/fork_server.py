@@ -1,4 +1,6 @@
-"""Child processes that search for modules where this process does, and run nothing of the working folder.
+"""Start of child processes: programs of their own, and quick copies from a fork server.
+
+They search for modules where this process does, and run nothing of the working folder.
 
 `python` is the command line of a program of its own, which imports everything anew. `start` has a fork
 server, which has imported the modules already, copy itself in milliseconds. That of multiprocessing would run

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator import fork_server
 from orchestrator.fork_server import ForkServer, python, start
 
 SCENARIO = "fuzzy_feedback/single_sine"
