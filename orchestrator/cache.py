@@ -204,7 +204,7 @@ def _hash(content: bytes) -> bytes:
 
 
 OF_RESULTS = (
-    *("signals_and_targets.py", "plan.py", "coupling_algorithms.py", "fault_kinds.py"),
+    *("signal_names.py", "plan.py", "coupling_algorithms.py", "fault_kinds.py"),
     *("scenario", "fmu", "wiring", "master", "results", "tyre_stand.py"),
 )
 """Modules and packages on which the results of a run depend; FMUs are hashed separately."""

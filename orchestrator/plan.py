@@ -19,7 +19,7 @@ from vocabulary.roles import role_of
 from .errors import Diagnostic, Location
 from .fault_kinds import FaultList, FaultySignal
 from .messages import cut
-from .signals_and_targets import SignalName, Target
+from .signal_names import SignalName, Target
 
 Causality = Literal[
     "parameter", "input", "output", "local", "independent", "calculatedParameter", "structuralParameter"

@@ -16,14 +16,14 @@ import numpy as np
 
 from .errors import ScenarioError
 from .figures.style import QUIET, ROW, frame, line_style, new_figure
-from .fmu.find_and_open import Opener, find_fmu, find_folder
+from .fmu.opener import Opener, find_fmu, find_folder
 from .master.simulate import simulate_in_memory
 from .messages import listed
 from .plan import Fmu, InputSeries, Instance, Plan, Value
 from .scenario.find_and_load import load_scenario
 from .scenario.overrides import is_path
-from .signals_and_targets import SignalName
-from .wiring.wire_instances import make_plan
+from .signal_names import SignalName
+from .wiring.make_plan import make_plan
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

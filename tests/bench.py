@@ -34,7 +34,7 @@ from orchestrator.master.step_loop import Master
 from orchestrator.master.step_program import Operation
 from orchestrator.plan import Plan
 from orchestrator.scenario.find_and_load import load_scenario
-from orchestrator.wiring.wire_instances import make_plan
+from orchestrator.wiring.make_plan import make_plan
 
 DEFAULT = Path(__file__).parents[1] / "scenarios" / "fnn_sideslip" / "25mps.yaml"
 REPEATS = 3
@@ -204,7 +204,7 @@ def imports() -> float:
     """Return the time [s] to import what a run needs, in a fresh interpreter."""
     code = (
         "import time; t = time.perf_counter(); import orchestrator.cli, orchestrator.master.simulate, "
-        "orchestrator.wiring.wire_instances; print(time.perf_counter() - t)"
+        "orchestrator.wiring.make_plan; print(time.perf_counter() - t)"
     )
     command = [sys.executable, "-c", code]
     return min(float(subprocess.run(command, capture_output=True, check=True).stdout) for _ in range(REPEATS))

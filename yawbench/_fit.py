@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from orchestrator.experiments.fit import load_fit
 from orchestrator.experiments.fit_result import FitResult, FittedModel, make_fit
-from orchestrator.load_and_plan import Planner
+from orchestrator.planner import Planner
 
 from . import arguments
 from ._progress import bar

@@ -24,7 +24,7 @@ from orchestrator.master.step_loop import Master
 from orchestrator.master.step_program import SeriesFeed
 from orchestrator.messages import hint, short
 from orchestrator.plan import Plan
-from orchestrator.signals_and_targets import SignalName
+from orchestrator.signal_names import SignalName
 
 from ._controller import PythonComponent
 from ._scenario import Scenario

@@ -22,7 +22,7 @@ from components.fmi.component import Component
 from components.fmi.variables import VariableSpec, parameter, parameter_class
 from orchestrator.messages import short
 from orchestrator.plan import Value
-from orchestrator.signals_and_targets import SETTINGS
+from orchestrator.signal_names import SETTINGS
 
 from . import arguments
 

@@ -8,10 +8,10 @@ from typing import Any
 
 from orchestrator.errors import YawbenchError
 from orchestrator.experiments.jobs import Job, Outcome, execute
-from orchestrator.load_and_plan import Planner
 from orchestrator.master.fmi import open_instance
 from orchestrator.master.process_state import Log
 from orchestrator.plan import Instance
+from orchestrator.planner import Planner
 
 from ._controller import PythonComponent
 

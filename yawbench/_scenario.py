@@ -20,16 +20,16 @@ from orchestrator.errors import (
     warnings_in,
 )
 from orchestrator.fault_kinds import FaultList, FaultName
-from orchestrator.load_and_plan import Planner
 from orchestrator.master.process_state import Log
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.messages import hint, short
 from orchestrator.plan import Instance, Override, Plan, Value
+from orchestrator.planner import Planner
 from orchestrator.scenario import find_and_load
 from orchestrator.scenario.overrides import faults_at, setting
 from orchestrator.scenario.schema import LoadedScenario
-from orchestrator.signals_and_targets import Target
-from orchestrator.wiring.facts_and_state import FACTS
+from orchestrator.signal_names import Target
+from orchestrator.wiring.context import FACTS
 from vocabulary.roles import role_of
 from vocabulary.vehicle import CAR
 

@@ -35,7 +35,7 @@ from orchestrator.plan import (
 )
 from orchestrator.results.reader import Results
 from orchestrator.results.run_record import RunRecord
-from orchestrator.signals_and_targets import SignalName, Target, TargetKind
+from orchestrator.signal_names import SignalName, Target, TargetKind
 
 from ._controller import ControllerLike, Numbers
 

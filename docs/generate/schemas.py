@@ -17,7 +17,7 @@ from orchestrator.experiments import schema as experiment
 from orchestrator.experiments import threats as threats
 from orchestrator.fault_kinds import KINDS, FaultLocation
 from orchestrator.scenario import schema as scenario
-from orchestrator.signals_and_targets import SignalName, Target
+from orchestrator.signal_names import SignalName, Target
 
 from .text import NOTE, cell, code, docstring, table
 

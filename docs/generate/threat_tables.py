@@ -9,12 +9,7 @@ from typing import NamedTuple
 from orchestrator.experiments.confidence import percentile_bounds
 from orchestrator.experiments.ranking_tables import gains_sentence, gains_table, seeds_table
 from orchestrator.experiments.threat_runs import ThreatResult, published_result
-from orchestrator.experiments.threat_scores import (
-    ScoreTable,
-    compared_gains,
-    resampled_scores,
-    scored,
-)
+from orchestrator.experiments.threat_scores import ScoreTable, compared_gains, resampled_scores, scored
 from orchestrator.experiments.threats import REFERENCE, load_threats
 from orchestrator.messages import listed
 from orchestrator.pages import threats_page

@@ -14,18 +14,7 @@ from . import ir
 from .built_in import BuiltIn
 from .evaluate import DEEPEST, Call
 from .statements import EXIT, ON, RESULT, RETURN
-from .values import (
-    ANY,
-    Bound,
-    Closure,
-    Dict,
-    Failure,
-    Frame,
-    Instance,
-    Picked,
-    Refused,
-    Union,
-)
+from .values import ANY, Bound, Closure, Dict, Failure, Frame, Instance, Picked, Refused, Union
 
 
 class Calling(BuiltIn):

@@ -12,19 +12,7 @@ from .merge import items_of
 from .read import kinds_within, names_within
 from .shapes import Memo, Shape, Widening, build, numbers_of, shape_of, types_of
 from .statements import CONTINUE, EXIT, ON, OVER, RESULT, RETURN, Execution
-from .values import (
-    RESIZED,
-    UNSET,
-    Box,
-    Bytes,
-    Each,
-    List,
-    Refused,
-    Ring,
-    Span,
-    now,
-    same,
-)
+from .values import RESIZED, UNSET, Box, Bytes, Each, List, Refused, Ring, Span, now, same
 
 UNROLLED = 16
 """Passes up to which a loop over a range is written out; chosen: four wheels, seven sets."""

@@ -10,20 +10,7 @@ from typing import Any
 from . import ir
 from .evaluate import Call, Evaluation
 from .lower import OPERATORS
-from .values import (
-    Box,
-    Closure,
-    Dict,
-    Each,
-    Frame,
-    List,
-    Picked,
-    Refused,
-    Ring,
-    Union,
-    is_number,
-    is_plain,
-)
+from .values import Box, Closure, Dict, Each, Frame, List, Picked, Refused, Ring, Union, is_number, is_plain
 
 BINARY = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "//", ast.Mod: "%", ast.Pow: "**",

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from ..fmu.find_and_open import PackagedComponent
+from ..fmu.opener import PackagedComponent
 from .options import RunOptions, plan_of_scenario, takes
 from .progress import say
 
@@ -43,7 +43,7 @@ def build(components: Components = None, out: BuildFolder = None, force: Force =
 
     from orchestrator.messages import hint
 
-    from ..fmu.find_and_open import hidden, packaged, packaged_components
+    from ..fmu.opener import hidden, packaged, packaged_components
 
     known = find_recipes()
     named = [*(components or ())]
@@ -180,7 +180,7 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
         signals_table,
         units_table,
     )
-    from ..fmu.find_and_open import hidden
+    from ..fmu.opener import hidden
     from ..results.reader import found_runs
     from ..scenario import find_and_load
     from .progress import print_tables
@@ -221,7 +221,7 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
 
 def _further_folders(*, build: bool) -> Sequence[Path]:
     """Return the folders of FMUs that the environment names, and those of packages, whose FMUs are built."""
-    from ..fmu.find_and_open import Opener, further_folders, packaged, packaged_components
+    from ..fmu.opener import Opener, further_folders, packaged, packaged_components
 
     opener = Opener(build=build)
     components = [component for name in packaged_components() if (component := packaged(name))]
@@ -235,7 +235,7 @@ def _folder_of_fmus(folder: Path | None) -> Path:
     from fmus.rebuild_stale import build_folder
 
     from ..errors import ModelDescriptionError
-    from ..fmu.find_and_open import HOME, Opener, find_folder
+    from ..fmu.opener import HOME, Opener, find_folder
 
     if folder is None:
         folder = find_folder(Path("here"), opener=Opener(build=True))

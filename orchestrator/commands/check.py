@@ -53,7 +53,7 @@ def check(scenario: ScenarioFile, options: RunOptions, all_: All = False) -> Non
 
 def _hidden(plan: Plan) -> list[Diagnostic]:
     """Return warnings of FMUs of packages that others hide, which a run does not look for."""
-    from ..fmu.find_and_open import hidden
+    from ..fmu.opener import hidden
 
     warnings = [
         warning
@@ -240,8 +240,8 @@ def _beside_tyres(plan: Plan) -> Iterable[Sequence[str]]:
     """Yield the deviation of stiffnesses stated for the axles from those of the scenario's tyres."""
     from ..errors import YawbenchError
     from ..tyre_stand import cornering_stiffness
+    from ..wiring.make_plan import TYRE_FORCES
     from ..wiring.parameters import STATIC_LOADS, STIFFNESSES, known_car
-    from ..wiring.wire_instances import TYRE_FORCES
 
     takers = _grouped(
         ((name, float(unit.parameters[name])), unit.name)
@@ -272,7 +272,7 @@ def _idle(plan: Plan) -> list[str]:
 
 def _matters(unit: Instance, name: str) -> bool:
     """Return whether a default is worth showing: it concerns the car, its speed or the road."""
-    from ..wiring.facts_and_state import FACTS
+    from ..wiring.context import FACTS
     from ..wiring.suspicious_values import OF_CAR
 
     return name in OF_CAR or any(name in fact.inputs or fact.counts(unit, name) for fact in FACTS.values())

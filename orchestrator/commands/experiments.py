@@ -16,11 +16,11 @@ from .options import CHANGES, MAKING, RunOptions, named, takes
 from .progress import executor_of, hold, pooled, print_tables, say, say_failed, stoppable
 
 if TYPE_CHECKING:
-    from ..experiments.cases_to_jobs import PlannedExperiment
     from ..experiments.dry_run import Forecast, Pace
     from ..experiments.executor import Executor
     from ..experiments.experiment import LoadedExperiment
     from ..experiments.experiment_result import Each, ExperimentResult
+    from ..experiments.plan_experiment import PlannedExperiment
     from ..figures.style import LabelledRun
     from ..pages.viewer import View
 

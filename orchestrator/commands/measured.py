@@ -15,8 +15,8 @@ from .progress import hold, print_tables, say, stoppable
 if TYPE_CHECKING:
     from ..experiments.fit_result import FitResult
     from ..experiments.tables import Table
-    from ..load_and_plan import Planner
     from ..measured.measurement import Measurement
+    from ..planner import Planner
 
 MeasuredAction = Annotated[Literal["show"], typer.Argument(help="show: examine the recording.")]
 MeasurementFile = Annotated[Path, typer.Argument(metavar="FILE", help="Measurement file.")]
@@ -152,10 +152,10 @@ def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
 
     from ..experiments.fit import load_fit
     from ..experiments.fit_result import make_fit
-    from ..load_and_plan import Planner
     from ..measured.least_squares import CONVERGED
     from ..pages.fit_page import fit_page, parameter_table, score_table
     from ..pages.page_parts import save_page
+    from ..planner import Planner
     from ..results.run_folder import default_folder
     from ..safe_files import write_whole
 
@@ -186,7 +186,7 @@ def vehicle_text(result: FitResult, folder: Path, planner: Planner) -> str:
     import os
 
     from ..experiments.fit import MEASURED
-    from ..signals_and_targets import Target
+    from ..signal_names import Target
 
     fit, model = result.fit, result.scenario
     scenario = planner.load(fit.scenario)

@@ -260,7 +260,7 @@ def plan_of_scenario(scenario: Path, options: RunOptions) -> Plan:
     Raises:
         YawbenchError: the scenario, an option or an FMU is invalid, or a component cannot be built.
     """
-    from ..load_and_plan import Planner
+    from ..planner import Planner
 
     planner = Planner(build=options.build)
     loaded = planner.load(scenario, options.changes, validate=not options.no_validate)

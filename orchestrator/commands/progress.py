@@ -21,10 +21,10 @@ from . import output
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..experiments.cases_to_jobs import PlannedExperiment
     from ..experiments.executor import Executor
     from ..experiments.experiment_result import Each
     from ..experiments.jobs import Job, Outcome
+    from ..experiments.plan_experiment import PlannedExperiment
     from ..experiments.tables import Table
     from .options import RunOptions
 
@@ -136,7 +136,7 @@ class Terminal:
 
     def planned(self, planned: PlannedExperiment) -> None:
         """Print which FMUs are out of date."""
-        from ..fmu.find_and_open import stale_fmus
+        from ..fmu.opener import stale_fmus
 
         for note in map(str, stale_fmus(planned.fmus.values())):
             if note not in self.noted:
@@ -171,7 +171,7 @@ def executor_of(
         of_jobs: fields of all jobs in place of the options'.
     """
     from ..experiments.executor import Executor, runner_of
-    from ..load_and_plan import Planner
+    from ..planner import Planner
 
     runner = None if options.no_run else runner_of(options.jobs, options.scheduler)
     planner = Planner(build=options.build)

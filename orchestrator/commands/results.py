@@ -42,8 +42,8 @@ def recorded(sources: Sequence[Path], options: RunOptions) -> list[Path]:
     """
     from ..errors import ScenarioError
     from ..experiments.jobs import Job, execute, ready
-    from ..fmu.find_and_open import stale_fmus
-    from ..load_and_plan import Planner
+    from ..fmu.opener import stale_fmus
+    from ..planner import Planner
     from ..results.freshness import staleness
     from ..results.measurement_results import is_measurement, segments_of
     from ..results.run_folder import default_folder

@@ -60,7 +60,7 @@ def vehicle(
     frequency and damping over speed.
     """
     from ..errors import ScenarioError
-    from ..load_and_plan import Planner
+    from ..planner import Planner
     from ..results.run_folder import below_results
     from ..scenario import find_and_load, yaml_lines
     from ..scenario.schema import Vehicle

@@ -24,7 +24,7 @@ from ..scenario.fault_schema import FaultSpec, by_location
 from ..scenario.quantities import parse_unit
 from ..scenario.schema import AlgorithmName, Scalar
 from ..scenario.schema_validation import StrictModel, Time, exactly_one
-from ..signals_and_targets import INPUTS, OF_RUN, VEHICLE, Target
+from ..signal_names import INPUTS, OF_RUN, VEHICLE, Target
 from .claim_schema import LEVELS as VALUES
 from .claim_schema import Number, Patterns, is_finite, text_of
 

@@ -20,7 +20,7 @@ from ..errors import ResultsError
 from ..figures.style import QUIET, line_style, literal, shown, shown_unit
 from ..metrics.expressions import MetricValue, metric
 from ..metrics.measures import variable_of, words
-from ..signals_and_targets import Target
+from ..signal_names import Target
 from .axes_and_sampling import RUN, Level, names_of
 from .claim_schema import si_number, text_of
 from .experiment import Case

@@ -32,7 +32,7 @@ from ..plan import Value as Plain
 from ..results.reader import Results
 from ..scenario.find_and_load import load_scenario
 from ..scenario.overrides import is_path, swap_of
-from ..signals_and_targets import SignalName
+from ..signal_names import SignalName
 from .claim_schema import text_of
 from .experiment import LoadedExperiment, NamedRun, experiment_of
 from .experiment_result import ExperimentResult

@@ -24,13 +24,13 @@ from ..plan import Plan
 from ..results.file_formats import expected_size, in_bytes
 from ..results.run_folder import RUN_FILE
 from .axes_and_sampling import VariantSpec
-from .cases_to_jobs import PlannedExperiment
 from .executor import Executor, left_to_do
 from .experiment import LoadedExperiment
 from .experiment_result import judge_records
 from .jobs import Job
 from .journal import records_in
 from .open_value_regions import RegionCell, plan_region
+from .plan_experiment import PlannedExperiment
 from .ranking import LoadedRanking, angle_experiment, angles_of, dwell_experiment
 from .tables import Table
 from .threat_runs import RESOLUTION, STEP

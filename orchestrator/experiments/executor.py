@@ -19,27 +19,17 @@ from typing import Any, Protocol, TypeVar
 
 from ..cache import warn_of_record
 from ..errors import ResultsError, ScenarioError
-from ..load_and_plan import Planner
 from ..metrics.expressions import metric, results_to_be, unit_in
 from ..plan import Plan
+from ..planner import Planner
 from ..results.freshness import altered, staleness
 from ..results.run_folder import RUN_FILE
 from ..workers import Pool
-from .cases_to_jobs import PlannedExperiment, plan_experiment
 from .experiment import Case, LoadedExperiment, NamedRun
 from .experiment_result import Each, ExperimentResult, judge_records, judge_results
-from .jobs import (
-    Job,
-    MeasuredRun,
-    MetricRequests,
-    OnOutcome,
-    Outcome,
-    execute,
-    pool_for,
-    read_back,
-    ready,
-)
+from .jobs import Job, MeasuredRun, MetricRequests, OnOutcome, Outcome, execute, pool_for, read_back, ready
 from .journal import Journal
+from .plan_experiment import PlannedExperiment, plan_experiment
 
 T = TypeVar("T")
 K = TypeVar("K")

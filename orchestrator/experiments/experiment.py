@@ -23,7 +23,7 @@ from ..safe_files import reads
 from ..scenario import find_and_load, overrides, yaml_lines
 from ..scenario.schema_validation import validate
 from ..scenario.yaml_lines import Document, KeyPath
-from ..signals_and_targets import Target
+from ..signal_names import Target
 from .axes_and_sampling import DesignAxisSpec, DesignPoint, changes_at, changes_of_file, points
 from .claim_schema import Claim, DerivedSpec, ValidationSpec
 from .jobs import TestRequest

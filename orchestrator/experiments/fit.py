@@ -36,13 +36,13 @@ from vocabulary.signals import SIGNALS
 from vocabulary.vehicle import CAR
 
 from ..errors import ScenarioError, YawbenchError, code_of, text_of
-from ..load_and_plan import Planner
 from ..measured.least_squares import Simulated, Window
 from ..measured.measurement import Measurement, load_measurement
 from ..measured.segment import LowPass, Segment
 from ..measured.single_track import start_states
 from ..messages import hint
 from ..plan import InputSeries, Instance, Override, Value, Variable
+from ..planner import Planner
 from ..results.freshness import key_of
 from ..safe_files import reads
 from ..scenario import yaml_lines
@@ -50,7 +50,7 @@ from ..scenario.quantities import convert, gain_and_offset, measure_of
 from ..scenario.schema import Scalar, SeriesSpec
 from ..scenario.schema_validation import Instant, StrictModel, Time, validate
 from ..scenario.yaml_lines import Document
-from ..signals_and_targets import INPUTS, SignalName, Target, match
+from ..signal_names import INPUTS, SignalName, Target, match
 from ..workers import Pool
 from .jobs import Job, execute
 

@@ -22,7 +22,6 @@ import numpy as np
 from vocabulary.signals import SIGNALS
 
 from ..errors import ScenarioError, code_of
-from ..load_and_plan import Planner
 from ..measured.least_squares import (
     CONFIDENCE,
     Estimate,
@@ -37,8 +36,9 @@ from ..measured.least_squares import (
 from ..measured.single_track import SIGNALS as OF_SINGLE_TRACK
 from ..measured.single_track import SingleTrack, SingleTrackWindow, start_states, typical_values
 from ..messages import hint
+from ..planner import Planner
 from ..scenario import yaml_lines
-from ..signals_and_targets import Target
+from ..signal_names import Target
 from ..workers import Pool
 from .fit import MARGIN, MEASURED, FitWindow, FreeSpec, LoadedFit, ScenarioModel, number_in
 from .jobs import NEEDED

@@ -26,10 +26,10 @@ from ..errors import (
     warnings_in,
 )
 from ..interrupts import StopFlag, interrupts
-from ..load_and_plan import Planner
 from ..messages import printable
 from ..metrics.expressions import evaluate, metric
 from ..plan import Override, Plan
+from ..planner import Planner
 from ..results.freshness import key_of
 from ..results.reader import Results, load_results
 from ..results.run_folder import RunStatus

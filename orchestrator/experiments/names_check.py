@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..messages import hint
 from ..scenario.yaml_lines import Document, KeyPath
-from ..signals_and_targets import Target
+from ..signal_names import Target
 from .axes_and_sampling import RUN, levels_of, names_of
 from .claim_schema import MetricReference, text_of
 from .published_tables import cells

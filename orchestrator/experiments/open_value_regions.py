@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Final
 
 from ..errors import Diagnostic, Location, ScenarioError
-from ..load_and_plan import Planner
 from ..messages import hint, listed
 from ..metrics.expressions import MetricValue
 from ..metrics.verdict import Verdict
 from ..plan import Override
 from ..plan import Value as Given
-from ..signals_and_targets import Target
+from ..planner import Planner
+from ..signal_names import Target
 from .axes_and_sampling import (
     Level,
     OpenValueSpec,
@@ -28,13 +28,13 @@ from .axes_and_sampling import (
     extended_hypercube,
     levels_of,
 )
-from .cases_to_jobs import PlannedExperiment, found_at, metrics_of, number_of
 from .claim_schema import Claim, MetricReference
 from .claims import ONE_IN, TIMES, ClaimResult, LevelVerdict, OpenValueScan, Region, judge
 from .confidence import Decision, SequentialTest
 from .experiment import RUNS, LoadedExperiment, NamedRun
 from .experiment_result import ExperimentResult, derive
 from .jobs import Job, MeasuredRun, keyed, ready
+from .plan_experiment import PlannedExperiment, found_at, metrics_of, number_of
 from .published_tables import ranked
 
 ORIGIN: Final = "region"

@@ -46,7 +46,7 @@ from ..safe_files import reads
 from ..scenario import overrides, yaml_lines
 from ..scenario.schema import Scalar
 from ..scenario.schema_validation import StrictModel, Time, validate
-from ..signals_and_targets import Target
+from ..signal_names import Target
 from .axes_and_sampling import (
     DesignAxisSpec,
     Level,

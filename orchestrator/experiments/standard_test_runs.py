@@ -16,7 +16,7 @@ from ..plan import Override, Plan
 from ..results.reader import load_results
 from ..scenario.find_and_load import LoadedScenario
 from ..scenario.quantities import convert
-from ..signals_and_targets import Target
+from ..signal_names import Target
 from .executor import Executor, highest_passing, side_by_side
 from .experiment import NamedRun
 from .jobs import Job, planned

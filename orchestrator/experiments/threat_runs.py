@@ -18,7 +18,7 @@ from ..plan import Instance, Override
 from ..safe_files import reads
 from ..scenario.overrides import setting as setting_of
 from ..scenario.quantities import convert
-from ..signals_and_targets import Target
+from ..signal_names import Target
 from .axes_and_sampling import DesignAxisSpec, Level, changes_of_file
 from .executor import Executor, Search, highest_passing, side_by_side
 from .experiment import LoadedExperiment, NamedRun, experiment_of

@@ -27,15 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import claim_schema
-from .confidence import (
-    CONFIDENCE,
-    DRAWS,
-    Bounds,
-    bootstrap,
-    pairs_apart,
-    percentile_bounds,
-    shared_places,
-)
+from .confidence import CONFIDENCE, DRAWS, Bounds, bootstrap, pairs_apart, percentile_bounds, shared_places
 from .tables import Table, column
 from .threat_runs import ThreatResult
 from .threats import REFERENCE

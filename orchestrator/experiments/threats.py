@@ -47,7 +47,7 @@ from ..safe_files import reads
 from ..scenario import yaml_lines
 from ..scenario.schema import Scalar
 from ..scenario.schema_validation import StrictModel, validate
-from ..signals_and_targets import Target
+from ..signal_names import Target
 from .axes_and_sampling import OverrideSpec, TargetText
 from .ranking import EntriesSpec, EntrySpec, LoadedRanking, load_ranking
 

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 from ..cache import checksums_of
 from ..errors import ScenarioError
 from ..metrics.expressions import MetricValue
-from ..signals_and_targets import Target
+from ..signal_names import Target
 from .axes_and_sampling import DesignAxisSpec, OverrideSpec, VariantSpec, level_at
 from .claims import MetricTable
 from .experiment import LoadedExperiment

@@ -16,7 +16,7 @@ import numpy as np
 from ..metrics.expressions import columns_of, reference_of
 from ..metrics.measures import variable_of, words
 from ..results.reader import Results
-from ..signals_and_targets import VARIABLE
+from ..signal_names import VARIABLE
 from .style import (
     LabelledRun,
     digits_of,

@@ -40,15 +40,15 @@ from typing import Any
 import numpy as np
 
 from ..interrupts import StopFlag
-from ..load_and_plan import Planner
 from ..master.fmi import open_instance
 from ..master.instance import FmuInstance
 from ..master.process_state import Log
 from ..master.step_loop import Master
 from ..plan import Override
+from ..planner import Planner
 from ..scenario import ssp_read
 from ..scenario.ssp_archive import PARAMETER_SET
-from ..signals_and_targets import SignalName
+from ..signal_names import SignalName
 
 
 @dataclass(frozen=True)

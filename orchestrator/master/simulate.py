@@ -11,14 +11,7 @@ from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
 
-from ..errors import (
-    Diagnostic,
-    Interrupted,
-    ResultsError,
-    ScenarioError,
-    SimulationError,
-    YawbenchError,
-)
+from ..errors import Diagnostic, Interrupted, ResultsError, ScenarioError, SimulationError, YawbenchError
 from ..interrupts import StopFlag, interrupts
 from ..messages import printable
 from ..metrics.plausibility import PlausibilityWatch
@@ -73,7 +66,7 @@ def simulate(
     before the instances are terminated and freed.
 
     Args:
-        plan: made by `wiring.wire_instances`.
+        plan: made by `wiring.make_plan`.
         out: folder of the results; made if it does not exist.
         progress: called with the number of communication points done and their total.
         opener: creates the instances; tests pass their own.

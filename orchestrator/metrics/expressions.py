@@ -31,7 +31,7 @@ from ..errors import ScenarioError
 from ..messages import closest, fold, hint, listed, short
 from ..plan import SENSING
 from ..scenario.quantities import convert
-from ..signals_and_targets import VARIABLE, SignalName
+from ..signal_names import VARIABLE, SignalName
 from .measures import MEASURES, Measure, si_of, symbol, variable_of, words
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from vocabulary.signals import SIGNALS
 from vocabulary.wheels import WHEEL_NAMES
 
 from ..scenario.quantities import conversion, measure_of, parse_unit
-from ..signals_and_targets import SignalName
+from ..signal_names import SignalName
 
 SETTLING_BAND = 0.05
 """Half-width of the band of a settled signal, relative to the reference's peak."""

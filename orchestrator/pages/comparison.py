@@ -23,7 +23,7 @@ from ..metrics.expressions import MetricValue, metric
 from ..metrics.measures import variable_of
 from ..results.reader import Results
 from ..results.run_record import RunRecord
-from ..signals_and_targets import SignalName
+from ..signal_names import SignalName
 from .viewer import View
 
 SAME = 1e-9

@@ -23,16 +23,16 @@ from vocabulary.vehicle import CAR
 from ..errors import Interrupted, ScenarioError, YawbenchError
 from ..experiments.jobs import LASTING, NEEDED, Job, execute, keyed, planned, recorded
 from ..figures.style import LabelledRun
-from ..fmu.find_and_open import find_folder
+from ..fmu.opener import find_folder
 from ..interrupts import StopFlag
-from ..load_and_plan import Planner
 from ..messages import hint, short
 from ..plan import Instance, Plan, Variable
+from ..planner import Planner
 from ..results.reader import Results
 from ..scenario import find_and_load
 from ..scenario.overrides import is_path, read_changes
 from ..scenario.schema import LoadedScenario
-from ..wiring.facts_and_state import FACTS
+from ..wiring.context import FACTS
 from ..workers import Pool, default_workers
 from .page_parts import render
 from .viewer import Settings, assets, viewer

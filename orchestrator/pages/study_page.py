@@ -39,10 +39,10 @@ from ..experiments.verdict_tables import (
 )
 from ..figures.phase_portrait import signals_of
 from ..figures.style import LabelledRun
-from ..load_and_plan import Planner
 from ..messages import changed, counted, listed
 from ..metrics.expressions import evaluate, metric
 from ..plan import Plan
+from ..planner import Planner
 from ..results.freshness import run_record
 from ..results.measurement_results import filtered_alike
 from ..results.reader import Results
@@ -51,29 +51,9 @@ from ..results.run_record import RunRecord, load_record
 from ..scenario.find_and_load import LoadedScenario
 from .diagram import diagram, systems_of
 from .evaluation_page import validation_facts
-from .page_parts import (
-    FigureImage,
-    anchor,
-    count_kinds,
-    fmus_of,
-    groups_of,
-    image_of,
-    programs_of,
-    render,
-)
+from .page_parts import FigureImage, anchor, count_kinds, fmus_of, groups_of, image_of, programs_of, render
 from .sweep_view import sweep_sentence, sweep_view, write_sides
-from .viewer import (
-    LARGEST,
-    MOST,
-    PANELS,
-    Carried,
-    Settings,
-    View,
-    answer_of,
-    assets,
-    carried,
-    embedded,
-)
+from .viewer import LARGEST, MOST, PANELS, Carried, Settings, View, answer_of, assets, carried, embedded
 
 
 def chapter(

@@ -23,7 +23,7 @@ from ..cache import OF_RESULTS, checksum, sources_hash
 from ..errors import ResultsError
 from ..fmu.binary import runs_as
 from ..plan import DEFAULT, Fmu, InputSeries, Instance, Plan, ValueSource, Wire
-from ..signals_and_targets import SignalName
+from ..signal_names import SignalName
 from .reader import load_results
 from .run_folder import RUN_FILE, RunStatus, is_dead
 from .run_record import (

@@ -22,22 +22,10 @@ from ..errors import ResultsError
 from ..messages import fold, listed, short
 from ..safe_files import check_regular, reads, reason
 from ..scenario.quantities import conversion, measure_of
-from ..signals_and_targets import SignalName
+from ..signal_names import SignalName
 from .file_formats import FILES, source_of
-from .run_folder import (
-    PART,
-    RUN_FILE,
-    RunStatus,
-    is_dead,
-    unfinished,
-)
-from .run_record import (
-    ConnectionRecord,
-    RunRecord,
-    check_record,
-    load_record,
-    warn_if_unchecked,
-)
+from .run_folder import PART, RUN_FILE, RunStatus, is_dead, unfinished
+from .run_record import ConnectionRecord, RunRecord, check_record, load_record, warn_if_unchecked
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from ..errors import Diagnostic, Location, ResultsError, Severity, warnings_in
 from ..messages import short
 from ..plan import NEUTRAL, Override, OverrideOrigin, SourceKind, ValueSource
 from ..safe_files import read_bytes, reading, reason
-from ..signals_and_targets import SignalName
+from ..signal_names import SignalName
 from .file_formats import FILES, RESULTS_FILE
 from .run_folder import FAILED, LARGEST, RUN_FILE, RunStatus, refuse_dead
 

@@ -4,7 +4,7 @@
     --set INSTANCE.PARAMETER=VALUE       a parameter of an instance
     --set vehicle.mass=1200              a parameter of the vehicle file, for all instances
     --set inputs.friction*=0.3           a constant
-    --set friction=0.3, speed=...        a fact (see `wiring.facts_and_state`)
+    --set friction=0.3, speed=...        a fact (see `wiring.context`)
     --set stop_time=2, step_size=..., algorithm=...     the run
     --set INSTANCE.step_size=0.01        the step of an instance
     --set INSTANCE.validate=false        accept an FMU with an invalid model description
@@ -30,7 +30,7 @@ from ..errors import Diagnostic, Location, ScenarioError
 from ..fault_kinds import WORDS, FaultList
 from ..messages import hint, listed
 from ..plan import Override, OverrideOrigin, Value
-from ..signals_and_targets import FACTS, FAULTS, INPUTS, OF_RUN, TYRES, VEHICLE, Target
+from ..signal_names import FACTS, FAULTS, INPUTS, OF_RUN, TYRES, VEHICLE, Target
 from . import yaml_lines
 from .fault_schema import location_of, parse_faults, read_line
 from .yaml_lines import Document, KeyPath

@@ -40,7 +40,7 @@ from vocabulary.vehicle import CAR
 from ..coupling_algorithms import ALGORITHMS
 from ..messages import listed, short
 from ..plan import Override, Value
-from ..signals_and_targets import RESERVED, SignalName
+from ..signal_names import RESERVED, SignalName
 from .fault_schema import FaultSpec
 from .schema_validation import Instant, OneOf, StrictModel, Time, in_unit
 from .tir import TyreFile

@@ -27,7 +27,7 @@ from lxml.etree import _Element
 
 from ..errors import Diagnostic, Location
 from ..messages import fold, listed
-from ..signals_and_targets import RESERVED
+from ..signal_names import RESERVED
 from .quantities import Unit, conversion
 from .ssp_archive import DESCRIPTION_FILE, OMS, OSP, OWN, SSD, SspArchive, SspError
 from .ssp_structure import (

@@ -19,18 +19,11 @@ from ..messages import fold, hint, listed
 from ..plan import Variable, Wire
 from ..scenario.find_and_load import Connection
 from ..scenario.yaml_lines import KeyPath, dotted
-from ..signals_and_targets import SignalName, matching
+from ..signal_names import SignalName, matching
+from .compatibility import DIFFERENCES, alike, contradicts_its_name, conversion_between, difference, fits
 from .constants import Constant, Input
-from .facts_and_state import WiringContext
+from .context import WiringContext
 from .order import in_order
-from .unit_and_type_checks import (
-    DIFFERENCES,
-    alike,
-    contradicts_its_name,
-    conversion_between,
-    difference,
-    fits,
-)
 
 
 class Connector:

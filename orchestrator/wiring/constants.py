@@ -16,8 +16,8 @@ from ..scenario.find_and_load import LoadedScenario
 from ..scenario.quantities import measure_of
 from ..scenario.schema import SeriesSpec
 from ..scenario.yaml_lines import KeyPath
-from ..signals_and_targets import SignalName
-from .facts_and_state import WiringContext, facts_of
+from ..signal_names import SignalName
+from .context import WiringContext, facts_of
 from .parameters import origin, value_for
 
 if TYPE_CHECKING:
@@ -153,12 +153,9 @@ def _series_reader(scenario: LoadedScenario) -> Reader:
     The reader raises ValueError if the file or a column is missing or unusable, the unit is incompatible, or
     the times do not cover the run.
     """
+    # NumPy takes long to import
     from ..measured.measurement import ENDINGS, Measurement, load_measurement
-    from ..measured.recording_formats import (  # NumPy takes long to import
-        ColumnFile,
-        numbers_in,
-        reading_series,
-    )
+    from ..measured.recording_formats import ColumnFile, numbers_in, reading_series
 
     @cache
     def opened(file: str) -> ColumnFile | Measurement:

@@ -13,8 +13,8 @@ from ..plan import Variable, Wire
 from ..scenario.find_and_load import LoadedScenario
 from ..scenario.quantities import convert
 from ..scenario.yaml_lines import KeyPath, dotted
-from ..signals_and_targets import match, matching
-from .facts_and_state import WiringContext
+from ..signal_names import match, matching
+from .context import WiringContext
 
 
 def faults_of(

@@ -27,8 +27,8 @@ from ..scenario import quantities
 from ..scenario.find_and_load import LoadedScenario
 from ..scenario.schema import TextSpec
 from ..scenario.yaml_lines import Document, KeyPath
+from .context import WiringContext, facts_of
 from .derivations import CarQuantities, car_of, contradictions
-from .facts_and_state import WiringContext, facts_of
 
 STIFFNESSES = ("cornering_stiffness_front", "cornering_stiffness_rear")
 STATIC_LOADS = ("static_load_front", "static_load_rear")

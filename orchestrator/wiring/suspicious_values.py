@@ -27,7 +27,7 @@ from ..messages import fold, listed
 from ..plan import DEFAULT, SENSING, Instance, OriginKind, Value, Variable, Wire
 from ..scenario.find_and_load import LoadedScenario
 from ..scenario.quantities import meant_unit, number_and_unit
-from .facts_and_state import FACTS
+from .context import FACTS
 from .parameters import STIFFNESSES, known_car
 
 CONTROL = ("reference", "controller", "allocator", "wheel_control", "monitor")

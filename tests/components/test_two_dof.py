@@ -15,11 +15,7 @@ from components.drivers.sine import Sine
 from components.fmi.component import Component
 from components.fmi.variables import parameter
 from components.plants.two_dof import TwoDof, TwoDofParameters
-from components.tyre_models.bakker_1987 import (
-    MagicFormula1987Parameters,
-    coefficients_1987,
-    loaded_tyre,
-)
+from components.tyre_models.bakker_1987 import MagicFormula1987Parameters, coefficients_1987, loaded_tyre
 from components.tyres.linear import LinearTyre
 from components.tyres.magic_formula_1987 import MagicFormula1987
 from tests.evidence import measured

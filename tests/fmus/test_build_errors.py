@@ -14,7 +14,7 @@ from fmus import check
 from fmus.build import COMPONENTS, build_all, build_component
 from fmus.check import defects
 from orchestrator.errors import BuildError, ModelDescriptionError
-from orchestrator.fmu.find_and_open import Opener, host_needs
+from orchestrator.fmu.opener import Opener, host_needs
 from tests.fmus.bare import Fmu, Unit
 from tests.orchestrator.fake_fmus import make_fmu
 from tests.sentences import golden, golden_in, refused, texts_of

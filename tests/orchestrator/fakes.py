@@ -11,7 +11,7 @@ from orchestrator.fault_kinds import FaultySignal
 from orchestrator.master.instance import ExperimentSetup, FmuInstance, StepCalls
 from orchestrator.master.process_state import ERROR, OK, Log
 from orchestrator.plan import Fmu, Instance, Plan, ValueRef, Variable, Wire
-from orchestrator.signals_and_targets import SignalName
+from orchestrator.signal_names import SignalName
 
 
 class Behaviour:

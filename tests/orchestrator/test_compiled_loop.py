@@ -24,7 +24,7 @@ from orchestrator.master import compiled_loop
 from orchestrator.master.simulate import simulate
 from orchestrator.results.reader import load_results
 from orchestrator.scenario.find_and_load import load_scenario, names
-from orchestrator.wiring.wire_instances import make_plan
+from orchestrator.wiring.make_plan import make_plan
 from tests.sentences import golden_in, refused
 
 from . import models3

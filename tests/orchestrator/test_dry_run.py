@@ -129,7 +129,7 @@ def test_time_is_that_of_the_processors_and_bounds_are_in_words():
 
 
 def test_further_sets_of_fmus_are_not_measured(monkeypatch, fmus, tmp_path):
-    from orchestrator.load_and_plan import Planner
+    from orchestrator.planner import Planner
 
     (tmp_path / "half.yaml").write_text(SCENARIO)
     planner = Planner(build=False)

@@ -28,7 +28,7 @@ from orchestrator.results.freshness import key_of, staleness
 from orchestrator.results.reader import load_results
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.scenario.overrides import read_changes
-from orchestrator.wiring.wire_instances import make_plan as plan_of_scenario
+from orchestrator.wiring.make_plan import make_plan as plan_of_scenario
 from tests.sentences import golden, golden_in, texts_of
 
 from .fake_fmus import Var, make_fmu, out

@@ -15,7 +15,7 @@ from orchestrator.metrics.expressions import evaluate, metric
 from orchestrator.results.freshness import staleness
 from orchestrator.results.reader import load_results
 from orchestrator.scenario.find_and_load import load_scenario
-from orchestrator.wiring.wire_instances import make_plan
+from orchestrator.wiring.make_plan import make_plan
 from tests.sentences import golden_in
 
 HERE = Path(__file__).parent

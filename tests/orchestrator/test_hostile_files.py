@@ -24,7 +24,7 @@ from orchestrator.safe_files import reading
 from orchestrator.scenario import yaml_lines
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.scenario.overrides import read_changes
-from orchestrator.wiring.wire_instances import make_plan
+from orchestrator.wiring.make_plan import make_plan
 from tests.sentences import golden, golden_in, places_of, refused, texts_of
 
 from .fake_fmus import Var, make_fmu

@@ -18,7 +18,7 @@ PRODUCT = ("components", "vocabulary", "fmus", "orchestrator", "yawbench")
 ROOT = Path(__file__).parents[2]
 ORCHESTRATOR = Path(__file__).parents[2] / "orchestrator"
 STAGES = (
-    {"errors", "messages", "signals_and_targets", "plan", "cache", "safe_files"}
+    {"errors", "messages", "signal_names", "plan", "cache", "safe_files"}
     | {"coupling_algorithms", "fault_kinds"},
     {"fork_server", "supervised_process", "workers", "interrupts"},
     {"scenario"},
@@ -30,7 +30,7 @@ STAGES = (
     {"master"},  # hands rows to a recorder of `results`, has `metrics` look at them
     {"figures"},
     {"tyre_stand"},  # measures for plans what units want to know of their tyres
-    {"load_and_plan"},
+    {"planner"},
     {"evaluation"},
     {"experiments"},
     {"interop", "vehicles"},

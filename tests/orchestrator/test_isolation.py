@@ -18,7 +18,7 @@ from orchestrator.master.isolation import Isolation
 from orchestrator.master.simulate import simulate
 from orchestrator.results.reader import load_results
 from orchestrator.scenario.find_and_load import load_scenario
-from orchestrator.wiring.wire_instances import make_plan
+from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.sentences import golden_in
 
@@ -102,7 +102,7 @@ def test_units_end_when_the_master_is_killed(fmus, tmp_path):
         "import sys, os, signal; from pathlib import Path\n"
         "from orchestrator.plan import Override\n"
         "from orchestrator.scenario.find_and_load import load_scenario\n"
-        "from orchestrator.wiring.wire_instances import make_plan\n"
+        "from orchestrator.wiring.make_plan import make_plan\n"
         "from orchestrator.master.isolation import Isolation\n"
         "from orchestrator.master.simulate import simulate\n"
         f"short = [Override.of('stop_time', 0.01, 'test')]\n"

@@ -13,7 +13,7 @@ import pytest
 from orchestrator.commands.check import show
 from orchestrator.errors import WiringError
 from orchestrator.scenario.find_and_load import load_scenario
-from orchestrator.wiring.wire_instances import make_plan
+from orchestrator.wiring.make_plan import make_plan
 from tests.sentences import golden, texts_of
 
 from ..trials.large import write_ring

@@ -12,10 +12,10 @@ import pytest
 import yawbench as yb
 from orchestrator.cli import main
 from orchestrator.errors import ResultsError, ScenarioError
-from orchestrator.load_and_plan import Planner
 from orchestrator.measured.measurement import load_measurement
 from orchestrator.measured.segment import LowPass
 from orchestrator.plan import InputSeries
+from orchestrator.planner import Planner
 from orchestrator.results.measurement_results import load_run
 from orchestrator.scenario.find_and_load import load_scenario
 from tests.pages.made_up import unpacked

@@ -13,7 +13,7 @@ from orchestrator.errors import WiringError
 from orchestrator.plan import ValueOrigin
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.wiring.derivations import DERIVATIONS, car_of, contradictions
-from orchestrator.wiring.wire_instances import make_plan
+from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.sentences import golden, golden_in, refused, texts_of
 from vocabulary.gravity import G

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.fmu import find_and_open
-from orchestrator.fmu.find_and_open import HOME
+from orchestrator.fmu import opener
+from orchestrator.fmu.opener import HOME
 from orchestrator.results.reader import Results, load_results
 from tests.sentences import golden, golden_in
 
@@ -54,14 +54,12 @@ def install(tmp_path, monkeypatch, cache) -> Iterator[Install]:
         info = site / f"{package}-1.0.dist-info"
         info.mkdir()
         (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {distribution}\nVersion: 1.0\n")
-        (info / "entry_points.txt").write_text(
-            f"[{find_and_open.GROUP}]\nlaws = {of or f'{package}.components'}\n"
-        )
-        find_and_open.packaged_components.cache_clear()
+        (info / "entry_points.txt").write_text(f"[{opener.GROUP}]\nlaws = {of or f'{package}.components'}\n")
+        opener.packaged_components.cache_clear()
         return controllers
 
     yield make
-    find_and_open.packaged_components.cache_clear()
+    opener.packaged_components.cache_clear()
     for module in [name for name in sys.modules if name.partition(".")[0] in ("my_laws", "your_laws")]:
         del sys.modules[module]
 
@@ -161,7 +159,7 @@ def test_folders_of_the_environment_come_after_the_nearest(yawbench, tmp_path, m
     shutil.copy("fmus/controller_off.fmu", first / "controller_mine.fmu")
     shutil.copy("fmus/controller_fuzzy_sideslip.fmu", second / "controller_mine.fmu")
     shutil.copy("fmus/controller_off.fmu", second / "controller_off.fmu")
-    monkeypatch.setenv(find_and_open.FOLDERS, f"{first}:{second}")
+    monkeypatch.setenv(opener.FOLDERS, f"{first}:{second}")
     status, _, said = yawbench(
         "run", "half.yaml", "--swap", "controller=controller_mine", "--out", "results/mine"
     )
@@ -175,7 +173,7 @@ def test_folders_of_the_environment_come_after_the_nearest(yawbench, tmp_path, m
 
 
 def test_a_folder_of_the_environment_that_is_not_there_is_told(yawbench, tmp_path, monkeypatch):
-    monkeypatch.setenv(find_and_open.FOLDERS, str(tmp_path / "nothing"))
+    monkeypatch.setenv(opener.FOLDERS, str(tmp_path / "nothing"))
     status, _, said = yawbench("run", "half.yaml", "--swap", "controller=controller_mine")
     assert status == 2
     assert golden(said)
@@ -185,7 +183,7 @@ def test_nothing_is_searched_where_every_name_is_in_the_folder(yawbench, monkeyp
     def searched():
         raise AssertionError
 
-    monkeypatch.setattr(find_and_open, "packaged_components", searched)
+    monkeypatch.setattr(opener, "packaged_components", searched)
     assert yawbench("run", "half.yaml")[0] == 0
 
 

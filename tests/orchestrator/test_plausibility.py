@@ -15,7 +15,7 @@ from orchestrator.experiments.tables import MARK, marked, remarks
 from orchestrator.metrics.plausibility import CHECKS, PlausibilityWatch
 from orchestrator.plan import Fmu, Instance, Plan, Variable, Wire
 from orchestrator.results.run_record import RunRecord
-from orchestrator.signals_and_targets import SignalName
+from orchestrator.signal_names import SignalName
 from tests.sentences import golden
 from vocabulary.wheels import WHEELS
 

@@ -9,9 +9,9 @@ import yaml
 
 from orchestrator.errors import warnings_in
 from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.wiring.make_plan import make_plan
 from orchestrator.wiring.parameters import known_car
 from orchestrator.wiring.suspicious_values import suspicious_vehicle
-from orchestrator.wiring.wire_instances import make_plan
 from tests.changed import changed
 from tests.commands import status_of
 from tests.sentences import golden, golden_in

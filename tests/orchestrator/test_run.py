@@ -18,7 +18,7 @@ from orchestrator.master.fmi import open_instance
 from orchestrator.master.simulate import simulate
 from orchestrator.results.reader import load_results
 from orchestrator.scenario.find_and_load import load_scenario
-from orchestrator.wiring.wire_instances import make_plan
+from orchestrator.wiring.make_plan import make_plan
 from tests.fmu_copies import put_fmus
 from tests.sentences import golden, golden_in
 

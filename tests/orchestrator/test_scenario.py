@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator.errors import Diagnostic, ScenarioError
 from orchestrator.scenario.find_and_load import ScenarioSpec, load_scenario
-from orchestrator.signals_and_targets import SignalName
+from orchestrator.signal_names import SignalName
 from tests.changed import changed
 from tests.sentences import golden, golden_in, places_of
 

@@ -27,7 +27,7 @@ from orchestrator.interop.second_opinion import (
 )
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.scenario.find_and_load import load_scenario
-from orchestrator.wiring.wire_instances import make_plan
+from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.evidence import measured
 from tests.sentences import golden, golden_in, refused

@@ -13,7 +13,7 @@ from orchestrator.interop.ssp_write import for_omsimulator, system_structure, wr
 from orchestrator.plan import Plan, Wire
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.scenario.ssp_archive import SSC, SSD, SSV
-from orchestrator.wiring.wire_instances import make_plan
+from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.sentences import golden, refused, texts_of
 

@@ -22,7 +22,7 @@ from orchestrator.results.reader import Results
 from orchestrator.results.run_record import RunRecord
 from orchestrator.scenario.find_and_load import SHIPPED, load_scenario
 from orchestrator.tyre_stand import cornering_stiffness
-from orchestrator.wiring.wire_instances import make_plan
+from orchestrator.wiring.make_plan import make_plan
 from tests.sentences import golden, golden_in
 from vocabulary.wheels import WHEELS
 

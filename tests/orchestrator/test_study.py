@@ -15,13 +15,13 @@ from lxml import html
 from rich.console import Console
 
 from orchestrator.errors import Diagnostic, ScenarioError
-from orchestrator.experiments.cases_to_jobs import jobs_of
 from orchestrator.experiments.claim_schema import Claim, GridSpec, calculate, rank_correlation
 from orchestrator.experiments.claims import judge
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.experiment_result import judge_results
 from orchestrator.experiments.figures import draw_all
 from orchestrator.experiments.jobs import Job, Outcome
+from orchestrator.experiments.plan_experiment import jobs_of
 from orchestrator.experiments.published_tables import correlation
 from orchestrator.experiments.result_files import write_findings
 from orchestrator.experiments.tables import Table, for_terminal

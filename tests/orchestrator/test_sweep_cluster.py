@@ -14,10 +14,10 @@ from pathlib import Path
 import pytest
 
 from orchestrator.cli import main
-from orchestrator.experiments.cases_to_jobs import plan_experiment
 from orchestrator.experiments.executor import left_to_do
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.jobs import Job, Outcome
+from orchestrator.experiments.plan_experiment import plan_experiment
 
 from .test_sweep import UNITS, moods, rows, yawbench  # noqa: F401
 

@@ -110,10 +110,10 @@ def test_everything_made_of_a_run_names_all_that_was_changed(yawbench, tmp_path,
 @pytest.mark.exhaustive
 def test_the_figure_of_a_sweep_names_what_options_changed(yawbench, fmus, tmp_path):
 
-    from orchestrator.experiments.cases_to_jobs import plan_experiment
     from orchestrator.experiments.experiment import load_experiment
     from orchestrator.experiments.experiment_result import judge_records
     from orchestrator.experiments.jobs import MeasuredRun
+    from orchestrator.experiments.plan_experiment import plan_experiment
     from tests.changed import changed as given
 
     (tmp_path / "sweep.yaml").write_text(SWEEP)

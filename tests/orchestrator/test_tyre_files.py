@@ -12,8 +12,8 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.errors import ScenarioError, WiringError, warnings_in
-from orchestrator.experiments.cases_to_jobs import plan_experiment
 from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.plan_experiment import plan_experiment
 from orchestrator.interop.ssp_write import write_ssp
 from orchestrator.pages.page_parts import groups_of
 from orchestrator.results.freshness import key_of, run_record
@@ -21,8 +21,8 @@ from orchestrator.results.reader import load_results
 from orchestrator.results.run_folder import default_folder
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.scenario.overrides import changes_of, read_changes
-from orchestrator.signals_and_targets import Target
-from orchestrator.wiring.wire_instances import make_plan
+from orchestrator.signal_names import Target
+from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.sentences import golden, golden_in, refused, texts_of
 

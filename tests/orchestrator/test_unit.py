@@ -15,7 +15,7 @@ from orchestrator.master.isolation import Isolation
 from orchestrator.master.simulate import simulate
 from orchestrator.plan import Fmu, Instance, Plan, Variable, Wire
 from orchestrator.results.reader import load_results
-from orchestrator.signals_and_targets import SignalName
+from orchestrator.signal_names import SignalName
 from tests.sentences import golden, golden_in, refused
 
 HERE = Path(__file__).parent

@@ -14,7 +14,7 @@ from orchestrator.plan import CHOSEN, ERRATUM, LITERATURE, NEUTRAL, PAPER, Value
 from orchestrator.results.freshness import key_of, run_record, staleness
 from orchestrator.results.run_record import RunRecord
 from orchestrator.scenario.find_and_load import load_scenario
-from orchestrator.wiring.wire_instances import make_plan
+from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.fmu_copies import put_fmus
 from tests.orchestrator.recorded import record_text

@@ -14,8 +14,8 @@ from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coef
 from orchestrator.cli import main
 from orchestrator.commands.check import show
 from orchestrator.errors import WiringError, warnings_in
-from orchestrator.load_and_plan import Planner
 from orchestrator.master.simulate import simulate_in_memory
+from orchestrator.planner import Planner
 from orchestrator.scenario.find_and_load import load_scenario
 from orchestrator.tyre_stand import cornering_stiffness
 from orchestrator.vehicles import handling as handling
@@ -32,7 +32,7 @@ from orchestrator.vehicles.handling import (
     plants_in,
 )
 from orchestrator.wiring.derivations import car_of
-from orchestrator.wiring.wire_instances import make_plan
+from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.components.magic import forces_and_moment
 from tests.fmu_copies import put_fmus

@@ -31,7 +31,7 @@ import fmpy
 from orchestrator.cli import main
 from orchestrator.master import isolation  # noqa: F401  imported once, before the forks
 from orchestrator.master.simulate import simulate  # noqa: F401
-from orchestrator.wiring.wire_instances import make_plan  # noqa: F401
+from orchestrator.wiring.make_plan import make_plan  # noqa: F401
 
 SOURCE = Path(__file__).parents[1] / "orchestrator" / "hostile.c"
 INCLUDE = Path(__file__).parents[2] / "fmus"

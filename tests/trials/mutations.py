@@ -139,7 +139,7 @@ def load(file: Path, kind: str, planner: Any) -> None:
     from orchestrator.plan import Override
     from orchestrator.results.reader import load_results
     from orchestrator.scenario.find_and_load import load_scenario
-    from orchestrator.wiring.wire_instances import make_plan
+    from orchestrator.wiring.make_plan import make_plan
 
     fmus, opener = ROOT / "fmus", planner.opener
     if kind == "study":
@@ -195,7 +195,7 @@ def work(pipe: Connection, group: str, numbers: list[int], seed: int, folder: Pa
     os.environ.update(box.environment())
     tempfile.tempdir = None
     os.chdir(box.work)
-    from orchestrator.load_and_plan import Planner
+    from orchestrator.planner import Planner
 
     planner = Planner()
     sys.unraisablehook = lambda _: None  # as in the command line

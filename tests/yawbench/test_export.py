@@ -30,9 +30,7 @@ import sys
 from dataclasses import dataclass
 
 import ourlab.limits as within
-from ourlab.limits import (
-    cut,
-)
+from ourlab.limits import cut
 from .deep import SHARE
 
 assert "ourlab_was_imported_twice" not in sys.modules

@@ -1,4 +1,4 @@
-"""Facts that reach every unit which has to know them, and remarks on values that are hardly meant."""
+"""Facts that reach every instance that needs them, and warnings about suspicious values."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import pytest
 
 from orchestrator.errors import WiringError, warnings_in
 from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.wiring.make_plan import make_plan
 from orchestrator.wiring.suspicious_values import seen_as
-from orchestrator.wiring.wire_instances import make_plan
 from tests.changed import changed
 from tests.sentences import golden, refused
 from vocabulary.wheels import WHEELS

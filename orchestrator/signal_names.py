@@ -19,7 +19,7 @@ TIMES = ("start_time", "stop_time", "step_size")
 OF_RUN = (*TIMES, "algorithm")
 """Override targets that concern the whole run, not an instance."""
 FACTS = ("friction", "speed")
-"""Override targets that reach all instances with such an input or parameter: `wiring.facts_and_state`."""
+"""Override targets that reach all instances with such an input or parameter: `wiring.context`."""
 VEHICLE = "vehicle"
 """Override target of the vehicle file, and prefix of its parameters."""
 INPUTS = "inputs"

@@ -1,4 +1,6 @@
-"""Facts, values that reach all instances that need them; the state of a wiring: FMUs, errors, notes so far.
+"""State shared by all steps of wiring: the scenario, its opened FMUs, errors and notes so far; facts.
+
+Facts are values that reach all instances that need them:
 
     friction: 0.65         # every parameter `base_friction` of a road, and every input `friction`,
                            # `friction_fl` .. `friction_rr` that no wire drives
@@ -6,7 +8,7 @@
 
 In a scenario file, a value given by its own name takes precedence over a fact; as an override
 (`--set friction=0.3`), a fact takes precedence over the file, so that one override reaches all instances. To
-add a fact, add a row to `FACTS`, its name to `signals_and_targets.FACTS`, and a key to the schema of
+add a fact, add a row to `FACTS`, its name to `signal_names.FACTS`, and a key to the schema of
 scenarios.
 """
 
@@ -23,8 +25,8 @@ from ..messages import fold_sentences
 from ..plan import Fmu, Instance, Value, ValueOrigin, Variable
 from ..scenario.find_and_load import LoadedScenario
 from ..scenario.yaml_lines import MOST_ERRORS, Document, KeyPath
-from ..signals_and_targets import FACTS as NAMES
-from ..signals_and_targets import match, matching
+from ..signal_names import FACTS as NAMES
+from ..signal_names import match, matching
 
 
 @dataclass(frozen=True)

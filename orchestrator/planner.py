@@ -8,15 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from .errors import ScenarioError
-from .fmu.find_and_open import Opener, report_to_stderr
+from .fmu.opener import Opener, report_to_stderr
 from .messages import hint
 from .plan import Fmu, Instance, Override, Plan
 from .scenario import yaml_lines
 from .scenario.find_and_load import LoadedScenario, load_scenario
 from .scenario.yaml_lines import Document
-from .signals_and_targets import match
+from .signal_names import match
 from .tyre_stand import cornering_stiffness
-from .wiring.wire_instances import Network, make_plan
+from .wiring.make_plan import Network, make_plan
 
 
 class Planner:

@@ -8,15 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import Diagnostic, Location, ScenarioError
-from ..load_and_plan import Planner
 from ..metrics.expressions import STANDARD, metric, results_to_be, unit_in
 from ..plan import DEFAULT, Fmu, Instance, Plan, Variable
 from ..plan import Value as Given
+from ..planner import Planner
 from ..results.reader import Results
 from ..scenario import quantities
 from ..scenario.yaml_lines import dotted
-from ..signals_and_targets import OF_RUN, SignalName, Target
-from ..wiring.facts_and_state import FACTS
+from ..signal_names import OF_RUN, SignalName, Target
+from ..wiring.context import FACTS
 from .axes_and_sampling import AxisSpec, Level
 from .claim_schema import MetricReference, MetricSpec, si_number
 from .experiment import RUNS, Case, LoadedExperiment, NamedRun

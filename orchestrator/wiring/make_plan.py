@@ -24,15 +24,15 @@ from vocabulary.wheels import WHEELS
 from ..errors import BuildError, Diagnostic, Location, ModelDescriptionError, WiringError, YawbenchError
 from ..fmu.binary import CORE
 from ..fmu.description import shadowed_modules
-from ..fmu.find_and_open import Opener, find_fmu, find_folder, hidden, host_needs, stale_fmus
+from ..fmu.opener import Opener, find_fmu, find_folder, hidden, host_needs, stale_fmus
 from ..messages import closest, fold, hint, listed
 from ..plan import DEFAULT, Fmu, InputSeries, Instance, Plan, Value, ValueOrigin, Variable, Wire
 from ..scenario.find_and_load import LoadedScenario
 from ..scenario.overrides import is_path
-from ..signals_and_targets import SignalName, match
+from ..signal_names import SignalName, match
 from .connections import Connector
 from .constants import Constant, Input, constants
-from .facts_and_state import WiringContext
+from .context import WiringContext
 from .faults import faults_of
 from .order import EvaluationOrder, evaluate
 from .parameters import STATIC_LOADS, STIFFNESSES, Parameters

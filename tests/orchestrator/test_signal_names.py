@@ -11,17 +11,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.experiments.cases_to_jobs import plan_experiment
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.open_value_regions import RegionRuns
+from orchestrator.experiments.plan_experiment import plan_experiment
 from orchestrator.figures.panels import panels_of
 from orchestrator.figures.style import LabelledRun
 from orchestrator.metrics.expressions import evaluate, metric
 from orchestrator.pages.comparison import divergence
 from orchestrator.results.reader import load_results
 from orchestrator.scenario.find_and_load import load_scenario
-from orchestrator.signals_and_targets import SignalName, Target, match, matching
-from orchestrator.wiring.wire_instances import make_plan
+from orchestrator.signal_names import SignalName, Target, match, matching
+from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.commands import status_of
 
