@@ -10,7 +10,7 @@ from pathlib import Path
 from statistics import median
 
 import pytest
-from orchestrator.experiments.execution import Executor, runner_of
+from orchestrator.experiments.executor import Executor, runner_of
 
 from docs.generate import threat_tables
 from orchestrator.experiments.ranking import angle_experiment, angles_of
