@@ -10,9 +10,9 @@ from pathlib import Path
 from statistics import median
 
 import pytest
-from orchestrator.experiments.executor import Executor, runner_of
 
 from docs.generate import threat_tables
+from orchestrator.experiments.executor import Executor, runner_of
 from orchestrator.experiments.ranking import angle_experiment, angles_of
 from orchestrator.experiments.threat_runs import Survived, ThreatResult, published_result, survivals
 from orchestrator.experiments.threat_scores import (
