@@ -31,7 +31,7 @@ from orchestrator.fmu.description import describe
 from orchestrator.master.instance import Buffers, ExperimentSetup, Status, StepCalls, nothing_to_do
 from orchestrator.master.process_state import ERROR, OK, Log
 from orchestrator.messages import counted, listed
-from orchestrator.plan import Fmu, Instance, RunsAs, Value, ValueRef
+from orchestrator.plan import Fmu, Instance, Value, ValueRef
 from vocabulary.roles import ROLES
 from vocabulary.wheels import wheels
 
@@ -130,9 +130,7 @@ class PythonComponent:
 
     def as_now(self) -> Fmu:
         """Return its FMU in its present state, with a native library or with the reason why it has none."""
-        if isinstance(self._translated, str):
-            return replace(self.fmu, runs_as=RunsAs(self._translated))
-        return in_native_code(self.component, self._translated, self.fmu, self._xml)
+        return in_native_code(self.program, self.component, self._translated, self.fmu, self._xml)
 
     def open(self, unit: Instance, log: Log) -> PythonInstance:
         """Return an instance of the component for a run, in Python."""
@@ -225,10 +223,10 @@ def _described(description: ElementTree.Element) -> bytes:
     return ElementTree.tostring(description)
 
 
-def _component(program: Any, role: str) -> tuple[type[Component], type[Component] | str]:
+def _component(program: Any, role: str) -> tuple[type[Component], type[Component]]:
     """Return the component class made from a function, an object or a class.
 
-    Beside it, there is the class for the translator, or why there is none.
+    Beside it, there is the class for the translator.
     """
     if arguments.is_a(program, type):
         if issubclass(program, Component):
@@ -237,10 +235,13 @@ def _component(program: Any, role: str) -> tuple[type[Component], type[Component
             f"{_name(program)} is a class; give an object of it, {_name(program)}()",
             code="controller-invalid",
         )
-    if hasattr(program, "output"):
-        return _of_object(program)
-    if callable(program):
-        return _of_function(program, role)
+    if hasattr(program, "output") or callable(program):
+        try:
+            copy.deepcopy(program)
+        except Exception as error:
+            text = f"{_name(program)} cannot be copied for a run: {error}"
+            raise ScenarioError(text, code="controller-invalid") from error
+        return _of_object(program) if hasattr(program, "output") else _of_function(program, role)
     raise ScenarioError(
         f"{_name(program)} is not a controller: give the name or path of an FMU, a function of signals, "
         "an object with inputs, outputs and a method output(t, u), or a component class",
@@ -267,23 +268,33 @@ def _of_function(function: Callable[..., Any], role: str) -> tuple[type[Componen
     names = [p.name for p in parameters if p.default is p.empty]
     inputs = [name for name in names if name != "t"]
     outputs = [item for pattern in known[role] for item in wheels(pattern)]
-    own = _parameters.of_function(function)
+    called = _parameters.of_function(function)
+    made = _parameters.of_object(function, [*names, *called.values])
+    own = called | made
 
-    def compute(self: Any, t: float, u: Sequence[float]) -> Any:
-        values = dict(zip(inputs, u, strict=True)) | self._chosen
-        result = function(**values, t=t) if "t" in names else function(**values)
-        return _numbers(result, outputs)
+    def result(self: Any, t: float, u: Sequence[float]) -> tuple[float, ...]:
+        values = dict(zip(inputs, u, strict=True)) | self._passed
+        returned = self._program(**values, t=t) if "t" in names else self._program(**values)
+        return _numbers(returned, outputs)
 
-    def configure(self: Any) -> None:
-        self._chosen = own.chosen(self.p)
+    def start(self: Any, t: float, u: Sequence[float]) -> None:
+        self._passed = called.chosen(self.p)
+        self._program = _parameters.fresh(function, made, self.p)
+        self._returned = result(self, t, u)
 
-    checks = {"output": compute, "configure": configure, "_fail": _fail}
-    both = checks, of_function(function, inputs, "t" in names, list(own.values))
+    def advance(self: Any, t: float, h: float, u: Sequence[float]) -> None:
+        self._returned = result(self, t + h, u)
+
+    def compute(self: Any, t: float, u: Sequence[float]) -> tuple[float, ...]:
+        return self._returned  # type: ignore[no-any-return]
+
+    checks = {"start": start, "advance": advance, "output": compute, "_fail": _fail}
+    both = checks, of_function(function, inputs, "t" in names, list(called.values), made)
     checked, bare = (_class(function, inputs, known[role], members, own) for members in both)
     return checked, bare
 
 
-def _of_object(program: Any) -> tuple[type[Component], type[Component] | str]:
+def _of_object(program: Any) -> tuple[type[Component], type[Component]]:
     """Return component classes; each instance of the first uses a copy of the object."""
     for wanted in ("inputs", "outputs"):
         if not hasattr(program, wanted):
@@ -292,32 +303,20 @@ def _of_object(program: Any) -> tuple[type[Component], type[Component] | str]:
                 code="controller-invalid",
             )
 
-    def __init__(self: Any, **kwargs: Any) -> None:
-        super(component, self).__init__(**kwargs)
-        try:
-            self._program = copy.deepcopy(program)  # so that a run does not affect the next one
-        except Exception as error:
-            raise ScenarioError(
-                f"{_name(program)} cannot be copied for a run: {error}", code="controller-invalid"
-            ) from error
+    own = _parameters.of_object(program, _names(program))
 
     def configure(self: Any) -> None:
-        values = own.chosen(self.p)
-        same = all(values[name] is value for name, value in own.values.items())
-        self._program = copy.deepcopy(program) if same else _parameters.made_anew(program, own, values)
+        self._program = _parameters.fresh(program, own, self.p)
 
-    own = _parameters.of_object(program, _names(program))
-    members = {"__init__": __init__, "configure": configure, "_fail": _fail}
+    members = {"configure": configure, "_fail": _fail}
     for method in ("output", "advance", "start"):
         if hasattr(program, method):
             if not callable(getattr(program, method)):
                 arguments.refuse(method, "a method", getattr(program, method))
             members[method] = _passing_on(method)
-    component = _class(program, program.inputs, program.outputs, members, own)
-    try:
-        return component, _class(program, program.inputs, program.outputs, of_object(program, own), own)
-    except Exception as error:  # it is not made to be one
-        return component, f"not translated: {_name(program)}: {arguments.error_text(error)}"
+    both = members, of_object(program, own)
+    checked, bare = (_class(program, program.inputs, program.outputs, each, own) for each in both)
+    return checked, bare
 
 
 def _passing_on(method: str) -> Callable[..., Any]:

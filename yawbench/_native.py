@@ -7,14 +7,14 @@ calls it in Python also checks what it returns, which is not arithmetic.
 
 from __future__ import annotations
 
-import inspect
+import copy
 import io
+import sysconfig
 import tempfile
 import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import FunctionType
 from typing import Any
 
 import components
@@ -25,12 +25,10 @@ from orchestrator.fmu.archive import open_fmu
 from orchestrator.fmu.binary import PYTHON_WANTED, REASON, binary_of, python_wanted
 from orchestrator.plan import Fmu, RunsAs
 
-from ._parameters import ProgramParameters
+from ._parameters import ProgramParameters, functions_of, has_constructor
 
 LIMIT = 20
 """Processor time [s] that the comparison with Python may take, in a run; chosen: a short law takes one."""
-PLAIN = (bool, int, float, str, type(None))
-"""Types of values that an object may hold before its first step."""
 
 
 def _values(result: Any) -> Any:
@@ -43,77 +41,45 @@ def _values(result: Any) -> Any:
 
 
 def of_function(
-    function: Callable[..., Any], inputs: Sequence[str], timed: bool, parameters: Sequence[str]
+    function: Callable[..., Any],
+    inputs: Sequence[str],
+    timed: bool,
+    called: Sequence[str],
+    made: ProgramParameters,
 ) -> dict[str, Any]:
-    """Return the methods of a component that only calls a function.
+    """Return the methods of a component that only calls a function, or an object that can be called.
 
     Args:
         function: of its inputs and parameters, and of `t` if `timed`.
-        inputs, timed, parameters: what it is called with.
+        inputs, timed: what it is called with.
+        called: parameters that it is called with, too.
+        made: those that an object is made with.
     """
+    fresh = _maker(function, made)
 
-    def output(self: Component, t: float, u: Sequence[float]) -> Any:
-        values = dict(
-            zip([*inputs, *parameters], [*u, *[getattr(self.p, x) for x in parameters]], strict=True)
-        )
-        result = function(**values, t=t) if timed else function(**values)
-        return _values(result)
+    def result(self: Any, t: float, u: Sequence[float]) -> Any:
+        values = dict(zip([*inputs, *called], [*u, *[getattr(self.p, x) for x in called]], strict=True))
+        return _values(self._program(**values, t=t) if timed else self._program(**values))
 
-    return {"output": output}
+    def start(self: Any, t: float, u: Sequence[float]) -> None:
+        self._program = fresh(self)
+        self._returned = result(self, t, u)
+
+    def advance(self: Any, t: float, h: float, u: Sequence[float]) -> None:
+        self._returned = result(self, t + h, u)
+
+    def output(self: Any, t: float, u: Sequence[float]) -> Any:
+        return self._returned
+
+    return {"start": start, "advance": advance, "output": output}
 
 
 def of_object(program: Any, own: ProgramParameters) -> dict[str, Any]:
-    """Return the members of a component that makes an object with its parameters, or is the object itself.
-
-    Without parameters, the attributes of the object become the state.
-
-    Raises:
-        TypeError: the object holds something else than numbers and texts.
-    """
-    if own.values:
-        return _with_parameters(program, own)
-    members: dict[str, Any] = {}
-    for cls in reversed(type(program).__mro__[:-1]):
-        members |= {name: value for name, value in vars(cls).items() if not name.startswith("__")}
-    held = {name: value for name, value in members.items() if type(value) in PLAIN} | vars(program)
-    for name, value in held.items():
-        if type(value) not in PLAIN:
-            raise TypeError(f"{name} is a {type(value).__name__}")
-    its_start, its_advance, its_output = map(members.get, ("start", "advance", "output"))
+    """Return the members of a component that calls the methods of an object."""
+    fresh = _maker(program, own)
 
     def configure(self: Any) -> None:
-        for name, value in held.items():
-            setattr(self, name, value)
-
-    def start(self: Any, t: float, u: Sequence[float]) -> None:
-        its_start(self, t, self._named(*u))  # type: ignore[misc]
-
-    def advance(self: Any, t: float, h: float, u: Sequence[float]) -> None:
-        its_advance(self, t, h, self._named(*u))  # type: ignore[misc]
-
-    def output(self: Any, t: float, u: Sequence[float]) -> Any:
-        result = its_output(self, t, self._named(*u))  # type: ignore[misc]
-        return _values(result)
-
-    members |= {"configure": configure, "output": output}
-    members |= {"start": start} if its_start else {}
-    return members | ({"advance": advance} if its_advance else {})
-
-
-def _with_parameters(program: Any, own: ProgramParameters) -> dict[str, Any]:
-    cls: Any = type(program)
-    for name, value in own.fixed.items():
-        if type(value) not in PLAIN:
-            raise TypeError(f"{name} is a {type(value).__name__}")
-    fixed, attributes = own.fixed, sorted(own.attributes)
-    arguments = [name for name in own.values if name not in own.attributes]
-
-    def configure(self: Any) -> None:
-        self._program = cls(
-            **fixed, **dict(zip(arguments, [getattr(self.p, x) for x in arguments], strict=True))
-        )
-        for name in attributes:
-            setattr(self._program, name, getattr(self.p, name))
+        self._program = fresh(self)
 
     def start(self: Any, t: float, u: Sequence[float]) -> None:
         self._program.start(t, self._named(*u))
@@ -122,18 +88,45 @@ def _with_parameters(program: Any, own: ProgramParameters) -> dict[str, Any]:
         self._program.advance(t, h, self._named(*u))
 
     def output(self: Any, t: float, u: Sequence[float]) -> Any:
-        result = self._program.output(t, self._named(*u))
-        return _values(result)
+        return _values(self._program.output(t, self._named(*u)))
 
     members = {"configure": configure, "output": output}
-    members |= {"start": start} if hasattr(cls, "start") else {}
-    return members | ({"advance": advance} if hasattr(cls, "advance") else {})
+    members |= {"start": start} if hasattr(program, "start") else {}
+    return members | ({"advance": advance} if hasattr(program, "advance") else {})
 
 
-def in_native_code(component: type[Component], translated: type[Component], fmu: Fmu, xml: bytes) -> Fmu:
+def _maker(program: Any, own: ProgramParameters) -> Callable[[Any], Any]:
+    """Return a function of a component that makes its object as it is before a run.
+
+    Args:
+        program: the object.
+        own: the parameters that it is made with; without any, it is copied.
+    """
+    if not own.values:
+        return lambda self: copy.deepcopy(program)
+    cls: Any = type(program)
+    fixed, attributes, constructed = own.fixed, sorted(own.attributes), has_constructor(cls)
+    arguments = [name for name in own.values if name not in own.attributes]
+
+    def made(self: Any) -> Any:
+        program = cls.__new__(cls)
+        for name in attributes:  # before the constructor, which may derive something from them
+            setattr(program, name, getattr(self.p, name))
+        if constructed:
+            passed = zip(arguments, [getattr(self.p, x) for x in arguments], strict=True)
+            program.__init__(**copy.deepcopy(fixed), **dict(passed))
+        return program
+
+    return made
+
+
+def in_native_code(
+    program: Any, component: type[Component], translated: type[Component], fmu: Fmu, xml: bytes
+) -> Fmu:
     """Return the FMU of a component with a native library, or with the reason why it runs in Python.
 
     Args:
+        program: what the component was made of.
         component: its class.
         translated: a class that gives the same, for the translator.
         fmu: as described.
@@ -143,11 +136,10 @@ def in_native_code(component: type[Component], translated: type[Component], fmu:
         return replace(fmu, runs_as=PYTHON_WANTED)
     from fmus.native.build import NATIVE_LIBRARY, native  # here, because most scenarios need none of it
 
-    functions = (function for cls in translated.__mro__ for function in _functions(cls))
-    codes = [function.__code__ for function in functions]
-    # dataclasses write methods that have no file
-    generated = [code for code in codes if code.co_filename == "<string>" and code.co_name.startswith("__")]
-    folders = {Path(code.co_filename).parent for code in codes if code not in generated}
+    codes = [function.__code__ for function in functions_of(translated, program)]
+    # methods that dataclasses write have no file, or one of Python
+    own = [code for code in codes if not (code.co_filename == "<string>" and code.co_name.startswith("__"))]
+    folders = {Path(code.co_filename).parent for code in own} - {Path(sysconfig.get_path("stdlib"))}
     with tempfile.TemporaryDirectory(prefix="yawbench_") as folder:
         made = native(
             component,
@@ -157,6 +149,7 @@ def in_native_code(component: type[Component], translated: type[Component], fmu:
             guid=fmu.guid,
             resources=Path(folder),
             translated=translated,
+            unnamed=Path(__file__),
             limit=LIMIT,
         )
         if made.why_not:
@@ -182,14 +175,3 @@ def zipped(files: dict[str, bytes]) -> bytes:
         for name, content in files.items():
             members.writestr(zipfile.ZipInfo(name), content)
     return archive.getvalue()
-
-
-def _functions(cls: type) -> list[Any]:
-    """Return the functions of a class, with those that they have from around them."""
-    functions = [member for member in vars(cls).values() if inspect.isfunction(member)]
-    for function in functions:
-        for held in (cell.cell_contents for cell in function.__closure__ or ()):
-            classes = held.__mro__ if issubclass(type(held), type) else ()  # `isinstance` asks the object
-            within = [x for base in classes for x in vars(base).values()] or [held]
-            functions += [x for x in within if type(x) is FunctionType and x not in functions]
-    return functions

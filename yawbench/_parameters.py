@@ -9,18 +9,21 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import functools
 import inspect
 import math
 import pickle
+import sys
+import sysconfig
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import CellType, FunctionType, MethodType
 from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
 
 from components.fmi.component import Component
 from components.fmi.variables import VariableSpec, parameter, parameter_class
-from orchestrator.messages import short
 from orchestrator.plan import Value
 from orchestrator.signal_names import SETTINGS
 
@@ -30,6 +33,8 @@ PLAIN = (bool, int, float, str)
 """Types of the values that FMI has."""
 DECLARATIONS = frozenset({"inputs", "outputs", "sampled", *SETTINGS})
 """Attributes of an object that declare it, and settings of every instance."""
+INSTALLED = tuple({sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")})
+"""Folders of Python and of installed packages."""
 UNIT = "1"
 """Placeholder for units that Python does not know, until `without_units` removes it."""
 
@@ -51,6 +56,15 @@ class ProgramParameters:
     fixed: dict[str, Any] = field(default_factory=dict)
     attributes: frozenset[str] = frozenset()
     unitless: frozenset[str] = frozenset()
+
+    def __or__(self, other: ProgramParameters) -> ProgramParameters:
+        """Return the parameters of both; what an object is made with is that of `other`."""
+        return replace(
+            other,
+            values=self.values | other.values,
+            declared=self.declared | other.declared,
+            unitless=self.unitless | other.unitless,
+        )
 
     def members(self, name: str) -> dict[str, Any]:
         """Return the members of a component class that declare the parameters."""
@@ -88,7 +102,7 @@ def of_object(program: Any, signals: Sequence[str]) -> ProgramParameters:
     """
     cls = type(program)
     try:
-        accepted = _arguments_of(cls.__init__)[1:] if _has_own(cls) else []
+        accepted = _arguments_of(cls.__init__)[1:] if has_constructor(cls) else []
     except (TypeError, ValueError):  # written in C
         return ProgramParameters()
     named = [p for p in accepted if p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)]
@@ -117,7 +131,7 @@ def of_object(program: Any, signals: Sequence[str]) -> ProgramParameters:
     fixed = {name: value for name, value in kept.items() if name not in made.values}
     made = replace(made, fixed=fixed, attributes=frozenset(attributes) & frozenset(made.values))
     try:
-        again = made_anew(program, made, made.values)
+        again = _made_anew(program, made, made.values)
         same = _alike(vars(again), vars(program)) if hasattr(program, "__dict__") else True
         same = same and all(_alike(getattr(again, name), value) for name, value in made.values.items())
     except Exception:  # the user's constructor may raise anything
@@ -125,7 +139,20 @@ def of_object(program: Any, signals: Sequence[str]) -> ProgramParameters:
     return made if same else ProgramParameters()
 
 
-def made_anew(program: Any, parameters: ProgramParameters, values: Mapping[str, Any]) -> Any:
+def fresh(program: Any, own: ProgramParameters, p: Any) -> Any:
+    """Return a program as it is before a run, so that no run affects the next one.
+
+    Args:
+        program: a function or an object.
+        own: parameters that an object is made with.
+        p: the parameters of the component.
+    """
+    values = own.chosen(p)
+    same = all(values[name] is value for name, value in own.values.items())
+    return copy.deepcopy(program) if same else _made_anew(program, own, values)
+
+
+def _made_anew(program: Any, parameters: ProgramParameters, values: Mapping[str, Any]) -> Any:
     """Return an object like a program, made with other values of its parameters."""
     cls: Any = type(program)
     keywords = {
@@ -137,7 +164,7 @@ def made_anew(program: Any, parameters: ProgramParameters, values: Mapping[str, 
     for name in parameters.attributes:  # before the constructor, which may derive something from them
         if values[name] is not getattr(cls, name):
             object.__setattr__(made, name, values[name])
-    if _has_own(cls):
+    if has_constructor(cls):
         made.__init__(**keywords)
     return made
 
@@ -158,19 +185,69 @@ def brought_along(program: Any, component: type[Component]) -> dict[str, Value]:
 
 def text_of(program: Any) -> bytes:
     """Return a program's source text and state, as far as Python knows them, to distinguish programs."""
-    functions = [program] if inspect.isfunction(program) else []
-    for cls in type(program).__mro__[:-1] if hasattr(program, "output") else ():
-        functions += [member for member in vars(cls).values() if inspect.isfunction(member)]
-    values: list[Any] = [getattr(program, "__dict__", None)]
-    for function in functions:
-        values += [function.__defaults__, function.__kwdefaults__]
-        values += [cell.cell_contents for cell in function.__closure__ or ()]
+    parts = [] if isinstance(program, (type, FunctionType)) else [_pickled(program)]
+    for function in functions_of(program, named=True):
+        try:
+            parts.append(inspect.getsource(function).encode())
+        except Exception:  # there is none
+            parts.append(function.__code__.co_code + _pickled(function.__code__.co_consts))
+        values = [function.__defaults__, function.__kwdefaults__]
+        values += [cell.cell_contents for cell in function.__closure__ or () if not _is_empty(cell)]
         values += [function.__globals__.get(name) for name in function.__code__.co_names]
+        parts += map(_pickled, values)
+    return b"".join(parts)
+
+
+def functions_of(*programs: Any, named: bool = False) -> list[FunctionType]:
+    """Return the functions of programs: their own, of their classes, and of what they hold.
+
+    Args:
+        programs: functions, classes, and objects.
+        named: with those of the user that they call by the names of modules.
+    """
+    functions: list[FunctionType] = []
+    waiting, seen = list(reversed(programs)), set()
+    while waiting:
+        value = waiting.pop()
+        if id(value) in seen or type(value) in (*PLAIN, type(None), np.ndarray):
+            continue
+        seen.add(id(value))
+        if isinstance(value, FunctionType):
+            functions.append(value)
+            waiting += [cell.cell_contents for cell in value.__closure__ or () if not _is_empty(cell)]
+            if named:
+                there = (value.__globals__.get(name) for name in value.__code__.co_names)
+                waiting += [x for x in there if isinstance(x, (FunctionType, type)) and _is_of_user(x)]
+        elif issubclass(type(value), type):  # `isinstance` would ask the object
+            waiting += [x for base in value.__mro__[:-1] for x in vars(base).values()]
+        elif type(value) in (list, tuple):
+            waiting += value
+        elif type(value) is dict:
+            waiting += value.values()
+        elif type(value) is functools.partial:
+            waiting += [value.func, *value.args, *value.keywords.values()]
+        elif type(value) is MethodType:
+            waiting += [value.__func__, value.__self__]
+        elif type(value) in (classmethod, staticmethod):
+            waiting.append(value.__func__)
+        elif type(value) is property:
+            waiting += [value.fget, value.fset]
+        elif any(value is program for program in programs) or _is_of_user(type(value)):
+            waiting += [type(value), getattr(value, "__dict__", None)]
+    return functions
+
+
+def _is_of_user(value: Any) -> bool:
+    """Return whether a function or class is neither Python's nor of an installed package."""
+    file = getattr(sys.modules.get(value.__module__ or ""), "__file__", None) or ""
+    return value.__module__ != "builtins" and not file.startswith(INSTALLED)
+
+
+def _is_empty(cell: CellType) -> bool:
     try:
-        source = inspect.getsource(type(program) if hasattr(program, "output") else program).encode()
-    except Exception:  # there is none, or inspecting the user's object fails
-        source = short(program).encode()
-    return source + b"".join(map(_pickled, values))
+        return cell.cell_contents is cell
+    except ValueError:
+        return True
 
 
 def _pickled(value: Any) -> bytes:
@@ -180,7 +257,7 @@ def _pickled(value: Any) -> bytes:
         return type(value).__name__.encode()
 
 
-def _has_own(cls: type) -> bool:
+def has_constructor(cls: type) -> bool:
     """Return whether a class has a constructor of its own."""
     return cls.__init__ is not object.__init__  # type: ignore[misc]
 

@@ -23,7 +23,7 @@ from orchestrator.fault_kinds import FaultList, FaultName
 from orchestrator.master.process_state import Log
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.messages import hint, short
-from orchestrator.plan import Instance, Override, Plan, Value
+from orchestrator.plan import Fmu, Instance, Override, Plan, Value
 from orchestrator.planner import Planner
 from orchestrator.scenario import find_and_load
 from orchestrator.scenario.overrides import faults_at, setting
@@ -244,8 +244,8 @@ class Scenario:
         notes = tuple(
             Diagnostic(
                 "instance-in-python",
-                f"{unit.name}: {unit.fmu.name} is plain Python of this process, not an FMU; runs as "
-                f"{unit.fmu.runs_as}",
+                f"{unit.name}: {unit.fmu.name} is plain Python of this process, not an FMU; "
+                f"{_how_it_runs(unit.fmu)}",
                 "info",
             )
             for unit in plan.instances
@@ -314,6 +314,10 @@ class Scenario:
         )
         changed = "".join(f"<br>{escape(str(change))}" for change in self.changes)
         return f"<b>{escape(plan.title)}</b>{changed}<table>{rows}</table>"
+
+
+def _how_it_runs(fmu: Fmu) -> str:
+    return f"runs in Python: {fmu.runs_as.why}" if fmu.runs_as and fmu.runs_as.why else "runs natively"
 
 
 def warn(title: str, diagnostics: Iterable[Diagnostic]) -> None:

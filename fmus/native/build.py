@@ -103,6 +103,7 @@ def native(
     guid: str,
     resources: Path,
     translated: type[Any] | None = None,
+    unnamed: Path | None = None,
     hurry: bool = False,
     limit: int = compare_with_python.LIMIT,
 ) -> Native:
@@ -115,6 +116,7 @@ def native(
         guid: of the FMU.
         resources: folder passed to an instance.
         translated: a class for the translator that gives the same; default: the component.
+        unnamed: a file whose lines the reason does not name.
         hurry: leave it for later if it took longer than `LONGEST` the last time.
         limit: processor time [s] that the comparison may take.
     """
@@ -126,7 +128,7 @@ def native(
         if hurry and float(recall(EFFORTS, entry) or 0.0) > LONGEST:
             return Native(why_not=LATER)
         began = _processor_time()
-        text = emit(specialise(translated or component, home, *others), source, guid)
+        text = emit(specialise(translated or component, home, *others, unnamed=unnamed), source, guid)
         made, new = _let_through(text, component, guid, resources, limit)
         if new:
             keep(EFFORTS, entry, str(_processor_time() - began).encode())

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import copy
 import dataclasses
 import functools
+import inspect
 import operator
 import types
 from collections.abc import Sequence
@@ -14,7 +16,22 @@ from . import ir
 from .built_in import BuiltIn
 from .evaluate import DEEPEST, Call
 from .statements import EXIT, ON, RESULT, RETURN
-from .values import ANY, Bound, Closure, Dict, Failure, Frame, Instance, Picked, Refused, Union
+from .values import (
+    ANY,
+    Bound,
+    Box,
+    Closure,
+    Dict,
+    Failure,
+    Frame,
+    Instance,
+    List,
+    Picked,
+    Refused,
+    Union,
+    is_plain,
+    like,
+)
 
 
 class Calling(BuiltIn):
@@ -75,6 +92,8 @@ class Calling(BuiltIn):
         if isinstance(function, Bound):
             if isinstance(function.function, str):
                 return self._method(function.owner, function.function, args, named)
+            if isinstance(function.owner, Instance) and function.function is function.owner.cls.__init__:  # type: ignore[misc]
+                return self._initialized(function.owner, args, named)
             return self.call(function.function, [function.owner, *args], named)
         if isinstance(function, Instance):
             return self.call(self.attribute(function, "__call__"), args, named)
@@ -82,14 +101,23 @@ class Calling(BuiltIn):
             return self.call(function.__func__, [function.__self__, *args], named)
         if isinstance(function, functools._lru_cache_wrapper):
             function = function.__wrapped__
+        if function is copy.deepcopy:
+            return self._copied(args[0], type(args[0]).__name__, {})
         if isinstance(function, types.FunctionType) and self.sources.contains(function):
             return self._inlined(function, args, named)
         if isinstance(function, operator.itemgetter):
             keys = function.__reduce__()[1]
             picked = tuple(self.subscript(args[0], key) for key in keys)
             return picked if len(keys) > 1 else picked[0]
+        if isinstance(function, functools.partial):
+            return self.call(function.func, [*function.args, *args], function.keywords | named)
+        if function is object.__new__ and isinstance(args[0], type):
+            return Instance(args[0])
         if isinstance(function, type) and not self._is_python(function):
             return self._made(function, args, named)
+        of_object = inspect.getattr_static(type(function), "__call__", None)
+        if isinstance(of_object, types.FunctionType) and self.sources.contains(of_object):
+            return self._inlined(of_object, [function, *args], named)
         return self._built_in(function, args, named)
 
     @staticmethod
@@ -163,12 +191,55 @@ class Calling(BuiltIn):
         if issubclass(cls, (tuple, list, dict, int, float, str)):
             raise Refused(f"making a {cls.__name__}")
         made = Instance(cls)
-        init = cls.__dict__.get("__init__") or cls.__init__
+        self._initialized(made, args, named)
+        return made
+
+    def _initialized(self, made: Instance, args: list[Any], named: dict[str, Any]) -> None:
+        init = made.cls.__init__  # type: ignore[misc]
         own = isinstance(init, types.FunctionType) and self.sources.contains(init)
-        if dataclasses.is_dataclass(cls) and not own:
-            self._fill(made, cls, args, named)
+        if dataclasses.is_dataclass(made.cls) and not own:
+            self._fill(made, made.cls, args, named)
         elif isinstance(init, types.FunctionType):
             self.call(init, [made, *args], named)
+
+    def _copied(self, value: Any, name: str, copies: dict[int, Any]) -> Any:
+        """Return a copy of an object of Python that the evaluation can change.
+
+        Args:
+            value: the object, or what it holds.
+            name: of the value in refusals.
+            copies: id of an object -> its copy.
+
+        Raises:
+            Refused: it holds something else than numbers, texts, functions, lists and objects of own classes.
+        """
+        if is_plain(value) or isinstance(value, (type, types.FunctionType, types.BuiltinFunctionType)):
+            return value
+        if id(value) in copies:
+            return copies[id(value)]
+        if isinstance(value, functools.partial):
+            passed = (value.func, *value.args, *value.keywords.values())
+            if all(self._copied(x, name, copies) is x for x in passed):
+                return value
+            raise Refused(f"{name} of something that may change cannot be copied")
+        if isinstance(value, types.MethodType):
+            return Bound(value.__func__, self._copied(value.__self__, name, copies))
+        if isinstance(value, tuple):
+            return like(value, [self._copied(x, f"{name}[{k}]", copies) for k, x in enumerate(value)])
+        made: Box
+        held: dict[Any, Any]
+        if type(value) is list:
+            made, held = List([None] * len(value)), dict(enumerate(value))
+        elif type(value) is dict:
+            made, held = Dict({}), {self._key(key): x for key, x in value.items()}
+        elif _is_its_attributes(value):
+            made, held = Instance(type(value)), vars(value)
+        else:
+            raise Refused(f"{name}, of type {type(value).__name__}, cannot be copied")
+        copies[id(value)] = made
+        is_object = isinstance(made, Instance)
+        for key, x in held.items():
+            made.slots[key] = self._copied(x, f"{name}.{key}" if is_object else f"{name}[{key!r}]", copies)
         return made
 
     def _fill(self, made: Instance, cls: type, args: list[Any], named: dict[str, Any]) -> None:
@@ -186,3 +257,19 @@ class Calling(BuiltIn):
             made.slots[f.name] = value
         if hasattr(cls, "__post_init__"):
             self.call(cls.__post_init__, [made], {})
+
+
+class _Empty:
+    """What every object has that is all in its attributes."""
+
+
+def _is_its_attributes(value: Any) -> bool:
+    """Return whether an object of Python is all in its attributes, and copied as Python does by default."""
+    cls: Any = type(value)
+    ways = ("__reduce_ex__", "__reduce__", "__getstate__", "__setstate__", "__deepcopy__")
+    return (
+        cls.__basicsize__ == _Empty.__basicsize__
+        and hasattr(value, "__dict__")
+        and not any(vars(base).get("__slots__") for base in cls.__mro__)
+        and all(getattr(cls, way, None) is getattr(_Empty, way, None) for way in ways)
+    )

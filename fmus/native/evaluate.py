@@ -73,7 +73,8 @@ class Evaluation(Merging):
         self.calls: list[Call] = []
 
     def where(self) -> str:
-        return f"{self.calls[-1].source.file}:{self.calls[-1].line}" if self.calls else ""
+        named = next((call for call in reversed(self.calls) if call.source.file), None)
+        return f"{named.source.file}:{named.line}" if named else ""
 
     def raised_at(self) -> str:
         inner = next((call for call in reversed(self.calls) if call.source.of_package), None)

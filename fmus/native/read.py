@@ -24,7 +24,7 @@ class Source:
 
     Attributes:
         node: its syntax tree.
-        file: as sentences name it, from the folder of the package.
+        file: as sentences name it, from the folder of the package; "" if they do not.
         of_package: whether Python names it, too, where it raises (see `components.fmi.component`).
         names: of the module.
         cells: variables of the functions around it.
@@ -86,11 +86,13 @@ class Sources:
     Args:
         home: folder of the package.
         others: further folders and files.
+        unnamed: a file whose lines sentences do not name.
     """
 
-    def __init__(self, home: Path, *others: Path) -> None:
+    def __init__(self, home: Path, *others: Path, unnamed: Path | None = None) -> None:
         self.home = home.resolve()
         self.others = others
+        self.unnamed = unnamed
         self._known: dict[FunctionType, Source] = {}
 
     def contains(self, function: FunctionType) -> bool:
@@ -113,6 +115,7 @@ class Sources:
         file = Path(code.co_filename)
         of_package = file.is_relative_to(self.home)
         shown = file.relative_to(self.home).as_posix() if of_package else file.name
+        shown = "" if file == self.unnamed else shown
         where = f"{shown}:{code.co_firstlineno}"
         content = content_of(str(file))
         if content is None:

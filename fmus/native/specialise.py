@@ -51,12 +51,12 @@ class Program:
     rings: list[int] = field(default_factory=list)
 
 
-def specialise(component: type[Any], home: Path, *others: Path) -> Program:
+def specialise(component: type[Any], home: Path, *others: Path, unnamed: Path | None = None) -> Program:
     """Return a component as a program.
 
     Args:
         component: its class.
-        home, others: where its functions are (see `Sources`).
+        home, others, unnamed: where its functions are (see `Sources`).
 
     Raises:
         Refused: what cannot be translated, with file and line.
@@ -66,7 +66,7 @@ def specialise(component: type[Any], home: Path, *others: Path) -> Program:
 
     def run() -> None:
         try:
-            outcomes.append(_Specialising(component, Sources(home, *others)).program())
+            outcomes.append(_Specialising(component, Sources(home, *others, unnamed=unnamed)).program())
         except BaseException as error:
             outcomes.append(error)
 
@@ -204,7 +204,7 @@ class _Specialising:
 
     def _line_of(self, method: str) -> str:
         source = self.sources.of(getattr(self.component, method))
-        return f"{source.file}:{source.node.lineno}"
+        return f"{source.file}:{source.node.lineno}" if source.file else ""
 
     def _run(self, method: str, attributes: dict[str, Any], *args: Any) -> tuple[Instance, Outlining]:
         me = Instance(self.component, {**attributes, "p": self.parameters})

@@ -1,9 +1,11 @@
 """The Python library: scenarios as values, runs in memory, units in plain Python."""
 
+import functools
 import json
 import re
 import sys
 import warnings
+from collections import deque
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
@@ -163,10 +165,67 @@ def test_a_run_without_an_fmu_says_so(base):
     assert note.severity == "info" and note.message.startswith("controller: ")
 
 
+@dataclass
+class Switched:
+    """A law that is called, with a parameter and a table."""
+
+    gain: float = 2e4
+    table: list = field(default_factory=lambda: [0.5, 1.0])
+
+    def __call__(self, yaw_rate_ref, yaw_rate, t):
+        return self.gain * self.table[int(t > 0.1)] * (yaw_rate_ref - yaw_rate)
+
+
+class Lag:
+    def __init__(self):
+        self.y = 0.0
+
+    def step(self, u):
+        self.y += 0.1 * (u - self.y)
+        return self.y
+
+
+class Lagging:
+    """A law that is called, and keeps an object and a list."""
+
+    def __init__(self, gain=2e4):
+        self.gain, self.lag, self.past = gain, Lag(), [0.0, 0.0]
+
+    def __call__(self, yaw_rate_ref, yaw_rate):
+        self.past[0], self.past[1] = self.past[1], self.lag.step(yaw_rate_ref - yaw_rate)
+        return self.gain * (self.past[0] + self.past[1])
+
+    def law(self, yaw_rate_ref, yaw_rate, share=0.5):
+        return share * self.gain * self.lag.step(yaw_rate_ref - yaw_rate)
+
+
+class Derived:
+    """A law whose constructor derives something from an attribute of the class."""
+
+    inputs = ("yaw_rate_ref", "yaw_rate")
+    outputs = ("yaw_moment",)
+    gain = 1e4
+
+    def __init__(self, scale=1.0):
+        self.total = scale * self.gain
+
+    def output(self, t, u):
+        return self.total * (u.yaw_rate_ref - u.yaw_rate)
+
+
+def scaled(gain, yaw_rate_ref, yaw_rate):
+    return gain * (yaw_rate_ref - yaw_rate)
+
+
 LAWS = {
     "a function": proportional,
     "a lambda": lambda yaw_rate_ref, yaw_rate, t: 2e4 * (yaw_rate_ref - yaw_rate) if t > 0.1 else 0,
     "an object": Counting(),
+    "an object that derives": Derived(),
+    "an object that is called": Switched(),
+    "an object that is called and remembers": Lagging(),
+    "a method": Lagging().law,
+    "a partial function": functools.partial(scaled, 1e4),
     "a component": Fnn,
 }
 
@@ -186,21 +245,31 @@ def with_numpy(yaw_rate_ref, yaw_rate):
     return 2e4 * np.tanh(yaw_rate_ref - yaw_rate)
 
 
-@dataclass
 class Remembering:
-    """A law with a list, which belongs to the object."""
+    """A law with a queue, which belongs to the object."""
 
-    inputs = ("yaw_rate",)
-    outputs = ("yaw_moment",)
-    past: list = field(default_factory=list)
+    def __init__(self):
+        self.past = deque(maxlen=3)
 
-    def output(self, t, u):
-        return len(self.past)
+    def __call__(self, yaw_rate):
+        self.past.append(yaw_rate)
+        return -1e3 * sum(self.past)
+
+
+class Slotted:
+    __slots__ = ("gain",)
+
+    def __init__(self):
+        self.gain = 1e3
+
+    def __call__(self, yaw_rate):
+        return -self.gain * yaw_rate
 
 
 UNTRANSLATED = {
     "numpy": with_numpy,
-    "a list": Remembering(),
+    "a queue": Remembering(),
+    "slots": Slotted(),
     "no source": eval("lambda yaw_rate: -1e3 * yaw_rate"),
 }
 
@@ -220,6 +289,26 @@ def test_a_law_that_returns_a_truth_is_refused_natively_too(law, base):
     assert zero.run().record["fmus"]["controller"]["runs_as"] == "native"  # the same C as for False
     with refused(yb.SimulationError, "fmu-call-failed"):
         base.swap(controller=law).run()
+
+
+@pytest.mark.parametrize("law", [Lagging(), Lagging().law, Remembering()], ids=["native", "method", "Python"])
+def test_no_run_of_an_object_that_remembers_affects_the_next(law, base):
+    assert equal(base.swap(controller=law).run(), base.swap(controller=law).run())
+
+
+def test_parameters_of_an_object_that_is_called_are_those_of_constructor_and_call(base):
+    def last(scenario):
+        return scenario.set({"stop_time": 1.0}).run()["controller.yaw_moment"][-1]
+
+    scenario = base.swap(controller=Lagging())
+    assert (
+        last(scenario.set({"controller.gain": 1e4}))
+        == last(base.swap(controller=Lagging(1e4)))
+        != last(scenario)
+    )
+    derived = base.swap(controller=Derived()).set({"controller.gain": 2e4, "controller.scale": 0.5})
+    assert last(derived) == last(base.swap(controller=Derived()))
+    assert derived.set({"stop_time": 0.01}).run().record["fmus"]["controller"]["runs_as"] == "native"
 
 
 def slow_law(yaw_rate_ref, yaw_rate):
