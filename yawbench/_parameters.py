@@ -228,7 +228,7 @@ def functions_of(*programs: Any, named: bool = False) -> list[FunctionType]:
             waiting += [value.func, *value.args, *value.keywords.values()]
         elif type(value) is MethodType:
             waiting += [value.__func__, value.__self__]
-        elif type(value) in (classmethod, staticmethod):
+        elif type(value) in (classmethod, staticmethod) and isinstance(value.__func__, FunctionType):
             waiting.append(value.__func__)
         elif type(value) is property:
             waiting += [value.fget, value.fset]

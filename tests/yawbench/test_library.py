@@ -298,7 +298,7 @@ def test_no_run_of_an_object_that_remembers_affects_the_next(law, base):
 
 def test_parameters_of_an_object_that_is_called_are_those_of_constructor_and_call(base):
     def last(scenario):
-        return scenario.set({"stop_time": 1.0}).run()["controller.yaw_moment"][-1]
+        return scenario.run()["controller.yaw_moment"][-1]
 
     scenario = base.swap(controller=Lagging())
     assert (
