@@ -207,7 +207,7 @@ class Derived:
     gain = 1e4
 
     def __init__(self, scale=1.0):
-        self.total = scale * self.gain
+        self.scale, self.total = scale, scale * self.gain
 
     def output(self, t, u):
         return self.total * (u.yaw_rate_ref - u.yaw_rate)
