@@ -39,7 +39,7 @@ HERE = Path(__file__).resolve().parent
 COMPONENTS = HERE.parent / "components"
 
 Recipe = PythonRecipe | CRecipe
-"""How to build an FMU."""
+"""Instructions for building an FMU, by the language of its component."""
 BuildProgress = Callable[[str, str], None]
 """Called with the name of an FMU and its outcome: built, current, removed or failed."""
 

@@ -1,4 +1,4 @@
-"""How fast, how slippery, how much steering: a lane change under sliders.
+"""A lane change under sliders: speed, friction and steering.
 
 marimo edit notebooks/sliders.py     with its code
 marimo run notebooks/sliders.py      as a page

@@ -209,9 +209,9 @@ OF_RESULTS = (
 )
 """Modules and packages on which the results of a run depend; FMUs are hashed separately."""
 OF_METRICS = (*OF_RESULTS, "metrics")
-"""Those that determine the metrics of a run."""
+"""Modules and packages on which the metrics of a run depend."""
 OF_TESTS = (*OF_METRICS, "evaluation")
-"""Those that determine the evaluation of a standard test."""
+"""Modules and packages on which the evaluation of a standard test depends."""
 
 _HERE = Path(__file__).parent
 

@@ -31,7 +31,7 @@ Severity = Literal["error", "warning", "info"]
 
 @dataclass(frozen=True)
 class Location:
-    """Where a diagnostic points; every part may be unknown.
+    """Location of a diagnostic; every part may be unknown.
 
     Attributes:
         file: the file with the value.

@@ -24,19 +24,18 @@ from .signal_names import SignalName, Target
 Causality = Literal[
     "parameter", "input", "output", "local", "independent", "calculatedParameter", "structuralParameter"
 ]
-"""What a variable is to its FMU, as in FMI 2.0 and 3.0."""
+"""Causality of a variable, as in FMI 2.0 and 3.0: parameter, input, output, ..."""
 Variability = Literal["constant", "fixed", "tunable", "discrete", "continuous"]
-"""When the value of a variable may change, as in FMI 2.0 and 3.0."""
+"""Variability of a variable, as in FMI 2.0 and 3.0: the times at which its value may change."""
 VariableType = Literal["Real", "Integer", "Boolean", "String", "Enumeration"]
 """Type of a variable, as in FMI 2.0; `Variable.encoding` has that of FMI 3.0."""
 OverrideOrigin = Literal[
     "--set", "--swap", "--fault", "--vehicle", "--controller", "set", "swap", "fault",
-    "study", "sweep", "ranking", "region", "fit", "converge", "second-opinion",
-    "sine with dwell", "slowly increasing steer", "entry speed",
+    "study", "sweep", "ranking", "region", "fit", "converge", "second-opinion", "standard test",
 ]  # fmt: skip
-"""What made an override: an option, a method of the library, a file of many runs, a command or a test."""
+"""Maker of an override: an option, a method of the library, a file of many runs, a command or a test."""
 OriginKind = Literal["default", "vehicle", "derived", "scenario", "file"] | OverrideOrigin
-"""Where a value comes from: its FMU, the vehicle file, a formula, the scenario, a file, or an override."""
+"""Kind of a value's origin: its FMU, the vehicle file, a formula, the scenario, a file, or an override."""
 SourceKind = Literal["paper", "literature", "chosen", "erratum", "varied", "neutral"]
 """Kind of a source: "varied" is an override, "neutral" has no source of its own."""
 Value = float | int | bool | str
@@ -106,7 +105,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class BuildInfo:
-    """How an FMU was built by this program."""
+    """Build of an FMU by this program."""
 
     source: str  # path: of a component from the folder above components/, else from the FMU's folder
     key: str  # hash of the sources and of everything else that determines the FMU's bytes
@@ -116,7 +115,7 @@ class BuildInfo:
 
 @dataclass(frozen=True)
 class RunsAs:
-    """Whether a component in Python runs as native code, and why if it does not."""
+    """Execution of a component in Python: as native code or not, and the reason if it is not."""
 
     why: str = ""  # it runs in Python; "" if native
 
@@ -148,7 +147,7 @@ class Fmu:
     host_packages: tuple[str, ...] = ()  # Python packages that the host process must have
     built: BuildInfo | None = None  # None: built elsewhere, or not examined
     python_modules: dict[str, str] = field(default_factory=dict)
-    """For PythonFMU: top-level module in resources/ -> hash of its content."""
+    """Modules of a PythonFMU: top-level module in resources/ -> hash of its content."""
     refused: dict[str, str] = field(default_factory=dict)
     """Variable that cannot be used -> reason."""
     violations: tuple[Diagnostic, ...] = ()
@@ -158,7 +157,7 @@ class Fmu:
     tolerance: float | None = None
     """Relative tolerance of the default experiment."""
     runs_as: RunsAs | None = None
-    """Of plain Python, which has no archive that says so."""
+    """Execution of plain Python, which has no archive that says it."""
     needs_tool: bool = False
     """Whether it needs the tool that exported it (`needsExecutionTool`)."""
 
@@ -252,7 +251,7 @@ def _first_word(source: str) -> SourceKind | None:
 
 @dataclass(frozen=True)
 class ValueOrigin:
-    """Where the value of a parameter or constant comes from."""
+    """Origin of the value of a parameter or constant."""
 
     kind: OriginKind
     detail: str = ""  # the formula of a derived value, the name of a file
@@ -290,7 +289,7 @@ class Instance:
 
     @property
     def role(self) -> str:
-        """What the instance does: "driver", "controller", "plant", ... (see `vocabulary.roles`)."""
+        """Role of the instance: "driver", "controller", "plant", ... (see `vocabulary.roles`)."""
         return role_of(self.name, self.fmu.name, self.fmu.role)
 
     def parameter(self, name: str) -> Value | None:

@@ -1,4 +1,4 @@
-"""From a scenario file and overrides to the plan of a run: for commands, experiments and the library."""
+"""The planner: from a scenario file and overrides to a plan, for commands, experiments and the library."""
 
 from __future__ import annotations
 

@@ -172,7 +172,7 @@ class SupervisedProcess:
 
     def __init__(self, start: Callable[[int, int], Child]) -> None:
         self._deadline = math.inf
-        """When an answer is late, by `time.monotonic` [s]."""
+        """Time by which an answer is late, of `time.monotonic` [s]."""
         self._closed = False
         commands, writing = os.pipe()
         reading, answers = os.pipe()

@@ -49,7 +49,7 @@ def default_workers() -> int:
 
 
 class Finished(NamedTuple):
-    """What became of a call: its value, the exception that it raised, or how the process ended."""
+    """Outcome of a call: its value, the exception that it raised, or the end of the process."""
 
     number: int  # of the call, in the order in which they were given
     seconds: float  # from request to answer

@@ -1,4 +1,4 @@
-"""What the tool writes, as text without anything that differs between two runs of the same program.
+"""Artefacts of the tool, as text without anything that differs between two runs of the same program.
 
 Times, versions, paths, and hashes of code and FMUs are taken out. What remains says what was computed: every
 signal of a results file, the cells of tables, the verdicts of a page, the variables of an FMU.

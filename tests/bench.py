@@ -1,4 +1,4 @@
-"""What a run costs: `make bench`, or `python -m tests.bench [--long] [SCENARIO ...]`.
+"""Cost of a run: `make bench`, or `python -m tests.bench [--long] [SCENARIO ...]`.
 
 Prints, and asserts nothing: times depend on the machine and on who else uses it. Every figure is the best of
 several runs, which is the one least disturbed, if nothing else is said. First comes a table of ratios, each
@@ -71,7 +71,7 @@ class Meter:
 
 
 Change = Callable[[Operation], list[Operation]]
-"""What becomes of an operation of the program before it is measured."""
+"""Replacement of an operation of the program before it is measured."""
 
 
 def measure(plan: Plan, change: Change = lambda operation: [operation]) -> dict[str, float]:

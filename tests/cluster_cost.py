@@ -1,4 +1,4 @@
-"""What short runs on a Dask cluster of this machine cost: `python -m tests.cluster_cost [--runs 5000]`.
+"""Cost of short runs on a Dask cluster of this machine: `python -m tests.cluster_cost [--runs 5000]`.
 
 Starts a scheduler and two workers, runs a sweep there by the command line, and prints the memory of the
 command and the scheduler and the scheduler's share of the time as the number of finished runs grows; the

@@ -59,7 +59,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What came of an FMU in FMPy and here: "ran", or why not; and the values that differ."""
+    """Outcome of an FMU in FMPy and here: "ran", or why not; and the values that differ."""
 
     name: str
     fmi: str

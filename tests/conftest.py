@@ -23,7 +23,7 @@ LONGEST_FIRST = (
     *("components/test_conformance.py", "components/test_car_on_tyres.py", "components/test_w"),
     "components",
 )
-"""How paths begin: files with long runs come first, so that no worker is left alone with one at the end."""
+"""Beginnings of paths: long runs come first, so that no worker is left alone with one at the end."""
 
 gc.set_threshold(50_000, 20, 20)
 """Python looks for garbage less often: thousands of tests keep much, and leave little."""

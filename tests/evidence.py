@@ -1,4 +1,4 @@
-"""What tests have measured of how far the numbers can be trusted: asserted here, and told in the docs.
+"""Measured errors that tell how far numbers can be trusted: asserted here, and printed in the docs.
 
 `docs/evidence.json` keeps the figures, and the page "How far to trust the numbers" is made from it. A test
 that measures one asserts its limit and that the record is still true; with `YAWBENCH_RECORD=1` in the

@@ -130,7 +130,7 @@ class Job(NamedTuple):
     name: str
     commands: tuple[tuple[str, ...], ...]
     cost: int = 1
-    """How long it takes, roughly: the longest are begun first."""
+    """Rough duration: the longest are begun first."""
     quick: bool = False
     """Whether --quick does it too."""
     printed: bool = True
@@ -138,7 +138,7 @@ class Job(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """What differs between two fingerprints, by name."""
+    """Difference between two fingerprints, by name."""
 
     differing: list[str]
     missing: list[str]

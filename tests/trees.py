@@ -1,4 +1,4 @@
-"""What stands in a folder, to be compared with what stands there later."""
+"""Snapshot of a folder, to be compared with a later one."""
 
 from __future__ import annotations
 

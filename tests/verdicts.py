@@ -1,4 +1,4 @@
-"""How far the verdicts on the papers carry, as docs/verdicts.md tells it.
+"""Reach of the verdicts on the papers, as docs/verdicts.md states it.
 
 The page is the record: a test makes all runs and compares; with `YAWBENCH_RECORD=1` in the environment it
 writes the page anew. What the README tells of verdicts is held against the page, which takes no runs.

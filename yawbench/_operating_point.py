@@ -52,7 +52,7 @@ class Inside(NamedTuple):
 
 
 StateKey = int | Inside
-"""Where a value of the state is: an index of the signal pool, or inside a component."""
+"""Location of a value of the state: an index of the signal pool, or inside a component."""
 
 
 class OperatingPoint:

@@ -104,7 +104,7 @@ def tune(
     if tuned.best.objective is None:
         why = reasons[0] if reasons else f"no run yields {listed(weights)}"
         raise ResultsError(f"no trial has a value of the objective: {why}", code="results-missing")
-    _warn(design.spec.title, generations_done, reasons)
+    warn(design.spec.title, _diagnostics(generations_done, reasons))
     return Tuning(design, tuned)
 
 
@@ -209,8 +209,8 @@ def _programs(bases: list[Scenario]) -> dict[Path, PythonComponent]:
     return programs
 
 
-def _warn(title: str, done: list[ExperimentResult], reasons: list[str]) -> None:
-    """Issue what plans of the first trials warn of, and how many trials failed, as one warning."""
+def _diagnostics(done: list[ExperimentResult], reasons: list[str]) -> list[Diagnostic]:
+    """Return the diagnostics of the plans of the first trials, and a warning if runs failed."""
     first = done[0].planned
     plans = [job.plan for job in first.jobs if job.plan] if first else []
     diagnostics = list(dict.fromkeys(entry for plan in plans for entry in plan.diagnostics))
@@ -218,7 +218,7 @@ def _warn(title: str, done: list[ExperimentResult], reasons: list[str]) -> None:
         total = sum(len(findings.records) for findings in done)
         text = f"{len(reasons)} of {counted(total, 'run')} failed: {reasons[0]}"
         diagnostics.append(Diagnostic("runs-with-warnings", text, "warning"))
-    warn(title, diagnostics)
+    return diagnostics
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from ..mathematics.first_order_lag import Stage
 
 @dataclass(frozen=True)
 class LagParameters:
-    """Of one wheel's motor and brake; all four are equal."""
+    """Parameters of one wheel's motor and brake; all four are equal."""
 
     motor_time_constant: float = parameter(0.015, "s", "Lag of the motor", "chosen", minimum=0.0)
     motor_delay: float = parameter(0.003, "s", "Pure delay of the motor", "chosen", minimum=0.0)

@@ -65,7 +65,7 @@ DRIVEN_WHEELS = (*WHEEL_SLIPS, "wheel_speed_*", *of_steered_wheels("wheel_veloci
 
 @dataclass(frozen=True)
 class StartParameters:
-    """How a car begins, and what slip means when it hardly moves."""
+    """Start of a car, and the speed below which its slips refer to that speed."""
 
     initial_sideslip: float = parameter(0.0, "rad", "Sideslip angle at the start", "chosen: none")
     initial_yaw_rate: float = parameter(0.0, "rad/s", "Yaw rate at the start", "chosen: none")
@@ -80,7 +80,7 @@ class StartParameters:
 
 @dataclass(frozen=True)
 class DrivenCarParameters:
-    """What a car whose wheels are driven and braked needs beside that."""
+    """Further parameters of a car whose wheels are driven and braked."""
 
     slip_stiffness_per_load: float = parameter(
         22.0,

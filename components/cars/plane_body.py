@@ -37,7 +37,7 @@ class Geometry(Protocol):
 
 
 NO_MOMENTS: Four = (0.0, 0.0, 0.0, 0.0)
-"""Of four tyres about their vertical axes [N.m]."""
+"""No moments of four tyres about their vertical axes [N.m]."""
 
 
 def sum_of(moments: Sequence[float]) -> float:

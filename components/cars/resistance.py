@@ -1,4 +1,4 @@
-"""What slows a car besides its tyres' slip: air, on the body, and rolling resistance, on the wheels.
+"""Driving resistance: air drag, on the body, and rolling resistance, on the wheels.
 
     F = 1/2 rho C_D A v_x |v_x|         on the body
     M = f F_z R                         on a wheel of load F_z, friction against its rotation
@@ -17,7 +17,7 @@ from ..fmi.variables import of_car
 
 @dataclass(frozen=True)
 class ResistanceParameters:
-    """Those of paper B, table 1."""
+    """Parameters of driving resistance; defaults: paper B, table 1."""
 
     drag_coefficient: float = of_car(0.3, "paper B, table 1")
     frontal_area: float = of_car(1.8, "paper B, table 1")

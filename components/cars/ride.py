@@ -1,4 +1,4 @@
-"""How a sprung body moves on four unsprung masses: heave, roll, pitch, wheel travel, coupled with yaw.
+"""Ride of a sprung body on four unsprung masses: heave, roll, pitch, wheel travel, coupled with yaw.
 
 Coordinates, all zero at rest: heave z [m] of the sprung mass's centre, roll phi, pitch theta [rad], heights
 u_i [m] of the unsprung masses; x_i, y_i are the wheel's place from the sprung mass's centre. Wheel travel

@@ -1,4 +1,4 @@
-"""What an inclined road and the wind do to a car, beside its tyres: they act on all of its mass alike.
+"""Accelerations of a car by an inclined road and the wind, which act on all of its mass alike.
 
     e_x = -g sin(slope)              e_y = F_w / m - g sin(bank)              [m/s2], vehicle axes
     g_n = g sqrt(1 - sin^2(slope) - sin^2(bank))        gravity towards the road

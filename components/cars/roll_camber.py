@@ -1,4 +1,4 @@
-"""How the wheels lean on the road when the body rolls.
+"""Roll camber: inclination of the wheels against the road when the body rolls.
 
     gamma_f = e_f phi        gamma_r = e_r phi
 

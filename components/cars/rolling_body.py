@@ -42,7 +42,7 @@ class RollingCarParameters(StartParameters, RollCamberParameters, ResistancePara
 
 
 class RollingBody:
-    """What the equations need of the parameters `p`, derived once.
+    """Equations of the rolling body, with constants derived once from the parameters `p`.
 
     Raises:
         ValueError: springs that cannot hold the body up, or an inertia that cannot be.

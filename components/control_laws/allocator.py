@@ -20,7 +20,7 @@ BASIC = ("yaw_moment", "drive_force", "steer_angle")
 
 @dataclass(frozen=True)
 class DriveParameters:
-    """Of the driver's force."""
+    """Parameters of the driver's force."""
 
     drive_front_share: float = of_car(
         0.5, "chosen: equal motors", text="Share of the driver's force in front", maximum=1.0

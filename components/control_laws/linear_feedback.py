@@ -26,7 +26,7 @@ from ..cars.single_track_car import SingleTrackCar
 
 Matrix = tuple[tuple[float, float], tuple[float, float]]
 _SMALLEST = 1e-6
-"""Of a_12, by which the yaw rate reaches the sideslip; it crosses zero at walking pace."""
+"""Smallest magnitude of a_12, by which the yaw rate reaches the sideslip; it crosses zero at walking pace."""
 
 
 def error_dynamics(car: SingleTrackCar, v: float) -> Matrix:

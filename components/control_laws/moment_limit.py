@@ -1,4 +1,4 @@
-"""What bounds a yaw moment: a largest one, and walking pace, where sideslip means nothing."""
+"""Bounds of a yaw moment: a largest magnitude, faded out below walking pace, where sideslip means nothing."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -8,7 +8,7 @@ from ..fmi.variables import parameter
 
 @dataclass(frozen=True)
 class LimitParameters:
-    """Of the limits."""
+    """Parameters of the limits."""
 
     moment_limit: float = parameter(
         5000.0, "N.m", "Largest yaw moment", "chosen: beyond what one wheel gives at mu 0.4", minimum=0.0

@@ -17,7 +17,7 @@ from ..mathematics.sums import added, dot
 from .linear_feedback import Matrix
 
 _ORDER = 14
-"""Of the series of the matrix exponential: beyond what counts where `A h` is at most 1."""
+"""Order of the series of the matrix exponential: beyond what counts where `A h` is at most 1."""
 
 
 def _discrete(a: Matrix, b: float, h: float) -> tuple[Matrix, tuple[float, float]]:
@@ -47,7 +47,7 @@ def _discrete(a: Matrix, b: float, h: float) -> tuple[Matrix, tuple[float, float
 
 @dataclass(frozen=True)
 class CostWeights:
-    """What counts alike, and how the horizon is divided."""
+    """Weights of the cost, and the time step of the horizon."""
 
     beta_0: float  # [rad]
     r_0: float  # [rad/s]

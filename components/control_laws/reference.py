@@ -17,7 +17,7 @@ SHOWN = ("yaw_rate_ref", "sideslip_ref", "yaw_acceleration_ref", "sideslip_rate_
 
 @dataclass(frozen=True)
 class RateParameters:
-    """Of the rates."""
+    """Parameters of the rates."""
 
     rate_time_constant: float = parameter(
         0.005, "s", "Lag tau of the rates", "chosen: one sample of the controllers", minimum=0.0

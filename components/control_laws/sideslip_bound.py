@@ -1,4 +1,4 @@
-"""How far a car may slip aside on a road, so that its driver still masters it.
+"""Largest sideslip angle on a road at which a driver still controls the car.
 
     beta_max = atan(c mu),      c = 0.02 s2/m g
 

@@ -30,12 +30,12 @@ ERRORS = (
 """The inputs of the law, in the order of `surface` and `demand`."""
 
 SURFACE = ("yaw_rate_ref", "sideslip_ref", "yaw_rate", "sideslip")
-"""Those that the sliding surface itself follows."""
+"""Inputs that the sliding surface itself follows."""
 
 
 @dataclass(frozen=True)
 class SurfaceParameters:
-    """Of the surface, of its boundary layer and of the moment's limits; the paper names none but I_z."""
+    """Parameters of the surface, its boundary layer and the moment's limits; the paper names none but I_z."""
 
     boundary_layer: float = parameter(
         0.1, "rad/s", "Half width Delta of the boundary layer", "chosen: about 6 deg/s", minimum=0.0

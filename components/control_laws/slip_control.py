@@ -35,7 +35,7 @@ from ..tyre_models.tyre import Curve
 
 @dataclass(frozen=True)
 class SlipControlParameters:
-    """Of the wheel, the law and the limits; the gains are those tried for paper B."""
+    """Parameters of the wheel, the law and the limits; the gains are those tried for paper B."""
 
     wheel_radius: float = like(PaperB, "wheel_radius")
     wheel_inertia: float = like(PaperB, "wheel_inertia")

@@ -52,7 +52,7 @@ NARROWEST = 0.1
 
 @dataclass(frozen=True)
 class FnnParameters:
-    """Of the network, of its learning and of the moment it may ask for."""
+    """Parameters of the network, of its learning and of the moment it may ask for."""
 
     error_gain: float = parameter(
         400.0, "1/rad", "Scale theta_1 of e", "chosen: at 0.16 degrees x_1 is 1/2", minimum=0.0

@@ -86,7 +86,7 @@ class FuzzyPidParameters(PidParameters):
 
 
 class GainSchedule:
-    """What sets the gains of the loop "yaw_rate" or "sideslip" on line."""
+    """Fuzzy rules that set the gains of the loop "yaw_rate" or "sideslip" in every step."""
 
     def __init__(self, p: FuzzyPidParameters, loop: str) -> None:
         self.base, self.ranges = gains_of(p, loop), gains_of(p, loop, "range")

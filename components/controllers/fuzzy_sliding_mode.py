@@ -29,7 +29,7 @@ TABLE = """
 
 @dataclass(frozen=True)
 class FuzzySlidingModeParameters(SurfaceParameters):
-    """Of the law and of the ranges that the paper leaves open."""
+    """Parameters of the law and of the ranges that the paper leaves open."""
 
     largest_reaching_rate: float = parameter(
         3.0, "rad/s2", "Range of eps, from 0", "chosen: its middle exceeds the constant law's", minimum=1e-6

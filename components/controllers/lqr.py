@@ -24,7 +24,7 @@ from .pid import SEEN
 
 @dataclass(frozen=True)
 class LqrParameters:
-    """Of the linear single-track car that the law is made for; weights, by what counts alike, and limits."""
+    """Parameters of the single-track car that the law is made for; weights, by what counts alike; limits."""
 
     mass: float = like(PaperA, "mass")
     yaw_inertia: float = like(PaperA, "yaw_inertia")

@@ -23,12 +23,12 @@ from .lqr import LqrParameters
 from .pid import SEEN
 
 SPACING = 0.5
-"""Of the speeds [m/s]. Chosen: gains change by a hundredth or two from one to the next."""
+"""Spacing of the speeds [m/s]. Chosen: gains change by a hundredth or two from one to the next."""
 
 
 @dataclass(frozen=True)
 class MpcParameters(LqrParameters):
-    """Those of the LQR, and the horizon."""
+    """Parameters of the LQR, and of the horizon."""
 
     prediction_step: float = parameter(
         0.02, "s", "Step of the prediction", "chosen: a tenth of the car's own times", minimum=1e-4

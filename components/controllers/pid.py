@@ -56,7 +56,7 @@ class PidParameters:
 
 
 SEEN = ("yaw_rate_ref", "yaw_rate", "sideslip_ref", "sideslip")
-"""What the loops see, in the order of `YawLoops`."""
+"""Inputs of the loops, in the order of `YawLoops`."""
 
 
 def gains_of(p: PidParameters, loop: str, kind: str = "gain") -> Gains:

@@ -16,7 +16,7 @@ from ..fmi.variables import output, parameter
 
 @dataclass(frozen=True)
 class SlidingModeParameters(SurfaceParameters):
-    """Of the law; the paper names none of its gains."""
+    """Parameters of the law; the paper names none of its gains."""
 
     switching: str = parameter(
         "sign",

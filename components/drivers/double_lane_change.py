@@ -31,7 +31,7 @@ from ..mathematics.first_order_lag import Stage
 
 @dataclass(frozen=True)
 class DoubleLaneChangeParameters(HeldSpeedParameters, LaneChangeParameters):
-    """Of the driver, of the car as the driver knows it, and of the track."""
+    """Parameters of the driver, of the car as the driver knows it, and of the track."""
 
     preview_time: float = parameter(
         0.78, "s", "Preview T_p", "chosen: through the cones at 70 km/h on mu 0.4", minimum=0.05

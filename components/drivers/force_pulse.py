@@ -17,7 +17,7 @@ from ..fmi.variables import parameter
 
 @dataclass(frozen=True)
 class ForcePulseParameters:
-    """Of pedal and steering wheel; no paper names them: chosen for slip control on a slippery road."""
+    """Parameters of pedal and steering wheel; in no paper: chosen for slip control on a slippery road."""
 
     force: float = parameter(
         -6000.0,

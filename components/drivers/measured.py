@@ -19,7 +19,7 @@ from ..fmi.variables import like, output, parameter, signal
 
 @dataclass(frozen=True)
 class MeasuredParameters:
-    """Of the steering, and of the foot."""
+    """Parameters of the steering, and of the foot."""
 
     steering_ratio: float = like(SteeringParameters, "steering_ratio")
     mass: float = like(PaperC, "mass")

@@ -45,7 +45,7 @@ from ..mathematics.sums import dot
 from .double_lane_change import DoubleLaneChangeParameters
 
 STEP = 0.03
-"""Of the preview [s]. Chosen: half a metre at 18 m/s."""
+"""Time step of the preview [s]. Chosen: half a metre at 18 m/s."""
 SLOWEST = 2.0
 """Speed below which gains stay what they are there [m/s]."""
 MOST = 0.99
@@ -54,7 +54,7 @@ MOST = 0.99
 
 @dataclass(frozen=True)
 class OptimalPreviewParameters(HeldSpeedParameters, LaneChangeParameters):
-    """Of the driver, of the car as the driver knows it, and of the track."""
+    """Parameters of the driver, of the car as the driver knows it, and of the track."""
 
     path_margin: float = parameter(
         0.1, "m", "Margin between body and cones that the path aims at", "chosen: tuned", minimum=0.0

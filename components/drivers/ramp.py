@@ -17,7 +17,7 @@ from ..fmi.variables import parameter
 
 @dataclass(frozen=True)
 class RampParameters(SteeringParameters, HeldSpeedParameters):
-    """Of the steering input."""
+    """Parameters of the steering input."""
 
     amplitude: float = parameter(1.5, "rad", "Final angle of the hand wheel", "paper C, section 3.3")
     ramp_time: float = parameter(2.0, "s", "Duration of the ramp", "paper C, section 3.3", minimum=0.0)

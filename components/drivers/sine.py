@@ -17,7 +17,7 @@ from ..fmi.variables import of_car, parameter
 
 @dataclass(frozen=True)
 class SineParameters(SteeringParameters, SpeedHoldingParameters):
-    """Of the steering input; papers A and B name a sine but neither amplitude nor period."""
+    """Parameters of the steering input; papers A and B name a sine but neither amplitude nor period."""
 
     amplitude: float = parameter(0.05, "rad", "Amplitude at the hand wheel", "chosen: paper A at 15 m/s")
     steering_ratio: float = of_car(1.0, "chosen: 1, the amplitude is that of the road wheels")

@@ -17,7 +17,7 @@ from ..fmi.variables import parameter
 
 @dataclass(frozen=True)
 class SineSweepParameters(SteeringParameters, HeldSpeedParameters):
-    """Of the steering input."""
+    """Parameters of the steering input."""
 
     amplitude: float = parameter(
         math.radians(20.0), "rad", "Amplitude at the hand wheel", "chosen: tyres stay linear"

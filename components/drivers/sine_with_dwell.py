@@ -22,7 +22,7 @@ from ..fmi.variables import parameter
 
 @dataclass(frozen=True)
 class SineWithDwellParameters(SteeringParameters, HeldSpeedParameters):
-    """Of the steering input and of the accelerator."""
+    """Parameters of the steering input and of the accelerator."""
 
     amplitude: float = parameter(
         math.radians(270.0), "rad", "Amplitude at the hand wheel", "UN R140: least of the last runs"

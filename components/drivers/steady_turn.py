@@ -25,7 +25,7 @@ from .double_lane_change import DoubleLaneChangeParameters
 
 @dataclass(frozen=True)
 class SteadyTurnParameters(HeldSpeedParameters):
-    """Of the circle, of the action, and of the car as the driver knows it."""
+    """Parameters of the circle, of the action, and of the car as the driver knows it."""
 
     radius: float = parameter(
         100.0, "m", "Radius of the circle, positive: to the left", "after ISO 7975, from memory"

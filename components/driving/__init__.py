@@ -1,1 +1,1 @@
-"""What drivers share: the pedal, the steering wheel, the track."""
+"""Code shared by drivers: the pedal, the steering wheel, the track."""

@@ -16,7 +16,7 @@ from .speed_holding import SpeedHold
 
 @dataclass(frozen=True)
 class SteeringParameters:
-    """Of the steering and of when it begins."""
+    """Parameters of the steering and of when it begins."""
 
     steering_ratio: float = of_car(17.0, "chosen: large saloon")
     start_time: float = parameter(1.0, "s", "Time at which steering begins", "chosen: 1 s straight ahead")

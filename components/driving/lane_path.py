@@ -28,12 +28,12 @@ from ..mathematics.sums import dot
 from .track import Outline
 
 LEAD, TAIL = 15.0, 15.0
-"""Of the path before the first cones and behind the last ones [m]. Chosen: a turn of the wheel at 25 m/s."""
+"""Path before the first cones and behind the last ones [m]. Chosen: a turn of the wheel at 25 m/s."""
 INTERVALS = 40
-"""Between the knots. Chosen: half of them raise the largest force by 2 %."""
+"""Number of intervals between the knots. Chosen: half of them raise the largest force by 2 %."""
 POWER = 8
 MOST_STEPS = 60
-"""Of Newton's method; chosen: twice what the standard's tracks need."""
+"""Largest number of steps of Newton's method; chosen: twice what the standard's tracks need."""
 CLOSE = 1e-5
 """Relative gain of a step at which it ends."""
 AHEAD = 5.0

@@ -1,4 +1,4 @@
-"""How drivers hold their speed: a PI law for the drive force, through the lag of pedal and engine.
+"""Speed control of drivers: a PI law for the drive force, through the lag of pedal and engine.
 
     F* = K e + (K / T_i) integral(e),   e = v_target - v_x,     0 <= F* <= F_max    no windup at the limits
     tau dF/dt = F* - F                  drive force = constant part + F
@@ -21,7 +21,7 @@ from ..mathematics.pid_loop import Gains, Pid
 
 @dataclass(frozen=True)
 class SpeedHoldingParameters:
-    """Of the driver's right foot and the engine. By default the speed is not held."""
+    """Parameters of the driver's right foot and the engine. By default the speed is not held."""
 
     constant_drive_force: float = parameter(
         0.0, "N", "Sum of the longitudinal tyre forces asked for, always", "paper A: no driving"
@@ -43,7 +43,7 @@ class SpeedHoldingParameters:
 
 @dataclass(frozen=True)
 class HeldSpeedParameters(SpeedHoldingParameters):
-    """The same for a driver who holds the speed unless told otherwise."""
+    """Parameters of a driver who holds the speed by default."""
 
     speed_gain: float = parameter(
         4000.0, "N.s/m", "Gain K of speed holding, 0 for none", "chosen: 1000 N at 0.25 m/s", minimum=0.0

@@ -36,7 +36,7 @@ class Outline(NamedTuple):
 
 @dataclass(frozen=True)
 class LaneChangeParameters:
-    """Of the track and of the car that has to fit in."""
+    """Parameters of the track and of the car that has to fit in."""
 
     vehicle_width: float = parameter(
         1.85, "m", "Vehicle width, from which lane widths follow", "chosen: large saloon", minimum=0.5

@@ -1,1 +1,1 @@
-"""What estimators share: reference speed, zero points, the filter on a single track."""
+"""Code shared by estimators: reference speed, zero points, the filter on a single track."""

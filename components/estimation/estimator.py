@@ -42,7 +42,7 @@ NAMES = (
     *("slip_angle_*", "slip_ratio_*", "vertical_load_*", "wheel_velocity_*"),
 )
 OUTPUTS = tuple(output(name, *INPUTS[:-1], *wheels("wheel_speed_*")) for name in NAMES)
-"""What every estimator gives, all of it following all inputs at once."""
+"""Outputs of every estimator, each with direct feedthrough of all inputs."""
 
 
 class Estimator(Component):

@@ -1,4 +1,4 @@
-"""What all estimators are told: the car, as a control unit knows it, and how far signals are trusted."""
+"""Parameters of all estimators: the car, as a control unit knows it, and the noise of its signals."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from ..fmi.variables import like, parameter
 
 @dataclass(frozen=True)
 class EstimatorParameters:
-    """Of the car, as a control unit knows it, and of what all estimators do."""
+    """Parameters of the car, as a control unit knows it, and of what all estimators do."""
 
     mass: float = like(PaperB, "mass")
     cg_to_front_axle: float = like(PaperB, "cg_to_front_axle")

@@ -40,7 +40,7 @@ _TUNED = "chosen: on runs of four cars, see docs/estimators.md"
 
 @dataclass(frozen=True)
 class FilterParameters(EstimatorParameters):
-    """How far model, measurement and friction are trusted."""
+    """Tyre stiffnesses, and standard deviations of model, measurement and friction."""
 
     cornering_stiffness_front: float = parameter(
         91600.0, "N/rad", "Stiffness C_f of the front axle", "chosen: that of the tyres of set 1", minimum=1.0

@@ -21,7 +21,7 @@ from ..fmi.variables import parameter
 
 @dataclass(frozen=True)
 class KinematicParameters(EstimatorParameters):
-    """Of the washout."""
+    """Parameters of the washout."""
 
     washout: float = parameter(
         2.0, "s", "Time constant of the washout", "chosen: a lane change is shorter", minimum=0.05

@@ -27,7 +27,7 @@ NEEDED = ("velocity_x", "sideslip")
 
 @dataclass(frozen=True)
 class ToldParameters:
-    """Of the messages."""
+    """Parameters of the messages."""
 
     sample_time: float = parameter(
         0.01, "s", "Time between messages, 0: one at every communication point", "chosen: as of sensors",

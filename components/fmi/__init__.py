@@ -1,1 +1,1 @@
-"""What declares a unit and speaks FMI for it."""
+"""Base class of components, declarations of their variables, and their FMI interface."""

@@ -91,7 +91,7 @@ class Component(Fmi2Slave):
     """Packages outside the standard library that the Python of every host must have, such as "numpy"."""
 
     by_signal: ClassVar[Any]
-    """Of the inputs `u`, one item per declared signal: a number, or a list of four for a `*`."""
+    """Getter of the inputs `u`, one item per declared signal: a number, or a list of four for a `*`."""
 
     variables: ClassVar[tuple[VariableSpec, ...]] = ()
     fmu_name: ClassVar[str] = ""

@@ -1,4 +1,4 @@
-"""How a component declares what it shows to the outside.
+"""Declarations of a component's parameters, inputs and outputs.
 
 Parameters are the fields of a frozen dataclass (`parameter`), inputs and outputs are names from
 the signal dictionary, or signals of the component's own (`signal`), outputs say in `output` on
@@ -262,7 +262,7 @@ def parameter_class(module: str, name: str, declared: Mapping[str, Any], bases: 
 
 @dataclass(frozen=True)
 class NoParameters:
-    """For a component that has none."""
+    """Parameters of a component that has none."""
 
 
 def parameter_variables(parameters: type) -> list[VariableSpec]:

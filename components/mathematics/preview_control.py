@@ -21,7 +21,7 @@ from .quadratic_program import Rows
 from .sums import added, dot
 
 ORDER = 12
-"""Of the series of the matrix exponential: beyond what counts where its argument is at most 1."""
+"""Order of the series of the matrix exponential: beyond what counts where its argument is at most 1."""
 LONGEST = 2000
 """Steps of the growing horizon at most."""
 STILL = 1e-9

@@ -20,9 +20,9 @@ from .sums import dot
 Rows = list[list[float]]
 
 SWEEPS = 500
-"""At most. Chosen: ten times what control of a car's yaw needs; programs without a solution end, too."""
+"""Most sweeps. Chosen: ten times what control of a car's yaw needs; programs without a solution end, too."""
 CLOSE = 1e-10
-"""Of the largest multiplier, by which none may have moved. Chosen: far below a sensor's resolution."""
+"""Share of the largest multiplier by which none may have moved. Chosen: far below a sensor's resolution."""
 
 
 def inverse(h: Sequence[Sequence[float]]) -> Rows:

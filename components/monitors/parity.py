@@ -70,13 +70,13 @@ SEEN = (
     "friction",
     "yaw_moment_wanted",
 )
-"""What is watched, of which any step may show a fault."""
+"""Inputs in which any step may show a fault."""
 SLOWEST = 5.0
 """Speed below which nothing is judged [m/s]; chosen: a_y / v is noise there."""
 SMALLEST = 0.1
 """Least friction [1]; chosen: ice."""
 LARGEST = 25.0
-"""Of (e / tol)^2 in a mean; chosen: a single message weighs no more."""
+"""Largest (e / tol)^2 in a mean; chosen: a single message weighs no more."""
 SATURATED, USED = 0.5, 0.4
 """Share of the grip from which axles, and a_y, make tolerances wider; chosen: tyres are linear below."""
 LEAN_SHARE = 0.04
@@ -88,14 +88,14 @@ SLIP_LIMIT = 0.1
 WHEEL_HARD = 0.17
 """Slip of a wheel where the moment uses all grip, in addition; chosen: on runs of paper B's car at mu 0.3."""
 LARGEST_OF_WHEELS = 4.0
-"""The same of wheels; chosen: slip control lets a wheel go for a moment."""
+"""Largest (e / tol)^2 of wheels; chosen: slip control lets a wheel go for a moment."""
 SMALL = 0.1
-"""What evidence leaves without a fault; chosen: a third of a tolerance, squared."""
+"""Evidence below which nothing is suspected; chosen: a third of a tolerance, squared."""
 
 
 @dataclass(frozen=True)
 class ParityParameters:
-    """Of the car, and how far signals may be apart."""
+    """Parameters of the car, and how far signals may be apart."""
 
     mass: float = like(PaperB, "mass")
     yaw_inertia: float = like(PaperB, "yaw_inertia")

@@ -45,10 +45,10 @@ from ..fmi.variables import like, output, parameter, signal
 
 GYRO, ACCELEROMETER, HAND_WHEEL, WHEEL = 1.0, 2.0, 3.0, 4.0
 SIGNALS = (GYRO, ACCELEROMETER, HAND_WHEEL)
-"""Of which the last three rates are made, in their order."""
+"""Signals from which the three yaw rates are made, in their order."""
 INPUTS = ("yaw_rate", "acceleration_y", "steer_angle", "wheel_speed_*", "friction")
 SEEN = (*INPUTS[:3], *wheels("wheel_speed_*"), "friction")
-"""What is watched, of which any step may show a fault."""
+"""Inputs in which any step may show a fault."""
 SLOWEST = 3.0
 """Speed below which nothing is judged [m/s]; chosen: a_y / v is noise there."""
 SLOW = 10.0
@@ -63,7 +63,7 @@ def median_speed(wheels: list[float], rolling: list[bool], count: int) -> float:
 
 @dataclass(frozen=True)
 class RedundancyParameters:
-    """Of the car, and how far signals may be apart."""
+    """Parameters of the car, and how far signals may be apart."""
 
     cg_to_front_axle: float = like(PaperB, "cg_to_front_axle")
     cg_to_rear_axle: float = like(PaperB, "cg_to_rear_axle")

@@ -28,7 +28,7 @@ from ..fmi.variables import like, of_car, parameter
 
 @dataclass(frozen=True)
 class SteadyStateParameters:
-    """Of the single-track model and of its limits."""
+    """Parameters of the single-track model and of its limits."""
 
     mass: float = like(PaperA, "mass")
     cg_to_front_axle: float = like(PaperA, "cg_to_front_axle")

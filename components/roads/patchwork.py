@@ -41,7 +41,7 @@ EVERYWHERE = 1e6
 
 @dataclass(frozen=True)
 class PatchworkParameters:
-    """Of the road, the wind, and the positions of the car's wheels."""
+    """Parameters of the road, the wind, and the positions of the car's wheels."""
 
     base_friction: float = parameter(
         0.9, "1", "Friction coefficient where there is no patch", "chosen: dry asphalt", minimum=0.0

@@ -1,1 +1,1 @@
-"""What sensors share: the channel that a signal takes to a message, and noise that is counted."""
+"""Code shared by sensors: the channel from a signal to a message, and counted noise."""

@@ -23,7 +23,7 @@ SLACK = 1e-9
 
 @dataclass(frozen=True)
 class ChannelSpec:
-    """What a channel does to its signal; `unit` is that of the signal.
+    """Properties of a channel; `unit` is that of its signal.
 
     Attributes:
         bandwidth: of the low pass [Hz].

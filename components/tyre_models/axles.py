@@ -11,7 +11,7 @@ from ..fmi.variables import parameter
 
 @dataclass(frozen=True)
 class AxleParameters:
-    """Of both axles."""
+    """Parameters of both axles."""
 
     cornering_stiffness_front: float = parameter(
         0.0, "N/rad", "Cornering stiffness C_f of the front axle; 0: of two tyres",

@@ -33,7 +33,7 @@ ODD = """
     PEY3 PHY1 PHY2 PVY1 PVY2 RBY3 RVY1 RVY2 RVY4 RVY5 RVY6
     QBZ9 QBZ10 QDZ6 QDZ7 QEZ4 QHZ1 QHZ2 SSZ1
 """
-"""Those of them that are used with `asymmetric_terms` only."""
+"""Coefficients that are used with `asymmetric_terms` only."""
 
 
 def _one(description: str) -> Any:

@@ -58,7 +58,7 @@ COMMON = {
     "inflpres": _Row(220000.0, "Inflation pressure p_i", _BOOK, "Pa", 1e-3),
     "lfzo": _Row(1.0, "Scaling of the nominal load", "chosen: the set as measured", "1", 0.01),
 }
-"""What every part of the law needs."""
+"""Parameters of every part of the law."""
 
 LONGITUDINAL = {
     "lcx": _scale("the shape factor C of F_x"),
@@ -96,7 +96,7 @@ LONGITUDINAL = {
     "rex2": _Row(0.0, "Variation of that curvature with load", _BOOK),
     "rhx1": _Row(0.007, "Shift of the reduction of F_x by slip angle", _BOOK),
 }
-"""What F_x needs beside that."""
+"""Further parameters of F_x."""
 
 REST = {
     "fittyp": _Row(62.0, "Kind of the set: 5 to 52 MF-Tyre 5.2 (PAC2002), 60 to 62 MF-Tyre 6", "chosen: 6.2"),
@@ -210,7 +210,7 @@ REST = {
     "qsx14": _Row(0.0, "Variation of that with the size of camber", "chosen: likewise"),
     "ppmx1": _Row(0.0, "Variation of qsx2 with pressure", "chosen: likewise"),
 }
-"""What F_y, M_z and M_x need beside that."""
+"""Further parameters of F_y, M_z and M_x."""
 
 RELAXATION = {
     "longitudinal_stiffness": _Row(
@@ -241,7 +241,7 @@ RELAXATION = {
     "lsgkp": _scale("the relaxation length of F_x (5.2)"),
     "lsgal": _scale("the relaxation length of F_y (5.2)"),
 }
-"""What the lag of forces behind slips needs beside that."""
+"""Further parameters of the lag of forces behind slips."""
 
 
 def of_axles(rows: dict[str, _Row]) -> dict[str, Any]:
@@ -288,9 +288,9 @@ class _General:
 LongitudinalParameters = parameter_class(
     __name__, "LongitudinalParameters", of_axles(COMMON | LONGITUDINAL), bases=(_General,)
 )
-"""What F_x of kappa needs."""
+"""Parameters of F_x(kappa)."""
 
 Pacejka2012Parameters = parameter_class(
     __name__, "Pacejka2012Parameters", of_axles(REST), bases=(LongitudinalParameters,)
 )
-"""What all forces and moments need."""
+"""Parameters of all forces and moments."""

@@ -30,7 +30,7 @@ from ..tyre_models.tyre import Curve, Tyre
 
 @dataclass(frozen=True)
 class DugoffParameters(AxleParameters):
-    """Of one tyre, and of the axles where they differ."""
+    """Parameters of one tyre, and of the axles where they differ."""
 
     longitudinal_stiffness: float = parameter(
         40000.0, "N", "Longitudinal stiffness C_x of one tyre per unit slip", "paper A, table 1", minimum=1.0

@@ -20,7 +20,7 @@ from ..tyre_models.tyre import Tyre
 
 @dataclass(frozen=True)
 class LinearTyreParameters(AxleParameters):
-    """Of one tyre, and of the axles where they differ."""
+    """Parameters of one tyre, and of the axles where they differ."""
 
     longitudinal_stiffness: float = parameter(
         40000.0, "N", "Longitudinal stiffness C_x of one tyre per unit slip", "paper A, table 1", minimum=0.0

@@ -14,7 +14,7 @@ from ..fmi.variables import like, output, parameter
 
 @dataclass(frozen=True)
 class DirectParameters:
-    """Of the wheel and its motor."""
+    """Parameters of the wheel and its motor."""
 
     wheel_radius: float = like(PaperA, "wheel_radius")
     torque_limit: float = parameter(

@@ -24,7 +24,7 @@ from ..mathematics.first_order_lag import Stage
 
 @dataclass(frozen=True)
 class HydraulicParameters:
-    """Of brakes, hydraulics and slip release."""
+    """Parameters of brakes, hydraulics and slip release."""
 
     wheel_radius: float = like(PaperC, "wheel_radius")
     brake_factor_front: float = parameter(

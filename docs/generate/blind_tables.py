@@ -29,7 +29,7 @@ COLUMNS = (
 )  # fmt: skip
 
 Errors = dict[str, np.ndarray]
-"""What the estimators are not told -> array of manoeuvre and seed [deg]."""
+"""Effect unknown to the estimators -> their errors, by manoeuvre and seed [deg]."""
 
 
 def published() -> dict[str, Errors]:

@@ -1,4 +1,4 @@
-"""What a unit in C declares: its model description, read, checked, and made into a C header."""
+"""Model description of a component in C: read, checked, and made into a C header."""
 
 from __future__ import annotations
 

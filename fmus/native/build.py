@@ -42,9 +42,9 @@ LINUX = ("-O2", "-Wl,--build-id=none", "-Wl,-z,defs", "-s")
 TO_WINDOWS = "x86_64-w64-mingw32-gcc"
 WINDOWS = ("-O1", "-static", "-Wl,--no-insert-timestamp", "-s")
 STORE = "native"
-"""Of native libraries in the cache."""
+"""Folder of native libraries in the cache."""
 EFFORTS = "efforts"
-"""Of processor times that native libraries took, in the cache."""
+"""Folder of the processor times that native libraries took, in the cache."""
 LONGEST = 3.0
 """Processor time [s] of a native library for which no run waits; chosen: a run then begins within 3 s."""
 LATER = "its native library takes longer than a run should wait; 'yawbench build' makes it"

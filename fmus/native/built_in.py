@@ -56,7 +56,7 @@ def _is_pure(function: Any) -> bool:
 
 
 class Repeated:
-    """What `itertools.repeat` gives without end."""
+    """Endless `itertools.repeat`."""
 
     def __init__(self, value: Any) -> None:
         self.value = value

@@ -25,7 +25,7 @@ from .ir import INEXACT
 
 STEPS = 2000
 LENGTHS = (0.001, 0.005, 0.02)
-"""Of steps [s]: those of plants, controllers and sensors."""
+"""Lengths of steps [s]: those of plants, controllers and sensors."""
 FEW, FEWEST, IN_ALL = 100, 2, 3000
 """Steps with every other value of a parameter: at most, at least, and of all values together about."""
 MANY = 60

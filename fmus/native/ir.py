@@ -31,7 +31,7 @@ class Var:
 
 Operand = Var | bool | int | float
 Part = str | tuple[Operand, str]
-"""Of a text: as it is, or a value with its format: "r" as `repr`, ".3g" as `:.3g`."""
+"""Part of a text: as it is, or a value with its format: "r" as `repr`, ".3g" as `:.3g`."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Digit:
 
 @dataclass
 class If:
-    """One of two paths."""
+    """A branch: one of two paths is taken."""
 
     test: Var
     then: list[Statement] = field(default_factory=list)

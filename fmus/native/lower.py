@@ -39,7 +39,7 @@ def complaint(call: Callable[[], Any]) -> tuple[str, str]:
 
 
 class Facts:
-    """What is known of conditions on a path."""
+    """Conditions known to hold, or not to hold, on a path."""
 
     def __init__(self) -> None:
         self.truths: dict[ir.Var, bool] = {}

@@ -24,7 +24,7 @@ from .values import Instance, List, Refused, Union, Unreachable, is_number
 WIDEST = 40
 """Times a step is followed until the state has its form."""
 STACK = 512 * 1024 * 1024
-"""Of the thread that translates [bytes]: calls within calls are followed by calls within calls."""
+"""Stack of the thread that translates [bytes]: calls within calls are followed by calls within calls."""
 
 
 HOOKS = ("configure", "start", "advance", "output")

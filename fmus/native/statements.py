@@ -34,7 +34,7 @@ from .values import (
 
 EXIT, RESULT = "<exit>", "<result>"
 ON, CONTINUE, BREAK, RETURN, OVER = range(5)
-"""How a block ends: it goes on, or not; a loop's test fails."""
+"""Ends of a block: it goes on, leaves a loop or the function, or the test of a loop fails."""
 
 
 class Execution(Operating):

@@ -17,7 +17,7 @@ from . import ir
 
 
 class Refused(Exception):
-    """What a component does cannot be translated; the text names it."""
+    """Error: a construct of the component cannot be translated; the text names it."""
 
     def __init__(self, text: str, where: str = "") -> None:
         super().__init__(text)
@@ -190,7 +190,7 @@ class Bytes:
 
 @dataclass(frozen=True, eq=False)
 class Span:
-    """What a loop of unknown length goes through: item(k) for k from `first` below `end`."""
+    """Items of a loop of unknown length: item(k) for k from `first` below `end`."""
 
     first: ir.Operand
     end: ir.Operand

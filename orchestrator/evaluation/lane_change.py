@@ -92,7 +92,7 @@ def drive_series(driver: SeriesDriver) -> TestSeries:
         seconds = math.ceil(10.0 * driver.duration * driver.speed / speed) / 10.0  # for the same distance
         values = {"speed": speed, "stop_time": seconds}
         name = f"{speed / KMH:.2f}"
-        run = SeriesRun(name, f"{name} km/h", values, "entry speed", partly=False)
+        run = SeriesRun(name, f"{name} km/h", values, partly=False)
         return any(map(is_clean, driver.make([run])))
 
     bounds = {"step": SEARCH_STEP, "resolution": RESOLUTION, "least": SLOWEST, "most": FASTEST}

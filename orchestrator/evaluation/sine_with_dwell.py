@@ -394,7 +394,7 @@ def drive_series(driver: SeriesDriver) -> TestSeries:
     for name, side in SIDES:
         for amplitude in amplitudes(driver.angle):
             folder = f"{name}_first/{math.degrees(amplitude):.2f}"
-            runs.append(SeriesRun(folder, folder, {AMPLITUDE: side * amplitude}, "sine with dwell"))
+            runs.append(SeriesRun(folder, folder, {AMPLITUDE: side * amplitude}))
     return judge_series(driver.make(runs), driver.angle)
 
 

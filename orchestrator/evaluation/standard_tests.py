@@ -18,7 +18,7 @@ from ..metrics.verdict import Verdict, worst
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..plan import OverrideOrigin, Value
+    from ..plan import Value
     from .trace import Trace
 
 P = ParamSpec("P")
@@ -156,7 +156,6 @@ class SeriesRun:
     folder: str  # below that of the series
     label: str
     values: Mapping[str, Value]  # target of an override -> value
-    origin: OverrideOrigin  # of these overrides, for records
     partly: bool = True  # whether it is judged, as far as it goes, if it fails
 
 

@@ -131,7 +131,7 @@ class AxisSpec(StrictModel):
 
     @property
     def kind(self) -> AxisKind:
-        """What the axis varies: a value, an FMU, a file or several targets at once."""
+        """Kind of its targets: a value, an FMU, a file, or several at once."""
         if self.variants:
             return "variant"
         target = self.vary[0]
@@ -263,7 +263,7 @@ class OpenValueSpec(AxisSpec):
 
 
 class RegionSpec(StrictModel):
-    """Where claims are judged again: along each open value, and over all of them together."""
+    """Region over which claims are judged again: along each open value, and over all of them together."""
 
     points: int = Field(
         16,

@@ -131,7 +131,7 @@ class Region:
 
     @property
     def spread(self) -> float | None:
-        """How much the margin shrinks in the worst tenth of the points [1].
+        """Decrease of the margin in the worst tenth of the points [1].
 
         The distance from the margin at the chosen point to the best one of that tenth: infinite if runs
         failed there, 0 if it is larger than at the chosen point.

@@ -51,7 +51,7 @@ LARGEST_BATCH = 200
 _UNPACKED: dict[str, Fmu] = {}
 """On a worker: key of an FMU -> the FMU in this machine's cache."""
 _NO_JOB = Job("", Path(), Path())
-"""In outcomes that travel back: the caller has the jobs."""
+"""Stand-in for the job in outcomes that travel back: the caller has the jobs."""
 
 
 def run_on_cluster(jobs: Sequence[Job], done: OnOutcome, *, scheduler: str) -> None:

@@ -58,7 +58,7 @@ FIGURE_SPECS = [
     {"name": name, "title": name.replace("_", " ").capitalize(), "runs": ["*"], "panels": [*panels]}
     for name, panels in FIGURES.items()
 ]
-"""The same as in an experiment file."""
+"""Figures, as in an experiment file."""
 
 
 def comparison(scenario: Path, swaps: Sequence[str], changes: Sequence[Override]) -> LoadedExperiment:

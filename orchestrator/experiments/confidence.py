@@ -184,7 +184,7 @@ class SequentialTest:
 
     @cached_property
     def boundaries(self) -> tuple[tuple[int, int], ...]:
-        """For each look the largest count that decides "below", the smallest that decides "above"."""
+        """Bounds at each look: the largest count that decides "below", the smallest that decides "above"."""
         alive, before, made = np.ones(1), 0, list[tuple[int, int]]()
         spent_low = spent_high = 0.0
         for look in self.looks:

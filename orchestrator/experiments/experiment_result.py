@@ -322,7 +322,7 @@ def derive(spec: ExperimentSpec, values: MetricTable) -> dict[str, MetricValue]:
 
 @dataclass(frozen=True)
 class Limit:
-    """How far an axis may go for one run and setting of the other axes, in the unit of the file."""
+    """Limit of an axis for a run and a setting of the other axes, in the unit of the file."""
 
     others: dict[str, Level]  # axis -> level; "run" -> the run, if named
     largest: float | None  # up to which all values hold; None: not even the first

@@ -82,7 +82,7 @@ class Job:
 
 
 MeasuredStatus = Literal["not made", "completed", "ended early", "failed"]
-"""How a run of an experiment ended, if it was made."""
+"""State of a run of an experiment."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +118,7 @@ class MeasuredRun:
 
     @property
     def reason(self) -> str | None:
-        """Why the run failed or ended early; None if neither."""
+        """Reason why the run failed or ended early; None if neither."""
         return text_of(errors_in(self.diagnostics)) or self.ended
 
 
@@ -143,7 +143,7 @@ class Outcome:
 
     @property
     def reason(self) -> str:
-        """Why the job failed, in one line."""
+        """Reason why the job failed, in one line."""
         return text_of(self.diagnostics)
 
     @property

@@ -23,8 +23,8 @@ from .jobs import Job, planned
 
 SLOW_STEER = "slowly_increasing_steer"
 """Folder of the runs of slowly increasing steer."""
-STEERED: Final = "slowly increasing steer"
-"""Origin of their overrides."""
+ORIGIN: Final = "standard test"
+"""Origin of the overrides by which a test varies its scenario."""
 
 
 @dataclass
@@ -93,7 +93,7 @@ class TestDriver:
         """
         named = []
         for run in runs:
-            own = (Override.of(target, value, run.origin) for target, value in run.values.items())
+            own = (Override.of(target, value, ORIGIN) for target, value in run.values.items())
             named.append(_run(run.folder, self.scenario, self.changes, *own))
         title = runs[0].label if len(runs) == 1 else self.test.name.replace("-", " ")
         jobs, status = self.make_runs(title, named)
@@ -120,7 +120,7 @@ def slow_steer_runs(scenario: Path, changes: Sequence[Override], execute: Execut
     (plan,) = execute.plans([NamedRun("", "", "", scenario, (*changes,))])
     amplitude = slow_steer_amplitude(plan, scenario)
     return [
-        _run(f"{SLOW_STEER}/{name}", scenario, changes, Override.of(AMPLITUDE, side * amplitude, STEERED))
+        _run(f"{SLOW_STEER}/{name}", scenario, changes, Override.of(AMPLITUDE, side * amplitude, ORIGIN))
         for name, side in SIDES
     ]
 

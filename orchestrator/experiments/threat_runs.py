@@ -38,7 +38,7 @@ NO_LOSS = ("signal-unknown", "internal-error", "run-process-died")
 """Errors of a run that say nothing about the car; any other end of a run counts as lost."""
 DRIVER = Target.parse(AMPLITUDE).instance
 MOMENT = f"faults.{CONTROLLER}.yaw_moment"
-"""Where a moment limit for all acts, besides the parameter of controllers that have one."""
+"""Target of a moment limit for all, besides the parameter of controllers that have one."""
 PATH = ("position_*", "yaw_angle*", "cone_overrun*")
 """Signals that lane changes need in addition to those of a ranking."""
 

@@ -194,7 +194,7 @@ def scores_without(
 
 
 class Moves(NamedTuple):
-    """How an order differs from another one of the same entries."""
+    """Difference between two orders of the same entries."""
 
     correlation: float  # Spearman's, of the entries with control; NaN for fewer than three, or equal ones
     moved: int  # of them, those whose place changes
@@ -238,7 +238,7 @@ class Spread(NamedTuple):
 
 @dataclass(frozen=True)
 class GainsAndLaws:
-    """How far gains and laws spread the mean positions apart.
+    """Spread of the mean positions by gains and by laws.
 
     `laws`, `seeds`: of laws tuned with several seeds, the standard deviation between laws and that of the
     luck of the search within them, components of variance; `ratio`: laws / seeds. `gains`: between authors'

@@ -200,7 +200,7 @@ class ThreatsSpec(StrictModel):
 
 
 class SearchPlace(NamedTuple):
-    """What a search is for."""
+    """Key of a search: the setting, threat, car and entry that it is for."""
 
     setting: str
     threat: str

@@ -34,7 +34,7 @@ Kind = IntEnum(
 )
 """Kinds of operations; CALL: only Python can do it."""
 Answer = IntEnum("Answer", "FINISHED INTERRUPTED PYTHON STATUS NOT_FINITE COPIED PAUSED", start=0)
-"""Why a walk returned: STATUS, a call whose status needs attention; COPIED, this is a copy made by `fork`."""
+"""Reasons for a walk's return; STATUS: a call's status needs attention; COPIED: a copy made by `fork`."""
 
 
 class OperationData(ctypes.Structure):

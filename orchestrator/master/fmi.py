@@ -125,7 +125,7 @@ def _callbacks() -> fmi2CallbackFunctions:
 
 
 class _StepAnswers(ctypes.Structure):
-    """What `fmi3DoStep` answers."""
+    """Output arguments of `fmi3DoStep`."""
 
     _fields_ = [
         ("event", ctypes.c_bool),

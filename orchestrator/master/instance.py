@@ -142,7 +142,7 @@ class CtypesInstance(FmuInstance, ABC):
         self.name = unit.name
         self._directory = unit.fmu.directory
         self.keep: Callable[[CtypesInstance], None] | None = None
-        """Takes the instance, reset, when it would be freed."""
+        """Callback that takes the instance, reset, when it would be freed."""
         self._component: int | None = None
         self._begin(log, corrupted)
         self._listener = 0

@@ -102,7 +102,7 @@ class Master:
         self._copies = copies or Copies()
         self._compiled: CompiledLoop | None = None
         self.loop = self._choose_loop()
-        """Which loop makes the run: "compiled", or "Python: " and why."""
+        """Loop that makes the run: "compiled", or "Python: " and the reason."""
 
     def _choose_loop(self) -> str:
         """Have the compiled loop make the run if there is something in it that it can do by itself."""

@@ -100,7 +100,7 @@ class Model(Protocol):
 
 @dataclass(frozen=True)
 class Identifiability:
-    """How well the effects of parameters on the residuals can be told apart.
+    """Conditioning of a fit: how well the effects of its parameters can be told apart.
 
     Attributes:
         condition: of J with columns scaled to length 1; infinite if a column is 0.

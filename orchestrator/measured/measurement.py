@@ -66,7 +66,7 @@ from .segment import MOVED, POLES, LowPass, Segment, parts_of, resample, to_cent
 MEASURABLE: dict[str, SignalEntry] = {name: entry for key, entry in SIGNALS.items() for name in wheels(key)}
 """Signals that a measurement may have, those of wheels one by one."""
 ENDINGS = (".yaml", ".yml")
-"""Of measurement files."""
+"""Endings of measurement files."""
 BY_TIME = "time"
 OF_CAR = {name: entry.unit for name, entry in CAR.items()} | {"friction": "1"}
 """Known quantities of a car and its road, with their units."""

@@ -66,7 +66,7 @@ class Verdict:
 
     @property
     def beyond(self) -> float | None:
-        """How far the value lies beyond its bound on the side where it should be, in its unit."""
+        """Distance of the value beyond its bound, on the side where it should be, in its unit."""
         if self.value is None or self.bound is None:
             return None
         return _beyond(self.value, self.bound, self.relation in _UPWARDS)

@@ -38,7 +38,7 @@ MOTION = (
 
 
 OF_WHEELS = ("force_along", "force_across", "load", "friction")
-"""What `road_of` has of each wheel."""
+"""Signals of each wheel that `road_of` draws."""
 
 
 @dataclass(frozen=True)
@@ -211,7 +211,7 @@ def ground_of(parameters: Mapping[str, Any], x: Bounds, y: Bounds) -> list[Frict
 
 
 class _TooFineError(Exception):
-    """There are more intervals than can be drawn."""
+    """Error: more intervals than can be drawn."""
 
 
 def _of_table(table: FrictionTable | None, box: Sequence[Bounds]) -> Iterator[FrictionPatch]:

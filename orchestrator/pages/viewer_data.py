@@ -53,7 +53,7 @@ class PackedRun:
     time: PackedColumn
     columns: dict[str, PackedColumn]
     address: str = ""
-    """Where the page gets the bytes; "": it carries them."""
+    """Address from which the page loads the bytes; "": it carries them."""
 
     def only(self, names: Collection[str]) -> PackedRun:
         """Return the run with some of its columns."""
@@ -82,7 +82,7 @@ class PackedRun:
 
     @property
     def header(self) -> dict[str, Any]:
-        """What the script needs to decode the block: of times and each column [form, offset, ...]."""
+        """Header from which the script decodes the block: of times and each column [form, offset, ...]."""
 
         def place(column: PackedColumn) -> list[Any]:
             return [column.form, self._offsets[column.planes], *column.numbers]

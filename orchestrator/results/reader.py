@@ -158,7 +158,7 @@ class Results:
 
     @property
     def ended(self) -> str | None:
-        """Why an instance ended the run before its stop time; None if none did."""
+        """Reason for which an instance ended the run before its stop time; None if none did."""
         ended = self.record.ended
         return ended.message if ended else None
 

@@ -89,7 +89,7 @@ class FmuRecord(_Part):
 
 
 class ErrorRecord(_Part):
-    """Why a run failed."""
+    """Failure of a run."""
 
     message: str = ""
     unit: str | None = None
@@ -99,7 +99,7 @@ class ErrorRecord(_Part):
 
 
 class EndRecord(_Part):
-    """Which instance ended a run before its stop time, when [s] and why."""
+    """Early end of a run: the instance that ended it, the time [s] and its reason."""
 
     unit: str | None = None
     time: float | None = None
@@ -133,7 +133,7 @@ NotFinite = Literal["nan", "inf", "-inf"]
 
 
 class LocationRecord(_Part):
-    """Where a diagnostic points; see `errors.Location`."""
+    """Location of a diagnostic; see `errors.Location`."""
 
     file: str | None = None
     line: int | None = None
@@ -144,7 +144,7 @@ class LocationRecord(_Part):
 
 
 class DiagnosticRecord(_Part):
-    """What was left out or assumed, or a warning; see `errors.Diagnostic`."""
+    """A diagnostic of a run; see `errors.Diagnostic`."""
 
     code: str = ""
     severity: Severity = "info"
@@ -228,7 +228,7 @@ class OverrideRecord(_Part):
 
 
 NOT_RECORDED = ValueSource(NEUTRAL, "source not recorded")
-"""Of values in records of earlier versions."""
+"""Source of values in records of earlier versions."""
 
 
 def _run_status(value: object) -> RunStatus:

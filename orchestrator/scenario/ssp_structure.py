@@ -66,7 +66,7 @@ class SspStructure:
 
     components: dict[ElementPath, SspComponent] = field(default_factory=dict)
     systems: dict[ElementPath, _Element] = field(default_factory=dict)
-    """From the innermost to the outermost."""
+    """Path -> system, from the innermost to the outermost."""
     connectors: dict[ElementPath, dict[str, SspVariable]] = field(default_factory=dict)
     """Element -> name of a connector -> its kind and unit, if given."""
     sources: dict[SspEnd, tuple[SspEnd, _Element]] = field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""Which outputs fit which inputs, by types, units of measurement, and the items of enumerations."""
+"""Compatibility of outputs and inputs: types, units of measurement, items of enumerations."""
 
 from __future__ import annotations
 

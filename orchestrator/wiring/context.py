@@ -31,7 +31,7 @@ from ..signal_names import match, matching
 
 @dataclass(frozen=True)
 class Fact:
-    """Which inputs and parameters a fact sets."""
+    """Inputs and parameters that a fact sets."""
 
     unit: str  # of measurement, of the value
     inputs: tuple[str, ...] = ()

@@ -1,4 +1,4 @@
-"""What both moment allocators promise."""
+"""Properties of both moment allocators."""
 
 from __future__ import annotations
 

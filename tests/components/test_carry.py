@@ -23,7 +23,7 @@ PLANTS = (SevenDof, EightDof, FourteenDof)
 
 
 def free(plant):
-    """What takes rolling and air resistance off a plant that has them."""
+    """Parameters that take rolling and air resistance off a plant that has them."""
     resisting = issubclass(plant.Parameters, ResistanceParameters)
     return {"drag_coefficient": 0.0, "rolling_resistance": 0.0} if resisting else {}
 

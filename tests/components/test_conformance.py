@@ -1,4 +1,4 @@
-"""What every component keeps, whoever wrote it: found by itself, driven through its FMI entry points."""
+"""Rules that every component keeps: each is found by itself and driven through its FMI entry points."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ MIDDLE = {
     "wheel_velocity": 19.0,
     "slip_stiffness": 60000.0,
 }
-"""Where inputs lie that are not small about zero."""
+"""Centres of inputs that are not small about zero."""
 SPREAD = {
     "rad": 0.05,
     "rad/s": 0.3,
@@ -78,7 +78,7 @@ SPREAD = {
     "m": 2.0,
     "Pa": 1e5,
 }
-"""How far about that, by unit."""
+"""Spread about the centres, by unit."""
 
 ODD = {
     "steering_wheel_angle_measured",
@@ -95,7 +95,7 @@ ODD = {
     *wheels("patch_slip_angle_*"),
     *("bank", "wind_force_y", "wind_moment_z", "yaw_moment_wanted", "implied_sideslip"),
 }
-"""What changes its sign in a mirror; all else keeps it."""
+"""Signals that change their sign in a mirror; all others keep it."""
 LOPSIDED = {("asymmetric_terms", True), ("table_reading", "printed"), ("wheel_choice", "printed")}
 ODD_PARAMETERS = (
     "radius",
@@ -108,7 +108,7 @@ FLAWS = ("_noise", "_bias", "_drift")
 """Ends of the names of parameters that give answers without a question."""
 
 ROUNDED = dict.fromkeys(("controller_fnn", "controller_fuzzy_feedback", "controller_fuzzy_sideslip"), 1e-6)
-"""What may be lost in a mirror [N.m]: sums over fuzzy sets run from left to right; else not a bit."""
+"""Largest loss in a mirror [N.m]: sums over fuzzy sets run from left to right; else not a bit."""
 
 SPLIT = {
     **dict.fromkeys(("plant_seven_dof", "plant_two_dof"), 1e-4),
@@ -116,7 +116,7 @@ SPLIT = {
     "plant_fourteen_dof": 2e-3,
     **dict.fromkeys(("reference_single_track", "reference_steady_state"), 0.2),
 }
-"""How far two half steps may be from a whole one, over the range of the output; else rounding.
+"""Largest difference of two half steps from a whole one, over the range of the output; else rounding.
 
 Plants are of second order in the step, their loads and accelerations carried; the rates of references
 belong to the step they are taken over."""

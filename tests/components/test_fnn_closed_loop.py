@@ -61,7 +61,7 @@ class MultiRateLoop(Loop):
 
 @dataclass(frozen=True)
 class Run:
-    """What a run is judged by."""
+    """Numbers by which a run is judged."""
 
     error: float  # max |beta - beta_ref| over max |beta_ref|
     error_of_period: tuple[float, ...]  # the same within each period of the steering

@@ -1,4 +1,4 @@
-"""What tyres say about the slope of their force: against differences of the force itself."""
+"""Slope of the force that tyres report, against differences of the force itself."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the project says of itself: one version, one date, lists of files that exist, hooks that can run."""
+"""Facts of the project: one version, one date, lists of files that exist, hooks that can run."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ FILES = ("delta", "vx", "yawRate", "axCG", "ayCG", "beta_true")
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What the program makes of a made-up recording in the form of the public one."""
+    """A folder that the program makes of a made-up recording in the form of the public one."""
     place = tmp_path_factory.mktemp("recording")
     recording = place / "clone" / "datasets" / "20140222_01_01_03_250lm"
     recording.mkdir(parents=True)

@@ -1,4 +1,4 @@
-"""What the record of attacks says of the program's limits is so."""
+"""Limits of the program, as docs/robustness.md states them."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ from vocabulary.signals import SIGNALS
 
 
 class Page(HTMLParser):
-    """What a page links to, loads, and can be linked to at."""
+    """Links, loaded files and anchors of a page."""
 
     def __init__(self, file: Path) -> None:
         super().__init__()

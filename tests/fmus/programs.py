@@ -25,9 +25,9 @@ in_windows = pytest.mark.skipif(
     WINE is None or shutil.which(TO_WINDOWS) is None, reason="needs Wine and a cross compiler"
 )
 MINORS = (10, 11, 12, 13)
+"""Minor versions of Python 3 that are supported."""
 OURS_FIRST = sorted(MINORS, key=lambda minor: minor != sys.version_info.minor)
-"""Which Pythons there are is asked as late as in a test: it takes a process each."""
-"""Of the versions of Python 3 that are supported."""
+"""The same, ours first; whether they are installed is asked in a test: it takes a process each."""
 
 
 def unpacked_inputs(folder: Path) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""What the build writes: valid, minimal, the same bytes everywhere, and only what has changed."""
+"""Archives that the build writes: valid, minimal, the same bytes everywhere, and written only if changed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a host may say to a unit, and what it gets to hear: arguments, log, states."""
+"""Calls of a host to an FMU: arguments, log, states."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What cannot become an FMU is named with its file, its line and what would be right."""
+"""Errors of the build: file, line and remedy of a component that cannot become an FMU."""
 
 from __future__ import annotations
 

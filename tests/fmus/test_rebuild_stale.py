@@ -1,4 +1,4 @@
-"""What is stale is built before a scenario runs, and nothing else is."""
+"""Stale FMUs are built before a scenario runs, and no others."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from orchestrator.signal_names import SignalName
 
 
 class Behaviour:
-    """What a fake unit does. `u` maps input names to values; outputs map names to values."""
+    """Behaviour of a fake instance. `u` maps input names to values; outputs map names to values."""
 
     inputs: Sequence[str] = ()
     outputs: Mapping[str, Sequence[str] | None] = {}  # output -> inputs it depends on directly

@@ -1,4 +1,4 @@
-"""What `yawbench check` prints, and how it ends."""
+"""Output and exit status of `yawbench check`."""
 
 from __future__ import annotations
 

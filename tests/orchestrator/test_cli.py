@@ -1,4 +1,4 @@
-"""What the command line says of itself."""
+"""The command line: help, version, options, signals."""
 
 from __future__ import annotations
 

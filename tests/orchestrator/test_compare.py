@@ -1,4 +1,4 @@
-"""Which runs a comparison makes, and what it makes of their results."""
+"""Comparisons: their runs, and the tables and pages of their results."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ METRICS = {
 
 @pytest.fixture
 def findings(tmp_path):
-    """What a comparison of three made-up runs comes to, of which one failed."""
+    """Result of a comparison of three made-up runs, of which one failed."""
     runs = [NamedRun(name, name, name, Path("s.yaml"), ()) for name in ("off", "broken", "fnn")]
     experiment = experiment_of(Path("s.yaml"), runs, title="title", figures=FIGURE_SPECS)
     spec = ExperimentSpec.model_validate(

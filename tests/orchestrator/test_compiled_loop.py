@@ -39,7 +39,7 @@ pytestmark = [
 ]
 COMPILED = "compiled"
 OF_EACH_RUN = ("id", "started", "wall_time", "checksums")
-"""What differs in run.json from run to run."""
+"""Keys of run.json that differ from run to run."""
 
 CAR = """
 stop_time: 0.6

@@ -1,4 +1,4 @@
-"""What CONTRIBUTING's table promises: what is added to its one place works wherever the program uses it."""
+"""Additions by CONTRIBUTING's table: what is added to its one place works wherever the program uses it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stands in the folder of a run, whatever has happened to the runs there."""
+"""Content of the folder of a run, whatever has happened to the runs there."""
 
 import json
 import math

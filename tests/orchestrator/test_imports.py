@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import functools
+import re
 import sys
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
@@ -201,3 +202,18 @@ def test_no_name_is_an_empty_word():
         if name in EMPTY
     ]
     assert names == []
+
+
+RIDDLES = re.compile(r"(What|How|Where|Who|Why|When|Which|Of) ")
+"""Beginnings of sentences that say something about a thing, not what it is."""
+
+
+def test_docstrings_say_what_a_thing_is():
+    riddles = [
+        (path.relative_to(ROOT).as_posix(), node.value.lineno, node.value.value)
+        for path in (path for room in (*PRODUCT, "docs", "tests") for path in (ROOT / room).rglob("*.py"))
+        for node in ast.walk(tree_of(path))
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+        if isinstance(node.value.value, str) and RIDDLES.match(node.value.value.lstrip())
+    ]
+    assert riddles == []

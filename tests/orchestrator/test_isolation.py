@@ -29,7 +29,7 @@ UNITS = (
     "wheel_control_direct", "plant_seven_dof", "tyre_dugoff",
 )  # fmt: skip
 STEP = "if (fabs(law(s, v)) < v->moment_limit)"
-"""Where the controller in C gets something to do that it should not."""
+"""Line at which the controller in C is given something to do that it should not."""
 
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="--isolate needs Linux or macOS")

@@ -32,7 +32,7 @@ UNITS = None
 PAPER_A = SCENARIOS / "fnn_sideslip" / "25mps.yaml"
 LANE_CHANGE = SCENARIOS / "real_signals" / "monitored_lane_change.yaml"
 CHANGING = ("started", "wall_time", "id", "created", "checksums", "times")
-"""What two records of the same run do not share."""
+"""Keys that differ between two records of the same run."""
 METRICS = (
     ("peak", "peak(yaw_rate)", None),
     ("rms", "rms(yaw_rate)", None),

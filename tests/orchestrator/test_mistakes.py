@@ -1,4 +1,4 @@
-"""What a newcomer may get wrong, and the sentence that says what to do."""
+"""Mistakes of newcomers, and the sentences that say what to do."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ KNOWN = "did you mean"
 
 @pytest.fixture
 def said(tmp_path, monkeypatch, capsys):
-    """What is said in a folder with a copy of the scenarios, and by which exit status it ends."""
+    """Output and exit status of a command in a folder with a copy of the scenarios."""
     shutil.copytree(ROOT / "scenarios", tmp_path / "scenarios")
     (tmp_path / "a_file").touch()
     (tmp_path / "empty.yaml").touch()

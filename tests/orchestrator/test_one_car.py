@@ -25,7 +25,7 @@ SALOON = Path(__file__).parents[2] / "scenarios" / "vehicles" / "large_saloon.ya
 
 @pytest.fixture(scope="module")
 def saloon():
-    """What the file of the large saloon says, with unequal wheels."""
+    """The file of the large saloon, with unequal wheels."""
     given = YAML(typ="safe").load(SALOON.read_text(encoding="utf-8"))["parameters"]
     return {name: float(value) for name, value in given.items()} | {"front_unsprung_share": 0.4}
 

@@ -1,4 +1,4 @@
-"""What is remarkable in a run's course, and where that is said."""
+"""Plausibility warnings of runs, and where they are shown."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What figures show: panels, lines, words, units, scales and files."""
+"""Figures: panels, lines, words, units, scales and files."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ def load(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def findings(load, fmus, tmp_path_factory):
-    """What the study comes to."""
+    """Result of the study."""
     findings = findings_of(load(), fmus, tmp_path_factory.mktemp("runs"))
     assert (
         len({job.key for job in findings.planned.jobs}) == 2 + 2 * 4

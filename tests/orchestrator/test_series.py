@@ -218,7 +218,7 @@ def test_a_series_for_a_units_input_goes_before_equal_names(folder: Path) -> Non
 
 @pytest.mark.parametrize("form", ["parquet", "mf4", "csv"])
 def test_recorded_results_are_a_source_with_their_units(form, folder, monkeypatch) -> None:
-    """Of a run of any format; degrees that were recorded arrive as radians."""
+    """Series of a run of any format; degrees that were recorded arrive as radians."""
 
     class Clock(Behaviour):
         outputs = {"angle": ()}

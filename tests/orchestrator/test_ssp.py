@@ -128,7 +128,7 @@ def test_a_round_trip_gives_the_same_numbers_to_the_last_bit(scenario, fmus, tmp
 @pytest.mark.parametrize("adapted", [False, True], ids=["all", "omsimulator"])
 @pytest.mark.sampled(2)
 def test_an_archive_is_valid_against_the_schemas_of_ssp(scenario, standard, adapted, fmus, tmp_path):
-    """Of 2.0 all that matters here is that of 1.0 but for the number."""
+    """Version 2.0 differs here from 1.0 by the number alone."""
     plan = plan_of(SCENARIOS / scenario, fmus)
     write_ssp(for_omsimulator(plan)[0] if adapted else plan, tmp_path / "system.ssp", standard)
     with zipfile.ZipFile(tmp_path / "system.ssp") as archive:

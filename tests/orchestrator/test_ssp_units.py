@@ -1,4 +1,4 @@
-"""What connections of an SSP archive do to numbers: units of connectors, transformations, systems."""
+"""Conversions by the connections of an SSP archive: units of connectors, transformations, systems."""
 
 from __future__ import annotations
 

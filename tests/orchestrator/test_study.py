@@ -119,7 +119,7 @@ def out(tmp_path) -> Path:
 
 
 def test_a_grid_is_drawn_from_results_alone(study, out):
-    """Where scenarios or FMUs are not at hand, so that nothing can be planned."""
+    """Neither scenarios nor FMUs are at hand, so nothing can be planned."""
     grid = """
 grids:
   errors:

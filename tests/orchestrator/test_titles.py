@@ -1,4 +1,4 @@
-"""What was changed stands beside the title of everything drawn or printed from a run."""
+"""Overrides are named beside the title of everything drawn or printed from a run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a careful reader of a page would complain of: things cut, overlapping, empty, too wide."""
+"""Flaws of a page that a careful reader would complain of: things cut, overlapping, empty, too wide."""
 
 from __future__ import annotations
 

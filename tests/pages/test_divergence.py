@@ -1,4 +1,4 @@
-"""Where two runs part."""
+"""Divergence of two runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where parameters come from, and whether results are still good."""
+"""Origins of parameters, and freshness of results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a page carries of recorded signals: every sample, within the stated error, in few bytes."""
+"""Recorded signals in a page: every sample, within the stated error, in few bytes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a study has found, for the tests of its file: `study` made some of its runs, `whole` all."""
+"""Results of a study, for the tests of its file: `study` made some of its runs, `whole` all."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far estimates are from the truth, open loop: `python -m tests.scenarios.open_loop` prints the table.
+"""Errors of estimates, open loop: `python -m tests.scenarios.open_loop` prints the table.
 
 Each manoeuvre is run once with exact signals; what it has recorded goes through the production sensors, 10 ms
 late, with both biases of either sign or none, to the estimators, whose friction begins at 0.5 and at 0.8. A
@@ -70,7 +70,7 @@ MANOEUVRES = {
 }
 """Name -> manoeuvre."""
 SPEED = 0.3
-"""What the speed may miss, rms [m/s]."""
+"""Largest error of the speed, rms [m/s]."""
 
 
 @dataclass(frozen=True)

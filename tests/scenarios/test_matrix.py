@@ -34,7 +34,7 @@ UNITS = (
     *(f"tyre_{name}" for name in TYRES),
 )  # fmt: skip
 ON_THE_ROAD = {"plant.sideslip": 0.5, "plant.yaw_rate": 1.5}
-"""What a car that has not been lost stays within: rad, rad/s."""
+"""Bounds within which a car stays that has not been lost: rad, rad/s."""
 
 
 CASES = list(product(PLANTS, TYRES, CONTROLLERS))

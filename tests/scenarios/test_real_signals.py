@@ -1,4 +1,4 @@
-"""What estimators miss, open loop, and who sees what in the scenarios of real signals."""
+"""Errors of estimators, open loop, and the signals of instances in the scenarios of real signals."""
 
 from __future__ import annotations
 

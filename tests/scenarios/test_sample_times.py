@@ -1,4 +1,4 @@
-"""What samples has a sample time of its own, so that a finer communication step leaves it as it is."""
+"""Sampled components have a sample time of their own, which a finer communication step leaves as it is."""
 
 from __future__ import annotations
 

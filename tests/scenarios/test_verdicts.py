@@ -1,4 +1,4 @@
-"""What the docs and the README tell of how far the verdicts on the papers carry."""
+"""Statements of the docs and the README on how far the verdicts on the papers carry."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ KINDS = {
     "leaves a thread": ("thread",),
     "answers wrongly": ("status_7", "status_minus", "status_huge", "pending", "fatal", "error", "discard"),
 }  # fmt: skip
-"""What an FMU may do in any call, by kind."""
+"""Things that an FMU may do in any call, by kind."""
 VALUES = ("nan", "inf", "wired_nan", "huge_text", "no_text", "not_utf8", "count")
 OTHERS = (*(f"value:{what}" for what in VALUES), "free:log_after")
 
@@ -101,7 +101,7 @@ connections:
   - {{from: bad.text, to: after.text_in}}
 """
 VALUES_OF = {"good.y": 2 + 1 / 3, "good.spare": 1e-311 * 1e308 + 0.5, "after.spare": 1e-311 * 1e308 + 0.5}
-"""What units that do no harm put out, always."""
+"""Outputs of FMUs that do no harm, always the same."""
 
 
 @dataclass(frozen=True)

@@ -53,15 +53,15 @@ COMMANDS = {
 SAME = ("*.csv", "*.parquet", "*.fmu", "experiment.json", "entries.yaml")
 """Files that are the same to the last byte, whatever happened before; others hold times and versions."""
 MEASURED = "step_time"
-"""What columns of computing time begin with, which no two runs share."""
+"""Prefix of columns of computing time, which no two runs share."""
 LITTER = (PART, NEW, LOCK_FILE, ".tmp", ".draft")
-"""What the names of files end in that a command which has ended may not leave."""
+"""Endings of names of files that a command which has ended may not leave."""
 NOISE = ("Traceback", "leaked", "resource_tracker", "yawbench itself")
-"""What a command that is killed may not have on the terminal."""
+"""Words that a command that is killed may not print."""
 ENDED = {signal.SIGKILL: (-signal.SIGKILL,), signal.SIGTERM: (128 + signal.SIGTERM, -signal.SIGTERM)}
-"""How a command ends by a signal: by SIGTERM also at once, while Python is still being started."""
+"""Exit status after a signal: by SIGTERM also at once, while Python is still being started."""
 WHOLE = {".svg": b"</svg>", ".html": b"</html>", ".png": b"IEND\xaeB`\x82", ".json": b"}"}
-"""What the files end in that are written at once."""
+"""Last bytes of files that are written at once."""
 
 
 class Trial:

@@ -48,7 +48,7 @@ STEPS = 3000
 
 @dataclass
 class Tally:
-    """What became of the cases of a kind."""
+    """Counts of the outcomes of the cases of a kind."""
 
     counts: Counter[str] = field(default_factory=Counter)
     notes: list[str] = field(default_factory=list)

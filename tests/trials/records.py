@@ -40,7 +40,7 @@ VALUES = (
     0, 1, -1, 2.5, 1e308, -1e-308, 10**30, True, False, None, "", "deg", "rad", "7.5", "12", "NaN", [], {},
     [3.7, "deg"], [1, 2, 3], {"a": 1}, float("nan"), float("inf"), "\x1b[31m", "\u202e", "plant.yaw_rate",
 )  # fmt: skip
-"""What is put in the place of a value."""
+"""Replacements of a value."""
 RIGHT, SAID, MADE = "numbers right, nothing to say", "named in a sentence", "named, and made again"
 NAMED = (
     r"(:line\d+:|:\d+:|:[^;]{0,300}(was(changed|added|removed)|cannotberead|isnottherecordofarun|"
@@ -53,7 +53,7 @@ SWEEP_OF_TWO = SWEEP.replace("[0.01, 0.02, 0.03, 0.04, 0.05, 0.06]", "[0.01, 0.0
 
 @dataclass
 class Told:
-    """What a call of the command line came to."""
+    """Outcome of a call of the command line."""
 
     status: int
     out: str
@@ -142,7 +142,7 @@ class Trial:
 
     @property
     def fmus(self) -> tuple[object, ...]:
-        """Where the FMUs are, as an option."""
+        """Folder of the FMUs, as an option."""
         return ("--fmus", self._fmus)
 
     def restore(self, name: str) -> None:

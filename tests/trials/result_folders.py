@@ -92,7 +92,7 @@ class Case:
 
 @dataclass
 class Tally:
-    """What became of the folders."""
+    """Counts of the outcomes of the folders."""
 
     folders: int = 0
     calls: Counter[str] = field(default_factory=Counter)  # what was made of them -> how often

@@ -9,7 +9,7 @@ import pytest
 from .wrong_calls import TAKEN, Tally, cases, described, trial
 
 EACH = 29
-"""Of so many calls the sample makes one. Chosen: a prime, so that each parameter meets other values."""
+"""Calls of which the sample makes one. Chosen: a prime, so that each parameter meets other values."""
 
 
 def held(tally: Tally, calls: int) -> bool:

@@ -47,7 +47,7 @@ LONGEST = 3000
 """Characters of a message. Chosen: a sentence that lists all signals of a run has less."""
 TAKEN, REFUSED = "taken", "refused by name"
 SENTINEL = "beyond the arguments"
-"""What a call that would take long ends with if its arguments are right."""
+"""Message of the error with which a call that would take long ends if its arguments are right."""
 
 FINITE = {
     "zero", "minus one", "three", "two and a half", "minus one and a half", "10**18", "1e308", "numpy int",
@@ -67,7 +67,7 @@ ODD_TEXTS = {"numpy text", "hostile text"}
 """Texts that are none to declarations, which become part of an FMU."""
 EMPTY = {"empty text", "hostile text"}
 NO_ITEMS = {"empty array", "zip"}
-"""What gives no items, in order."""
+"""Kinds of values without items in an order."""
 
 
 class Law:
@@ -98,7 +98,7 @@ def beside(call: Callable[[Any], object]) -> Callable[[Any], object]:
 
 
 class Bench:
-    """What the calls are made with: a scenario, a run, an experiment; made once."""
+    """Objects for the calls: a scenario, a run, an experiment; made once."""
 
     @cached_property
     def base(self) -> yb.Scenario:
@@ -471,7 +471,7 @@ NOT_CALLED = (
     yb.Controller, yb.Diagnostic, yb.Evaluation, yb.Location, yb.MetricValue, yb.Override, yb.Plan,
     yb.TestQuantity, yb.Validation, yb.Verdict,
 )  # fmt: skip
-"""What users write, or only read."""
+"""Classes that users write, or only read."""
 
 
 def described() -> dict[str, list[str]]:
@@ -526,7 +526,7 @@ def _quotes(said: str, value: Any) -> bool:
 
 @dataclass
 class Tally:
-    """What became of the calls."""
+    """Counts of the outcomes of the calls."""
 
     counts: Counter[str] = field(default_factory=Counter)
     notes: list[str] = field(default_factory=list)
@@ -534,7 +534,7 @@ class Tally:
 
     @property
     def bad(self) -> int:
-        """How many did not hold."""
+        """Number of calls that did not hold."""
         return sum(number for outcome, number in self.counts.items() if outcome.isupper())
 
 

@@ -15,7 +15,7 @@ import pandas as pd
 
 
 class Raised(Exception):
-    """What hostile objects raise: nobody may let it pass."""
+    """Error that hostile objects raise: no caller may let it pass."""
 
 
 def _raises(*_: Any, **__: Any) -> Any:
@@ -228,7 +228,7 @@ OTHERS: dict[str, Callable[[], Any]] = {
     "file": lambda: open("/dev/null", "rb"),  # noqa: SIM115
 }  # fmt: skip
 WRONG = TEXTS | NUMBERS | OTHERS
-"""What it is -> makes it, anew for every call."""
+"""Description of a value -> function that makes it, anew for every call."""
 
 
 def plant_links(folder: Path) -> None:

@@ -122,7 +122,7 @@ class Data:
 
 
 class Derived:
-    """What its constructor derives follows from an attribute of the class."""
+    """Controller whose constructor derives a value from an attribute of the class."""
 
     inputs, outputs = ("yaw_rate",), ("yaw_moment",)
     gain = 1e4

@@ -23,7 +23,7 @@ def law(yaw_rate_ref, yaw_rate, gain=20000, limit=1e4, things: int = 3):
 
 
 class Law:
-    """What the constructor derives follows its argument; `bias` is an attribute of the class."""
+    """Controller whose constructor derives a value from its argument; `bias` is an attribute of the class."""
 
     inputs = ("yaw_rate_ref", "yaw_rate")
     outputs = ("yaw_moment",)

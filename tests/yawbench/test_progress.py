@@ -24,7 +24,7 @@ def base():
 
 @pytest.fixture
 def terminal(monkeypatch):
-    """What a terminal would show of bars without delay."""
+    """Text that a terminal would show of bars without delay."""
     shown = io.StringIO()
 
     def console(*, always: bool = False) -> Console:

@@ -1,4 +1,4 @@
-"""What the public signatures say: types in place of `Any`, and classes that are public themselves."""
+"""Public signatures: types in place of `Any`, and classes that are public themselves."""
 
 from __future__ import annotations
 

@@ -123,8 +123,9 @@ def test_trials_that_fail_are_counted_and_lose(base):
         return gain * (yaw_rate_ref - yaw_rate) if gain < 5e4 else 1.0 / (gain - gain)
 
     ranges = {"controller.gain": (1e3, 1e5)}
-    with pytest.warns(yb.YawbenchWarning, match=r"\d of 10 runs failed: .*ZeroDivisionError"):
+    with pytest.warns(yb.YawbenchWarning, match=r"\d of 10 runs failed: .*ZeroDivisionError") as warned:
         tuned = yb.tune(base.swap(controller=fragile), ranges, ERROR, **SMALL)
+    assert [warning.filename for warning in warned] == [__file__]
     assert float(tuned.values["controller.gain"]) < 5e4
     assert 0 < tuned.table["objective"].isna().sum() < 10
     with refused(yb.ResultsError, "results-missing"), warnings.catch_warnings():

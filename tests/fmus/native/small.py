@@ -31,7 +31,7 @@ from ..fmi.variables import output, parameter, signal
 
 @dataclass(frozen=True)
 class Parameters:
-    """Of all kinds."""
+    """Parameters of all kinds."""
 
     gain: float = parameter(2.0, "1", "A number", "chosen: a test", minimum=-10.0)
     count: int = parameter(3, None, "An integer", "chosen: a test")

@@ -1,4 +1,4 @@
-"""How an FMU carries its native library: one archive, Python beside it, either of them on request."""
+"""Native library in an FMU: one archive, Python beside it, either of them on request."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from components.fmi.variables import output, parameter
 
 @dataclass(frozen=True)
 class LawParameters:
-    """Of the law."""
+    """Parameters of the law."""
 
     gain: float = parameter(2000.0, "N.m.s/rad", "Gain", "chosen: a test", minimum=0.0)
 

@@ -1,4 +1,4 @@
-"""What is not translated is refused in one sentence with file and line."""
+"""Constructs that are not translated are refused in one sentence with file and line."""
 
 from __future__ import annotations
 

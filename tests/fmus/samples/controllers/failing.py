@@ -26,7 +26,7 @@ WAYS = (
 
 @dataclass(frozen=True)
 class FailingParameters:
-    """Where and how."""
+    """Place and kind of the failure."""
 
     where: str = parameter("nowhere", None, "Method that fails", choices=PLACES)
     how: str = parameter("exception", None, "How it fails", choices=WAYS)
