@@ -260,7 +260,7 @@ class Calling(BuiltIn):
 
 
 class _Empty:
-    """What every object has that is all in its attributes."""
+    """A class without slots or base, with which others are compared."""
 
 
 def _is_its_attributes(value: Any) -> bool:
