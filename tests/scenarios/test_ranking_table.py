@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import csv
 import math
+from dataclasses import replace
 
 import pytest
 
 from docs.generate import matrix_tables
-from orchestrator.experiments.ranking import load_ranking
-from orchestrator.experiments.ranking_scores import EntryScore, RankedState, RankingResult
+from orchestrator.experiments.executor import Executor, runner_of
+from orchestrator.experiments.ranking import ConditionSpec, load_ranking
+from orchestrator.experiments.ranking_scores import EntryScore, RankedState, RankingResult, run_ranking
 from tests.commands import status_of
 
 RANKING = load_ranking(matrix_tables.FILE)
@@ -123,6 +125,46 @@ def test_the_conclusions_on_sideslip_and_effort_are_those_of_the_table(published
         s for s in published.scores if s is not band and s.mean("intervention") <= band.mean("intervention")
     ]
     assert all(score.mean("headroom") < band.mean("headroom") for score in cheap)
+
+
+@pytest.mark.exhaustive
+def test_what_is_not_the_same_for_all_is_as_the_page_says(tmp_path):
+    hard = RANKING.spec.conditions["hard"]
+    unguarded = ConditionSpec.model_validate(
+        {
+            **hard.model_dump(exclude_unset=True, mode="json"),
+            "title": "unguarded",
+            "set": {"allocator.wheel_choice": "moment"},
+        }
+    )
+    names = ("fnn", "lqr", "fuzzy_pid", "fuzzy_sideslip", "sliding_mode")
+    entries = {name: RANKING.entries[name] for name in names}
+    for name, limit in (("fuzzy_pid", 10e3), ("sliding_mode", 5e3)):
+        spec, folder = entries[name]
+        entries[f"{name} limited"] = spec.model_copy(update={"parameters": {"moment_limit": limit}}), folder
+    spec = RANKING.spec.model_copy(update={"conditions": {"hard": hard, "unguarded": unguarded}})
+    chosen = replace(RANKING, spec=spec, entries=entries, quick=True)
+    with Executor(tmp_path, chosen.identity, runner_of(1, None)) as execute:
+        runs = {(run.entry, run.condition): run for run in run_ranking(chosen, execute, keep=False).runs}
+
+    def ratio(entry: str, condition: str) -> str:
+        return f"{100 * runs[entry, condition]['ratio_1000']:.0f} %"
+
+    def slip(entry: str, condition: str = "hard") -> str:
+        return f"{math.degrees(runs[entry, condition]['sideslip']):.1f}°"
+
+    assert {round(math.degrees(run.amplitude)) for run in runs.values()} == {270}
+    page = " ".join(matrix_tables.PAGE.read_text(encoding="utf-8").split())
+    for sentence in (
+        f"more ({ratio('fnn', 'unguarded')} at COS + 1 s instead of {ratio('fnn', 'hard')}), and LQR "
+        f"({ratio('lqr', 'unguarded')} instead of {ratio('lqr', 'hard')}; the limit is 35 %)",
+        f"({slip('fuzzy_pid')} and {slip('fuzzy_sideslip')} of sideslip, with the guard or without)",
+        f"fuzzy PID reaches {slip('fuzzy_pid limited')} of sideslip instead of {slip('fuzzy_pid')}",
+        f"with 5 reaches {slip('sliding_mode limited')} instead of {slip('sliding_mode')}",
+    ):
+        assert sentence in page
+    for entry in ("fuzzy_pid", "fuzzy_sideslip"):
+        assert slip(entry) == slip(entry, "unguarded")
 
 
 @pytest.mark.exhaustive
