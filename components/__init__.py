@@ -1,4 +1,4 @@
-"""The units' models: pure physics and control laws behind thin FMI classes.
+"""Components, the sources of FMUs: pure physics and control laws behind thin FMI classes.
 
 The papers that are named A to D:
 

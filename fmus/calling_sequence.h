@@ -1,5 +1,5 @@
 /* Which call FMI 2.0 allows when, and the time that an instance has reached: one definition for the launcher,
- * native units and units in C. What is refused leaves the instance as it was. */
+ * native libraries and components in C. What is refused leaves the instance as it was. */
 #ifndef YAWBENCH_CALLING_SEQUENCE_H
 #define YAWBENCH_CALLING_SEQUENCE_H
 

@@ -1,4 +1,4 @@
-/* The FMU's binary on Linux: opens the unit's native library if there is one beside it, and passes every call
+/* The FMU's binary on Linux: opens the component's native library if there is one beside it, and passes every call
  * on to it. Otherwise it provides Python, and passes them on to PythonFMU's library.
  *
  * PythonFMU 0.7.0's own library has no link to libpython, so only a host that is itself a Python
@@ -35,7 +35,7 @@
 /* PythonFMU's library, or the native one: loaded once, by whoever instantiates first. */
 static struct {
     void *handle;
-    bool native; /* it is no PythonFMU's, but the unit itself */
+    bool native; /* it is the component's own library, not PythonFMU's */
     fmi2InstantiateFn Instantiate;
     fmi2FreeInstanceFn FreeInstance;
 #define MEMBER(name, parameters) fmi2##name##Fn name;
@@ -224,7 +224,7 @@ static bool open_library(const char *name, char *problem, size_t size)
     return true;
 }
 
-/* True if the unit has a native library and nobody asks for Python. */
+/* True if the FMU has a native library and nobody asks for Python. */
 static bool is_native(void)
 {
     char folder[PATH_MAX];
@@ -397,7 +397,7 @@ EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String 
     in->visible = visible;
     in->log_all = logging_on != fmi2False;
     in->guid = strdup(guid == NULL ? "" : guid);
-    if (!library.native && in->guid != NULL) { /* a native unit needs none */
+    if (!library.native && in->guid != NULL) { /* a native library needs none */
         in->resources = find_resources(location, in->guid, problem, sizeof problem);
     }
     if (in->resources == NULL && !library.native) {
@@ -571,7 +571,7 @@ static bool is_empty(fmi2FMUstate state)
     return empty;
 }
 
-/* Hand a new state over in place of the one that `*target` may hold; a failed unit gives an empty one. */
+/* Hand a new state over in place of the one that `*target` may hold; a failed instance gives an empty one. */
 static fmi2Status deliver(Instance *in, fmi2FMUstate fresh, Progress at, fmi2FMUstate *target,
                           const char *failure)
 {

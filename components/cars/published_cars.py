@@ -1,4 +1,4 @@
-"""The cars of the papers, as far as several units know them."""
+"""The cars of the papers, as far as several components share them."""
 
 from dataclasses import dataclass
 

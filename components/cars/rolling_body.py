@@ -68,7 +68,7 @@ class RollingBody:
         self.stiffness = (p.roll_stiffness - coupling * G) / inertia  # of the oscillator, q [1/s2]
 
     def __deepcopy__(self, memo: object) -> RollingBody:
-        return self  # never changes: saving a unit's state need not copy it
+        return self  # never changes: saving a component's state need not copy it
 
     def forcing(self, y: float, phi: float, pull: Pull = LEVEL) -> float:
         """Return the roll acceleration [rad/s2] that the lateral force `y` [N] drives, springs apart."""

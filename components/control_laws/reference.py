@@ -1,6 +1,6 @@
 """The base of references: the yaw rate and the sideslip asked for, and their rates.
 
-The rates are slopes of what is shown over the unit's own step, smoothed by a first-order lag
+The rates are slopes of what is shown over the instance's own step, smoothed by a first-order lag
 (`mathematics.slope`), since a steering angle often comes in steps of a sensor. So they belong to limited
 references, corners included, and a jump gives a pulse of the area of the jump. They are zero at the start.
 """

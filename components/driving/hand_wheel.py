@@ -2,7 +2,7 @@
 
     delta(t) = delta_h(t) / steering_ratio
 
-A manoeuvre is one function of time. Stimuli live in a unit, not in the master, so that they are exact at
+A manoeuvre is one function of time. Stimuli live in a component, not in the master, so that they are exact at
 every instant and not quantised to whole communication steps. The speed: `driving.speed_holding`.
 """
 

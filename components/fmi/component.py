@@ -76,13 +76,13 @@ def _picker(inputs: Sequence[str | VariableSpec]) -> Callable[[list[float]], tup
 
 
 class Component(Fmi2Slave):
-    """A unit of the test bench. The first line of a subclass's docstring describes its FMU."""
+    """A component of the test bench. The first line of a subclass's docstring describes its FMU."""
 
     Parameters: ClassVar[type] = NoParameters
     inputs: ClassVar[tuple[str | VariableSpec, ...]] = ()
     outputs: ClassVar[tuple[str | VariableSpec, ...]] = ()
     sampled: ClassVar[bool] = False
-    """True for a unit that samples (controller, allocator): its outputs are discrete."""
+    """True for a component that samples (controller, allocator): its outputs are discrete."""
 
     author: ClassVar[str] = ""
     copyright: ClassVar[str] = ""

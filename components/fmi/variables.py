@@ -67,7 +67,7 @@ def signal(
         minimum, maximum: limits written into the model description; the dictionary's if left out.
         depends_on: of an output, the inputs it depends on directly at the same instant. A `*`
             there means the same wheel if the output's own name has one, else all four.
-        optional: of an input, that the unit does its work at the start value if nothing drives it.
+        optional: of an input, that the component does its work at the start value if nothing drives it.
 
     Raises:
         DeclarationError: unknown name without unit and text, a name that is not lower-case
@@ -231,7 +231,7 @@ def of_car(
 
     Args:
         default, source: as of `parameter`.
-        text: what this unit says in place of the dictionary's meaning.
+        text: this component's text in place of the dictionary's meaning.
         minimum: in place of the dictionary's.
         maximum: largest value.
     """

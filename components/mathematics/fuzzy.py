@@ -136,7 +136,7 @@ class Mamdani:
         ]
 
     def __deepcopy__(self, memo: object) -> Mamdani:
-        return self  # never changes: saving a unit's state need not copy it
+        return self  # never changes: saving a component's state need not copy it
 
     def __call__(self, x: float, y: float) -> list[float]:
         """Return the outputs for the inputs `x` (rows) and `y` (columns); NaN for NaN."""

@@ -1,1 +1,1 @@
-"""Laws of one tyre, where more than one unit asks for them."""
+"""Laws of one tyre, shared by several components."""

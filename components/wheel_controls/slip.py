@@ -1,7 +1,7 @@
 """Wheel torque by sliding-mode slip control, with the curve of a known tyre.
 
 The law is described in `control_laws.slip_control`. It needs the tyre's F_x(kappa) at the present slip
-angle, load and friction; this unit evaluates the very functions that the tyre units evaluate, so no table is
+angle, load and friction; it evaluates the very functions that the tyre components evaluate, so no table is
 typed in. Give it the same parameters as the tyre, as a scenario's vehicle file does by itself.
 
 Source: paper B, equations (31)-(38).

@@ -1,1 +1,1 @@
-"""Units written in C: what they share, and how they are built."""
+"""Components written in C: shared code, and their build."""

@@ -1,4 +1,4 @@
-"""Units written in C: a folder with modelDescription.xml and C files becomes the files of an FMU.
+"""Components written in C: a folder with modelDescription.xml and C files becomes the files of an FMU.
 
 The model description is the one place where variables are declared; `variables.h` is made from it
 at every build, the GUID follows from it and the sources. As with components in Python, the same
@@ -48,7 +48,7 @@ WINDOWS = ("-static", "-Wl,--no-insert-timestamp", "-s")
 
 
 def find_c_components(root: Path) -> dict[str, Path]:
-    """Return name of FMU -> folder of every unit in C below `root`."""
+    """Return name of FMU -> folder of every component in C below `root`."""
     components = {}
     for role in ROLES:
         for file in sorted((root / role).glob(f"*/{DESCRIPTION}")):
@@ -58,7 +58,7 @@ def find_c_components(root: Path) -> dict[str, Path]:
 
 @dataclass(frozen=True)
 class CRecipe:
-    """A unit in C; the folder that holds its own says the role, as in `controllers/idea/idea.c`.
+    """A component in C; the folder that holds its own says the role, as in `controllers/idea/idea.c`.
 
     Raises:
         BuildError: no model description, or no role.
@@ -123,14 +123,14 @@ class CRecipe:
             raise BuildError(f"there are both {folder.name}.py and {folder.name}/ in {folder.parent}")
         description, *code = self._files()
         sources = {file.name: file.read_bytes() for file in code}
-        units = [name for name in sources if name.endswith(".c")]
-        if not units:
+        c_files = [name for name in sources if name.endswith(".c")]
+        if not c_files:
             raise BuildError(f"{self.source} contains no C file")
         role = ROLES[self.source.parent.name]
         root, variables = read_declaration(description.read_bytes(), self.name, role)
         root.set("guid", _guid(root, sources))
         sources["variables.h"] = header(variables, root.get("guid", "")).encode()
-        common = [*FLAGS, *EXACT, "-I.", f"-I{HERE}", f"-I{HERE.parent}", *units, "-lm"]
+        common = [*FLAGS, *EXACT, "-I.", f"-I{HERE}", f"-I{HERE.parent}", *c_files, "-lm"]
         system, suffix = platform()
         own = LINUX if sys.platform == "linux" else ()
         files = {

@@ -29,7 +29,7 @@ def read_declaration(xml: bytes, name: str, role: Role) -> tuple[ElementTree.Ele
     """Return the model description and its variables, after checking what the C side relies on.
 
     Raises:
-        BuildError: not XML, or with a sentence per variable that a unit in C cannot have.
+        BuildError: not XML, or with a sentence per variable that a component in C cannot have.
     """
     try:
         root = ElementTree.fromstring(xml)
@@ -47,7 +47,7 @@ def read_declaration(xml: bytes, name: str, role: Role) -> tuple[ElementTree.Ele
         own = element.get("name") or ""
         real = element.find("Real")
         if real is None:
-            problems.append(f"{DESCRIPTION}: {own} is not Real; a unit in C has only Real variables")
+            problems.append(f"{DESCRIPTION}: {own} is not Real; a component in C has only Real variables")
         elif element.get("causality") not in ("input", "output", "parameter"):
             problems.append(f"{DESCRIPTION}: {own} must be an input, an output or a parameter")
         elif element.get("valueReference") != str(i):

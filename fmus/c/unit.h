@@ -1,6 +1,6 @@
-/* A co-simulation unit in C: every function of FMI 2.0, around what the unit's own file defines.
+/* An FMU for co-simulation in C: every function of FMI 2.0, around what the component's own file defines.
  *
- * The unit's file includes variables.h, which `yawbench build` makes from modelDescription.xml
+ * The component's file includes variables.h, which `yawbench build` makes from modelDescription.xml
  * (`Variables`: one double per variable, by name), and then defines
  *
  *     State                                           what it remembers from step to step
@@ -8,7 +8,7 @@
  *     void advance(State *, const Variables *, double t, double h)  the state from t to t + h
  *     void output(const State *, Variables *, double t)             all outputs at t
  *
- * all static, and includes this file last. Like a component in Python, the unit computes its outputs
+ * all static, and includes this file last. Like a component in Python, it computes its outputs
  * whenever somebody asks for them until initialization ends, and after every step from then on;
  * parameters out of their range are refused in one sentence. State and variables are saved and
  * restored as they lie in memory, so a State must not hold pointers. */
@@ -41,10 +41,10 @@ typedef struct {
     fmi2CallbackFunctions host;
     char name[256];
     Content now;
-} Unit;
+} Instance;
 
 /* Send a sentence to the host's log. Log text is a printf format, so '%' is doubled. */
-static fmi2Status fail(const Unit *unit, const char *format, ...)
+static fmi2Status fail(const Instance *instance, const char *format, ...)
 {
     char text[512], safe[2 * sizeof text], *end = safe;
     va_list values;
@@ -58,8 +58,8 @@ static fmi2Status fail(const Unit *unit, const char *format, ...)
         }
     }
     *end = '\0';
-    if (unit->host.logger != NULL) {
-        unit->host.logger(unit->host.componentEnvironment, unit->name, fmi2Error, "logStatusError", safe);
+    if (instance->host.logger != NULL) {
+        instance->host.logger(instance->host.componentEnvironment, instance->name, fmi2Error, "logStatusError", safe);
     }
     return fmi2Error;
 }
@@ -75,28 +75,28 @@ static void begin(Content *content)
     content->stale = 1;
 }
 
-static fmi2Status refresh(Unit *unit)
+static fmi2Status refresh(Instance *instance)
 {
-    const double *values = (const double *)&unit->now.v;
+    const double *values = (const double *)&instance->now.v;
     for (size_t i = 0; i < N_VARIABLES; i++) {
         const char *name = DECLARED[i].name;
         if (DECLARED[i].causality != PARAMETER) {
             continue;
         }
         if (!isfinite(values[i])) {
-            return fail(unit, "%s must be a finite number (got %g)", name, values[i]);
+            return fail(instance, "%s must be a finite number (got %g)", name, values[i]);
         }
         if (values[i] < DECLARED[i].min) {
-            return fail(unit, "%s must be at least %g (got %g)", name, DECLARED[i].min, values[i]);
+            return fail(instance, "%s must be at least %g (got %g)", name, DECLARED[i].min, values[i]);
         }
         if (values[i] > DECLARED[i].max) {
-            return fail(unit, "%s must be at most %g (got %g)", name, DECLARED[i].max, values[i]);
+            return fail(instance, "%s must be at most %g (got %g)", name, DECLARED[i].max, values[i]);
         }
     }
-    memset(&unit->now.state, 0, sizeof unit->now.state);
-    start(&unit->now.state, &unit->now.v, unit->now.start_time);
-    output(&unit->now.state, &unit->now.v, unit->now.start_time);
-    unit->now.stale = 0;
+    memset(&instance->now.state, 0, sizeof instance->now.state);
+    start(&instance->now.state, &instance->now.v, instance->now.start_time);
+    output(&instance->now.state, &instance->now.v, instance->now.start_time);
+    instance->now.stale = 0;
     return fmi2OK;
 }
 
@@ -110,20 +110,20 @@ FMI2_EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2St
                                           fmi2Boolean logging_on)
 {
     (void)resources, (void)visible, (void)logging_on;
-    Unit *unit = calloc(1, sizeof *unit);
-    if (unit == NULL) {
+    Instance *instance = calloc(1, sizeof *instance);
+    if (instance == NULL) {
         return NULL;
     }
-    unit->host = *host;
-    snprintf(unit->name, sizeof unit->name, "%s", name);
+    instance->host = *host;
+    snprintf(instance->name, sizeof instance->name, "%s", name);
     if (type != fmi2CoSimulation || guid == NULL || strcmp(guid, GUID) != 0) {
-        fail(unit, type != fmi2CoSimulation ? "this unit is for co-simulation"
+        fail(instance, type != fmi2CoSimulation ? "this FMU is for co-simulation"
                                             : "the GUID is not that of this FMU: the model description is of another build");
-        free(unit);
+        free(instance);
         return NULL;
     }
-    begin(&unit->now);
-    return unit;
+    begin(&instance->now);
+    return instance;
 }
 
 FMI2_EXPORT void fmi2FreeInstance(fmi2Component c)
@@ -134,46 +134,46 @@ FMI2_EXPORT void fmi2FreeInstance(fmi2Component c)
 FMI2_EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance,
                                            fmi2Real start_time, fmi2Boolean stop_defined, fmi2Real stop_time)
 {
-    Unit *unit = c;
+    Instance *instance = c;
     Refusal why;
     (void)tolerance_defined, (void)tolerance;
-    if (!set_up(&unit->now.at, start_time, stop_defined, stop_time, &why)) {
-        return fail(unit, "%s", why.text);
+    if (!set_up(&instance->now.at, start_time, stop_defined, stop_time, &why)) {
+        return fail(instance, "%s", why.text);
     }
-    unit->now.start_time = start_time;
-    unit->now.stale = 1;
+    instance->now.start_time = start_time;
+    instance->now.stale = 1;
     return fmi2OK;
 }
 
 FMI2_EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 {
-    Unit *unit = c;
+    Instance *instance = c;
     Refusal why;
-    return pass_on(&unit->now.at, BEFORE_INITIALIZATION, DURING_INITIALIZATION, "fmi2EnterInitializationMode", &why)
+    return pass_on(&instance->now.at, BEFORE_INITIALIZATION, DURING_INITIALIZATION, "fmi2EnterInitializationMode", &why)
                ? fmi2OK
-               : fail(unit, "%s", why.text);
+               : fail(instance, "%s", why.text);
 }
 
 FMI2_EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 {
-    Unit *unit = c;
+    Instance *instance = c;
     Refusal why;
-    if (!pass_on(&unit->now.at, DURING_INITIALIZATION, AFTER_INITIALIZATION, "fmi2ExitInitializationMode", &why)) {
-        return fail(unit, "%s", why.text);
+    if (!pass_on(&instance->now.at, DURING_INITIALIZATION, AFTER_INITIALIZATION, "fmi2ExitInitializationMode", &why)) {
+        return fail(instance, "%s", why.text);
     }
-    fmi2Status status = unit->now.stale ? refresh(unit) : fmi2OK;
-    unit->now.initializing = 0;
+    fmi2Status status = instance->now.stale ? refresh(instance) : fmi2OK;
+    instance->now.initializing = 0;
     return status;
 }
 
 FMI2_EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean keep)
 {
     (void)keep;
-    Unit *unit = c;
-    Content *now = &unit->now;
+    Instance *instance = c;
+    Content *now = &instance->now;
     Refusal why;
     if (!may_step(&now->at, t, h, &why)) {
-        return fail(unit, "%s", why.text);
+        return fail(instance, "%s", why.text);
     }
     advance(&now->state, &now->v, t, h);
     output(&now->state, &now->v, t + h);
@@ -183,14 +183,14 @@ FMI2_EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2B
 
 FMI2_EXPORT fmi2Status fmi2Terminate(fmi2Component c)
 {
-    Unit *unit = c;
+    Instance *instance = c;
     Refusal why;
-    return terminate(&unit->now.at, &why) ? fmi2OK : fail(unit, "%s", why.text);
+    return terminate(&instance->now.at, &why) ? fmi2OK : fail(instance, "%s", why.text);
 }
 
 FMI2_EXPORT fmi2Status fmi2Reset(fmi2Component c)
 {
-    begin(&((Unit *)c)->now);
+    begin(&((Instance *)c)->now);
     return fmi2OK;
 }
 
@@ -198,36 +198,36 @@ FMI2_EXPORT fmi2Status fmi2Reset(fmi2Component c)
 
 FMI2_EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2Real values[])
 {
-    Unit *unit = c;
+    Instance *instance = c;
     for (size_t i = 0; i < n; i++) {
         if (r[i] >= N_VARIABLES) {
-            return fail(unit, "there is no Real with the value reference %u", r[i]);
+            return fail(instance, "there is no Real with the value reference %u", r[i]);
         }
-        if (DECLARED[r[i]].causality == OUTPUT && unit->now.initializing && unit->now.stale &&
-            refresh(unit) != fmi2OK) {
+        if (DECLARED[r[i]].causality == OUTPUT && instance->now.initializing && instance->now.stale &&
+            refresh(instance) != fmi2OK) {
             return fmi2Error;
         }
-        values[i] = ((const double *)&unit->now.v)[r[i]];
+        values[i] = ((const double *)&instance->now.v)[r[i]];
     }
     return fmi2OK;
 }
 
 FMI2_EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Real values[])
 {
-    Unit *unit = c;
+    Instance *instance = c;
     for (size_t i = 0; i < n; i++) {
         if (r[i] >= N_VARIABLES) {
-            return fail(unit, "there is no Real with the value reference %u", r[i]);
+            return fail(instance, "there is no Real with the value reference %u", r[i]);
         }
         if (DECLARED[r[i]].causality == OUTPUT) {
-            return fail(unit, "%s cannot be set", DECLARED[r[i]].name);
+            return fail(instance, "%s cannot be set", DECLARED[r[i]].name);
         }
-        if (DECLARED[r[i]].causality == PARAMETER && !unit->now.initializing) {
-            return fail(unit, "%s cannot be set after initialization", DECLARED[r[i]].name);
+        if (DECLARED[r[i]].causality == PARAMETER && !instance->now.initializing) {
+            return fail(instance, "%s cannot be set after initialization", DECLARED[r[i]].name);
         }
-        ((double *)&unit->now.v)[r[i]] = values[i];
+        ((double *)&instance->now.v)[r[i]] = values[i];
     }
-    unit->now.stale = 1;
+    instance->now.stale = 1;
     return fmi2OK;
 }
 
@@ -235,20 +235,20 @@ FMI2_EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[]
 
 FMI2_EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
-    Unit *unit = c;
+    Instance *instance = c;
     if (*state == NULL) {
-        *state = calloc(1, sizeof unit->now);
+        *state = calloc(1, sizeof instance->now);
     }
     if (*state == NULL) {
-        return fail(unit, "there is no memory for the state");
+        return fail(instance, "there is no memory for the state");
     }
-    memcpy(*state, &unit->now, sizeof unit->now);
+    memcpy(*state, &instance->now, sizeof instance->now);
     return fmi2OK;
 }
 
 FMI2_EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
 {
-    memcpy(&((Unit *)c)->now, state, sizeof(Content));
+    memcpy(&((Instance *)c)->now, state, sizeof(Content));
     return fmi2OK;
 }
 
@@ -289,13 +289,13 @@ FMI2_EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte b
     return status;
 }
 
-/* ---- what such a unit does not have ---- */
+/* ---- functions that such an FMU does not have ---- */
 
 #define FMI2_NOTHING(name, parameters)                                                                      \
     FMI2_EXPORT fmi2Status fmi2##name parameters                                                            \
     {                                                                                                       \
         (void)values;                                                                                       \
-        return n == 0 ? fmi2OK : fail(c, "all variables of this unit are Real");                            \
+        return n == 0 ? fmi2OK : fail(c, "all variables of this FMU are Real");                            \
     }
 FMI2_NOTHING(GetInteger, (fmi2Component c, const fmi2ValueReference *r, size_t n, fmi2Integer values[]))
 FMI2_NOTHING(GetBoolean, (fmi2Component c, const fmi2ValueReference *r, size_t n, fmi2Boolean values[]))
@@ -315,7 +315,7 @@ FMI2_EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind k
     if (kind != fmi2LastSuccessfulTime) {
         return fail(c, "fmi2GetRealStatus knows of fmi2LastSuccessfulTime alone");
     }
-    *value = ((Unit *)c)->now.at.time;
+    *value = ((Instance *)c)->now.at.time;
     return fmi2OK;
 }
 

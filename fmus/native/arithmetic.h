@@ -1,4 +1,4 @@
-/* Arithmetic as CPython has it, lists that grow, and the texts of exceptions: what made units compute with. */
+/* Arithmetic as CPython has it, lists that grow, and the texts of exceptions: for translated components. */
 #include <math.h>
 #include <stdarg.h>
 #include <stddef.h>

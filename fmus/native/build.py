@@ -52,7 +52,7 @@ LATER = "its native library takes longer than a run should wait; 'yawbench build
 
 @dataclass(frozen=True)
 class Native:
-    """The native libraries of a unit.
+    """The native libraries of an FMU.
 
     Attributes:
         files: path in the archive -> content.
@@ -121,7 +121,7 @@ def native(
         limit: processor time [s] that the comparison may take.
     """
     if sys.platform != "linux" or platform.machine() != "x86_64":
-        return Native(why_not=f"native units are built on Linux on x86-64, this is {platform.system()}")
+        return Native(why_not=f"native libraries are built on Linux on x86-64, this is {platform.system()}")
     try:
         compiler_version(compiler_command())
         entry = hashlib.sha256(component.fmu_name.encode()).hexdigest()
@@ -137,7 +137,7 @@ def native(
         return Native(why_not=str(refused))
     except BuildError as error:
         return Native(why_not=str(error.diagnostics[0]))
-    except Exception as error:  # whatever it is, the unit itself works
+    except Exception as error:  # whatever it is, the FMU itself works
         return Native(why_not=f"not translated: {type(error).__name__}: {error}")
 
 

@@ -1,10 +1,10 @@
-"""Comparison of a native unit with its Python twin: driven through the same calls, equal in every bit.
+"""Comparison of a native library with its Python twin: driven through the same calls, equal in every bit.
 
 Both are taken through 2,000 steps at each of three step lengths, with inputs in their usual ranges, a
 hundredth and three times of them; with every value of parameters that have choices, with parameters moved;
 through reset, a second start, states saved, restored and serialized; through parameters out of range and
 inputs that are not finite. Values, statuses and sentences must be the same, but where inputs are huge a
-native unit may refuse to compute an integer beyond 2^53. NaN is NaN, whatever its sign.
+native library may refuse to compute an integer beyond 2^53. NaN is NaN, whatever its sign.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class _Callbacks(ctypes.Structure):
 
 
 class Difference(Exception):
-    """A difference between a native unit and its twin."""
+    """A difference between a native library and its twin."""
 
 
 Answer = tuple[bool, list[str], bytes]
@@ -51,7 +51,7 @@ Answer = tuple[bool, list[str], bytes]
 
 
 class Native:
-    """A native unit, loaded from its library."""
+    """An instance of a native library."""
 
     def __init__(self, library: Path, guid: str) -> None:
         self.library = ctypes.CDLL(str(library))
@@ -61,7 +61,7 @@ class Native:
         call = self.library.fmi2Instantiate
         made = call(b"native", c_int(1), guid.encode(), None, byref(self._callbacks), c_int(0), c_int(0))
         if made is None:
-            raise Difference(f"the native unit does not start: {'; '.join(self.messages)}")
+            raise Difference(f"the native library does not start: {'; '.join(self.messages)}")
         self.instance = c_void_p(made)
 
     def _log(self, environment: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:
@@ -127,14 +127,14 @@ class Twin:
         messages = self.messages
 
         def log(
-            unit: Any, text: str, status: int = 0, category: str | None = None, debug: object = None
+            instance: Any, text: str, status: int = 0, category: str | None = None, debug: object = None
         ) -> None:
             if category != "traceback":
                 messages.append(text)
 
         component.log = log
         self._make: Callable[[], Any] = lambda: component(instance_name="native", resources=str(resources))
-        self.unit = self._make()
+        self.instance = self._make()
 
     def _answer(self, succeeded: Any = True, values: Sequence[float] = ()) -> Answer:
         messages = list(self.messages)
@@ -142,34 +142,34 @@ class Twin:
         return succeeded is not False and not messages, messages, struct.pack(f"{len(values)}d", *values)
 
     def reset(self) -> Answer:
-        self.unit = self._make()
+        self.instance = self._make()
         return self._answer()
 
     def set(self, kind: str, refs: Sequence[int], values: Sequence[Any]) -> Answer:
-        getattr(self.unit, f"set_{kind.lower()}")(list(refs), list(values))
+        getattr(self.instance, f"set_{kind.lower()}")(list(refs), list(values))
         return self._answer()
 
     def get(self, refs: Sequence[int]) -> Answer:
-        values = self.unit.get_real(list(refs))
+        values = self.instance.get_real(list(refs))
         return self._answer(values=values)
 
     def begin(self, t: float) -> Answer:
-        self.unit.setup_experiment(t)
-        self.unit.enter_initialization_mode()
+        self.instance.setup_experiment(t)
+        self.instance.enter_initialization_mode()
         return self._answer()
 
     def end_initialization(self) -> Answer:
-        self.unit.exit_initialization_mode()
+        self.instance.exit_initialization_mode()
         return self._answer()
 
     def step(self, t: float, h: float) -> Answer:
-        return self._answer(self.unit.do_step(t, h))
+        return self._answer(self.instance.do_step(t, h))
 
     def save(self) -> bytes:
-        return self.unit._fmu_state_to_bytes(self.unit._get_fmu_state())  # type: ignore[no-any-return]
+        return self.instance._fmu_state_to_bytes(self.instance._get_fmu_state())  # type: ignore[no-any-return]
 
     def restore(self, content: bytes) -> Answer:
-        self.unit._set_fmu_state(self.unit._fmu_state_from_bytes(content))
+        self.instance._set_fmu_state(self.instance._fmu_state_from_bytes(content))
         return self._answer()
 
 
@@ -271,7 +271,7 @@ def random_inputs(variables: Sequence[Any], seed: str) -> Iterator[list[float]]:
 
 
 def compare(library: Path, guid: str, component: type[Any], resources: Path, steps: int = STEPS) -> None:
-    """Take a native unit and its twin through everything.
+    """Take a native library and its twin through everything.
 
     Raises:
         Difference: the first one that is found.
@@ -358,10 +358,10 @@ def _choices(beside: _Beside, variables: Sequence[Any]) -> Iterator[tuple[str, C
 
 
 def differences(library: Path, guid: str, component: type[Any], resources: Path, limit: int = LIMIT) -> str:
-    """Return the first difference between a native unit and its twin, "" if none; in another process.
+    """Return the first difference between a native library and its twin, "" if none; in another process.
 
     Args:
-        library, guid: of the native unit.
+        library, guid: of the native library.
         component, resources: of its twin.
         limit: processor time [s] that all may take.
 

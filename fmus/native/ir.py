@@ -15,7 +15,7 @@ REAL, INT, BOOL, WORD, WIDE = "real", "int", "bool", "word", "wide"
 EXACT = 2**53
 """Up to which an integer is exact as a double."""
 INEXACT = "an integer beyond 2^53, which Python alone computes exactly: set YAWBENCH_UNITS=python"
-"""Error of a native unit whose integer becomes larger."""
+"""Error of a native library whose integer becomes larger."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,11 +141,11 @@ Statement = Let | Load | Invoke | Digits | Digit | If | Loop | Leave | Raise | P
 
 @dataclass(frozen=True)
 class Function:
-    """One of the four functions of a unit.
+    """One of the four functions of a component.
 
     Attributes:
         body: its statements.
-        stores: (place, value): what it leaves in the unit; a place is a C expression.
+        stores: (place, value): what it leaves in the instance; a place is a C expression.
     """
 
     body: Sequence[Statement]

@@ -1,4 +1,4 @@
-"""Shapes of values: what a loop carries from one pass to the next, what a unit keeps between steps.
+"""Shapes of values: what a loop carries from one pass to the next, what a component keeps between steps.
 
 A shape holds what is always the same and has leaves where numbers are; two values have a shape that is wide
 enough for both. A value becomes the list of its leaves' numbers, and is made of such a list again.

@@ -1,7 +1,7 @@
 """Specialization of a component into four functions: its parameters, its start, a step, and its outputs.
 
-What stays on `self` is the unit's state. Its form is found by following the functions until it no longer
-widens: what is the same in every step is known, every other number has a place in the unit.
+What stays on `self` is the component's state. Its form is found by following the functions until it no longer
+widens: what is the same in every step is known, every other number has a place in the instance.
 """
 
 from __future__ import annotations
@@ -193,7 +193,7 @@ class _Specialising:
         widening.of(state, self._shape(me, fixed))
         after = self._numbers(state, me, machine, "output")
         if widening.grew or any(x is not leaf for x, leaf in zip(after, leaves, strict=True)):
-            raise Refused("output() changes what the unit keeps", self._line_of("output"))
+            raise Refused("output() changes what the component keeps", self._line_of("output"))
         outputs = self.returned
         if isinstance(outputs, Union) or not isinstance(outputs, (tuple, List)):
             raise Refused("output() returns what has several forms", self._line_of("output"))

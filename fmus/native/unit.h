@@ -21,7 +21,7 @@
 
 enum { LONGEST_TEXT = 256 }; /* of a text that is none of a parameter's choices */
 
-/* All that is saved and restored with a unit's state. */
+/* All that is saved and restored with the state of an instance. */
 typedef struct {
     Variables v;
     Configured c;
@@ -45,14 +45,14 @@ typedef struct {
     fmi2CallbackFunctions host;
     char *name;
     Saved now;
-} Unit;
+} Instance;
 
 /* ---- log ---- */
 
-static void send(const Unit *unit, fmi2Status status, const char *category, const char *text)
+static void send(const Instance *instance, fmi2Status status, const char *category, const char *text)
 {
     char *safe = malloc(2 * strlen(text) + 1), *end = safe;
-    if (safe == NULL || unit->host.logger == NULL) {
+    if (safe == NULL || instance->host.logger == NULL) {
         free(safe);
         return;
     }
@@ -63,40 +63,40 @@ static void send(const Unit *unit, fmi2Status status, const char *category, cons
         }
     }
     *end = '\0';
-    unit->host.logger(unit->host.componentEnvironment, unit->name, status, category, safe);
+    instance->host.logger(instance->host.componentEnvironment, instance->name, status, category, safe);
     free(safe);
 }
 
-static fmi2Status complain(const Unit *unit, const char *text)
+static fmi2Status complain(const Instance *instance, const char *text)
 {
-    send(unit, fmi2Error, "logStatusError", text);
+    send(instance, fmi2Error, "logStatusError", text);
     return fmi2Error;
 }
 
-static double *real_at(Unit *unit, size_t i)
+static double *real_at(Instance *instance, size_t i)
 {
-    return (double *)((char *)&unit->now.content.v + DECLARED[i].place);
+    return (double *)((char *)&instance->now.content.v + DECLARED[i].place);
 }
 
-static int *other_at(Unit *unit, size_t i)
+static int *other_at(Instance *instance, size_t i)
 {
-    return (int *)((char *)&unit->now.content.v + DECLARED[i].place);
+    return (int *)((char *)&instance->now.content.v + DECLARED[i].place);
 }
 
-static fmi2Status refuse(const Unit *unit, const Refusal *why)
+static fmi2Status refuse(const Instance *instance, const Refusal *why)
 {
-    return complain(unit, why->text);
+    return complain(instance, why->text);
 }
 
 /* Log an exception as the component would; the instance is of no more use. */
-static fmi2Status fail(Unit *unit, const char *what, double t, const Problem *problem)
+static fmi2Status fail(Instance *instance, const char *what, double t, const Problem *problem)
 {
     static const Problem empty;
     Problem *sentence = malloc(sizeof *sentence);
     char number[64];
-    unit->now.content.failed = 1;
+    instance->now.content.failed = 1;
     if (sentence == NULL) {
-        return complain(unit, what);
+        return complain(instance, what);
     }
     *sentence = empty;
     say(sentence, what);
@@ -111,14 +111,14 @@ static fmi2Status fail(Unit *unit, const char *what, double t, const Problem *pr
         say(sentence, i == 0 ? "; inputs: " : ", ");
         say(sentence, DECLARED[i].name);
         say(sentence, " = ");
-        write_repr(number, *real_at(unit, i));
+        write_repr(number, *real_at(instance, i));
         if (sizeof sentence->text - sentence->length < sizeof number + 64) { /* cut where Python would go on */
             say(sentence, "...");
             break;
         }
         say(sentence, number);
     }
-    complain(unit, sentence->text);
+    complain(instance, sentence->text);
     free(sentence);
     return fmi2Error;
 }
@@ -137,11 +137,11 @@ static char *naming(const char *doing, const char *type, const fmi2ValueReferenc
     return text;
 }
 
-static fmi2Status fail_at(Unit *unit, const char *doing, const char *type, const fmi2ValueReference r[], size_t n,
-                          const Problem *problem)
+static fmi2Status fail_at(Instance *instance, const char *doing, const char *type,
+                          const fmi2ValueReference r[], size_t n, const Problem *problem)
 {
     char *text = naming(doing, type, r, n);
-    fmi2Status status = fail(unit, text == NULL ? doing : text, unit->now.content.start_time, problem);
+    fmi2Status status = fail(instance, text == NULL ? doing : text, instance->now.content.start_time, problem);
     free(text);
     return status;
 }
@@ -175,10 +175,10 @@ static void say_quoted(Problem *problem, const char *text)
 }
 
 /* Say what is wrong with a parameter, if anything is. */
-static int wrong_parameter(Unit *unit, size_t i, Problem *problem)
+static int wrong_parameter(Instance *instance, size_t i, Problem *problem)
 {
     const Declared *d = &DECLARED[i];
-    if (d->type == STRING && *other_at(unit, i) < 0) {
+    if (d->type == STRING && *other_at(instance, i) < 0) {
         begin_problem(problem, "ValueError", "");
         say(problem, d->name);
         say(problem, " must be one of ");
@@ -187,14 +187,14 @@ static int wrong_parameter(Unit *unit, size_t i, Problem *problem)
             say(problem, d->choices[k]);
         }
         say(problem, " (got ");
-        say_quoted(problem, unit->now.content.wrong);
+        say_quoted(problem, instance->now.content.wrong);
         say(problem, ")");
         return 1;
     }
     if (d->type == STRING) {
         return 0;
     }
-    double x = d->type == REAL ? *real_at(unit, i) : *other_at(unit, i);
+    double x = d->type == REAL ? *real_at(instance, i) : *other_at(instance, i);
     int finite = d->type != REAL || (x >= -1e308 && x <= 1e308);
     if (finite && !(x < d->min) && !(x > d->max)) {
         return 0;
@@ -217,14 +217,14 @@ static int wrong_parameter(Unit *unit, size_t i, Problem *problem)
     return 1;
 }
 
-static int bring_up_to_date(Unit *unit, Problem *problem)
+static int bring_up_to_date(Instance *instance, Problem *problem)
 {
-    Content *now = &unit->now.content;
+    Content *now = &instance->now.content;
     if (now->configured) {
         return 0;
     }
     for (size_t i = N_INPUTS + N_OUTPUTS; i < N_VARIABLES; i++) {
-        if (wrong_parameter(unit, i, problem)) {
+        if (wrong_parameter(instance, i, problem)) {
             return 1;
         }
     }
@@ -235,13 +235,13 @@ static int bring_up_to_date(Unit *unit, Problem *problem)
     return 0;
 }
 
-static int refresh(Unit *unit, Problem *problem)
+static int refresh(Instance *instance, Problem *problem)
 {
-    Content *now = &unit->now.content;
+    Content *now = &instance->now.content;
     double y[sizeof now->y / sizeof *now->y];
-    if (bring_up_to_date(unit, problem) ||
-        start(problem, &now->v, &now->c, &now->s, unit->now.lists, now->start_time) ||
-        output(problem, &now->v, &now->c, &now->s, unit->now.lists, y, now->start_time)) {
+    if (bring_up_to_date(instance, problem) ||
+        start(problem, &now->v, &now->c, &now->s, instance->now.lists, now->start_time) ||
+        output(problem, &now->v, &now->c, &now->s, instance->now.lists, y, now->start_time)) {
         return 1;
     }
     memcpy(now->y, y, sizeof y);
@@ -249,21 +249,21 @@ static int refresh(Unit *unit, Problem *problem)
     return 0;
 }
 
-static void begin(Unit *unit)
+static void begin(Instance *instance)
 {
     for (size_t i = 0; i < (size_t)N_LISTS; i++) {
-        free(unit->now.lists[i].items);
+        free(instance->now.lists[i].items);
     }
-    memset(&unit->now, 0, sizeof unit->now);
+    memset(&instance->now, 0, sizeof instance->now);
     for (size_t i = 0; i < N_VARIABLES; i++) {
         if (DECLARED[i].type == REAL) {
-            *real_at(unit, i) = DECLARED[i].start;
+            *real_at(instance, i) = DECLARED[i].start;
         } else {
-            *other_at(unit, i) = (int)DECLARED[i].start;
+            *other_at(instance, i) = (int)DECLARED[i].start;
         }
     }
-    unit->now.content.initializing = 1;
-    unit->now.content.stale = 1;
+    instance->now.content.initializing = 1;
+    instance->now.content.stale = 1;
 }
 
 /* ---- life cycle ---- */
@@ -280,15 +280,15 @@ FMI2_EXPORT const char *fmi2GetVersion(void)
 
 FMI2_EXPORT void fmi2FreeInstance(fmi2Component c)
 {
-    Unit *unit = c;
-    if (unit == NULL) {
+    Instance *instance = c;
+    if (instance == NULL) {
         return;
     }
     for (size_t i = 0; i < (size_t)N_LISTS; i++) {
-        free(unit->now.lists[i].items);
+        free(instance->now.lists[i].items);
     }
-    free(unit->name);
-    free(unit);
+    free(instance->name);
+    free(instance);
 }
 
 FMI2_EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
@@ -299,42 +299,42 @@ FMI2_EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2St
     if (host == NULL) {
         return NULL;
     }
-    Unit *unit = calloc(1, sizeof *unit);
-    if (unit == NULL) {
+    Instance *instance = calloc(1, sizeof *instance);
+    if (instance == NULL) {
         return NULL;
     }
-    unit->host = *host;
-    unit->name = malloc(name == NULL ? 1 : strlen(name) + 1);
-    if (unit->name == NULL) {
-        free(unit);
+    instance->host = *host;
+    instance->name = malloc(name == NULL ? 1 : strlen(name) + 1);
+    if (instance->name == NULL) {
+        free(instance);
         return NULL;
     }
-    strcpy(unit->name, name == NULL ? "" : name);
-    const char *problem = *unit->name == '\0'         ? "fmi2Instantiate needs an instance name in UTF-8"
+    strcpy(instance->name, name == NULL ? "" : name);
+    const char *problem = *instance->name == '\0'         ? "fmi2Instantiate needs an instance name in UTF-8"
                           : type != fmi2CoSimulation ? "this FMU is for co-simulation only"
                           : guid == NULL || strcmp(guid, GUID) != 0
                               ? "the GUID is not that of this FMU: the model description is of another build"
                               : NULL;
     if (problem != NULL) {
-        complain(unit, problem);
-        fmi2FreeInstance(unit);
+        complain(instance, problem);
+        fmi2FreeInstance(instance);
         return NULL;
     }
-    begin(unit);
-    return unit;
+    begin(instance);
+    return instance;
 }
 
 #define UNIT(c)                                                                                             \
-    Unit *unit = (c);                                                                                       \
-    if (unit == NULL) {                                                                                     \
+    Instance *instance = (c);                                                                               \
+    if (instance == NULL) {                                                                                 \
         return fmi2Error;                                                                                   \
     }                                                                                                       \
-    Content *now = &unit->now.content;                                                                      \
+    Content *now = &instance->now.content;                                                                  \
     (void)now;
 
 #define REQUIRE(condition, text)                                                                            \
     if (!(condition)) {                                                                                     \
-        return complain(unit, text);                                                                        \
+        return complain(instance, text);                                                                    \
     }
 
 FMI2_EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance,
@@ -344,7 +344,7 @@ FMI2_EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranc
     Refusal why;
     (void)tolerance_defined, (void)tolerance;
     if (!set_up(&now->at, start_time, stop_defined, stop_time, &why)) {
-        return refuse(unit, &why);
+        return refuse(instance, &why);
     }
     now->start_time = start_time;
     now->stale = 1;
@@ -357,9 +357,11 @@ FMI2_EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c)
     Refusal why;
     Problem problem;
     if (!pass_on(&now->at, BEFORE_INITIALIZATION, DURING_INITIALIZATION, "fmi2EnterInitializationMode", &why)) {
-        return refuse(unit, &why);
+        return refuse(instance, &why);
     }
-    return bring_up_to_date(unit, &problem) ? fail(unit, "initialization failed", now->start_time, &problem) : fmi2OK;
+    return bring_up_to_date(instance, &problem)
+               ? fail(instance, "initialization failed", now->start_time, &problem)
+               : fmi2OK;
 }
 
 FMI2_EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c)
@@ -368,10 +370,10 @@ FMI2_EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c)
     Refusal why;
     Problem problem;
     if (!pass_on(&now->at, DURING_INITIALIZATION, AFTER_INITIALIZATION, "fmi2ExitInitializationMode", &why)) {
-        return refuse(unit, &why);
+        return refuse(instance, &why);
     }
-    if (now->stale && refresh(unit, &problem)) {
-        return fail(unit, "initialization failed", now->start_time, &problem);
+    if (now->stale && refresh(instance, &problem)) {
+        return fail(instance, "initialization failed", now->start_time, &problem);
     }
     now->initializing = 0;
     return fmi2OK;
@@ -388,11 +390,11 @@ FMI2_EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2B
         return fmi2Error;
     }
     if (!may_step(&now->at, t, h, &why)) {
-        return refuse(unit, &why);
+        return refuse(instance, &why);
     }
-    if (advance(&problem, &now->v, &now->c, &now->s, unit->now.lists, t, h) ||
-        output(&problem, &now->v, &now->c, &now->s, unit->now.lists, y, t + h)) {
-        return fail(unit, "step failed", t, &problem);
+    if (advance(&problem, &now->v, &now->c, &now->s, instance->now.lists, t, h) ||
+        output(&problem, &now->v, &now->c, &now->s, instance->now.lists, y, t + h)) {
+        return fail(instance, "step failed", t, &problem);
     }
     memcpy(now->y, y, sizeof y);
     now->at.time = t + h;
@@ -403,13 +405,13 @@ FMI2_EXPORT fmi2Status fmi2Terminate(fmi2Component c)
 {
     UNIT(c)
     Refusal why;
-    return terminate(&now->at, &why) ? fmi2OK : refuse(unit, &why);
+    return terminate(&now->at, &why) ? fmi2OK : refuse(instance, &why);
 }
 
 FMI2_EXPORT fmi2Status fmi2Reset(fmi2Component c)
 {
     UNIT(c)
-    begin(unit);
+    begin(instance);
     return fmi2OK;
 }
 
@@ -422,8 +424,8 @@ FMI2_EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[]
     fmi2Status status = fmi2OK;
     for (size_t i = 0; i < n && now->stale && now->initializing && !now->failed; i++) {
         Problem problem;
-        if (r[i] >= N_INPUTS && r[i] < N_INPUTS + N_OUTPUTS && refresh(unit, &problem)) {
-            status = fail(unit, "initialization failed", now->start_time, &problem);
+        if (r[i] >= N_INPUTS && r[i] < N_INPUTS + N_OUTPUTS && refresh(instance, &problem)) {
+            status = fail(instance, "initialization failed", now->start_time, &problem);
         }
     }
     for (size_t i = 0; i < n; i++) {
@@ -434,10 +436,10 @@ FMI2_EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[]
             }
             begin_problem(&problem, "IndexError", "");
             say(&problem, "list index out of range");
-            return fail_at(unit, "reading", "Real", r, n, &problem);
+            return fail_at(instance, "reading", "Real", r, n, &problem);
         }
         int is_output = r[i] >= N_INPUTS && r[i] < N_INPUTS + N_OUTPUTS;
-        values[i] = is_output ? now->y[r[i] - N_INPUTS] : *real_at(unit, r[i]);
+        values[i] = is_output ? now->y[r[i] - N_INPUTS] : *real_at(instance, r[i]);
     }
     return status;
 }
@@ -453,9 +455,9 @@ FMI2_EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[]
             begin_problem(&problem, "ValueError", "");
             say_name(&problem, r[i]);
             say(&problem, now->initializing ? " cannot be set" : " cannot be set after initialization");
-            return fail_at(unit, "setting", "Real", r, n, &problem);
+            return fail_at(instance, "setting", "Real", r, n, &problem);
         }
-        *real_at(unit, r[i]) = values[i];
+        *real_at(instance, r[i]) = values[i];
         if (is_parameter) {
             now->configured = 0;
         }
@@ -481,38 +483,38 @@ static int wrong_reference(const fmi2ValueReference r[], size_t n, int type, con
     return 0;
 }
 
-static fmi2Status may_set(Unit *unit, const fmi2ValueReference r[], size_t n, int type, const char *named)
+static fmi2Status may_set(Instance *instance, const fmi2ValueReference r[], size_t n, int type, const char *named)
 {
     Problem problem;
-    if (!unit->now.content.initializing) {
+    if (!instance->now.content.initializing) {
         begin_problem(&problem, "ValueError", "");
         say_name(&problem, r[0]);
         say(&problem, " cannot be set after initialization");
-        return fail_at(unit, "setting", named, r, n, &problem);
+        return fail_at(instance, "setting", named, r, n, &problem);
     }
     if (wrong_reference(r, n, type, named, &problem)) {
-        return fail_at(unit, "setting", named, r, n, &problem);
+        return fail_at(instance, "setting", named, r, n, &problem);
     }
-    unit->now.content.configured = 0;
-    unit->now.content.stale = 1;
+    instance->now.content.configured = 0;
+    instance->now.content.stale = 1;
     return fmi2OK;
 }
 
-static int code_of(Unit *unit, size_t i, const char *text)
+static int code_of(Instance *instance, size_t i, const char *text)
 {
     for (int k = 0; k < DECLARED[i].n_choices; k++) {
         if (strcmp(DECLARED[i].choices[k], text) == 0) {
             return k;
         }
     }
-    snprintf(unit->now.content.wrong, LONGEST_TEXT, "%s", text);
+    snprintf(instance->now.content.wrong, LONGEST_TEXT, "%s", text);
     return -1;
 }
 
-static const char *text_of(Unit *unit, size_t i)
+static const char *text_of(Instance *instance, size_t i)
 {
-    int code = *other_at(unit, i);
-    return code < 0 ? unit->now.content.wrong : DECLARED[i].choices[code];
+    int code = *other_at(instance, i);
+    return code < 0 ? instance->now.content.wrong : DECLARED[i].choices[code];
 }
 
 #define GET_AND_SET(Type, TYPE, BLANK, READ, WRITE)                                                         \
@@ -527,7 +529,7 @@ static const char *text_of(Unit *unit, size_t i)
             for (size_t i = 0; i < n; i++) {                                                                \
                 values[i] = BLANK;                                                                          \
             }                                                                                               \
-            return fail_at(unit, "reading", #Type, r, n, &problem);                                         \
+            return fail_at(instance, "reading", #Type, r, n, &problem);                                     \
         }                                                                                                   \
         for (size_t i = 0; i < n; i++) {                                                                    \
             values[i] = READ;                                                                               \
@@ -540,16 +542,16 @@ static const char *text_of(Unit *unit, size_t i)
         UNIT(c)                                                                                             \
         REQUIRE(n == 0 || (r != NULL && values != NULL),                                                    \
                 "fmi2Set" #Type ": value references or values are missing")                                 \
-        fmi2Status status = n == 0 ? fmi2OK : may_set(unit, r, n, TYPE, #Type);                             \
+        fmi2Status status = n == 0 ? fmi2OK : may_set(instance, r, n, TYPE, #Type);                         \
         for (size_t i = 0; i < n && status == fmi2OK; i++) {                                                \
-            *other_at(unit, r[i]) = WRITE;                                                                  \
+            *other_at(instance, r[i]) = WRITE;                                                              \
         }                                                                                                   \
         return status;                                                                                      \
     }
 
-GET_AND_SET(Integer, INTEGER, 0, *other_at(unit, r[i]), values[i])
-GET_AND_SET(Boolean, BOOLEAN, fmi2False, *other_at(unit, r[i]), values[i] != 0)
-GET_AND_SET(String, STRING, "", text_of(unit, r[i]), code_of(unit, r[i], values[i] == NULL ? "" : values[i]))
+GET_AND_SET(Integer, INTEGER, 0, *other_at(instance, r[i]), values[i])
+GET_AND_SET(Boolean, BOOLEAN, fmi2False, *other_at(instance, r[i]), values[i] != 0)
+GET_AND_SET(String, STRING, "", text_of(instance, r[i]), code_of(instance, r[i], values[i] == NULL ? "" : values[i]))
 
 /* ---- state ---- */
 
@@ -582,11 +584,11 @@ FMI2_EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
     UNIT(c)
     REQUIRE(state != NULL, "fmi2GetFMUstate: no place for the state")
     Saved *saved = *state != NULL ? *state : calloc(1, sizeof *saved);
-    if (saved == NULL || !copy(saved, &unit->now)) {
+    if (saved == NULL || !copy(saved, &instance->now)) {
         if (saved != *state) {
             free(saved);
         }
-        return complain(unit, "fmi2GetFMUstate: out of memory");
+        return complain(instance, "fmi2GetFMUstate: out of memory");
     }
     *state = saved;
     return fmi2OK;
@@ -596,7 +598,7 @@ FMI2_EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
 {
     UNIT(c)
     REQUIRE(state != NULL, "fmi2SetFMUstate: no state given")
-    return copy(&unit->now, state) ? fmi2OK : complain(unit, "fmi2SetFMUstate: out of memory");
+    return copy(&instance->now, state) ? fmi2OK : complain(instance, "fmi2SetFMUstate: out of memory");
 }
 
 FMI2_EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
@@ -688,14 +690,14 @@ FMI2_EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte b
             forget(saved);
         }
         free(saved);
-        return complain(unit, "fmi2DeSerializeFMUstate: not a state of this FMU");
+        return complain(instance, "fmi2DeSerializeFMUstate: not a state of this FMU");
     }
     fmi2FreeFMUstate(c, state);
     *state = saved;
     return fmi2OK;
 }
 
-/* ---- what such a unit does not have ---- */
+/* ---- functions that such an FMU does not have ---- */
 
 FMI2_EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String names[])
 {
@@ -718,7 +720,7 @@ FMI2_EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind k
     FMI2_EXPORT fmi2Status fmi2##name parameters                                                            \
     {                                                                                                       \
         UNIT(c)                                                                                             \
-        return complain(unit, "fmi2" #name " is not supported");                                            \
+        return complain(instance, "fmi2" #name " is not supported");                                        \
     }
 UNSUPPORTED(GetDirectionalDerivative,
             (fmi2Component c, const fmi2ValueReference u[], size_t n_u, const fmi2ValueReference k[], size_t n_k,

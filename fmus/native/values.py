@@ -130,7 +130,7 @@ class Ring(Box):
     """A list of the state whose length is known at run time only.
 
     Attributes:
-        number: of the list in the unit.
+        number: of the list in the instance.
         item: shape of its items.
     """
 
