@@ -23,7 +23,7 @@ REFUSED = {
     "a state that output changes": (
         "def start(self, t, u):\n    self.n = 0.0\n"
         "def output(self, t, u):\n    self.n += u[0]\n    return (self.n,)",
-        "output() changes what the unit keeps",
+        "output() changes what the component keeps",
         3,
     ),
     "a loop without end": (
