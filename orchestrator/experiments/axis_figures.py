@@ -163,9 +163,15 @@ def set_scale(axes: Axes, which: Literal["x", "y"], scale: str) -> None:
         getattr(axes, f"{which}axis").set_major_formatter("{x:g}")
 
 
+BESIDE = 10
+"""Most names beside each other. Chosen: so many of 14 characters are as wide as a page."""
+
+
 def name_ticks(axes: Axes, names: Sequence[str]) -> None:
-    """Make x an axis of names, with ticks at 0, 1, 2, ..."""
-    axes.set_xticks(range(len(names)), [literal(name) for name in names])
+    """Make x an axis of names, with ticks at 0, 1, 2, ...; many names are written upwards."""
+    upwards: dict[str, Any] = {"rotation": 90, "fontsize": 7} if len(names) > BESIDE else {}
+    texts = [literal(name.replace("\n", " ") if upwards else name) for name in names]
+    axes.set_xticks(range(len(names)), texts, **upwards)
     axes.set_xlim(-0.5, len(names) - 0.5)
 
 

@@ -61,12 +61,13 @@ RANKING = Path("results/proving_ground/ranking", PAGE)
 def address_of(svg: str) -> Markup:
     """Return an SVG image as a short `data:` URL for an attribute in double quotes."""
     svg = svg[svg.index("<svg") :]
-    svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
+    svg = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", svg, flags=re.DOTALL)
     svg = re.sub(r"(?<=>)[^<]+(?=<)", lambda text: text[0].translate(CURLY), svg)
     svg = svg.replace("'", "").replace('"', "'")
+    svg = re.sub(r" id='[\w.]+_\d+'", "", svg)  # of groups, to which nothing refers
     svg = re.sub(
-        r"(scale\([^)]*\))|(\.\d\d)\d+", lambda match: match[1] or match[2], svg
-    )  # glyphs keep their aspect ratio
+        r"(scale\([^)]*\))|(\.\d)\d+", lambda match: match[1] or match[2], svg
+    )  # a tenth of a point; glyphs keep their aspect ratio
     svg = re.sub(r"\s*\n\s*", "\n", svg)
     return Markup("data:image/svg+xml," + quote(svg, safe=" =:/'(),;.-+*!?@$[]{}|^`~"))
 

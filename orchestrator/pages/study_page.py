@@ -234,7 +234,7 @@ SEVERAL = {
 }
 """Verdict -> its plural."""
 LONG = 16
-"""Rows from which on a table is folded. Chosen: with the claims, a page stays below 2,000 elements."""
+"""Rows of tables; further tables are folded. Chosen: with the claims, a page stays below 2,000 elements."""
 VIEW = "view"
 """Anchor of the viewer."""
 

@@ -143,7 +143,7 @@ def _data(findings: ExperimentResult, sides: Mapping[int, str]) -> dict[str, Any
         "statuses": statuses,
         "status": [statuses.index(record.status) for record in records],
         "told": {case.number: why for case in cases if (why := _remark(findings, case))},
-        "keys": [job.key[:KEY] for job in jobs],
+        "keys": "".join(job.key[:KEY].ljust(KEY) for job in jobs),
         "sides": [number in sides for number in range(len(cases))],
         "base": [
             ["yawbench", "run", str(run.scenario), *_words([*for_all, *run.changes, *by_options])]

@@ -10,6 +10,7 @@ those of uPlot, taken from the installed package `uplot-python`.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import distribution
@@ -229,11 +230,19 @@ def assets(*scripts: str) -> Markup:
     styles = [(foreign / "uPlot.min.css").read_text(encoding="utf-8")]
     sheets = ["viewer.css", *(name.replace(".js", ".css") for name in scripts)]
     styles += [static(name) for name in sheets if (files(__package__) / "static" / name).is_file()]
-    script = "\n".join(map(static, (*SCRIPTS, *scripts)))
+    script = without_comments("\n".join(map(static, (*SCRIPTS, *scripts))))
     return Markup(
         "<style>\n{}</style>\n<script>\n(() => {{\n'use strict';\n"
         "const makeUPlot = (devicePixelRatio) => {{\n{}\nreturn uPlot;\n}};\n{}}})();\n</script>"
-    ).format(Markup("\n".join(styles)), Markup(plotter), Markup(script))
+    ).format(Markup("\n".join(styles)), Markup(without_comments(plotter)), Markup(script))
+
+
+def without_comments(script: str) -> str:
+    """Return a script without indentation and `//` comments: 15 kB less in every page.
+
+    Text over several lines would lose its indentation; a test holds that no script has any.
+    """
+    return re.sub(r"^[ \t]*(?://.*)?\n|^[ \t]+|[ \t]+//\s[^'\"`\n]*$", "", script, flags=re.MULTILINE)
 
 
 def page(

@@ -137,6 +137,27 @@ def open_all(chromium: Browser) -> None:
     chromium.run("document.querySelectorAll('details').forEach((one) => { one.open = true; });")
 
 
+SCREENS = ((1440, 900), (390, 844))
+"""Width and height of the first screens that a page is designed for: a desk's and a phone's."""
+CHARTS = ".yv-chart, .ys-map svg, figure.chart img"
+
+
+def check_first_screen(chromium: Browser, page: Path, width: int, height: int) -> None:
+    """Open a page: the answer and the first curve, or a map's larger part, are on its first screen."""
+    chromium.open(page, width=width, height=height)
+    chromium.wait_for("!document.querySelector('.yv:not(.yv-ready), [data-packed]')")
+    chromium.wait_for("[...document.images].every((image) => image.complete)")
+    answer, chart, middle = chromium.run(
+        "const shown = (name) => [...document.querySelectorAll(name)].map((e) => e.getBoundingClientRect())"
+        "  .filter((box) => box.height > 20).sort((a, b) => a.top - b.top)[0];"
+        "const [answer, chart] = ['p.said', arguments[0]].map(shown);"
+        "return [answer.bottom, chart.top, (chart.top + chart.bottom) / 2];",
+        CHARTS,
+    )
+    assert answer < chart < middle < height
+    assert chromium.overflow() <= 0
+
+
 def check_budgets(chromium: Browser, page: Path) -> None:
     """The page that is open has at most 2,000 elements, and 250 kB without samples."""
     assert chromium.run("return document.querySelectorAll('*').length") <= 2000

@@ -21,7 +21,7 @@ from tests.orchestrator.recorded import record_text
 from tests.sentences import golden, golden_in, refused
 
 from .browser import DESK, PHONE
-from .flaws import check_budgets, flaws, inaccessible, open_all
+from .flaws import SCREENS, check_budgets, check_first_screen, flaws, inaccessible, open_all
 from .made_up import HALF_A_CAR, data_in, unpacked
 
 ROOT = Path(__file__).parents[2]
@@ -171,6 +171,32 @@ def test_the_answer_comes_first_and_a_claim_shows_its_runs(chromium, paper):
         chromium.wait_for(f"JSON.stringify(document.querySelector('.yv').viewer.state.shown) === '{text}'")
         assert chromium.run(state)["baseline"] == wanted[0]
     assert chromium.console() == []
+
+
+@pytest.mark.parametrize(("width", "height"), SCREENS)
+def test_the_answer_and_the_first_curve_are_on_the_first_screen(chromium, paper, width, height):
+    check_first_screen(chromium, paper.page, width, height)
+
+
+def test_the_pages_of_all_studies_would_keep_their_budget_of_elements(chromium, paper):
+    chromium.open(paper.page)
+    chromium.wait_for("document.querySelector('.yv-ready')")
+    elements, row, claim = chromium.run(
+        "const sizes = (name) => [...document.querySelectorAll(name)]"
+        "  .map((each) => each.querySelectorAll('*').length + 1);"
+        "const hidden = sizes('.yv-runs tr:has(.yv-show:not(:checked))');"
+        "return [sizes('html')[0], Math.max(...hidden), Math.max(...sizes('.claims > tbody > tr'))]"
+    )
+    own = load_experiment(paper.study)
+    for file in found_studies(ROOT / "scenarios"):
+        study = load_experiment(file)
+        runs = 0 if study.spec.axes else len(study.runs) - len(own.runs)  # axes: its runs are in no table
+        assert elements + runs * row + (judgements(study) - judgements(own)) * claim <= 2000, file
+
+
+def judgements(study):
+    """Return the number of claims and checks."""
+    return len(study.spec.claims) + len(study.spec.checks)
 
 
 def test_every_count_is_that_of_its_table(paper):

@@ -14,7 +14,7 @@ from orchestrator.cli import main
 from orchestrator.results.reader import load_results
 
 from .browser import DESK, PHONE, Browser
-from .flaws import inaccessible
+from .flaws import SCREENS, check_first_screen, inaccessible
 from .made_up import HALF_A_CAR
 
 UNITS = ("driver_sine", "reference_single_track")
@@ -72,6 +72,11 @@ def test_the_page_is_drawn_at_every_width_within_its_budgets(chromium, sweep, wi
     chromium.run(VIEW + "view.open(view.data.sides.indexOf(true))")
     chromium.wait_for("document.querySelector('.ys-run .yv-ready')")
     assert inaccessible(chromium) == []
+
+
+@pytest.mark.parametrize(("width", "height"), SCREENS)
+def test_the_answer_and_the_map_are_on_the_first_screen(chromium, sweep, width, height):
+    check_first_screen(chromium, sweep.page, width, height)
 
 
 TEXTS = """

@@ -15,9 +15,21 @@ from orchestrator.cli import main
 from orchestrator.errors import ResultsError
 from orchestrator.figures.panels import LabelledRun
 from orchestrator.figures.style import LINES, digits_of, shown_unit
-from orchestrator.pages.viewer import MOST, PANELS, Settings, View, answer_of, assets, page, still_of, viewer
+from orchestrator.pages.viewer import (
+    MOST,
+    PANELS,
+    Settings,
+    View,
+    answer_of,
+    assets,
+    page,
+    still_of,
+    viewer,
+    without_comments,
+)
 from orchestrator.pages.viewer_data import pack
 from orchestrator.results.reader import Results
+from tests.checkout import ROOT
 from tests.orchestrator.recorded import car, noted, write
 from tests.sentences import golden, golden_in
 from vocabulary.lane_change import lanes_of
@@ -764,3 +776,11 @@ def contrast(one: str, other: str) -> float:
 
     low, high = sorted([luminance(one), luminance(other)])
     return (high + 0.05) / (low + 0.05)
+
+
+def test_scripts_lose_comments_and_indentation_alone():
+    script = "  // why\n\n  let a = 'b // c';  // d\n/* e */\n"
+    assert without_comments(script) == "let a = 'b // c';\n/* e */\n"
+    for file in (ROOT / "orchestrator/pages/static").glob("*.js"):
+        for line in file.read_text(encoding="utf-8").splitlines():
+            assert line.count("`") % 2 == 0  # no text goes over several lines

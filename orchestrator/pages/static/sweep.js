@@ -53,6 +53,13 @@ class Sweep {
     return state;
   }
 
+  // The keys are one text, each as long as the others.
+  sideKey(row) {
+    const {keys} = this.data;
+    const length = keys.length / this.count;
+    return keys.slice(row * length, (row + 1) * length).trim();
+  }
+
   remember() {
     const plain = this.initial();
     const words = new URLSearchParams();
@@ -546,7 +553,7 @@ class Sweep {
     const quoted = (text) => `"${String(text ?? '').replaceAll('"', '""')}"`;
     const {data} = this;
     const head = ['run', ...this.dims.map((dim) => `${dim.discrete ? dim.id : dim.name}${dim.unit ? ` [${dim.unit}]` : ''}`), 'status', 'key'];
-    const lines = this.visible.map((row) => [row + 1, ...this.dims.map((dim) => (dim.discrete && !dim.numbers ? dim.words[dim.level(row)] : dim.at(row) ?? '')), data.statuses[data.status[row]], data.keys[row]]);
+    const lines = this.visible.map((row) => [row + 1, ...this.dims.map((dim) => (dim.discrete && !dim.numbers ? dim.words[dim.level(row)] : dim.at(row) ?? '')), data.statuses[data.status[row]], this.sideKey(row)]);
     return [head, ...lines].map((line) => line.map(quoted).join(',')).join('\n') + '\n';
   }
 
@@ -577,7 +584,7 @@ class Sweep {
     }
     if (!kept.length) { clearViewer(this.find('run')); return; }
     try {
-      const contents = await Promise.all(kept.map((row) => loadSide(this.data.folder, this.data.keys[row])));
+      const contents = await Promise.all(kept.map((row) => loadSide(this.data.folder, this.sideKey(row))));
       if (this.state.open === open) await showSides(this.find('run'), contents);
     } catch (error) {
       remark.append(Object.assign(document.createElement('p'), {textContent: `${error.message}: it belongs beside this page.`}));

@@ -395,7 +395,7 @@ class Viewer {
       row.querySelector('.yv-show').checked = this.shows(this.runs[k]);
       const base = row.querySelector('.yv-base');
       if (base) base.checked = this.state.baseline === k;
-      row.querySelector('.yv-swatch').innerHTML = this.swatch(this.runs[k]);
+      row.querySelector('.yv-swatch').innerHTML = this.shows(this.runs[k]) ? this.swatch(this.runs[k]) : '';
       const offset = row.querySelector('.yv-offset');
       if (offset) offset.value = this.state.offsets[k] || '';
     });
