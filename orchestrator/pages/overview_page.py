@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..messages import counted, listed
+from ..messages import counted
 from .page_parts import render
-from .study_page import SEVERAL, VIEW
+from .study_page import VIEW, in_sentence
 from .viewer import DATA, assets, embedded, tidy_sides, write_side
 
 TITLE = "Yaw-stability control: what papers say, and what comes out"
@@ -25,13 +25,12 @@ def _answer(chapters: Sequence[dict[str, Any]]) -> str:
         counts.update(facts["counts"])
     if not counts:
         return ""
-    parts = [f"{n} {word if n == 1 else SEVERAL.get(word, word)}" for word, n in counts.items()]
     judged = [facts for facts in chapters if facts["counts"]]
     alone = sum(not facts["region"] for facts in judged)
     where = f", {'all' if alone == len(judged) else f'{alone} of the studies'} at the chosen point only"
     return (
-        f"Of {sum(counts.values())} claims in {counted(len(judged), 'study', 'studies')}, {listed(parts)}"
-        f"{where if alone else ''}."
+        f"Of {sum(counts.values())} claims in {counted(len(judged), 'study', 'studies')}, "
+        f"{in_sentence(counts)}{where if alone else ''}."
     )
 
 

@@ -6,7 +6,7 @@ It has the verdicts, runs, system, tables and parameters of the experiment, and 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,9 @@ from ..experiments.tables import Cell, Table
 from ..experiments.verdict_tables import (
     FAILS,
     HOLDS,
+    NOT_JUDGED,
     SENSITIVE,
+    UNDECIDED,
     counts_of,
     derived_tables,
     heading,
@@ -191,12 +193,18 @@ def answer(findings: ExperimentResult) -> str:
             LabelledRun(runs[name].label, run) for name, run in findings.results.items() if run.time.size
         ]
         return answer_of(named) if named else ""
-    counts = [
-        f"{count} {word if count == 1 else SEVERAL.get(word, word)}"
-        for word, count in counts_of(results).items()
-    ]
     where = reach(findings)
-    return f"Of {len(results)} {kind}, {listed(counts, last='and')}{f', {where}' if where else ''}."
+    return f"Of {len(results)} {kind}, {in_sentence(counts_of(results))}{f', {where}' if where else ''}."
+
+
+def in_sentence(counts: Mapping[str, int]) -> str:
+    """Return how many verdicts are of each kind: `1 holds, 2 do not reproduce and 3 are undecided`."""
+    parts = []
+    for word, count in counts.items():
+        if word in (UNDECIDED, NOT_JUDGED):
+            word = f"{'is' if count == 1 else 'are'} {word}"
+        parts.append(f"{count} {word if count == 1 else SEVERAL.get(word, word)}")
+    return listed(parts, last="and")
 
 
 def judged(result: ClaimResult) -> dict[str, Any]:

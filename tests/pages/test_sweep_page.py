@@ -111,7 +111,7 @@ def test_the_page_of_two_thousand_runs_keeps_its_budgets(chromium, tmp_path, fmu
         assert chromium.run(VIEW + "return view.count") == 2000
         assert chromium.run("return document.querySelectorAll('*').length") <= MOST_ELEMENTS
         (caption,) = chromium.run(
-            "return [...document.querySelectorAll('table.grid + .notes')].map((one) => one.textContent)"
+            "return [...document.querySelectorAll('.wide + .notes')].map((one) => one.textContent)"
         )
         assert caption.startswith("The first 40 of 200 rows")
         assert chromium.console() == []
