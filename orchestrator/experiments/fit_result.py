@@ -34,7 +34,7 @@ from ..measured.least_squares import (
     estimate,
 )
 from ..measured.single_track import SIGNALS as OF_SINGLE_TRACK
-from ..measured.single_track import SingleTrack, SingleTrackWindow, start_states, typical_values
+from ..measured.single_track import UNITS, SingleTrack, SingleTrackWindow, start_states, typical_values
 from ..messages import hint
 from ..planner import Planner
 from ..scenario import yaml_lines
@@ -295,7 +295,7 @@ def _single_track(
         raise ValueError("the plant has no mass, or no distances of its axles")
     mass, front, rear = map(float, car)  # type: ignore[arg-type]
     own = [
-        Parameter(name, start, 0.2 * start, 5.0 * start)
+        Parameter(name, start, 0.2 * start, 5.0 * start, unit=UNITS[name])
         for name, start in typical_values(mass, front, rear).items()
     ]
     steering = {"steer_angle", "steering_wheel_angle"}

@@ -47,6 +47,7 @@ RESERVE = 1.15
 """Friction over the largest recorded a_y / g; chosen: no axle slides for long in the recording."""
 NEEDED = ("mass", "cg_to_front_axle", "cg_to_rear_axle")
 PARAMETERS = ("stiffness_front", "stiffness_rear", "friction_front", "friction_rear", "yaw_inertia")
+UNITS = dict(zip(PARAMETERS, ("N/rad", "N/rad", "1", "1", "kg.m2"), strict=True))
 SIGNALS = ("yaw_rate", "acceleration_y", "sideslip")
 STIFFNESS_PER_LOAD = 12.0
 """Typical cornering stiffness of an axle over its load [1/rad]; chosen: a passenger car's tyres."""

@@ -103,7 +103,7 @@ def parameter_table(model: FittedModel) -> Table:
     search = f"{estimate.sets} sets of values; {estimate.message}"
     table.notes.append(f"condition {estimate.identifiability.condition:.3g}; {search}")
     if estimate.covariance is None:
-        table.notes.append(f"no intervals: {estimate.pieces} pieces of 5 s are too few")
+        table.notes.append(f"no intervals: too few pieces of 5 s, {estimate.pieces}")
     for first, second, shared in estimate.correlated():
         table.notes.append(f"{first} and {second} are correlated: {shared:.2f}")
     return table

@@ -331,6 +331,16 @@ def test_the_bench_fits_a_phone(server, chromium: Browser):
     assert inaccessible(chromium) == []
 
 
+def test_a_run_is_chosen_by_the_box_on_the_line_of_its_name(server, chromium: Browser):
+    chromium.open(Path("/"))
+    chromium.driver.get(server.address)
+    box, name = chromium.run(
+        "return ['input', 'span'].map((tag) => document.querySelector(`table.runs label ${tag}`))"
+        "  .map((each) => each.getBoundingClientRect()).map(({top, bottom}) => (top + bottom) / 2)"
+    )
+    assert abs(box - name) < 5
+
+
 @pytest.mark.parametrize("address", ["", f"bench?scenario={SCENARIO}", "view?run=runs/one&run=runs/two"])
 def test_every_page_of_the_server_can_be_read_by_everyone(server, chromium: Browser, address):
     chromium.open(Path("/"))
