@@ -237,6 +237,22 @@ def test_published_disciplines_are_what_runs_come_to(entry, published, tmp_path:
 
 
 @pytest.mark.exhaustive
+def test_told_a_fiftieth_of_the_stiffness_laws_without_a_model_lose_no_car(text, tmp_path):
+    assert "Told a fiftieth of the stiffness, tuned laws that use the yaw rate lose no car" in text
+    told = THREATS.spec.threats["model"].model_copy(update={"easy": 0.02, "hard": 0.021})
+    main = THREATS.spec.settings[THREATS.main].model_copy(update={"threats": ["model"]})
+    spec = THREATS.spec.model_copy(
+        update={"threats": {**THREATS.spec.threats, "model": told}, "settings": {THREATS.main: main}}
+    )
+    threats = replace(THREATS, spec=spec)
+    with Executor(tmp_path, threats.identity, runner_of(1, None)) as execute:
+        slow = execute(angle_experiment(threats.ranking, execute, spec.cars), keep=False)
+        found = survivals(threats, angles_of(threats.ranking, slow, spec.cars), execute, only=WITHOUT_MODEL)
+    assert len(found) == len(spec.cars) * len(WITHOUT_MODEL)
+    assert {level.end for level in found.values()} == {"hard"}
+
+
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("car", THREATS.spec.cars)
 @pytest.mark.parametrize("entry", ENTRIES)
 def test_published_levels_are_what_runs_come_to(entry, car, published, request):
