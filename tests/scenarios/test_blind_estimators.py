@@ -37,6 +37,19 @@ def test_the_table_of_the_docs_follows_from_the_published_runs():
     assert text == page.read_text(encoding="utf-8")
 
 
+def test_the_page_says_how_far_the_kinematic_estimator_is_off_in_the_spin():
+    with blind_tables.RUNS.open(encoding="utf-8", newline="") as lines:
+        rows = [row for row in csv.DictReader(lines) if row["error"] == blind_tables.RIGHT]
+    by_run: dict[str, list[float]] = {}
+    for row in rows:
+        by_run.setdefault(row["run"], []).append(float(row["kinematic [rad]"]))
+    mean = {run: np.degrees(np.mean(values)) for run, values in by_run.items()}
+    ((page, _),) = blind_tables.pages_with_tables().items()
+    text = " ".join(page.read_text(encoding="utf-8").split())
+    assert f"the spin, where it errs by {max(mean.values()):.1f}° rms, makes most of its mean" in text
+    assert max(mean.values()) > 0.5 * sum(mean.values())
+
+
 def test_every_run_of_the_sweep_is_published():
     metrics = blind_tables.published()
     sweep = load_experiment(SWEEP)

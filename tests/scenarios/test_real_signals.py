@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 import yawbench as yb
 from orchestrator.cli import main
 from orchestrator.experiments.experiment import load_experiment
+from tests.verdicts import table_in
 
 from .open_loop import MANOEUVRES, SPEED, missed, row
 from .real_signals_tables import kept, late, step_by_step
@@ -102,6 +104,75 @@ def test_every_run_with_noise_that_a_mean_is_made_of_has_ten_seeds(name, noisy):
         seeds.setdefault(case.run.name, set()).update(drawn)
     assert sorted(map(len, seeds.values())) == [0] * (len(seeds) - noisy) + [10] * noisy
     assert len(study.short.points) == 3
+
+
+@pytest.fixture(scope="module")
+def page() -> str:
+    return (ROOT / "docs" / "estimators.md").read_text("utf-8")
+
+
+def test_the_page_says_what_the_low_pass_of_the_hand_wheel_is_worth(page):
+    """The run of the closed-loop study with friction known."""
+    known = {"sensor.latency": 0, "inputs.reference.friction": 0.5}
+    scenario = yb.load("real_signals/single_sine").set(known)
+    with_it, without = (
+        100 * run.metric("relative_rms_error(yaw_rate, ideal.yaw_rate_ref)", window=(0.5, 3.5))
+        for run in (scenario.run(), scenario.set({"estimator.inertial_bandwidth": 0}).run())
+    )
+    assert f"is {without:.2f} % instead of [{with_it:.2f} %]" in " ".join(page.split())
+
+
+def test_the_sentences_on_latency_follow_from_the_table_below_them(page):
+    section = page.partition("## Paper A and latency")[2].partition("## ")[0]
+    text = " ".join(section.split())
+    table = {
+        tuple(name.split(", ")): [float(cell.removesuffix(" %")) for cell in cells]
+        for name, *cells in table_in(section)
+        if name
+    }
+    fast = [row for (speed, law), row in table.items() if speed != "15 m/s" and law != "network that learns"]
+    slow = [x for (speed, _), row in table.items() if speed == "15 m/s" for x in row]
+    learning = [table[speed, "network that learns"] for speed in ("25 m/s", "40 m/s")]
+    conventional = table["15 m/s", "conventional fuzzy"][0]
+    (begin, end), (more, most) = zip(*((row[0], row[-1]) for row in learning), strict=True)
+    assert f"the best of these {4 * len(table)} runs has {min(min(row) for row in table.values())} %" in text
+    without, late = (sorted(row[column] for row in fast) for column in (0, -1))
+    assert (
+        f"grows from {without[0]:.0f} to {without[-1]:.0f} % without latency to {late[0] + 0.01:.0f} to "
+        f"{late[-1]:.0f} % at 20 ms; that of the learning network from {begin:.0f} and {end:.0f} % to "
+        f"{more:.0f} and {most:.0f} %"
+    ) in text
+    assert f"conventional fuzzy control without latency has {conventional} %" in text
+    assert f"the error is at least {sorted(slow)[1]:.0f} %" in text
+
+
+def test_the_sentence_on_bounds_has_how_far_they_lie_above_what_is_measured(page):
+    rows = [row for row in table_in(page.partition("## Controllers with estimates")[2]) if row[-1] == "met"]
+    above = []
+    for says, measured, _ in rows:
+        bound = float(
+            re.findall(r"([\d.]+)(?: %| deg| degrees)", says.rpartition(" at most ")[2] or says)[-1]
+        )
+        worst = float(re.findall(r"[\d.]+", measured)[-1])
+        above.append(100 * (bound / worst - 1))
+    assert f"{min(above):.0f} to {max(above):.0f} % above the worst result" in " ".join(page.split())
+
+
+def test_the_figures_of_the_measured_car_are_those_of_its_page(page):
+    cars = (ROOT / "docs" / "measured_cars.md").read_text("utf-8").partition("**Estimators**")[2]
+    rows = {name: cells for name, *cells in table_in(cars)}
+    (observer, second), (kinematic, _), (zero, _) = (
+        next(cells for name, cells in rows.items() if word in name)
+        for word in ("`estimator_observer`", "`estimator_kinematic`", "constant zero")
+    )
+    rms, _, interval = observer.partition(" ")
+    text = " ".join(page.split())
+    assert f"the observer errs by {rms} rms ({interval[1:-1]}, a bootstrap" in text
+    assert f"in the worst second by {second}." in text
+    assert f"A constant zero would err by {zero}," in text
+    assert f"the kinematic estimator, with {kinematic}, nothing" in text
+    share = 1 - float(rms.removesuffix("°")) / float(zero.removesuffix("°"))
+    assert share == pytest.approx(1 / 3, abs=0.05)  # "removes about a third"
 
 
 @pytest.mark.exhaustive
