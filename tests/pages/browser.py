@@ -31,6 +31,18 @@ WAIT = (
 """Script that ends when an expression is true at the drawing of a frame."""
 
 
+HELD = """
+const held = [], append = document.head.append;
+document.head.append = (script) => held.push(script);
+const end = (script) => append.call(document.head, script);
+const fail = (script) => script.dispatchEvent(new Event('error'));
+const frames = () => new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(go)));
+const choose = async (link) => { link.click(); await frames(); return held.at(-1); };
+const until = async (test) => { while (!test()) await frames(); };
+"""
+"""Beginning of a script that lets side files arrive, or fail, in an order of its own."""
+
+
 class Browser:
     """One window. `console` returns what pages have complained of since it was last asked."""
 
@@ -38,14 +50,21 @@ class Browser:
         self.driver = driver
         self.width = DESK
 
-    def open(self, file: Path, *, width: int = DESK, height: int = 900, calm: bool = True) -> None:
+    def open(
+        self, file: Path, fragment: str = "", *, width: int = DESK, height: int = 900, calm: bool = True
+    ) -> None:
         """Open a page in a window of that size; `calm`: the reader has asked for less motion."""
         self.width = width
         metrics = {"width": width, "height": height, "deviceScaleFactor": 2, "mobile": width < 600}
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
         wish = {"name": "prefers-reduced-motion", "value": "reduce" if calm else "no-preference"}
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": [wish]})
-        self.driver.get(file.resolve().as_uri())
+        self.driver.get("about:blank")  # where the fragment alone differs, nothing would be loaded
+        self.driver.get(file.resolve().as_uri() + (fragment and f"#{fragment.removeprefix('#')}"))
+
+    def reload(self) -> None:
+        """Load the page again, and wait until it is loaded: what a script starts may end after it."""
+        self.driver.refresh()
 
     def run(self, script: str, *arguments: Any) -> Any:
         """Return what a script in the page returns."""

@@ -13,7 +13,7 @@ from orchestrator.experiments.ranking import load_ranking
 from orchestrator.pages.ranking_page import result_of_threats
 from tests.orchestrator.test_ranking import SMALL
 
-from .browser import DESK, PHONE, Browser
+from .browser import DESK, HELD, PHONE, Browser
 from .flaws import inaccessible
 from .made_up import unpacked
 from .test_sweep_page import MOST_ELEMENTS
@@ -83,3 +83,65 @@ def test_a_cell_shows_its_worst_run_while_the_matrix_stays_in_sight(chromium: Br
         assert len(chromium.run("return document.querySelector('.chosen .yv').viewer.runs")) == 1
     assert chromium.console() == []
     assert all(one.startswith("file://") for one in chromium.requests())
+
+
+CHOSEN = (
+    "const chosen = document.querySelector('.chosen'), links = [...document.querySelectorAll('td.cell a')];"
+)
+PANELS = "return document.querySelector('.chosen .yv').viewer.state.panels"
+
+
+def test_a_late_error_does_not_replace_what_was_chosen_after_it(chromium: Browser, page):
+    chromium.open(page)
+    chromium.wait_for("document.querySelector('.chosen .yv-ready')")
+    details = chromium.run(
+        HELD + CHOSEN + "const first = await choose(links[1]), second = await choose(links[2]);"
+        "end(second); await until(() => chosen.querySelector('.yv-ready'));"
+        "fail(first); await frames();"
+        "return document.querySelector('.details').textContent"
+    )
+    assert details and "belongs beside this page" not in details
+    assert chromium.run(CHOSEN + "return Boolean(chosen.querySelector('.yv-ready'))")
+    assert chromium.console() == []
+
+
+def test_what_the_viewer_writes_while_the_next_run_is_loaded_is_not_taken_for_the_wish_of_a_link(
+    chromium: Browser, page
+):
+    chromium.open(page)
+    chromium.wait_for("document.querySelector('.chosen .yv-ready')")
+    at_first = chromium.run(PANELS)
+    chromium.run(
+        HELD + CHOSEN + "const {viewer} = chosen.querySelector('.yv');"
+        "const {panels} = viewer.state, wish = JSON.stringify(panels.slice(0, 1));"
+        "location.hash = `${links[1].hash}&&${viewer.key}?panels=${wish}`; await until(() => held.length);"
+        "viewer.state.panels = panels.slice(0, 2); viewer.remember();"
+        "end(held[0]); await until(() => chosen.querySelector('.yv').viewer !== viewer);"
+        "await until(() => chosen.querySelector('.yv-ready'));"
+    )
+    assert chromium.run(PANELS) == at_first[:1]
+
+
+def test_of_two_quick_choices_the_last_is_shown_with_the_panels_of_the_viewer_before(chromium: Browser, page):
+    chromium.open(page)
+    chromium.wait_for("document.querySelector('.chosen .yv-ready')")
+    at_first = chromium.run(PANELS)
+    shown = chromium.run(
+        HELD + CHOSEN + "const {viewer} = chosen.querySelector('.yv');"
+        "viewer.state.panels = viewer.state.panels.slice(0, 1);"
+        "const Plain = Response, unpacking = [];"  # samples of the first choice arrive after the second
+        "window.Response = class {"
+        "  constructor(stream) { this.stream = stream; }"
+        "  arrayBuffer() {"
+        "    return new Promise((go) => unpacking.push(() => go(new Plain(this.stream).arrayBuffer())));"
+        "  }"
+        "};"
+        "const began = () => chosen.querySelector('.yv-started') && !chosen.querySelector('.yv').viewer;"
+        "end(await choose(links[1])); await until(began); const first = chosen.querySelector('.yv');"
+        "end(await choose(links[2])); await until(() => began() && chosen.querySelector('.yv') !== first);"
+        "window.Response = Plain; for (const go of unpacking) go();"
+        "await until(() => chosen.querySelector('.yv-ready'));"
+        "return [chosen.querySelectorAll('.yv').length, Boolean(first.viewer)]"
+    )
+    assert shown == [1, False]
+    assert chromium.run(PANELS) == at_first[:1]

@@ -323,6 +323,23 @@ def test_a_slider_runs_the_car_and_the_link_opens_the_same(server, chromium: Bro
     assert chromium.console() == []
 
 
+def test_samples_that_could_not_be_fetched_are_asked_for_again(server, chromium: Browser):
+    chromium.driver.get(f"{server.address}bench?scenario={SCENARIO}")
+    chromium.wait_for("document.querySelector('form.bench')?.dataset.shown")
+    chromium.run(
+        "const {bench} = document.querySelector('form.bench'); let failed = 0;"
+        "window.plain = fetch;"
+        "window.fetch = (address, ...all) => (address === 'run' || failed++ ? plain(address, ...all)"
+        "  : Promise.resolve(new Response('no room', {status: 503})));"
+        "bench.set('friction', 0.37);"
+    )
+    status = "document.querySelector('form.bench .status').textContent"
+    chromium.wait_for(f"{status} === 'no room'")
+    chromium.run("document.querySelector('form.bench').bench.ask()")
+    chromium.wait_for(f"{status}.startsWith('Run in')")
+    assert chromium.run("return document.querySelectorAll('.yv').length") == 1
+
+
 def test_the_bench_fits_a_phone(server, chromium: Browser):
     chromium.open(Path("/"), width=PHONE)
     chromium.driver.get(f"{server.address}bench?scenario={SCENARIO}")

@@ -13,7 +13,7 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.results.reader import load_results
 
-from .browser import DESK, PHONE, Browser
+from .browser import DESK, HELD, PHONE, Browser
 from .flaws import SCREENS, check_first_screen, inaccessible
 from .made_up import HALF_A_CAR
 
@@ -51,9 +51,7 @@ def sweep(tmp_path_factory, fmus):
 
 
 def opened(chromium: Browser, page: Path, fragment: str = "", **size) -> None:
-    chromium.open(page, **size)
-    if fragment:
-        chromium.run("location.hash = arguments[0]; location.reload()", fragment)
+    chromium.open(page, fragment, **size)
     chromium.wait_for("document.querySelector('.ys-ready')")
 
 
@@ -219,7 +217,7 @@ def test_a_link_shows_the_same_runs_limit_and_brush_again(chromium, sweep):
     ]
     before = chromium.run("return document.querySelector('.ys-charts').innerHTML")
     chromium.run(VIEW + "view.remember()")
-    chromium.run("location.reload()")
+    chromium.reload()
     chromium.wait_for("document.querySelector('.ys-run .yv-ready')")
     assert chromium.run("return document.querySelector('.ys-charts').innerHTML") == before
 
@@ -232,6 +230,19 @@ def test_a_missing_side_file_is_said_on_the_page(chromium, sweep, tmp_path):
     chromium.wait_for("document.querySelector('.ys-remark p')")
     assert "is missing" in chromium.run("return document.querySelector('.ys-remark').textContent")
     chromium.console()  # the browser names the file, too
+
+
+def test_a_late_error_is_not_told_of_a_run_that_is_no_longer_open(chromium, sweep):
+    opened(chromium, sweep.page)
+    remarks = chromium.run(
+        HELD + VIEW + "const rows = view.data.sides.flatMap((kept, k) => (kept ? [k] : []));"
+        "view.state.open = [rows[0]]; view.show(); await frames();"
+        "view.state.open = [rows[1]]; view.show(); await frames();"
+        "end(held[1]); await until(() => document.querySelector('.ys-run .yv-ready'));"
+        "fail(held[0]); await frames();"
+        "return [held.length, document.querySelector('.ys-remark').textContent]"
+    )
+    assert remarks == [2, ""]
 
 
 def test_chosen_runs_as_csv_are_rows_of_the_table(chromium, sweep):

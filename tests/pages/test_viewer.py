@@ -259,10 +259,7 @@ def two(tmp_path_factory) -> Path:
 
 
 def opened(chromium: Browser, file: Path, fragment: str = "", **size) -> None:
-    chromium.open(file, **size)
-    if fragment:
-        chromium.run("location.hash = arguments[0]", fragment)
-        chromium.run("location.reload()")
+    chromium.open(file, fragment, **size)
     chromium.wait_for("document.querySelector('.yv-ready')")
     chromium.wait_for("document.querySelector('.yv').viewer.panels.every((panel) => panel.plot)")
 
@@ -628,7 +625,7 @@ def test_several_viewers_share_a_page(chromium, tmp_path):
     chromium.run(
         f"{viewers}[0].seek(1); {viewers}[1].zoomTo([2, 3]); {viewers}.forEach((one) => one.remember())"
     )
-    chromium.run("location.reload()")
+    chromium.reload()
     chromium.wait_for("document.querySelectorAll('.yv-ready').length === 2")
     assert chromium.run(f"return {viewers}.map((one) => one.state.span)") == [None, [2, 3]]
     assert chromium.run(f"return {viewers}[0].state.time") == 1
@@ -784,3 +781,17 @@ def test_scripts_lose_comments_and_indentation_alone():
     for file in (ROOT / "orchestrator/pages/static").glob("*.js"):
         for line in file.read_text(encoding="utf-8").splitlines():
             assert line.count("`") % 2 == 0  # no text goes over several lines
+
+
+def test_a_viewer_that_was_removed_writes_nothing_into_the_address(chromium: Browser, two):
+    opened(chromium, two)
+    later = chromium.run(
+        "const {viewer} = document.querySelector('.yv');"
+        "viewer.seek(1); viewer.remove();"
+        "let timers = 0; const plain = setTimeout;"
+        "window.setTimeout = (...all) => { timers += 1; return plain(...all); };"
+        "await new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(go)));"
+        "window.setTimeout = plain;"
+        "return timers"
+    )
+    assert later == 0

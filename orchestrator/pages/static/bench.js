@@ -5,9 +5,15 @@
 const STALE = 600; // ms after which a request makes way for a later one, whose run ends its run
 const served = new Map(); // address -> samples
 
+async function samplesAt(address) {
+  const answer = await fetch(address);
+  if (!answer.ok) throw new Error(await answer.text());
+  return new Uint8Array(await answer.arrayBuffer());
+}
+
 bytesOf = ({dataset: {address}}) => {
   if (!served.has(address)) {
-    served.set(address, fetch(address).then((answer) => answer.arrayBuffer()).then((all) => new Uint8Array(all)));
+    served.set(address, samplesAt(address).catch((error) => { served.delete(address); throw error; }));
     if (served.size > 24) served.delete(served.keys().next().value);
   }
   return served.get(address);
@@ -184,12 +190,11 @@ class Bench {
     const root = holder.querySelector('.yv');
     const earlier = place.querySelector('.yv');
     if (earlier) {
-      earlier.viewer.remove();
+      earlier.viewer?.remove();
       place.style.minHeight = `${place.offsetHeight}px`;
     }
     place.replaceChildren(root);
-    await startViewer(root);
-    place.style.minHeight = '';
+    try { await startViewer(root); } finally { place.style.minHeight = ''; }
   }
 }
 

@@ -16,12 +16,14 @@ function startChooser() {
     const turned = shown !== null;
     if (key && key !== shown) {
       shown = key;
+      const picture = readAddress(frameOf(chosen).id); // before the viewer that is still there writes its own
       try {
         const content = await loadSide(root.dataset.folder, key);
         if (shown !== key) return;
         details.innerHTML = content.html;
-        if (content.data) await showSides(chosen, [content], readAddress(frameOf(chosen).id)); else clearViewer(chosen);
+        if (content.data) await showSides(chosen, [content], picture); else clearViewer(chosen);
       } catch (error) {
+        if (shown !== key) return;
         details.textContent = `${error.message}: it belongs beside this page.`;
         clearViewer(chosen);
       }

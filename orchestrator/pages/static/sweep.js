@@ -587,6 +587,7 @@ class Sweep {
       const contents = await Promise.all(kept.map((row) => loadSide(this.data.folder, this.sideKey(row))));
       if (this.state.open === open) await showSides(this.find('run'), contents);
     } catch (error) {
+      if (this.state.open !== open) return;
       remark.append(Object.assign(document.createElement('p'), {textContent: `${error.message}: it belongs beside this page.`}));
     }
   }

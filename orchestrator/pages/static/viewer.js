@@ -317,7 +317,7 @@ class Viewer {
     this.waiting = true;
     requestAnimationFrame(() => {
       this.waiting = false;
-      this.moveCursor();
+      if (!this.removal.signal.aborted) this.moveCursor();
     });
   }
 
@@ -571,8 +571,10 @@ async function startViewer(root) {
   return fillViewer(root, data, [...root.querySelectorAll('script[type="text/plain"]')].map((block) => bytesOf(block)));
 }
 
+// Return the viewer; null if another has taken its place before the runs were there.
 async function fillViewer(root, data, blocks) {
   const bytes = await Promise.all(blocks);
+  if (!root.isConnected) return null;
   root.viewer = new Viewer(root, data, data.runs.map((run, k) => new Run(run, bytes[k], k)));
   return root.viewer;
 }

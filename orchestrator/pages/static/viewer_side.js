@@ -57,17 +57,18 @@ function clearViewer(holder) {
 function frameOf(holder) { return holder.querySelector('template').content.firstElementChild; }
 
 // Show the runs of side files in the viewer that a template holds, in place of the one before, whose panels stay
-// unless the address asks for a picture (`asked`).
+// unless the address asks for a picture (`asked`). Return the viewer; null if another choice came before it was made.
 async function showSides(holder, contents, asked = null) {
-  const state = asked ? null : holder.querySelector('.yv')?.viewer?.state;
+  const before = holder.querySelector('.yv');
+  const state = asked ? null : before?.viewer?.state ?? before?.inherited;
   clearViewer(holder);
-  const root = frameOf(holder).cloneNode(true);
+  const root = Object.assign(frameOf(holder).cloneNode(true), {inherited: state});
   if (asked) writeAddress(root.id, asked);
   holder.append(root);
   root.classList.add('yv-started');
   const data = together(contents.map((one) => one.data));
   const viewer = await fillViewer(root, {...data, file: root.id, alone: false}, contents.flatMap((one) => one.blocks.map(inflate)));
-  if (state) {
+  if (viewer && state) {
     const {panels, span, x, difference, tolerance} = state;
     Object.assign(viewer.state, {panels: panels.filter((one) => viewer.known(one)), span, tolerance, difference: difference && data.runs.length > 1});
     if (viewer.axes().includes(x)) viewer.state.x = x;
