@@ -285,6 +285,7 @@ def test_stale_results_are_shown_as_such_where_nothing_may_run(report, half):
     assert report("--no-run")[0] == 0
     tree = html.fromstring(unpacked(Path("results/half/study/report.html")))
     assert golden_in(texts(tree, ".verdict.bad"))
+    assert "✗ out of date 2 of 2 runs" in texts(tree, "summary")
     assert golden_in(tree.text_content())
 
 
