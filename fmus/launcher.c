@@ -246,17 +246,25 @@ static bool load(char *problem, size_t size)
 
 /* ---- resources ---- */
 
-/* True if `folder` holds what PythonFMU's library is going to read without looking. */
-static bool is_complete(const char *folder)
+/* Read the first line of a file of `folder`; false if there is none. */
+static bool read_line(const char *folder, const char *name, char *line, int size)
 {
-    char file[PATH_MAX], module[256] = "";
-    int length = snprintf(file, sizeof file, "%s/slavemodule.txt", folder);
+    char file[PATH_MAX];
+    int length = snprintf(file, sizeof file, "%s/%s", folder, name);
     FILE *text = length < (int)sizeof file ? fopen(file, "r") : NULL;
     if (text == NULL) {
         return false;
     }
-    bool named = fgets(module, sizeof module, text) != NULL;
+    bool read = fgets(line, size, text) != NULL;
     fclose(text);
+    return read;
+}
+
+/* True if `folder` holds what PythonFMU's library is going to read without looking. */
+static bool is_complete(const char *folder)
+{
+    char module[256] = "";
+    bool named = read_line(folder, "slavemodule.txt", module, sizeof module);
     module[strcspn(module, "\r\n")] = '\0';
     return named && exists("%s/%s.py", folder, module);
 }
@@ -264,15 +272,8 @@ static bool is_complete(const char *folder)
 /* True if `guid` is the one that was packed with the resources. */
 static bool is_guid_of(const char *folder, const char *guid)
 {
-    char file[PATH_MAX], packed[64] = "";
-    int length = snprintf(file, sizeof file, "%s/guid.txt", folder);
-    FILE *text = length < (int)sizeof file ? fopen(file, "r") : NULL;
-    if (text == NULL) {
-        return false;
-    }
-    bool read = fgets(packed, sizeof packed, text) != NULL;
-    fclose(text);
-    return read && strcmp(packed, guid) == 0;
+    char packed[64] = "";
+    return read_line(folder, "guid.txt", packed, sizeof packed) && strcmp(packed, guid) == 0;
 }
 
 /* Return the resource folder as PythonFMU's library must be told it; NULL with a sentence in `problem`. */

@@ -43,7 +43,7 @@ from ..results.reader import Results
 from ..safe_files import reads
 from ..scenario import find_and_load, yaml_lines
 from ..scenario.quantities import convert
-from ..scenario.schema_validation import StrictModel, validate
+from ..scenario.schema_validation import StrictModel, validated
 from ..scenario.yaml_lines import Document
 from .trace import Trace, trace_of
 
@@ -133,14 +133,11 @@ def load_bands(name: str | Path) -> Bands:
     """
     path = find_and_load.find(name, "a file of bands")
     document = yaml_lines.read(path, what="file of bands")
-    spec = validate(BandsSpec, document)
-    if spec is None or document.errors:
-        raise ScenarioError(document.sorted_errors())
+    spec = validated(BandsSpec, document)
     tolerances = {name: _tolerance(document, name, tolerance) for name, tolerance in spec.bands.items()}
     if spec.over not in tolerances:
         document.report(("over",), f"{spec.over} has no tolerance; add it to 'bands'", "key-missing")
-    if document.errors:
-        raise ScenarioError(document.sorted_errors())
+    document.raise_errors()
     return Bands(spec.title, spec.source, spec.over, tolerances)
 
 

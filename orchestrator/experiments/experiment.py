@@ -21,7 +21,7 @@ from ..metrics.expressions import TimeWindow
 from ..plan import Override, OverrideOrigin
 from ..safe_files import reads
 from ..scenario import find_and_load, overrides, yaml_lines
-from ..scenario.schema_validation import validate
+from ..scenario.schema_validation import validated
 from ..scenario.yaml_lines import Document, KeyPath
 from ..signal_names import Target
 from .axes_and_sampling import DesignAxisSpec, DesignPoint, changes_at, changes_of_file, points
@@ -386,9 +386,7 @@ def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> Lo
     path = Path(path)
     document = yaml_lines.read(path, what="experiment file")
     overrides.apply_to_all_runs(document, changes)
-    spec = validate(ExperimentSpec, document)
-    if spec is None or document.errors:
-        raise ScenarioError(document.sorted_errors())
+    spec = validated(ExperimentSpec, document)
     spec = expanded(spec, document)
     runs = {"": NamedRun("", "", "", path.parent / spec.scenario, ())} if spec.scenario else {}
     for i, entry in enumerate(spec.runs):
@@ -397,7 +395,7 @@ def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> Lo
                 document.report(
                     ("runs",), f"more than {MOST} runs; at most {MOST} are allowed", "experiment-too-large"
                 )
-                raise ScenarioError(document.sorted_errors())
+                document.raise_errors()
             if run.name in runs:
                 document.report(("runs", i, "name"), f"there is already a run {run.name!r}", "name-duplicate")
             runs[run.name] = run
@@ -408,7 +406,6 @@ def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> Lo
     if not document.errors:
         check_axes(spec, document)
         check_names(experiment, document)
-    if document.errors:
-        raise ScenarioError(document.sorted_errors())
+    document.raise_errors()
     _ = experiment.recordings  # a mistake in a measurement file is told before the runs are made
     return experiment

@@ -48,7 +48,7 @@ from ..safe_files import reads
 from ..scenario import yaml_lines
 from ..scenario.quantities import convert, gain_and_offset, measure_of
 from ..scenario.schema import Scalar, SeriesSpec
-from ..scenario.schema_validation import Instant, StrictModel, Time, validate
+from ..scenario.schema_validation import Instant, StrictModel, Time, validated
 from ..scenario.yaml_lines import Document
 from ..signal_names import INPUTS, SignalName, Target, match
 from ..workers import Pool
@@ -144,9 +144,7 @@ def load_fit(path: Path | str) -> LoadedFit:
     """
     path = Path(path)
     document = yaml_lines.read(path, what="fit file")
-    spec = validate(FitSpec, document)
-    if spec is None or document.errors:
-        raise ScenarioError(document.sorted_errors())
+    spec = validated(FitSpec, document)
     file = path.parent / spec.measured
     filtered = load_measurement(file)
     raw = load_measurement(file, filtered=False) if filtered.filter else filtered
@@ -168,8 +166,7 @@ def load_fit(path: Path | str) -> LoadedFit:
         for name in ("training", "held_out"):
             parts[name] = list(_windows(document, name, getattr(spec, name), filtered, raw, errors))
     _refuse_overlaps(document, spec)
-    if document.errors:
-        raise ScenarioError(document.sorted_errors())
+    document.raise_errors()
     return LoadedFit(path, spec, filtered, errors, parts["training"], parts["held_out"])
 
 

@@ -405,8 +405,7 @@ def free_parameters(fit: LoadedFit, model: ScenarioModel) -> list[Parameter]:
             free.append(_parameter(name, spec, fit, model, followed))
         except ValueError as error:  # noqa: PERF203 - all are reported
             document.report(("free", name), str(error), code_of(error))
-    if document.errors:
-        raise ScenarioError(document.sorted_errors())
+    document.raise_errors()
     return free
 
 

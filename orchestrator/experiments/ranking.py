@@ -45,7 +45,7 @@ from ..plan import Override, Plan
 from ..safe_files import reads
 from ..scenario import overrides, yaml_lines
 from ..scenario.schema import Scalar
-from ..scenario.schema_validation import StrictModel, Time, validate
+from ..scenario.schema_validation import StrictModel, Time, validated
 from ..signal_names import Target
 from .axes_and_sampling import (
     DesignAxisSpec,
@@ -263,22 +263,16 @@ def load_ranking(
         ScenarioError: the file is invalid; lists all errors.
     """
     path = Path(path)
-    document = yaml_lines.read(path, what="ranking file")
-    spec = validate(RankingSpec, document)
-    if spec is None or document.errors:
-        raise ScenarioError(document.sorted_errors())
+    spec = validated(RankingSpec, yaml_lines.read(path, what="ranking file"))
     entries = {name: (entry, path.parent) for name, entry in spec.entries.items()}
     edited: list[str] = []
     for name in spec.more_entries:
         file = path.parent / name
-        listed = yaml_lines.read(file, what="file of entries")
-        validated = validate(EntriesSpec, listed)
-        if validated is None or listed.errors:
-            raise ScenarioError(listed.sorted_errors())
-        if words := validated.edited:
+        listed = validated(EntriesSpec, yaml_lines.read(file, what="file of entries"))
+        if words := listed.edited:
             edited.append(f"{file}: {words}")
             warn_of_record(edited[-1])
-        for key, entry in validated.entries.items():
+        for key, entry in listed.entries.items():
             if key in entries:
                 raise ScenarioError(
                     f"{file}: entries.{key}: there is already an entry {key!r}", code="name-duplicate"

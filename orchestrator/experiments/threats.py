@@ -46,7 +46,7 @@ from ..plan import Override
 from ..safe_files import reads
 from ..scenario import yaml_lines
 from ..scenario.schema import Scalar
-from ..scenario.schema_validation import StrictModel, validate
+from ..scenario.schema_validation import StrictModel, validated
 from ..signal_names import Target
 from .axes_and_sampling import OverrideSpec, TargetText
 from .ranking import EntriesSpec, EntrySpec, LoadedRanking, load_ranking
@@ -293,10 +293,7 @@ def load_threats(
         ScenarioError: a file is invalid; lists all errors.
     """
     path = Path(path)
-    document = yaml_lines.read(path, what="threat file")
-    spec = validate(ThreatsSpec, document)
-    if spec is None or document.errors:
-        raise ScenarioError(document.sorted_errors())
+    spec = validated(ThreatsSpec, yaml_lines.read(path, what="threat file"))
     if quick:
         spec = spec.model_copy(update={"settings": dict([*spec.settings.items()][:1])})
     ranking = load_ranking(path.parent / spec.ranking, more=more)
@@ -316,11 +313,8 @@ def load_threats(
     for seed, file in {
         seed: file for setting in spec.settings.values() for seed, file in setting.seeds.items()
     }.items():
-        listed = yaml_lines.read(path.parent / file, what="file of entries")
-        entries = validate(EntriesSpec, listed)
-        if entries is None or listed.errors:
-            raise ScenarioError(listed.sorted_errors())
-        for name, entry in entries.entries.items():
+        listed = validated(EntriesSpec, yaml_lines.read(path.parent / file, what="file of entries"))
+        for name, entry in listed.entries.items():
             own = f"{name}_seed_{seed}"
             seeds[own] = name, seed
             title = f"{entry.title}, seed {seed}"

@@ -264,8 +264,7 @@ def load_measurement(path: Path | str, *, filtered: bool = True) -> Measurement:
         raise ScenarioError(document.sorted_errors())
     reader = _Reader(document, spec)
     segments = [segment for number in range(len(spec.files)) for segment in reader.segments_of(number)]
-    if document.errors:
-        raise ScenarioError(document.sorted_errors())
+    document.raise_errors()
     if filtered and reader.filter:
         low = reader.filter
         segments = [segment.filtered(low) for segment in segments]

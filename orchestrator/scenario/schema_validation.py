@@ -121,6 +121,18 @@ def validate(model: type[Model], document: Document) -> Model | None:
     return content
 
 
+def validated(model: type[Model], document: Document) -> Model:
+    """Return the validated content.
+
+    Raises:
+        ScenarioError: it is invalid, or the document has other errors; lists all.
+    """
+    content = validate(model, document)
+    document.raise_errors()
+    assert content is not None, "without content there is an error"
+    return content
+
+
 def _another_kind(model: type[BaseModel], data: Any) -> str | None:
     """Return a message if a file is obviously of another kind than expected, else None."""
     own = [key for key in KINDS if key in model.model_fields]

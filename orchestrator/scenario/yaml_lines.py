@@ -133,6 +133,11 @@ class Document:
         """Return all errors, first those of overrides, then those of the file in the order of lines."""
         return sorted(self.errors, key=lambda error: error.location.line or 0)
 
+    def raise_errors(self) -> None:
+        """Raise all errors, if there are any, as one ScenarioError."""
+        if self.errors:
+            raise ScenarioError(self.sorted_errors())
+
 
 def dotted(key: KeyPath) -> str:
     """Return 'connections[3].from' for ('connections', 3, 'from')."""
