@@ -22,7 +22,7 @@ FLAGS = (
     "--hide-scrollbars",
 )
 PHONE, DESK = 400, 1400
-SECONDS = 20
+SECONDS = 120
 """Longest wait for a page. Chosen: far more than any page takes, also on a busy computer."""
 WAIT = (
     "const done = arguments[arguments.length - 1];"
@@ -48,6 +48,7 @@ class Browser:
 
     def __init__(self, driver: Any) -> None:
         self.driver = driver
+        self.driver.set_script_timeout(SECONDS)
         self.width = DESK
 
     def open(
@@ -72,7 +73,6 @@ class Browser:
 
     def wait_for(self, condition: str) -> None:
         """Wait until an expression is true at the drawing of a frame."""
-        self.driver.set_script_timeout(SECONDS)
         self.driver.execute_async_script(WAIT.replace("{}", condition))
 
     def press(self, *keys: str) -> None:

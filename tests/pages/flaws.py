@@ -107,7 +107,6 @@ def inaccessible(chromium: Browser) -> list[str]:
         calm = {"name": "prefers-reduced-motion", "value": "reduce"}
         chromium.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": [wish, calm]})
         chromium.run(_axe())
-        chromium.driver.set_script_timeout(60)
         found += [f"{scheme}: {said}" for said in chromium.driver.execute_async_script(AXE)]
     chromium.run("scrollTo({top: 0, behavior: 'instant'})")  # axe-core scrolls to what it looks at
     return found
@@ -128,7 +127,6 @@ def flaws(chromium: Browser) -> list[str]:
         found.append(f"wider than the window by {wide} px")
     for what, script in (("cut", CUT), ("overlap", OVERLAPPING), ("drawing", TEXTS_ON_EACH_OTHER)):
         found += [f"{what}: {said}" for said in chromium.run(script)]
-    chromium.driver.set_script_timeout(60)
     return found + chromium.driver.execute_async_script(EMPTY)
 
 

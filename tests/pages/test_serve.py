@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -259,11 +260,11 @@ def test_a_later_run_takes_the_place_of_one_that_is_not_done():
 
     thread = threading.Thread(target=first)
     thread.start()
-    while "p" not in bench._latest:
-        pass
+    while "p" not in bench._latest and thread.is_alive():
+        time.sleep(0.01)
     bench._latest["p"] = StopFlag()
     bench._turn.release()
-    thread.join(30)
+    thread.join()
     bench.close()
     assert caught == ["run-superseded"]
 
@@ -281,10 +282,10 @@ def test_a_running_run_makes_way():
 
     thread = threading.Thread(target=first)
     thread.start()
-    while not bench._latest:
-        pass
+    while not bench._latest and thread.is_alive():
+        time.sleep(0.01)
     key, _ = bench.run(Wanted("p", "", SCENARIO, (BRIEF,)))
-    thread.join(30)
+    thread.join()
     bench.close()
     assert caught == ["run-superseded"] and bench.block(key)
 
