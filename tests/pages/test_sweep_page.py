@@ -154,6 +154,26 @@ def test_a_moved_limit_and_a_brush_choose_the_runs_that_the_table_says(chromium,
     assert chromium.run(VIEW + "return view.visible.length") == 40
 
 
+def test_the_keys_go_from_line_to_line_of_the_chosen_runs_and_open_one(chromium, sweep):
+    opened(chromium, sweep.page)
+    rates = [float(row["rate [rad/s]"]) for row in sweep.rows]
+    axis = chromium.driver.find_element("css selector", ".ys-axis[data-dim='metric rate']")
+    chromium.run("arguments[0].focus()", axis)
+    chromium.press("\ue014")  # right: the lowest
+    assert rates[chromium.run(VIEW + "return view.row")] == min(rates)
+    seen = []
+    for _ in range(3):
+        chromium.press("\ue014")
+        seen.append(rates[chromium.run(VIEW + "return view.row")])
+    assert seen == sorted(rates)[1:4]
+    chromium.press("\ue012")  # left
+    row = chromium.run(VIEW + "return view.row")
+    assert rates[row] == seen[1]
+    assert f"Run {row + 1}," in chromium.run("return document.querySelector('.ys-told').textContent")
+    chromium.press("\ue007")  # Enter
+    assert chromium.run(VIEW + "return view.state.open.at(-1)") == row
+
+
 def test_a_click_on_a_cell_opens_its_run_with_the_recorded_samples(chromium, sweep):
     opened(chromium, sweep.page)
     kept = chromium.run(VIEW + "return view.rows.filter((row) => view.data.sides[row])")

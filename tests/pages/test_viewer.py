@@ -392,6 +392,34 @@ def test_the_keyboard_steps_zooms_compares_and_plays(chromium, two):
     assert chromium.run(state)[1] is False
 
 
+def test_a_zoomed_span_follows_the_cursor_that_leaves_it(chromium, two):
+    from selenium.webdriver.common.keys import Keys
+
+    opened(chromium, two)
+    chromium.run(VIEWER + "viewer.seek(2); viewer.zoomTo([1, 3])")
+    span = VIEWER + "return [viewer.state.time, ...viewer.span()]"
+    chromium.press(Keys.ARROW_RIGHT)
+    assert chromium.run(span) == [pytest.approx(2.01), 1, 3]
+    chromium.run(VIEWER + "viewer.seek(3)")
+    chromium.press(Keys.ARROW_RIGHT)
+    time, begin, end = chromium.run(span)
+    assert (time, end - begin) == (pytest.approx(3.01), pytest.approx(2))
+    assert begin < time < end
+    chromium.press(Keys.END)
+    assert chromium.run(span) == [8, 6, 8]
+    chromium.press(Keys.HOME)
+    assert chromium.run(span) == [0, 0, 2]
+
+
+def test_the_address_keeps_how_near_the_road_is(chromium, two):
+    opened(chromium, two)
+    chromium.run("document.querySelector('.yv-nearer').click()")
+    address, near = chromium.run(VIEWER + "return [location.hash, viewer.road.view.zoom]")
+    assert near == pytest.approx(1.25)
+    opened(chromium, two, address)
+    assert chromium.run(VIEWER + "return viewer.road.view.zoom") == near
+
+
 def test_dragging_one_panel_zooms_all(chromium, two):
     opened(chromium, two)
     chromium.run(

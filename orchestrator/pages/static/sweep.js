@@ -535,8 +535,11 @@ class Sweep {
   pressedAxis(event) {
     const dim = this.dim(event.target.dataset.dim);
     if (!dim) return;
-    const way = {ArrowUp: 1, ArrowRight: 1, ArrowDown: -1, ArrowLeft: -1}[event.key];
-    if (event.key === 'Delete' || event.key === 'Escape' || event.key === 'Backspace') this.setBrush(dim, null);
+    const way = {ArrowUp: 1, ArrowDown: -1}[event.key];
+    const along = {ArrowRight: 1, ArrowLeft: -1}[event.key];
+    if (event.key === 'Enter') this.open(this.row, event.shiftKey);
+    else if (along) this.next(dim, along);
+    else if (event.key === 'Delete' || event.key === 'Escape' || event.key === 'Backspace') this.setBrush(dim, null);
     else if (!way) return;
     else {
       const ends = [...(this.state.brush[dim.id] || dim.range)];
@@ -547,6 +550,14 @@ class Sweep {
       if (ends[0] <= ends[1]) this.setBrush(dim, ends);
     }
     event.preventDefault();
+  }
+
+  // Point at the line above (1) or below (-1) on an axis; lost runs lie below all others.
+  next(dim, way) {
+    const height = (row) => dim.at(row) ?? -Infinity;
+    const order = [...this.visible].sort((a, b) => height(a) - height(b) || a - b);
+    const at = order.indexOf(this.row);
+    this.point(order[at < 0 ? (way > 0 ? 0 : order.length - 1) : Math.min(Math.max(at + way, 0), order.length - 1)]);
   }
 
   csv() {

@@ -131,7 +131,7 @@ class Viewer {
   initial() {
     return {
       view: 0, ...this.viewed(0), span: null, time: this.data.still,
-      difference: false, tolerance: 0, camera: 'cars', offsets: {},
+      difference: false, tolerance: 0, camera: 'cars', near: 1, offsets: {},
     };
   }
 
@@ -170,6 +170,7 @@ class Viewer {
       span: (v) => v === null || (Array.isArray(v) && v.length === 2 && v.every(Number.isFinite) && v[0] < v[1]),
       time: Number.isFinite, difference: (v) => typeof v === 'boolean', tolerance: (v) => Number.isFinite(v) && v >= 0,
       x: (v) => this.axes().includes(v), camera: (v) => v === 'cars' || v === 'whole' || isRun(v),
+      near: (v) => v >= ZOOM[0] && v <= ZOOM[1],
       offsets: (v) => v && typeof v === 'object' && !Array.isArray(v) && Object.values(v).every(Number.isFinite),
     };
     for (const [name, text] of own) {
@@ -313,12 +314,23 @@ class Viewer {
     if (!hovering && this.road) this.road.pause();
     const [start, end] = this.ends();
     this.state.time = Math.min(Math.max(time, start), end);
+    if (!hovering) this.follow();
     if (this.waiting) return;
     this.waiting = true;
     requestAnimationFrame(() => {
       this.waiting = false;
       if (!this.removal.signal.aborted) this.moveCursor();
     });
+  }
+
+  // Move a zoomed span along with a cursor that leaves it.
+  follow() {
+    const {span, time, x} = this.state;
+    if (!span || x !== 'time' || (time >= span[0] && time <= span[1])) return;
+    const [low, high] = this.whole();
+    const wide = span[1] - span[0];
+    const from = Math.min(Math.max(time - wide / 2, low), high - wide);
+    this.zoomTo([from, from + wide]);
   }
 
   moveCursor() {

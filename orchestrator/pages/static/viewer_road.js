@@ -102,7 +102,7 @@ function forceScale(runs) {
 
 class Road {
   constructor(viewer) {
-    Object.assign(this, {viewer, playing: false, rate: 1, view: {camera: 'cars', zoom: 1}});
+    Object.assign(this, {viewer, playing: false, rate: 1, view: {camera: 'cars'}});
     const find = viewer.find;
     Object.assign(this, {scene: find('scene'), button: find('play'), closeUps: find('closeups'), camera: find('camera')});
     this.cars = viewer.runs.filter((run) => run.road && run.road.x);
@@ -122,7 +122,7 @@ class Road {
     this.camera.addEventListener('change', (event) => {
       const chosen = event.target.value;
       viewer.state.camera = /^\d+$/.test(chosen) ? Number(chosen) : chosen;
-      this.view.zoom = 1;
+      viewer.state.near = 1;
       this.draw();
       viewer.remember();
     });
@@ -131,8 +131,10 @@ class Road {
   }
 
   zoom(factor) {
-    this.view.zoom = Math.min(Math.max(this.view.zoom * factor, ZOOM[0]), ZOOM[1]);
+    const {state} = this.viewer;
+    state.near = Math.min(Math.max(state.near * factor, ZOOM[0]), ZOOM[1]);
     this.draw();
+    this.viewer.remember();
   }
 
   // One close-up per shown run, and the cameras to choose from.
@@ -171,6 +173,7 @@ class Road {
     const chosen = this.camera.value;
     const index = this.shown.findIndex((run) => String(run.number) === chosen);
     this.view.camera = index >= 0 ? index : (chosen === 'whole' ? 'whole' : 'cars');
+    this.view.zoom = viewer.state.near;
     this.states = states;
     if (!this.shown.length) { surface(this.scene, density); return; }
     drawScene(this.scene, density, this.shown, states, this.view, this.scale);
@@ -194,6 +197,7 @@ class Road {
       viewer.state.time = Math.min(viewer.state.time + (before === null ? 0 : ((now - before) / 1000) * this.rate), end);
       before = now;
       if (viewer.state.time >= end) this.pause();
+      viewer.follow();
       viewer.moveCursor();
       if (this.playing) requestAnimationFrame(next);
     };
