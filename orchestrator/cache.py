@@ -22,6 +22,7 @@ import hashlib
 import json
 import os
 import re
+import shutil
 import tempfile
 import time
 import warnings
@@ -36,7 +37,7 @@ from .safe_files import fcntl, open_regular, write_whole
 
 _PLAIN_PATH = re.compile(r"[A-Za-z0-9_.~/\\: -]+")
 KEEP_DAYS = 60
-"""Files that have not been written for this many days are deleted when another one is stored."""
+"""Files that have not been written for this many days are deleted when a process first stores another one."""
 _DIGITS = 32
 """Length of the hash at the beginning of a cached file."""
 
@@ -181,12 +182,34 @@ def keep(store: str, key: str, content: bytes) -> None:
                 write_whole(file, _hash(content) + content)
             except OSError:
                 continue
-            oldest = time.time() - KEEP_DAYS * 86400.0
-            for other in file.parent.iterdir():
-                with contextlib.suppress(OSError):
-                    if other.stat().st_mtime < oldest:
-                        other.unlink()
+            delete_unused(file.parent)
             return
+
+
+@cache
+def delete_unused(folder: Path, names: str = ".*") -> None:
+    """Delete the entries of a cache folder that have not been written for `KEEP_DAYS`.
+
+    Once in each process: a folder may have ten thousand entries.
+
+    Args:
+        folder: to look into.
+        names: regular expression of the names of entries; others are not ours.
+    """
+    oldest = time.time() - KEEP_DAYS * 86400.0
+    with contextlib.suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            with contextlib.suppress(OSError):
+                if re.fullmatch(names, entry.name) and entry.stat().st_mtime < oldest:
+                    remove(Path(entry.path))
+
+
+def remove(path: Path) -> None:
+    """Delete an entry, even while it is in use."""
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def content_of(file: Path) -> bytes | None:

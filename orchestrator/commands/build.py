@@ -110,8 +110,8 @@ def cache(action: CacheAction = "show") -> None:
     written. Deleted entries are made again when needed.
     Nothing is deleted while another command uses the cache.
     """
-    from ..cache import alone_in, cache_folders
-    from ..fmu.archive import kept_in, remove
+    from ..cache import alone_in, cache_folders, remove
+    from ..fmu.archive import kept_in
 
     damaged, in_use = 0, False
     for folder in cache_folders():

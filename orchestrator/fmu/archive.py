@@ -22,7 +22,6 @@ import re
 import shutil
 import struct
 import tempfile
-import time
 import zipfile
 import zlib
 from collections.abc import Callable, Iterable
@@ -31,7 +30,7 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from ..cache import KEEP_DAYS, cache_folders, content_of, hold
+from ..cache import cache_folders, content_of, delete_unused, hold
 from ..errors import ModelDescriptionError
 from ..messages import closest, listed
 from ..plan import Fmu
@@ -219,7 +218,7 @@ def _make_entry(files: dict[str, bytes], fmu: Fmu, entry: Path) -> None:
                 _repair(entry, scratch, files)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
-    _prune(entry.parent)
+    delete_unused(entry.parent, r"\.unpacking-.*|[0-9a-f]{32}-\d+")
 
 
 def _repair(entry: Path, scratch: Path, files: Iterable[str]) -> None:
@@ -232,18 +231,6 @@ def _repair(entry: Path, scratch: Path, files: Iterable[str]) -> None:
         os.replace(scratch / name, target)
     for compiled in entry.rglob("__pycache__"):  # perhaps compiled from the damaged module
         shutil.rmtree(compiled, ignore_errors=True)
-
-
-def _prune(folder: Path) -> None:
-    """Delete entries and scratch folders not used for `KEEP_DAYS`."""
-    oldest = time.time() - KEEP_DAYS * 86400.0
-    for entry in folder.iterdir():
-        ours = entry.name.startswith(".unpacking-") or re.fullmatch(r"[0-9a-f]{32}-\d+", entry.name)
-        try:
-            if ours and entry.stat().st_mtime < oldest:
-                shutil.rmtree(entry, ignore_errors=True)
-        except OSError:
-            continue
 
 
 @dataclass(frozen=True)
@@ -292,11 +279,3 @@ def _zip_is_whole(file: Path) -> bool:
     with contextlib.suppress(zipfile.BadZipFile, OSError), zipfile.ZipFile(file) as archive:
         return archive.testzip() is None
     return False
-
-
-def remove(path: Path) -> None:
-    """Delete an entry, even while it is in use."""
-    if path.is_dir():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        path.unlink(missing_ok=True)

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from orchestrator import safe_files
-from orchestrator.cache import KEEP_DAYS, cache_folder
+from orchestrator.cache import KEEP_DAYS, cache_folder, delete_unused
 from orchestrator.errors import ModelDescriptionError
 from orchestrator.fmu import archive as fmu_archive
 from orchestrator.fmu.archive import open_fmu
@@ -152,6 +152,7 @@ def test_entries_unused_for_long_are_deleted(fmu: Path, cache: Path, tmp_path: P
     long_ago = time.time() - (KEEP_DAYS + 1) * 86400.0
     for folder in (old, left_over, foreign):
         os.utime(folder, (long_ago, long_ago))
+    delete_unused.cache_clear()  # as in another process
     new = open_fmu(make_fmu(tmp_path / "b.fmu")).directory.parent
     assert sorted(cache.iterdir()) == sorted([new, foreign])
 
