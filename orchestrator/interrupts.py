@@ -36,11 +36,11 @@ class StopFlag:
         self.flag.value, self.number = 1, number
         _requested_at = _requested_at or time.monotonic()
 
-    def interrupted(self, how: str, *, unit: str | None = None, time: float | None = None) -> Interrupted:
+    def interrupted(self, how: str, *, instance: str | None = None, time: float | None = None) -> Interrupted:
         """Return the exception to raise; `how` continues the message "the run was interrupted"."""
         space = "" if how.startswith(":") else " "
         problem = f"the run was interrupted{space}{how}"
-        return Interrupted(problem, instance=unit, time=time, number=self.number)
+        return Interrupted(problem, instance=instance, time=time, number=self.number)
 
 
 def stop_requested_at() -> float | None:

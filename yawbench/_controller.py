@@ -94,7 +94,7 @@ class PythonComponent:
 
     Args:
         program: a function, an object with `output`, or a component class.
-        unit: the instance whose FMU it replaces, for messages.
+        instance: the instance whose FMU it replaces, for messages.
         role: of that instance (controller, driver, ...); it determines the outputs of a function.
         label: what it is known by in place of its name, to tell objects of a class apart.
 
@@ -106,23 +106,25 @@ class PythonComponent:
         ScenarioError: the program is none of these, or its declarations are invalid.
     """
 
-    def __init__(self, program: object, *, unit: str, role: str, label: str = "") -> None:
+    def __init__(self, program: object, *, instance: str, role: str, label: str = "") -> None:
         self.program = program
         try:
             self.component, self._translated = _component(program, role)
             self.step_size = _step_size(program)
-            self._xml = _described(self._made(unit).to_xml())
+            self._xml = _described(self._made(instance).to_xml())
             self.parameters = _parameters.brought_along(program, self.component)
         except ScenarioError as error:
-            raise ScenarioError(f"{unit}: {error}", code="controller-invalid") from None
+            raise ScenarioError(f"{instance}: {error}", code="controller-invalid") from None
         except (TypeError, ValueError) as error:
-            raise ScenarioError(f"{unit}: {_name(program)}: {error}", code="controller-invalid") from error
+            raise ScenarioError(
+                f"{instance}: {_name(program)}: {error}", code="controller-invalid"
+            ) from error
         except Exception as error:  # the user's code may raise anything while its declarations are read
             raise ScenarioError(
-                f"{unit}: {_name(program)}: {arguments.error_text(error)}", code="controller-invalid"
+                f"{instance}: {_name(program)}: {arguments.error_text(error)}", code="controller-invalid"
             ) from error
         name = self.component.fmu_name
-        self.path = HOME / unit / f"{quote(label, safe=' ') or name}.fmu"
+        self.path = HOME / instance / f"{quote(label, safe=' ') or name}.fmu"
         digest = hashlib.sha256(self._xml + _parameters.text_of(program)).hexdigest()
         files = {"modelDescription.xml": self._xml}
         described = describe(files, zipped(files), self.path)
@@ -132,19 +134,19 @@ class PythonComponent:
         """Return its FMU in its present state, with a native library or with the reason why it has none."""
         return in_native_code(self.program, self.component, self._translated, self.fmu, self._xml)
 
-    def open(self, unit: Instance, log: Log) -> PythonInstance:
+    def open(self, instance: Instance, log: Log) -> PythonInstance:
         """Return an instance of the component for a run, in Python."""
-        return PythonInstance(unit, self._made(unit.name), log)
+        return PythonInstance(instance, self._made(instance.name), log)
 
-    def _made(self, unit: str) -> Component:
-        return self.component(instance_name=unit, resources="")
+    def _made(self, instance: str) -> Component:
+        return self.component(instance_name=instance, resources="")
 
 
 class PythonInstance:
     """A running Python component, with the interface of `orchestrator.master.instance.FmuInstance`."""
 
-    def __init__(self, unit: Instance, component: Component, log: Log) -> None:
-        self.name = unit.name
+    def __init__(self, instance: Instance, component: Component, log: Log) -> None:
+        self.name = instance.name
         self.component = component
         self._log = log
 

@@ -82,7 +82,7 @@ def export_fmu(controller: ControllerLike, file: str | Path, *, role: str = "con
 
 def _write(controller: Any, path: Path, role: str, folder: str) -> None:
     """Write the FMU of a program."""
-    program = PythonComponent(controller, unit=role, role=role)
+    program = PythonComponent(controller, instance=role, role=role)
     try:
         recipe = _recipe(controller, program, path.stem, folder)
         files, modules = recipe.make()
@@ -309,10 +309,10 @@ def _difference(known: PythonComponent, texts: dict[str, str], module: Parts) ->
         for setting, kind, refs, values, steps in _settings(variables):
             answers = []
             for component in (type("Known", (known.component,), {}), made):
-                unit = Twin(component, Path(stage.folder))
+                twin = Twin(component, Path(stage.folder))
                 if refs:
-                    unit.set(kind, refs, values)
-                answers.append(list(_outputs(unit, inputs, outputs, rows[:steps])))
+                    twin.set(kind, refs, values)
+                answers.append(list(_outputs(twin, inputs, outputs, rows[:steps])))
             for k, (expected, actual) in enumerate(zip(*answers, strict=False)):
                 if expected != actual:
                     return f"{setting} at t = {k * STEP:.3f} s, {_shown(expected)} and {_shown(actual)}"
@@ -339,19 +339,19 @@ def _settings(variables: Sequence[Any]) -> Iterator[tuple[str, str, list[int], l
 
 
 def _outputs(
-    unit: Twin, inputs: list[int], outputs: list[int], rows: list[list[float]]
+    twin: Twin, inputs: list[int], outputs: list[int], rows: list[list[float]]
 ) -> Iterator[bytes | str]:
     """Yield the outputs of a component in every step, until it fails."""
     if inputs:
-        unit.set("Real", inputs, rows[0])
-    if not (unit.begin(0.0)[0] and unit.end_initialization()[0]):
+        twin.set("Real", inputs, rows[0])
+    if not (twin.begin(0.0)[0] and twin.end_initialization()[0]):
         yield "it fails"
         return
     for k, row in enumerate(rows):
         if inputs:
-            unit.set("Real", inputs, row)
-        yield unit.get(outputs)[2]
-        if not unit.step(k * STEP, STEP)[0]:
+            twin.set("Real", inputs, row)
+        yield twin.get(outputs)[2]
+        if not twin.step(k * STEP, STEP)[0]:
             yield "it fails"
             return
 

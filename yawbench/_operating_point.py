@@ -82,7 +82,7 @@ class OperatingPoint:
             raise self._refusal("option-invalid", "linearize takes no faults: remove them")
         components = self._components(scenario)
         self._running: dict[str, Any] = {
-            unit.name: components[unit.name].open(unit, log) for unit in plan.instances
+            instance.name: components[instance.name].open(instance, log) for instance in plan.instances
         }
         self._master = Master(plan, self._running, log, StopFlag())
         self._pool, cycle = self._master.signals, self._master.program.cycle
@@ -145,7 +145,7 @@ class OperatingPoint:
                 changed[key.instance] = _with(changed[key.instance], key.path, value)
         self._restore((changed, signals, others))
         self._step(added)
-        after = {name: unit.component.__dict__ for name, unit in self._running.items()}
+        after = {name: instance.component.__dict__ for name, instance in self._running.items()}
         return _read(keys, after, self._pool.pool)
 
     def reached(self) -> list[StateKey]:
@@ -188,20 +188,20 @@ class OperatingPoint:
         """Return the component of every instance."""
         known = find_components()
         components = {}
-        for unit in self._plan.instances:
-            if (program := scenario._programs.get(unit.fmu.path)) is None:
-                stamp = read_stamp(unit.fmu.path)
-                if unit.fmu.name not in known or stamp is None or not stamp.is_component:
+        for instance in self._plan.instances:
+            if (program := scenario._programs.get(instance.fmu.path)) is None:
+                stamp = read_stamp(instance.fmu.path)
+                if instance.fmu.name not in known or stamp is None or not stamp.is_component:
                     text = (
-                        f"{unit.name}: {unit.fmu.path.name} hides its state: linearize takes plain Python, "
-                        "and FMUs of the components in Python that yawbench brings along"
+                        f"{instance.name}: {instance.fmu.path.name} hides its state: linearize takes plain "
+                        "Python, and FMUs of the components in Python that yawbench brings along"
                     )
                     raise self._refusal("fmu-not-supported", text)
-                module = import_module(".".join(("components", *known[unit.fmu.name])))
+                module = import_module(".".join(("components", *known[instance.fmu.name])))
                 classes = [value for value in vars(module).values() if isinstance(value, type)]
                 made = [c for c in classes if issubclass(c, Component) and c.__module__ == module.__name__]
-                program = PythonComponent(made[-1], unit=unit.name, role=unit.fmu.role or "")
-            components[unit.name] = program
+                program = PythonComponent(made[-1], instance=instance.name, role=instance.fmu.role or "")
+            components[instance.name] = program
         return components
 
     def _unit_of(self, name: str, what: str) -> str:
@@ -211,18 +211,20 @@ class OperatingPoint:
             for each in [*station.outputs, *(station.inputs if what == "input" else ())]:
                 if each.name == variable:
                     return each.unit or ""
-        every = [f"{unit.name}.{each}" for unit in self._plan.instances for each in unit.fmu.variables]
+        every = [
+            f"{instance.name}.{each}" for instance in self._plan.instances for each in instance.fmu.variables
+        ]
         text = f"{what}s: there is no {what} {short(name)}{hint(name, every, lead=what + 's')}"
         raise self._refusal("signal-unknown", text)
 
     def _state(self) -> tuple[dict[str, Any], np.ndarray, dict[Any, Any]]:
-        states = {name: unit.component._get_fmu_state() for name, unit in self._running.items()}
+        states = {name: instance.component._get_fmu_state() for name, instance in self._running.items()}
         return states, self._pool.pool.copy(), dict(self._pool.others)
 
     def _restore(self, state: tuple[dict[str, Any], np.ndarray, dict[Any, Any]]) -> None:
         states, pool, others = state
-        for name, unit in self._running.items():
-            unit.component._set_fmu_state(states[name])
+        for name, instance in self._running.items():
+            instance.component._set_fmu_state(states[name])
         self._pool.pool[:] = pool
         self._pool.others.clear()
         self._pool.others.update(others)
@@ -269,7 +271,7 @@ def _pair(name: str) -> tuple[str, str]:
 
 def _recording(plan: Plan, names: Iterable[str]) -> Plan:
     """Return the plan, recording those of the names that are outputs."""
-    outputs = {(unit.name, v.name) for unit in plan.instances for v in unit.fmu.of("output")}
+    outputs = {(instance.name, v.name) for instance in plan.instances for v in instance.fmu.of("output")}
     more = [SignalName(*_pair(name)) for name in names if _pair(name) in outputs]
     return replace(plan, record=tuple(dict.fromkeys((*plan.record, *more))))
 

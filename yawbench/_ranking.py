@@ -147,7 +147,7 @@ def _entry(controller: Any, name: str) -> tuple[str, EntrySpec, PythonComponent 
         return name or Path(fmu).stem, _spec(name or Path(fmu).stem, fmu), None
     if arguments.is_a(controller, type) and not issubclass(controller, Component):
         controller = _object_of(controller)
-    program = PythonComponent(controller, unit=CONTROLLER, role=CONTROLLER, label=name)
+    program = PythonComponent(controller, instance=CONTROLLER, role=CONTROLLER, label=name)
     words = name or program.path.stem
     sampled = {} if program.step_size is None else {"step_size": program.step_size}
     return words, _spec(words, str(program.path), {**program.parameters, **sampled}), program

@@ -19,10 +19,12 @@ from ._controller import PythonComponent
 def opener_of(programs: Mapping[Path, PythonComponent]) -> Callable[[Instance, Log, set[Path]], Any]:
     """Return the function that opens a run's instances: FMUs, and `programs` by their made-up paths."""
 
-    def opener(unit: Instance, log: Log, corrupted: set[Path]) -> Any:
-        program = programs.get(unit.fmu.path)
+    def opener(instance: Instance, log: Log, corrupted: set[Path]) -> Any:
+        program = programs.get(instance.fmu.path)
         return (
-            program.open(unit, log) if program and _in_python(unit) else open_instance(unit, log, corrupted)
+            program.open(instance, log)
+            if program and _in_python(instance)
+            else open_instance(instance, log, corrupted)
         )
 
     return opener
@@ -34,8 +36,8 @@ def planner_of(programs: Mapping[Path, PythonComponent]) -> Planner:
     return Planner(build=True, report=lambda text: None, opened=opened)
 
 
-def _in_python(unit: Instance) -> bool:
-    return not (unit.fmu.runs_as and unit.fmu.runs_as.native)
+def _in_python(instance: Instance) -> bool:
+    return not (instance.fmu.runs_as and instance.fmu.runs_as.native)
 
 
 def make_all(
@@ -54,7 +56,7 @@ def make_all(
         workers, done, run: see `execute`; `run` also takes an `opener`.
     """
     here = [
-        any(unit.fmu.path in programs and _in_python(unit) for unit in job.plan.instances)
+        any(instance.fmu.path in programs and _in_python(instance) for instance in job.plan.instances)
         if job.plan
         else False
         for job in jobs

@@ -90,7 +90,7 @@ class Scenario:
             arguments.refuse("programs", "programs as `swap` makes them", self._programs)
 
     def swap(
-        self, replacements: Mapping[str, ControllerLike] | None = None, /, **units: ControllerLike
+        self, replacements: Mapping[str, ControllerLike] | None = None, /, **instances: ControllerLike
     ) -> Scenario:
         """Return the scenario with other FMUs or plain Python in place of instances.
 
@@ -113,42 +113,42 @@ class Scenario:
         wanted = "a mapping of instances to FMUs, {'tyre': 'tyre_linear'}"
         with arguments.as_scenario_errors("swap"):
             entries = {} if replacements is None else arguments.mapping(replacements, "replacements", wanted)
-        return self._swapped({**entries, **units})
+        return self._swapped({**entries, **instances})
 
-    def _swapped(self, units: Mapping[str, ControllerLike], label: str = "") -> Scenario:
+    def _swapped(self, instances: Mapping[str, ControllerLike], label: str = "") -> Scenario:
         """Return the scenario with instances replaced; plain Python is known by the label, if any."""
         existing = self._loaded.units
-        changes, programs = [*self._unswapped(units).changes], dict(self._programs)
-        for unit, wanted in units.items():
-            if unit not in existing:
-                text = f"there is no instance {short(unit)}{hint(unit, existing, lead='instances')}"
+        changes, programs = [*self._unswapped(instances).changes], dict(self._programs)
+        for instance, wanted in instances.items():
+            if instance not in existing:
+                text = f"there is no instance {short(instance)}{hint(instance, existing, lead='instances')}"
                 raise ScenarioError(Diagnostic("instance-unknown", text, location=Location(self.path)))
             if arguments.names_file(wanted):
-                changes.append(Override(Target.of_instance(unit), fmu_of(wanted, unit), "swap"))
+                changes.append(Override(Target.of_instance(instance), fmu_of(wanted, instance), "swap"))
                 continue
-            role = role_of(unit, Path(self._loaded.replaced.get(unit, existing[unit].fmu)).stem)
-            program = PythonComponent(wanted, unit=unit, role=role, label=label)
+            role = role_of(instance, Path(self._loaded.replaced.get(instance, existing[instance].fmu)).stem)
+            program = PythonComponent(wanted, instance=instance, role=role, label=label)
             programs[program.path] = program
-            changes.append(Override(Target.of_instance(unit), str(program.path), "swap"))
+            changes.append(Override(Target.of_instance(instance), str(program.path), "swap"))
             if program.step_size is not None:
-                step_size = Target.of_instance(unit, "step_size")
+                step_size = Target.of_instance(instance, "step_size")
                 changes.append(Override(step_size, program.step_size, "swap"))
-            changes += self._kept(unit, program)
+            changes += self._kept(instance, program)
         return replace(self, changes=tuple(changes), _programs=programs)
 
-    def _kept(self, unit: str, program: PythonComponent) -> Iterator[Override]:
+    def _kept(self, instance: str, program: PythonComponent) -> Iterator[Override]:
         """Yield overrides with a program's own values for parameters that the scenario would set."""
         loaded, facts = self._loaded, [name for fact in FACTS.values() for name in fact.parameters]
-        by_scenario = {*CAR, *facts, *loaded.vehicle_file.parameters, *loaded.units[unit].parameters}
+        by_scenario = {*CAR, *facts, *loaded.vehicle_file.parameters, *loaded.units[instance].parameters}
         requested = {change.target for change in self.changes if change.origin == "set"}
         for name, value in program.parameters.items():
-            target = Target.of_instance(unit, name)
+            target = Target.of_instance(instance, name)
             if name in by_scenario and target not in requested:
                 yield Override(target, value, "swap")
 
-    def _unswapped(self, units: Iterable[str]) -> Scenario:
+    def _unswapped(self, instances: Iterable[str]) -> Scenario:
         """Return the scenario without earlier swaps of instances and the values that came with them."""
-        swapped = set(units)
+        swapped = set(instances)
         kept = (
             change
             for change in self.changes
@@ -244,12 +244,12 @@ class Scenario:
         notes = tuple(
             Diagnostic(
                 "instance-in-python",
-                f"{unit.name}: {unit.fmu.name} is plain Python of this process, not an FMU; "
-                f"{_how_it_runs(unit.fmu)}",
+                f"{instance.name}: {instance.fmu.name} is plain Python of this process, not an FMU; "
+                f"{_how_it_runs(instance.fmu)}",
                 "info",
             )
-            for unit in plan.instances
-            if unit.fmu.path in self._programs
+            for instance in plan.instances
+            if instance.fmu.path in self._programs
         )
         return replace(plan, diagnostics=plan.diagnostics + notes)
 
@@ -271,8 +271,8 @@ class Scenario:
         opened: list[Any] = []
         make = opener_of(self._programs)
 
-        def opener(unit: Instance, log: Log, corrupted: set[Path]) -> Any:
-            opened.append(make(unit, log, corrupted))
+        def opener(instance: Instance, log: Log, corrupted: set[Path]) -> Any:
+            opened.append(make(instance, log, corrupted))
             return opened[-1]
 
         with bar(self.title, wanted=wanted) as shown:
@@ -294,11 +294,13 @@ class Scenario:
 
     def _in_python(self, plan: Plan) -> Plan:
         """Return a plan in which plain Python runs as Python."""
-        units = [
-            replace(unit, fmu=self._programs[unit.fmu.path].fmu) if unit.fmu.path in self._programs else unit
-            for unit in plan.instances
+        instances = [
+            replace(instance, fmu=self._programs[instance.fmu.path].fmu)
+            if instance.fmu.path in self._programs
+            else instance
+            for instance in plan.instances
         ]
-        return replace(plan, instances=tuple(units))
+        return replace(plan, instances=tuple(instances))
 
     @property
     def title(self) -> str:
@@ -308,9 +310,9 @@ class Scenario:
     def _repr_html_(self) -> str:
         plan = self.plan()
         rows = "".join(
-            f"<tr><td>{escape(unit.name)}</td><td>{escape(unit.fmu.name)}</td>"
-            f"<td>{escape(unit.fmu.description)}</td></tr>"
-            for unit in plan.instances
+            f"<tr><td>{escape(instance.name)}</td><td>{escape(instance.fmu.name)}</td>"
+            f"<td>{escape(instance.fmu.description)}</td></tr>"
+            for instance in plan.instances
         )
         changed = "".join(f"<br>{escape(str(change))}" for change in self.changes)
         return f"<b>{escape(plan.title)}</b>{changed}<table>{rows}</table>"

@@ -46,9 +46,9 @@ def check(scenario: ScenarioFile, options: RunOptions, all_: All = False) -> Non
     output.answer(plan=_data_of(plan))
     for diagnostic in notes:
         say(f"note: {diagnostic}")
-    for unit in plan.instances:
-        for violation in unit.fmu.violations:
-            say(f"{violation.severity}: {unit.name}: {violation}")
+    for instance in plan.instances:
+        for violation in instance.fmu.violations:
+            say(f"{violation.severity}: {instance.name}: {violation}")
 
 
 def _hidden(plan: Plan) -> list[Diagnostic]:
@@ -57,8 +57,8 @@ def _hidden(plan: Plan) -> list[Diagnostic]:
 
     warnings = [
         warning
-        for unit in plan.instances
-        for warning in hidden([unit.fmu.path.stem], unit.fmu.path.parent, packages=True)
+        for instance in plan.instances
+        for warning in hidden([instance.fmu.path.stem], instance.fmu.path.parent, packages=True)
     ]
     return [warning for warning in dict.fromkeys(warnings) if warning not in plan.diagnostics]
 
@@ -128,7 +128,7 @@ def _print(plan: Plan, scenario: Path, console: Console, defaults: bool) -> None
         )
     _show(console, "Delayed by one step", ("from", "to", "value at the start"), _delayed_rows(plan))
     _show(console, "Faults", ("target", "fault", "signals"), _fault_rows(plan))
-    direct = evaluate({unit.name: unit.fmu for unit in plan.instances}, plan.wires).direct
+    direct = evaluate({instance.name: instance.fmu for instance in plan.instances}, plan.wires).direct
     headings = ("instance", "after", "direct feedthrough of")
     _show(console, "Why this order", headings, _order_rows(plan, direct))
     _show(
@@ -167,8 +167,8 @@ def _number(value: object) -> str:
 
 
 def _unit_rows(plan: Plan) -> Iterable[Sequence[str]]:
-    for unit in plan.instances:
-        yield unit.name, unit.fmu.name, f"{_number(1000 * unit.period * plan.step)} ms"
+    for instance in plan.instances:
+        yield instance.name, instance.fmu.name, f"{_number(1000 * instance.period * plan.step)} ms"
 
 
 def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
@@ -181,34 +181,38 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
     takers: list[tuple[tuple[str, str, str], str]] = []
     hidden = 0
     cambered = {wire.source for wire in plan.wires if wire.output in CAMBER}
-    for unit in plan.instances:
-        own = {v.name: unit.parameter(v.name) for v in unit.fmu.of("parameter")}
-        constants = {name: value for name, value in unit.constants.items() if name not in unit.series}
+    for instance in plan.instances:
+        own = {v.name: instance.parameter(v.name) for v in instance.fmu.of("parameter")}
+        constants = {name: value for name, value in instance.constants.items() if name not in instance.series}
         shown: list[tuple[tuple[str, str], str]] = []
         for name, value in {**own, **constants}.items():
-            source = unit.origins.get(name, DEFAULT)
-            matters = _matters(unit, name) or (unit.name in cambered and name.startswith("roll_camber"))
+            source = instance.origins.get(name, DEFAULT)
+            matters = _matters(instance, name) or (
+                instance.name in cambered and name.startswith("roll_camber")
+            )
             if not defaults and (source in of_tyres.values() or (source == DEFAULT and not matters)):
                 hidden += 1
                 continue
             origin = source.detail if source.kind == "file" else source.kind
-            shown.append(((_shown(value, unit.fmu.variables[name].unit), origin), name))
+            shown.append(((_shown(value, instance.fmu.variables[name].unit), origin), name))
         for (text, origin), names in _grouped(shown).items():
             for name in fold(names):
-                takers.append(((name, text, origin), unit.name))
+                takers.append(((name, text, origin), instance.name))
                 if defaults and origin == "default" and name in own:
-                    sources.setdefault((name, text, origin), unit.fmu.variables[name].source)
+                    sources.setdefault((name, text, origin), instance.fmu.variables[name].source)
     rows = [*_run_rows(plan)]
     for axle, origin_of_file in of_tyres.items():
-        takes = [unit.name for unit in plan.instances if origin_of_file in unit.origins.values()]
+        takes = [instance.name for instance in plan.instances if origin_of_file in instance.origins.values()]
         what = f"{files[axle]['kind']}, {files[axle]['side']}"
         rows.append((f"tyres, {axle}", what, str(origin_of_file), ", ".join(takes)))
-    for key, units in _grouped(takers).items():
-        rows.append((*key, ", ".join(units), *filter(None, [sources.get(key)])))
-    for unit in plan.instances:
-        for name, series in unit.series.items():
+    for key, instances in _grouped(takers).items():
+        rows.append((*key, ", ".join(instances), *filter(None, [sources.get(key)])))
+    for instance in plan.instances:
+        for name, series in instance.series.items():
             how = "held" if series.held else "linear"
-            rows.append((name, f"{series.file}: {series.column}, {how}", str(unit.origins[name]), unit.name))
+            rows.append(
+                (name, f"{series.file}: {series.column}, {how}", str(instance.origins[name]), instance.name)
+            )
     return rows, hidden
 
 
@@ -228,12 +232,12 @@ def _run_rows(plan: Plan) -> Iterable[Sequence[str]]:
 def _derived(plan: Plan) -> Iterable[Sequence[str]]:
     """Return the rows of derived vehicle values, each with its formula."""
     takers = _grouped(
-        ((name, origin.detail), unit.name)
-        for unit in plan.instances
-        for name, origin in unit.origins.items()
+        ((name, origin.detail), instance.name)
+        for instance in plan.instances
+        for name, origin in instance.origins.items()
         if origin.kind == "derived"
     )
-    return [(*key, ", ".join(units)) for key, units in takers.items()]
+    return [(*key, ", ".join(instances)) for key, instances in takers.items()]
 
 
 def _beside_tyres(plan: Plan) -> Iterable[Sequence[str]]:
@@ -244,10 +248,10 @@ def _beside_tyres(plan: Plan) -> Iterable[Sequence[str]]:
     from ..wiring.parameters import STATIC_LOADS, STIFFNESSES, known_car
 
     takers = _grouped(
-        ((name, float(unit.parameters[name])), unit.name)
-        for unit in plan.instances
+        ((name, float(instance.parameters[name])), instance.name)
+        for instance in plan.instances
         for name in STIFFNESSES
-        if name in unit.parameters and unit.origins[name].kind not in ("derived", "default")
+        if name in instance.parameters and instance.origins[name].kind not in ("derived", "default")
     )
     tyres = [u for u in plan.instances if {v.name for v in u.fmu.of("output")} >= {*TYRE_FORCES}]
     car = known_car(plan.scenario.get("vehicle_parameters", {})) if takers and len(tyres) == 1 else None
@@ -258,24 +262,28 @@ def _beside_tyres(plan: Plan) -> Iterable[Sequence[str]]:
         of_tyres = dict(zip(STIFFNESSES, cornering_stiffness(tyres[0], loads).values(), strict=True))
     except (ValueError, YawbenchError):
         return  # the tyre model does not provide it
-    for (name, stated), units in takers.items():
+    for (name, stated), instances in takers.items():
         of_axle = 2.0 * of_tyres[name]
         difference = f"{round(100.0 * (stated / of_axle - 1.0), 1) + 0.0:+g} %" if of_axle else ""
-        yield name, _shown(stated, "N/rad"), _shown(of_axle, "N/rad"), difference, ", ".join(units)
+        yield name, _shown(stated, "N/rad"), _shown(of_axle, "N/rad"), difference, ", ".join(instances)
 
 
 def _idle(plan: Plan) -> list[str]:
     """Return the values of the vehicle file that no instance uses."""
     names = plan.scenario.get("vehicle_parameters", {})
-    return [name for name in names if not any(unit.fmu.variables.get(name) for unit in plan.instances)]
+    return [
+        name for name in names if not any(instance.fmu.variables.get(name) for instance in plan.instances)
+    ]
 
 
-def _matters(unit: Instance, name: str) -> bool:
+def _matters(instance: Instance, name: str) -> bool:
     """Return whether a default is worth showing: it concerns the car, its speed or the road."""
     from ..wiring.context import FACTS
     from ..wiring.suspicious_values import OF_CAR
 
-    return name in OF_CAR or any(name in fact.inputs or fact.counts(unit, name) for fact in FACTS.values())
+    return name in OF_CAR or any(
+        name in fact.inputs or fact.counts(instance, name) for fact in FACTS.values()
+    )
 
 
 def _shown(value: Value | None, measure: str | None) -> str:
@@ -290,13 +298,13 @@ def _wire_rows(plan: Plan) -> Iterable[tuple[str, str, str, str]]:
     from ..messages import fold_wires, star
     from ..wiring.suspicious_values import seen_as
 
-    units = {unit.name: unit.fmu.variables for unit in plan.instances}
+    instances = {instance.name: instance.fmu.variables for instance in plan.instances}
     for (source, target), wires in _grouped(((w.source, w.target), w) for w in plan.wires).items():
         shown = []
         examples = {name: w for w in reversed(wires) for name in (w.input, star(w.input))}
         for end, name in fold_wires([(w.output, w.input) for w in wires]):
             example = examples[name]
-            of, measure = units[source][example.output].unit, units[target][example.input].unit
+            of, measure = instances[source][example.output].unit, instances[target][example.input].unit
             ends = end if end == name else f"{end} → {name}"
             if example.converts:
                 measure = f"{of or '?'} → {measure or '?'}: {_scaled(example)}"
@@ -305,10 +313,10 @@ def _wire_rows(plan: Plan) -> Iterable[tuple[str, str, str, str]]:
 
 
 def _delayed_rows(plan: Plan) -> Iterable[Sequence[str]]:
-    units = {unit.name: unit.fmu for unit in plan.instances}
+    instances = {instance.name: instance.fmu for instance in plan.instances}
     for wire in plan.wires:
         if wire.delayed:
-            variable = units[wire.target].variables[wire.input]
+            variable = instances[wire.target].variables[wire.input]
             ends = f"{wire.source}.{wire.output}", f"{wire.target}.{wire.input}"
             yield *ends, f"{variable.start:g} {variable.unit or ''}".rstrip()
 
@@ -339,10 +347,10 @@ def _order_rows(plan: Plan, direct: Iterable[Wire]) -> Iterable[Sequence[str]]:
     from ..messages import fold
 
     before = _grouped((w.target, w) for w in direct if not _is_backward(w, plan))
-    for unit in plan.instances:
-        if wires := before.get(unit.name):
+    for instance in plan.instances:
+        if wires := before.get(instance.name):
             sources = dict.fromkeys(wire.source for wire in wires)
-            yield unit.name, ", ".join(sources), ", ".join(fold([wire.input for wire in wires]))
+            yield instance.name, ", ".join(sources), ", ".join(fold([wire.input for wire in wires]))
 
 
 def _backward_rows(plan: Plan, direct: Iterable[Wire]) -> Iterable[Sequence[str]]:
@@ -355,5 +363,5 @@ def _backward_rows(plan: Plan, direct: Iterable[Wire]) -> Iterable[Sequence[str]
 
 def _is_backward(wire: Wire, plan: Plan) -> bool:
     """Return whether a wire leads to its source itself or to an instance that is evaluated before it."""
-    order = [unit.name for unit in plan.instances]
+    order = [instance.name for instance in plan.instances]
     return order.index(wire.source) >= order.index(wire.target)

@@ -113,7 +113,7 @@ def begin(kind: str, name: str, language: Language = "python", *, in_checkout: b
         "scenario": scenario.name,
         "vehicle": f"../vehicles/{name}.yaml" if kind == "vehicle" else shipped,
         "source_words": "the run of paper A (Yuan, Chen, Huang, Shi) at 25 m/s",
-        "units": [(unit, *UNITS[unit]) for unit in UNITS],
+        "units": [(instance, *UNITS[instance]) for instance in UNITS],
     }
     if kind in ROLES:
         return _unit(kind, name, language, in_checkout, scenario, facts)
@@ -148,7 +148,7 @@ def _unit(
         "source": source,
         "levels": len(test.parts) - 1,
         "source_words": f"{facts['source_words']}, with a {role} of your own",
-        "units": [(unit, *fmu) for unit, fmu in (UNITS | {role: (f"{role}_{name}", own)}).items()],
+        "units": [(instance, *fmu) for instance, fmu in (UNITS | {role: (f"{role}_{name}", own)}).items()],
         **LAW,
     }
     templates = {scenario: "scenario.yaml.j2"}

@@ -64,7 +64,8 @@ def recorded(sources: Sequence[Path], options: RunOptions) -> list[Path]:
     for job in ready(wanted, planner=Planner(build=options.build)):
         assert job.plan is not None
         jobs[job.scenario] = replace(job, out=default_folder(job.scenario, job.plan.changes))
-    for note in stale_fmus(unit.fmu for job in jobs.values() if job.plan for unit in job.plan.instances):
+    plans = [job.plan for job in jobs.values() if job.plan]
+    for note in stale_fmus(instance.fmu for plan in plans for instance in plan.instances):
         say(f"note: {note}")
     stale = [job for job in jobs.values() if job.plan and staleness(job.plan, job.out)]
     with stoppable(Path("results")), reported("", len(stale)) as report:

@@ -163,15 +163,19 @@ def trace_of(results: Results, label: str = "") -> Trace:
         if name not in signals and own[name] == 1 and np.issubdtype(values.dtype, np.number):
             signals[name] = values
     fmus = results.record.fmus
-    parameters = {unit: {**fmu.defaults, **fmu.parameters} for unit, fmu in fmus.items()}
+    parameters = {instance: {**fmu.defaults, **fmu.parameters} for instance, fmu in fmus.items()}
     best = [
-        unit for role in ("driver", "plant") for unit in results.instances_of_role(role)
+        instance for role in ("driver", "plant") for instance in results.instances_of_role(role)
     ]  # their parameters win over others of the same name
-    facts = {name: value for unit in (*parameters, *best) for name, value in parameters.get(unit, {}).items()}
+    facts = {
+        name: value
+        for instance in (*parameters, *best)
+        for name, value in parameters.get(instance, {}).items()
+    }
     masses = [
-        parameters[unit]["mass"]
-        for unit in results.instances_of_role("plant")
-        if "mass" in parameters.get(unit, {})
+        parameters[instance]["mass"]
+        for instance in results.instances_of_role("plant")
+        if "mass" in parameters.get(instance, {})
     ]
     mass = masses[-1] if masses else None
     return Trace(
@@ -190,7 +194,9 @@ def _friction(results: Results, fmus: Mapping[str, FmuRecord], parameters: Mappi
     """Return the lowest friction at any wheel: as recorded, else from the parameters of road and tyres."""
     if columns := columns_of(results, "friction_*"):
         return float(min(results.columns[column].min() for column in columns))
-    frictions = [parameters.get(unit, {}).get("base_friction") for unit in results.instances_of_role("road")]
+    frictions = [
+        parameters.get(instance, {}).get("base_friction") for instance in results.instances_of_role("road")
+    ]
     frictions += [values.get("friction") for values in parameters.values()]
     for fmu in fmus.values():
         frictions += [value for name, value in fmu.constants.items() if name.startswith("friction_")]

@@ -82,7 +82,9 @@ class _Parcels:
     """
 
     def __init__(self, jobs: Sequence[Job]) -> None:
-        every = {id(unit.fmu): unit.fmu for job in jobs if job.plan for unit in job.plan.instances}
+        every = {
+            id(instance.fmu): instance.fmu for job in jobs if job.plan for instance in job.plan.instances
+        }
         self._keys = {number: hashlib.sha256(pickle.dumps(fmu)).hexdigest() for number, fmu in every.items()}
         self.fmus = {self._keys[number]: fmu for number, fmu in every.items()}
 

@@ -85,12 +85,12 @@ def variants(scenario: Path, swaps: Sequence[str], changes: Sequence[Override]) 
     """
     choices = _choices(swaps)
     if all(len(names) == 1 for names in choices.values()):
-        swapped = [swap_of(unit, names[0], "--swap")[0] for unit, names in choices.items()]
+        swapped = [swap_of(instance, names[0], "--swap")[0] for instance, names in choices.items()]
         own = load_scenario(scenario, changes=[*swapped, *changes]).replaced
-        for unit, names in choices.items():
-            fmu = str(scenario.absolute().parent / own[unit]) if is_path(own[unit]) else own[unit]
+        for instance, names in choices.items():
+            fmu = str(scenario.absolute().parent / own[instance]) if is_path(own[instance]) else own[instance]
             names[:0] = [fmu] if fmu not in names else []
-    named = [unit for unit, names in choices.items() if len(names) > 1]
+    named = [instance for instance, names in choices.items() if len(names) > 1]
     if not named:
         raise ScenarioError(
             "nothing to compare: name several FMUs, for example --swap controller=a,b", code="option-invalid"
@@ -98,13 +98,13 @@ def variants(scenario: Path, swaps: Sequence[str], changes: Sequence[Override]) 
     runs: list[NamedRun] = []
     for combination in itertools.product(*choices.values()):
         chosen = dict(zip(choices, combination, strict=True))
-        label = " + ".join(_label(chosen[unit], choices[unit]) for unit in named)
+        label = " + ".join(_label(chosen[instance], choices[instance]) for instance in named)
         repeated = sum(run.label.partition(" (")[0] == label for run in runs)
         label += f" ({repeated + 1})" if repeated else ""
         name = re.sub(r"[^\w.+=-]+", "_", label.replace(" + ", "+")).strip("_")
         if any(run.name == name for run in runs):
             name = f"{name}_{len(runs) + 1}"
-        swapped_in = [swap for unit, text in chosen.items() for swap in swap_of(unit, text, "--swap")]
+        swapped_in = [swap for instance, text in chosen.items() for swap in swap_of(instance, text, "--swap")]
         runs.append(NamedRun(name, label, label, scenario, tuple(swapped_in)))
     return runs
 
@@ -113,15 +113,15 @@ def _choices(swaps: Sequence[str]) -> dict[str, list[str]]:
     """Return instance -> its FMUs, without repetition, in the order of the options."""
     choices: dict[str, list[str]] = {}
     for text in swaps:
-        unit, equals, fmus = text.partition("=")
+        instance, equals, fmus = text.partition("=")
         names = [fmus] if Path(fmus).is_file() else [name.strip() for name in fmus.split(",")]
-        if not (unit.strip() and equals and all(names)):
+        if not (instance.strip() and equals and all(names)):
             raise ScenarioError(
                 f"--swap {text}: write --swap INSTANCE=FMU or --swap INSTANCE=FMU,FMU,...",
                 code="option-invalid",
             )
-        known = choices.get(unit.strip(), [])
-        choices[unit.strip()] = list(dict.fromkeys([*known, *names]))
+        known = choices.get(instance.strip(), [])
+        choices[instance.strip()] = list(dict.fromkeys([*known, *names]))
     return choices
 
 

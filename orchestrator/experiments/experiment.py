@@ -144,7 +144,7 @@ def named_runs(document: Document, i: int, entry: RunSpec) -> Iterator[NamedRun]
         _check_folder(name, binding)
         changes: dict[Target, Override] = {}
         for part in (entry, *binding.choices):
-            swaps = {unit: binding.fill(fmu, "swap", unit) for unit, fmu in part.swap.items()}
+            swaps = {instance: binding.fill(fmu, "swap", instance) for instance, fmu in part.swap.items()}
             settings = {
                 target: yaml_lines.scalar(binding.fill(value, "set", str(target)))
                 if isinstance(value, str)

@@ -132,7 +132,7 @@ def plan_experiment(
         jobs = [replace(job, out=job.out / job.key[:12]) for job in jobs]
     else:
         jobs = [keyed(job) for job in jobs]
-    used = {unit.fmu.sha256: unit.fmu for plan in plans for unit in plan.instances}
+    used = {instance.fmu.sha256: instance.fmu for plan in plans for instance in plan.instances}
     return PlannedExperiment(experiment, jobs, units, metric_units, used)
 
 
@@ -182,7 +182,7 @@ def _units(experiment: LoadedExperiment, every: list[Plan]) -> dict[str, str]:
     Raises:
         ScenarioError: the unit in the file does not fit.
     """
-    plans = {tuple(unit.fmu.sha256 for unit in plan.instances): plan for plan in every}.values()
+    plans = {tuple(instance.fmu.sha256 for instance in plan.instances): plan for plan in every}.values()
     return {
         name: next((unit for plan in plans if (unit := _unit(axis, plan))), "")
         for name, axis in experiment.spec.axes.items()

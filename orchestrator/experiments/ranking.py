@@ -413,6 +413,8 @@ def _levels(
 def _since_steering(plan: Plan) -> TimeWindow | None:
     """Return the time from the beginning of steer to the end of a run; None if there is none between."""
     driver = Target.parse(AMPLITUDE).instance
-    begins = next(unit.parameter(STEERING_BEGINS) for unit in plan.instances if unit.name == driver)
+    begins = next(
+        instance.parameter(STEERING_BEGINS) for instance in plan.instances if instance.name == driver
+    )
     first, last = float(begins or 0.0), plan.time(plan.n_steps)
     return (first, last) if first < last else None

@@ -396,11 +396,11 @@ def signals_table(fmus: Sequence[Fmu]) -> Table:
 def recorded_table(plan: Plan) -> Table:
     """Return a table of the signals that a run of a plan records."""
     table = Table(plan.title, ["signal", "", "unit", "description"])
-    units = {unit.name: unit for unit in plan.instances}
-    for unit, name in plan.record:
-        variable, sign = units[unit].fmu.variables[name], symbol(name)
+    instances = {instance.name: instance for instance in plan.instances}
+    for instance, name in plan.record:
+        variable, sign = instances[instance].fmu.variables[name], symbol(name)
         text = _one_line(variable.description) or None
-        table.rows.append([f"{unit}.{name}", sign if sign != name else None, variable.unit, text])
+        table.rows.append([f"{instance}.{name}", sign if sign != name else None, variable.unit, text])
     return table
 
 

@@ -130,11 +130,11 @@ def _dependencies(description: Any) -> dict[int, tuple[str, ...] | None]:
 def _definitions(description: Any) -> dict[str | None, UnitDefinition]:
     """Return name -> definition in SI base units, for the units of measurement that have one."""
     return {
-        unit.name: UnitDefinition(
+        instance.name: UnitDefinition(
             (base.kg, base.m, base.s, base.A, base.K, base.mol, base.cd, base.rad), base.factor, base.offset
         )
-        for unit in description.unitDefinitions
-        if (base := unit.baseUnit) is not None
+        for instance in description.unitDefinitions
+        if (base := instance.baseUnit) is not None
     }
 
 
@@ -183,24 +183,24 @@ def shadowed_modules(fmus: Mapping[str, Fmu], *, isolated: bool = False) -> list
     """
     problems = []
     first_in: dict[str, tuple[str, str]] = {}
-    for unit, fmu in fmus.items():
+    for instance, fmu in fmus.items():
         for module, content in fmu.python_modules.items():
-            other, its_content = first_in.setdefault(module, (unit, content))
+            other, its_content = first_in.setdefault(module, (instance, content))
             if its_content != content and not isolated:
                 problems.append(
-                    f"{unit} ({fmu.name}) would run code of {other} ({fmus[other].name}): both FMUs bring "
-                    f"a Python module {module!r}, and a process has room for one; rebuild one of them "
+                    f"{instance} ({fmu.name}) would run code of {other} ({fmus[other].name}): both FMUs "
+                    f"bring a Python module {module!r}, and a process has room for one; rebuild one of them "
                     "with another module name, or run with --isolate"
                 )
             elif module in sys.stdlib_module_names:
                 problems.append(
-                    f"{unit} ({fmu.name}) would run other code: its Python module {module!r} has the name "
-                    "of one of Python's own; rebuild it with another module name"
+                    f"{instance} ({fmu.name}) would run other code: its Python module {module!r} has the "
+                    "name of one of Python's own; rebuild it with another module name"
                 )
             elif _loaded_from_elsewhere(module, content, fmu.directory):
                 problems.append(
-                    f"{unit} ({fmu.name}) would run other code: another Python module {module!r} is loaded "
-                    "in this process already; rebuild it with another module name"
+                    f"{instance} ({fmu.name}) would run other code: another Python module {module!r} is "
+                    "loaded in this process already; rebuild it with another module name"
                 )
     return problems
 

@@ -133,8 +133,8 @@ def run_fmpy_ssp(request: Request) -> Recording:
         parameter_set=SimpleNamespace(parameters=_parameters(request.archive)),
     )
     values = np.full((request.n_steps + 1, len(request.columns)), np.nan)
-    for i, (unit, name) in enumerate(request.columns):
-        values[1:, i] = rows[f"{unit}.{name}"][: request.n_steps]
+    for i, (instance, name) in enumerate(request.columns):
+        values[1:, i] = rows[f"{instance}.{name}"][: request.n_steps]
     return Recording(values, spent.seconds / request.n_steps)
 
 
@@ -142,8 +142,8 @@ def _parameters(archive: str) -> list[Any]:
     """Return the values of the archive that fmpy can set, named `instance.variable`."""
     data = ssp_read.read(Path(archive)).data
     values = dict(data["inputs"])
-    for unit, spec in data["units"].items():
-        values |= {f"{unit}.{name}": value for name, value in spec.get("parameters", {}).items()}
+    for instance, spec in data["units"].items():
+        values |= {f"{instance}.{name}": value for name, value in spec.get("parameters", {}).items()}
     return [SimpleNamespace(name=name, value=v) for name, v in values.items() if not isinstance(v, str)]
 
 
@@ -203,11 +203,11 @@ def run_libcosim(request: Request) -> Recording:
 def _readers(execution: Any, observer: Any, request: Request) -> list[tuple[list[int], Any]]:
     """Return, per instance, its columns and a function that reads their values."""
     infos = execution.slave_infos()
-    units = {infos[i].name.decode(): infos[i].index for i in range(execution.num_slaves())}
+    instances = {infos[i].name.decode(): infos[i].index for i in range(execution.num_slaves())}
     readers = []
-    for unit, index in units.items():
+    for instance, index in instances.items():
         references = {v.name.decode(): v.reference for v in execution.slave_variables(index)}
-        where = [i for i, (u, _) in enumerate(request.columns) if u == unit]
+        where = [i for i, (u, _) in enumerate(request.columns) if u == instance]
         outputs = [references[request.columns[i][1]] for i in where]
         if where:
             readers.append((where, partial(observer.last_real_values, index, outputs)))
@@ -229,7 +229,7 @@ def run_ecos(request: Request) -> Recording:
     simulation = EcosSimulation(request.step, ssp_path=request.archive)
     if not simulation.init(0, PARAMETER_SET):
         raise RuntimeError("Ecos cannot initialize the system")
-    names = [f"{unit}::{name}" for unit, name in request.columns]
+    names = [f"{instance}::{name}" for instance, name in request.columns]
     read = simulation.get_real
     values = np.empty((request.n_steps + 1, len(names)))
     values[0] = [read(name) for name in names]

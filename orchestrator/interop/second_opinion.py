@@ -130,7 +130,7 @@ def second_opinion(
     ours: dict[bool, tuple[Request, dict[str, Recording]]] = {}
     opinions = []
     for master in masters:
-        one_step = master.one_step and any(unit.period > 1 for unit in plan.instances)
+        one_step = master.one_step and any(instance.period > 1 for instance in plan.instances)
         if not installed(master):
             problem = f"{master.package} is not installed: pip install 'yawbench[interop]'"
             opinions.append(SecondOpinion(master, one_step, problem))
@@ -159,7 +159,7 @@ def second_opinion(
 def _request(plan: Plan, one_step: bool, folder: Path) -> Request:
     """Write the archive; return the request to run it."""
     if one_step:
-        plan = replace(plan, instances=tuple(replace(unit, period=1) for unit in plan.instances))
+        plan = replace(plan, instances=tuple(replace(instance, period=1) for instance in plan.instances))
     path = folder / ("one_step.ssp" if one_step else "system.ssp")
     write_ssp(plan, path)
     return Request(str(path), float(plan.step), plan.n_steps, _columns(plan))
@@ -167,8 +167,8 @@ def _request(plan: Plan, one_step: bool, folder: Path) -> Request:
 
 def _columns(plan: Plan) -> list[tuple[str, str]]:
     """Return the outputs to compare: all recorded ones of type Real."""
-    units = {unit.name: unit.fmu for unit in plan.instances}
-    return [(u, name) for u, name in plan.record if units[u].variables[name].type == "Real"]
+    instances = {instance.name: instance.fmu for instance in plan.instances}
+    return [(u, name) for u, name in plan.record if instances[u].variables[name].type == "Real"]
 
 
 def _recordings(module: str, request: Request, pinned: bool, folder: Path) -> dict[str, Recording] | str:
@@ -218,14 +218,16 @@ def differences(request: Request, own: np.ndarray, other: np.ndarray) -> dict[st
     magnitude = np.max(np.abs(own), axis=0)
     scale = np.where(_moving(own), np.ptp(own, axis=0), np.where(magnitude > 0, magnitude, 1.0))
     relative = np.max(gap, axis=0) / scale
-    return {f"{unit}.{name}": float(d) for (unit, name), d in zip(request.columns, relative, strict=True)}
+    return {
+        f"{instance}.{name}": float(d) for (instance, name), d in zip(request.columns, relative, strict=True)
+    }
 
 
 def still_signals(request: Request, own: np.ndarray) -> tuple[str, ...]:
     """Return the signals that are constant up to rounding in our run."""
     return tuple(
-        f"{unit}.{name}"
-        for (unit, name), moves in zip(request.columns, _moving(own), strict=True)
+        f"{instance}.{name}"
+        for (instance, name), moves in zip(request.columns, _moving(own), strict=True)
         if not moves
     )
 

@@ -67,7 +67,7 @@ def write_ssp(plan: Plan, path: Path, standard: Version = "1.0", *, named: bool 
         ResultsError: the archive cannot be written, or a text or value cannot be represented in it.
         ModelDescriptionError: an FMU no longer exists.
     """
-    series = [f"{unit.name}.{name}" for unit in plan.instances for name in unit.series]
+    series = [f"{instance.name}.{name}" for instance in plan.instances for name in instance.series]
     if series:
         raise ResultsError(
             f"{path}: an SSP archive cannot contain the time series of {listed(fold(series))}",
@@ -89,7 +89,7 @@ def write_ssp(plan: Plan, path: Path, standard: Version = "1.0", *, named: bool 
         with zipfile.ZipFile(content, "w") as archive:
             _put(archive, DESCRIPTION_FILE, description)
             for sha256, source in sorted(sources.items(), key=lambda item: item[1]):
-                fmu = next(unit.fmu for unit in plan.instances if unit.fmu.sha256 == sha256)
+                fmu = next(instance.fmu for instance in plan.instances if instance.fmu.sha256 == sha256)
                 _put(archive, source, read_archive(fmu.path))
         write_whole(path, content.getvalue(), named=named)
     except OSError as error:
@@ -117,14 +117,14 @@ def system_structure(plan: Plan, standard: Version = "1.0") -> _Element:
     if plan.scenario.get("source"):
         root.set("description", str(plan.scenario["source"]))
     root.set("generationTool", f"yawbench {version('yawbench')}")
-    units = _in_order_of_scenario(plan)
+    instances = _in_order_of_scenario(plan)
     spelled = _spelled_units(plan)
     sources = _sources(plan)
     enumerations: dict[str, Mapping[str, int]] = {}
     system = SubElement(root, f"{{{SSD}}}System", name="system")
     elements = SubElement(system, f"{{{SSD}}}Elements")
-    for unit in units:
-        _add_component(elements, unit, plan, sources[unit.fmu.sha256], spelled, enumerations)
+    for instance in instances:
+        _add_component(elements, instance, plan, sources[instance.fmu.sha256], spelled, enumerations)
     if plan.wires:
         connections = SubElement(system, f"{{{SSD}}}Connections")
         for wire in plan.wires:
@@ -184,32 +184,32 @@ def _in_order_of_scenario(plan: Plan) -> list[Instance]:
 def _sources(plan: Plan) -> dict[str, str]:
     """Return hash -> path in the archive for each FMU; the paths have no characters that need escaping."""
     sources: dict[str, str] = {}
-    for unit in plan.instances:
-        stem = re.sub(r"[^A-Za-z0-9_-]", "_", unit.fmu.name)
+    for instance in plan.instances:
+        stem = re.sub(r"[^A-Za-z0-9_-]", "_", instance.fmu.name)
         source = f"{RESOURCES}/{stem}.fmu"
-        if source in sources.values() and unit.fmu.sha256 not in sources:
-            source = f"{RESOURCES}/{stem}_{unit.fmu.sha256[:8]}.fmu"
-        sources.setdefault(unit.fmu.sha256, source)
+        if source in sources.values() and instance.fmu.sha256 not in sources:
+            source = f"{RESOURCES}/{stem}_{instance.fmu.sha256[:8]}.fmu"
+        sources.setdefault(instance.fmu.sha256, source)
     return sources
 
 
 def _add_component(
     elements: _Element,
-    unit: Instance,
+    instance: Instance,
     plan: Plan,
     source: str,
     spelled: Mapping[str, Unit],
     enumerations: dict[str, Mapping[str, int]],
 ) -> None:
     component = SubElement(
-        elements, f"{{{SSD}}}Component", name=unit.name, type="application/x-fmu-sharedlibrary"
+        elements, f"{{{SSD}}}Component", name=instance.name, type="application/x-fmu-sharedlibrary"
     )
     component.set("source", source)
     component.set("implementation", "CoSimulation")
-    if unit.fmu.description:
-        component.set("description", unit.fmu.description)
-    driven = {wire.input for wire in plan.wires if wire.target == unit.name}
-    shown = [v for v in unit.fmu.of("input") if v.name in driven] + unit.fmu.of("output")
+    if instance.fmu.description:
+        component.set("description", instance.fmu.description)
+    driven = {wire.input for wire in plan.wires if wire.target == instance.name}
+    shown = [v for v in instance.fmu.of("input") if v.name in driven] + instance.fmu.of("output")
     if shown:
         connectors = SubElement(component, f"{{{SSD}}}Connectors")
         for variable in shown:
@@ -222,18 +222,18 @@ def _add_component(
             if variable.type == "Real" and variable.unit in spelled:
                 kind.set("unit", str(variable.unit))
             elif variable.type == "Enumeration":
-                name = f"{unit.name}.{variable.name}"
+                name = f"{instance.name}.{variable.name}"
                 enumerations[name] = variable.items or {}
                 kind.set("name", name)
-    values = {**unit.parameters, **unit.constants}
+    values = {**instance.parameters, **instance.constants}
     if values:
         bindings = SubElement(component, f"{{{SSD}}}ParameterBindings")
         binding = SubElement(bindings, f"{{{SSD}}}ParameterBinding")
-        _add_values(SubElement(binding, f"{{{SSD}}}ParameterValues"), values, unit.fmu, spelled)
-    if unit.period > 1:
+        _add_values(SubElement(binding, f"{{{SSD}}}ParameterValues"), values, instance.fmu, spelled)
+    if instance.period > 1:
         annotation = _annotation(component, OSP_ANNOTATION)
         hint = SubElement(annotation, f"{{{OSP}}}StepSizeHint")
-        hint.set("value", _decimal(unit.period * plan.step))
+        hint.set("value", _decimal(instance.period * plan.step))
 
 
 def _add_values(above: _Element, values: Mapping[str, Value], fmu: Fmu, spelled: Mapping[str, Unit]) -> None:
@@ -263,7 +263,7 @@ def _text(variable: Variable, value: Value) -> str:
 def _spelled_units(plan: Plan) -> dict[str, Unit]:
     """Return the units of measurement in the plan that all FMUs define alike."""
     meant: dict[str, set[Unit | None]] = {}
-    for variable in (v for unit in plan.instances for v in unit.fmu.variables.values() if v.unit):
+    for variable in (v for instance in plan.instances for v in instance.fmu.variables.values() if v.unit):
         meant.setdefault(str(variable.unit), set()).add(measure_of(variable.unit, variable.definition))
     only = {name: next(iter(measures)) for name, measures in sorted(meant.items()) if len(measures) == 1}
     return {name: measure for name, measure in only.items() if measure is not None}
@@ -341,7 +341,7 @@ def for_omsimulator(plan: Plan) -> tuple[Plan, list[str]]:
     Raises:
         WiringError: a connection has a gain or offset beyond unit conversion, which it would silently ignore.
     """
-    fmus = {unit.name: unit.fmu.variables for unit in plan.instances}
+    fmus = {instance.name: instance.fmu.variables for instance in plan.instances}
 
     def by_units(wire: Wire) -> bool:
         source, target = fmus[wire.source][wire.output], fmus[wire.target][wire.input]
@@ -357,27 +357,27 @@ def for_omsimulator(plan: Plan) -> tuple[Plan, list[str]]:
     if problems:
         raise WiringError(problems, code="ssp-unsupported")
     notes = []
-    slow = [unit.name for unit in plan.instances if unit.period > 1]
+    slow = [instance.name for instance in plan.instances if instance.period > 1]
     if slow:
         notes.append(f"OMSimulator has one step for all instances: the steps of {listed(slow)} are omitted")
     texts = [f"{i.name}.{name} = {text!r}" for i in plan.instances for name, text in _texts(i).items()]
     if texts:
         notes.append(f"OMSimulator reads no texts from an archive; set them there: {listed(texts)}")
     wires = tuple(replace(wire, gain=1.0, offset=0.0) for wire in plan.wires)
-    units = tuple(_without_texts(unit) for unit in plan.instances)
-    return replace(plan, instances=units, wires=wires), notes
+    instances = tuple(_without_texts(instance) for instance in plan.instances)
+    return replace(plan, instances=instances, wires=wires), notes
 
 
-def _texts(unit: Instance) -> dict[str, Value]:
+def _texts(instance: Instance) -> dict[str, Value]:
     """Return the texts and enumeration items that differ from the FMU's start values."""
-    values, variables = {**unit.parameters, **unit.constants}, unit.fmu.variables
+    values, variables = {**instance.parameters, **instance.constants}, instance.fmu.variables
     return {k: v for k, v in values.items() if variables[k].type in UNREAD and v != variables[k].start}
 
 
-def _without_texts(unit: Instance) -> Instance:
+def _without_texts(instance: Instance) -> Instance:
     """Return the instance without values that OMSimulator does not read, and with the step of all."""
     parameters, constants = (
-        {name: value for name, value in values.items() if unit.fmu.variables[name].type not in UNREAD}
-        for values in (unit.parameters, unit.constants)
+        {name: value for name, value in values.items() if instance.fmu.variables[name].type not in UNREAD}
+        for values in (instance.parameters, instance.constants)
     )
-    return replace(unit, period=1, parameters=parameters, constants=constants)
+    return replace(instance, period=1, parameters=parameters, constants=constants)

@@ -190,8 +190,8 @@ def _go(course: RunLifecycle, opener: OpenInstance) -> dict[str, Any] | None:
     try:
         course.go(opener)
     except (YawbenchError, Interrupted) as error:
-        unit = getattr(error, "instance", None)
-        return {**error_record(error), "inputs": course.inputs_of(unit) if unit else {}}
+        instance = getattr(error, "instance", None)
+        return {**error_record(error), "inputs": course.inputs_of(instance) if instance else {}}
     except BaseException:
         return {"kind": "", "traceback": traceback.format_exc(), "inputs": {}}
     return None
@@ -300,7 +300,7 @@ class ChildRun(RunLifecycle, FmuProcess):
         self._limit = INITIALIZATION_LIMIT
         self._asked_at: float | None = None  # when a call of initialization exceeded its limit
 
-    def inputs_of(self, unit: str) -> dict[str, Value]:
+    def inputs_of(self, instance: str) -> dict[str, Value]:
         """Return the inputs with which the failed instance was last stepped."""
         return self._inputs
 
@@ -321,8 +321,8 @@ class ChildRun(RunLifecycle, FmuProcess):
             raise self._death(lost) from None
         self._told_end = True
         if ending is not None:
-            reason, unit, at = ending
-            self.ended = EndRequested(reason, instance=unit, time=at)
+            reason, instance, at = ending
+            self.ended = EndRequested(reason, instance=instance, time=at)
         if failed is not None:
             self._inputs = failed["inputs"]
             raise rebuilt(failed) if failed["kind"] else RuntimeError(failed["traceback"])
@@ -346,8 +346,8 @@ class ChildRun(RunLifecycle, FmuProcess):
             case _, [int() as done, int() as total] if kind == PROGRESS:
                 if self._progress is not None:
                     self._progress(done, total)
-            case _, [str() as unit, str() as what] if kind == WHERE:
-                self._where = unit, what
+            case _, [str() as instance, str() as what] if kind == WHERE:
+                self._where = instance, what
             case _, None if kind == WHERE:
                 pass
             case _:
@@ -409,21 +409,21 @@ class ChildRun(RunLifecycle, FmuProcess):
     def _death(self, lost: ProcessLost) -> SimulationError | Interrupted:
         """Return the exception for the death of the child process."""
         completed = self._shared.completed.value
-        unit, doing = self._where or (None, "step" if completed >= 0 else "initialization")
-        if unit is None and len(self._suspects) == 1:
-            unit = self._suspects[0]
-        period = next((u.period for u in self.plan.instances if u.name == unit), 1)
+        instance, doing = self._where or (None, "step" if completed >= 0 else "initialization")
+        if instance is None and len(self._suspects) == 1:
+            instance = self._suspects[0]
+        period = next((u.period for u in self.plan.instances if u.name == instance), 1)
         now = self.plan.time(max(0, completed + 1 - period if (completed + 1) % period == 0 else completed))
         sentence = f"{doing} failed at t = {now:.9g} s: the process of the run {lost}"
-        if unit is not None:
-            sentence = f"{unit}: {sentence}"
+        if instance is not None:
+            sentence = f"{instance}: {sentence}"
         elif self._suspects:
             sentence += (
                 f"; --isolate shows which instance it was (not in Python are {listed(self._suspects)})"
             )
         if self._stop.requested:
-            return self._stop.interrupted(f": {sentence}", unit=unit, time=now)
-        return SimulationError(sentence, instance=unit, time=now, code="fmu-process-died")
+            return self._stop.interrupted(f": {sentence}", instance=instance, time=now)
+        return SimulationError(sentence, instance=instance, time=now, code="fmu-process-died")
 
     def end(self) -> None:
         """Let the child terminate and free the instances; a crash there is only a warning."""
@@ -439,7 +439,9 @@ class ChildRun(RunLifecycle, FmuProcess):
             self._channel.say(FREE)
             self.hear(REPLY)
         except (ProcessLost, OSError) as lost:
-            unit = self._where[0] if self._where else ", ".join(self._suspects) or "the instances"
+            instance = self._where[0] if self._where else ", ".join(self._suspects) or "the instances"
             text = f"while instances were terminated and freed, the process of the run {lost}"
-            self.log.add(unit, WARNING, MASTER, text, self.plan.time(max(0, self._shared.completed.value)))
+            self.log.add(
+                instance, WARNING, MASTER, text, self.plan.time(max(0, self._shared.completed.value))
+            )
         self.close()

@@ -45,16 +45,16 @@ class Fmi2Instance(CtypesInstance):
         "String": ctypes.c_char_p,
     }
 
-    def _instantiate(self, unit: Instance) -> int | None:
+    def _instantiate(self, instance: Instance) -> int | None:
         callbacks = _callbacks()
-        callbacks.componentEnvironment = self._listener = listen(self._log, unit.name, callbacks)
+        callbacks.componentEnvironment = self._listener = listen(self._log, instance.name, callbacks)
         instantiate = self._function("Instantiate")
         instantiate.restype = ctypes.c_void_p
         component: int | None = instantiate(
-            unit.name.encode(),
+            instance.name.encode(),
             fmi2CoSimulation,
-            unit.fmu.guid.encode(),
-            Path(unit.fmu.directory, "resources").absolute().as_uri().encode(),
+            instance.fmu.guid.encode(),
+            Path(instance.fmu.directory, "resources").absolute().as_uri().encode(),
             ctypes.byref(callbacks),
             False,
             True,  # logging on: otherwise PythonFMU passes on no messages at all
@@ -150,17 +150,17 @@ class Fmi3Instance(CtypesInstance):
         "String": ctypes.c_char_p,
     }
 
-    def _instantiate(self, unit: Instance) -> int | None:
-        self._listener = listen(self._log, unit.name)
+    def _instantiate(self, instance: Instance) -> int | None:
+        self._listener = listen(self._log, instance.name)
         self._experiment = ExperimentSetup(0.0, 0.0)
         self._answers = _StepAnswers(reached=math.nan)
-        resources = str(Path(unit.fmu.directory, "resources").absolute()) + os.sep
+        resources = str(Path(instance.fmu.directory, "resources").absolute()) + os.sep
         no, yes = False, True
         instantiate = self._function("InstantiateCoSimulation")
         instantiate.restype = ctypes.c_void_p
         component: int | None = instantiate(
-            unit.name.encode(),
-            unit.fmu.guid.encode(),
+            instance.name.encode(),
+            instance.fmu.guid.encode(),
             resources.encode(),
             no,  # visible
             yes,  # logging
@@ -247,16 +247,16 @@ class KeptInstances:
         """Whether an FMU of another kind has been loaded into this process, which may have changed it."""
         self._idle: dict[tuple[str, Path, str], CtypesInstance] = {}
 
-    def take(self, unit: Instance, log: Log, corrupted: set[Path]) -> CtypesInstance | None:
+    def take(self, planned: Instance, log: Log, corrupted: set[Path]) -> CtypesInstance | None:
         """Return an idle instance for a `plan.Instance`; None if there is none."""
-        instance = self._idle.pop(_known_by(unit), None)
+        instance = self._idle.pop(_known_by(planned), None)
         if instance is not None:
             instance.renew(log, corrupted)
         return instance
 
-    def keep(self, unit: Instance, instance: CtypesInstance) -> None:
+    def keep(self, planned: Instance, instance: CtypesInstance) -> None:
         """Keep an instance that is reset; if there are too many, free the one that was idle for longest."""
-        self._idle[_known_by(unit)] = instance
+        self._idle[_known_by(planned)] = instance
         if len(self._idle) > MOST_KEPT:
             self._idle.pop(next(iter(self._idle))).release()
 
@@ -266,8 +266,8 @@ MOST_KEPT = 200
 _kept: KeptInstances | None = None
 
 
-def _known_by(unit: Instance) -> tuple[str, Path, str]:
-    return unit.fmu.sha256, unit.fmu.directory, unit.name
+def _known_by(instance: Instance) -> tuple[str, Path, str]:
+    return instance.fmu.sha256, instance.fmu.directory, instance.name
 
 
 def keep_instances() -> KeptInstances:
@@ -280,26 +280,26 @@ def keep_instances() -> KeptInstances:
 
 def keeps(plan: Plan) -> bool:
     """Return whether this process keeps the instances of a run, all of which are native."""
-    return _keeping() is not None and all(is_native(unit.fmu.directory) for unit in plan.instances)
+    return _keeping() is not None and all(is_native(instance.fmu.directory) for instance in plan.instances)
 
 
 def _keeping() -> KeptInstances | None:
     return _kept if _kept is not None and _kept.process == os.getpid() else None
 
 
-def open_instance(unit: Instance, log: Log, corrupted: set[Path]) -> CtypesInstance:
+def open_instance(planned: Instance, log: Log, corrupted: set[Path]) -> CtypesInstance:
     """Return the running instance for a `plan.Instance`; arguments and errors as for `CtypesInstance`."""
     kept = _keeping()
-    if kept is not None and (idle := kept.take(unit, log, corrupted)) is not None:
+    if kept is not None and (idle := kept.take(planned, log, corrupted)) is not None:
         return idle
     state = ProcessState()
     try:
-        instance = INSTANCE_TYPES[unit.fmu.fmi](unit, log, corrupted)
+        instance = INSTANCE_TYPES[planned.fmu.fmi](planned, log, corrupted)
     finally:
-        state.restore(unit.name, log)
+        state.restore(planned.name, log)
     if kept is not None:
-        if is_native(unit.fmu.directory):
-            instance.keep = functools.partial(kept.keep, unit)
+        if is_native(planned.fmu.directory):
+            instance.keep = functools.partial(kept.keep, planned)
         else:
             kept.others = True
     return instance

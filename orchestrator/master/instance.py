@@ -129,7 +129,7 @@ class CtypesInstance(FmuInstance, ABC):
     c_types: ClassVar[dict[str, Any]]
     """Type as in the names of setters and getters -> C type."""
 
-    def __init__(self, unit: Instance, log: Log, corrupted: set[Path]) -> None:
+    def __init__(self, instance: Instance, log: Log, corrupted: set[Path]) -> None:
         """Load the library and instantiate.
 
         Args:
@@ -139,30 +139,31 @@ class CtypesInstance(FmuInstance, ABC):
             ModelDescriptionError: the FMU has no loadable library for this platform.
             SimulationError: the FMU refuses to be instantiated.
         """
-        self.name = unit.name
-        self._directory = unit.fmu.directory
+        self.name = instance.name
+        self._directory = instance.fmu.directory
         self.keep: Callable[[CtypesInstance], None] | None = None
         """Callback that takes the instance, reset, when it would be freed."""
         self._component: int | None = None
         self._begin(log, corrupted)
         self._listener = 0
-        self._library = self._load(unit)
+        self._library = self._load(instance)
         if missing := [name for name in CORE[self.version] if not self._has(name)]:
             functions = listed(f"{self.prefix}{name}" for name in missing)
             fmpy.freeLibrary(self._library._handle)
             raise ModelDescriptionError(
-                f"{unit.name}: {unit.fmu.path}: its library lacks {functions}", code="fmu-function-missing"
+                f"{instance.name}: {instance.fmu.path}: its library lacks {functions}",
+                code="fmu-function-missing",
             )
-        self._component = self._instantiate(unit)
+        self._component = self._instantiate(instance)
         if self._component is None:
             self.free()
-            errors = log.errors(unit.name)
+            errors = log.errors(instance.name)
             reason = errors[0].text if errors else "it gave no reason"
-            if unit.fmu.needs_tool:
-                reason += f" (it requires its tool: {unit.fmu.generation_tool or 'not named'})"
+            if instance.fmu.needs_tool:
+                reason += f" (it requires its tool: {instance.fmu.generation_tool or 'not named'})"
             raise SimulationError(
-                f"{unit.name}: {unit.fmu.path} cannot be instantiated: {reason}",
-                instance=unit.name,
+                f"{instance.name}: {instance.fmu.path} cannot be instantiated: {reason}",
+                instance=instance.name,
                 time=0.0,
                 code="fmu-not-loadable",
             )
@@ -179,10 +180,12 @@ class CtypesInstance(FmuInstance, ABC):
         self._begin(log, corrupted)
         relisten(self._listener, log)
 
-    def _load(self, unit: Instance) -> ctypes.CDLL:
-        problem, here = binary_problem(unit.fmu), os.getcwd()
+    def _load(self, instance: Instance) -> ctypes.CDLL:
+        problem, here = binary_problem(instance.fmu), os.getcwd()
         if not problem:
-            file = (unit.fmu.directory / binary_of(self.version, unit.fmu.model_identifier)).absolute()
+            file = (
+                instance.fmu.directory / binary_of(self.version, instance.fmu.model_identifier)
+            ).absolute()
             try:
                 os.chdir(file.parent)  # some FMUs look for further libraries in the working directory
                 return ctypes.CDLL(str(file))
@@ -190,10 +193,12 @@ class CtypesInstance(FmuInstance, ABC):
                 problem = f"its library cannot be loaded: {error}"
             finally:
                 os.chdir(here)
-        raise ModelDescriptionError(f"{unit.name}: {unit.fmu.path}: {problem}", code="fmu-not-loadable")
+        raise ModelDescriptionError(
+            f"{instance.name}: {instance.fmu.path}: {problem}", code="fmu-not-loadable"
+        )
 
     @abstractmethod
-    def _instantiate(self, unit: Instance) -> int | None:
+    def _instantiate(self, instance: Instance) -> int | None:
         """Return the C pointer of the new instance, None if the FMU refuses."""
 
     def connect(self, buffers: Buffers) -> StepCalls:

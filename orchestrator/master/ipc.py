@@ -103,13 +103,13 @@ class LogRelay(Log):
         self._timed = timed
         self._unreported = 0  # dropped messages not passed on yet
 
-    def add(self, unit: str, status: int, category: str, text: str, time: float | None = None) -> None:
+    def add(self, instance: str, status: int, category: str, text: str, time: float | None = None) -> None:
         kept = len(self.messages)
-        super().add(unit, status, category, text, time)
+        super().add(instance, status, category, text, time)
         if len(self.messages) > kept:
             last = self.messages[-1]
             at = last.time if self._timed else None
-            self._channel.send(LOG, (unit, last.status, category, last.text, at))
+            self._channel.send(LOG, (instance, last.status, category, last.text, at))
 
     def drop(self, count: int) -> None:
         super().drop(count)
@@ -140,8 +140,14 @@ class FmuProcess(SupervisedProcess):
         match content:
             case int():
                 self.log.drop(content)
-            case [str() as unit, int() as status, str() as category, str() as text, float() | None as time]:
-                self.log.add(unit, status, category, text, time)
+            case [
+                str() as instance,
+                int() as status,
+                str() as category,
+                str() as text,
+                float() | None as time,
+            ]:
+                self.log.add(instance, status, category, text, time)
             case _:
                 raise ProtocolError("an invalid message")
         return None

@@ -123,30 +123,37 @@ class InstanceProcess(FmuProcess):
 class IsolatedInstance:
     """An instance of an FMU in a process of its own."""
 
-    def __init__(self, unit: Instance, log: Log, process: InstanceProcess) -> None:
+    def __init__(self, instance: Instance, log: Log, process: InstanceProcess) -> None:
         """Have the process load the library and instantiate the FMU.
 
         Raises:
             ModelDescriptionError, SimulationError: as for `CtypesInstance`; also if the process dies.
         """
-        self.name = unit.name
+        self.name = instance.name
         self._log = log
         self._process: InstanceProcess | None = process
         self._stepping = False
         self._part = ""
         self._answered = 0
-        self._prefix, self._real = INSTANCE_TYPES[unit.fmu.fmi].prefix, INSTANCE_TYPES[unit.fmu.fmi].real
+        self._prefix, self._real = (
+            INSTANCE_TYPES[instance.fmu.fmi].prefix,
+            INSTANCE_TYPES[instance.fmu.fmi].real,
+        )
         process.log = log
         try:
             process.wait_until_ready()
         except ProcessLost as lost:
-            raise self._refused(f"{unit.name}: {lost.in_('its start')}") from None
+            raise self._refused(f"{instance.name}: {lost.in_('its start')}") from None
         try:
             # without the hundreds of variables, which the process does not need
-            failed = process.ask("open", replace(unit, fmu=replace(unit.fmu, variables={}), series={}))
+            failed = process.ask(
+                "open", replace(instance, fmu=replace(instance.fmu, variables={}), series={})
+            )
         except ProcessLost as lost:
             reason = lost.in_(f"{self._prefix}Instantiate or before")
-            raise self._refused(f"{unit.name}: {unit.fmu.path} cannot be instantiated: {reason}") from None
+            raise self._refused(
+                f"{instance.name}: {instance.fmu.path} cannot be instantiated: {reason}"
+            ) from None
         if failed is not None:
             process.close()
             raise rebuilt(failed)
@@ -282,24 +289,24 @@ _BYTES = [bytes([parts]) for parts in range(SET + STEP + GET + 1)]
 class Isolation(contextlib.ExitStack):
     """A `run_lifecycle.OpenInstance` that isolates instances; their processes end with the `with` block."""
 
-    def __init__(self, units: Sequence[Instance], limit: float = CALL_LIMIT) -> None:
+    def __init__(self, instances: Sequence[Instance], limit: float = CALL_LIMIT) -> None:
         """Remember the instances, so that their processes can start at the same time.
 
         Args:
             limit: time that a call of an FMU may take [s].
         """
         super().__init__()
-        self._units = units
+        self._units = instances
         self._limit = limit
         self._processes: dict[str, InstanceProcess] = {}
 
-    def __call__(self, unit: Instance, log: Log, corrupted: set[Path]) -> FmuInstance:
+    def __call__(self, instance: Instance, log: Log, corrupted: set[Path]) -> FmuInstance:
         """Return a new isolated instance. Fatal from one does not affect the others: they share nothing."""
         if not self._processes:
             for each in self._units:
                 self._processes[each.name] = process = InstanceProcess(len(each.fmu.variables), self._limit)
                 self.callback(process.close)
-        return IsolatedInstance(unit, log, self._processes[unit.name])
+        return IsolatedInstance(instance, log, self._processes[instance.name])
 
 
 @contextlib.contextmanager
@@ -371,10 +378,10 @@ class InstanceServer:
         self._part.value = 0
         return answer
 
-    def open(self, unit: Instance) -> dict[str, Any] | None:
+    def open(self, instance: Instance) -> dict[str, Any] | None:
         """Instantiate the FMU; return a description of the error if that fails."""
         try:
-            self._instance = open_instance(unit, self._log, set())
+            self._instance = open_instance(instance, self._log, set())
         except YawbenchError as error:
             return error_record(error)
         return None

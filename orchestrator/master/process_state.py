@@ -83,7 +83,7 @@ class Log:
         finally:
             self._muted = False
 
-    def add(self, unit: str, status: int, category: str, text: str, time: float | None = None) -> None:
+    def add(self, instance: str, status: int, category: str, text: str, time: float | None = None) -> None:
         """Add a message; those with the status OK are ignored.
 
         Args:
@@ -92,28 +92,28 @@ class Log:
         status = known(status)
         if status == OK or (self._muted and category not in (MASTER, PROCESS)):
             return
-        self._counts[unit] += 1
-        if self._counts[unit] > KEPT and category not in (MASTER, PROCESS):
+        self._counts[instance] += 1
+        if self._counts[instance] > KEPT and category not in (MASTER, PROCESS):
             self.drop(1)
             return
         at = self.time.value if time is None else time
-        self.messages.append(Message(unit, at, status, category, text[:LONGEST].rstrip()))
+        self.messages.append(Message(instance, at, status, category, text[:LONGEST].rstrip()))
 
     def drop(self, count: int) -> None:
         """Count messages that are not kept."""
         self.dropped += count
 
-    def errors(self, unit: str) -> list[Message]:
+    def errors(self, instance: str) -> list[Message]:
         """Return the messages of an instance with a status worse than Warning, without tracebacks."""
         return [
             m
             for m in self.messages
-            if m.instance == unit and m.status > WARNING and m.category != "traceback"
+            if m.instance == instance and m.status > WARNING and m.category != "traceback"
         ]
 
-    def tracebacks(self, unit: str) -> list[str]:
+    def tracebacks(self, instance: str) -> list[str]:
         """Return the full Python tracebacks that an instance has logged."""
-        return [m.text for m in self.messages if m.instance == unit and m.category == "traceback"]
+        return [m.text for m in self.messages if m.instance == instance and m.category == "traceback"]
 
     def warnings(self, ended_by: str | None = None) -> Iterable[Message]:
         """Return the messages that did not end the run: the master's own first, then those of the FMUs.
@@ -131,14 +131,14 @@ class Log:
         return sorted(chosen, key=lambda m: m.category != MASTER)
 
 
-def describe(unit: str, what: str, time: float, status: int, log: Log) -> str:
+def describe(instance: str, what: str, time: float, status: int, log: Log) -> str:
     """Return an error message: instance, what failed, when, and the reason.
 
     Args:
         what: "step", "initialization", "setting inputs", ...
         time: beginning of the step [s].
     """
-    errors = _latest(unit, log)
+    errors = _latest(instance, log)
     if status != OK and errors and errors[0].time < log.time.value:
         errors = []  # the instance has continued since then
     if status == PENDING and not errors:
@@ -149,13 +149,13 @@ def describe(unit: str, what: str, time: float, status: int, log: Log) -> str:
         ended = (m for m in errors if m.category == PROCESS)  # it already quotes the last error of the FMU
         reason = " ".join(next(ended, errors[0]).text.split())
         if _HAS_TIME.match(reason):  # a component of this project, whose message already has place and time
-            return f"{unit}: {reason.partition('; inputs: ')[0]}"
-    return f"{unit}: {what} failed at t = {time:.9g} s: {reason}"
+            return f"{instance}: {reason.partition('; inputs: ')[0]}"
+    return f"{instance}: {what} failed at t = {time:.9g} s: {reason}"
 
 
-def _latest(unit: str, log: Log) -> list[Message]:
+def _latest(instance: str, log: Log) -> list[Message]:
     """Return the errors that an instance logged at the latest time at which it logged any."""
-    errors = log.errors(unit)
+    errors = log.errors(instance)
     return [m for m in errors if m.time == errors[-1].time]
 
 
@@ -163,21 +163,21 @@ _listeners: dict[int, tuple[Log, str, Any]] = {}
 _numbers = itertools.count(1)
 
 
-def listen(log: Log, unit: str, kept: Any = None) -> int:
+def listen(log: Log, instance: str, kept: Any = None) -> int:
     """Return the number under which `receive` passes messages on to `log`.
 
     Args:
         kept: object to be kept alive until `unlisten` is called with the number.
     """
     number = next(_numbers)
-    _listeners[number] = (log, unit, kept)
+    _listeners[number] = (log, instance, kept)
     return number
 
 
 def relisten(number: int, log: Log) -> None:
     """Pass the messages of an instance on to another log."""
-    _, unit, kept = _listeners[number]
-    _listeners[number] = (log, unit, kept)
+    _, instance, kept = _listeners[number]
+    _listeners[number] = (log, instance, kept)
 
 
 def unlisten(number: int) -> None:
@@ -190,8 +190,8 @@ def receive(number: int, status: int, category: bytes | None, text: bytes | None
     try:
         if number not in _listeners:
             return  # from a thread of an instance already freed
-        log, unit, _ = _listeners[number]
-        log.add(unit, status, _decoded(category), _decoded(text))
+        log, instance, _ = _listeners[number]
+        log.add(instance, status, _decoded(category), _decoded(text))
     except Exception as error:  # must not propagate into the calling C code
         print(f"yawbench: a log message was lost: {error}")
 
@@ -222,13 +222,16 @@ class ProcessState:
         """Return whether rounding, flush-to-zero or traps differ from the snapshot."""
         return _control(_arithmetic()) != _control(self._arithmetic)
 
-    def restore(self, unit: str, log: Log) -> None:
+    def restore(self, instance: str, log: Log) -> None:
         """Restore state that an instance has changed; log a warning the first time."""
         for what in self._restored():
-            if (unit, what) not in self._reported:
-                self._reported.add((unit, what))
+            if (instance, what) not in self._reported:
+                self._reported.add((instance, what))
                 log.add(
-                    unit, WARNING, MASTER, f"it changed {what}, which all instances share; this was undone"
+                    instance,
+                    WARNING,
+                    MASTER,
+                    f"it changed {what}, which all instances share; this was undone",
                 )
 
     def _restored(self) -> Iterator[str]:
@@ -275,9 +278,9 @@ class Copies:
         return bool(self._made[0])
 
 
-def suspects(units: Sequence[Instance]) -> list[str]:
+def suspects(instances: Sequence[Instance]) -> list[str]:
     """Return the instances that may have changed something: the compiled FMUs, or all if none is."""
-    return [u.name for u in units if u.fmu.compiled] or [u.name for u in units]
+    return [u.name for u in instances if u.fmu.compiled] or [u.name for u in instances]
 
 
 def flush_output() -> None:

@@ -80,17 +80,17 @@ class RunLifecycle:
         self._fmu_instances: dict[str, FmuInstance] = {}
         self._copies = Copies()
 
-    def inputs_of(self, unit: str) -> dict[str, Value]:
+    def inputs_of(self, instance: str) -> dict[str, Value]:
         """Return the inputs with which an instance was last stepped."""
-        return {} if self._master is None else self._master.inputs_of(unit)
+        return {} if self._master is None else self._master.inputs_of(instance)
 
     def go(self, opener: OpenInstance) -> None:
         """Open the FMUs, initialize them and step to the end."""
         corrupted: set[Path] = set()
-        for unit in self.plan.instances:
-            for violation in unit.fmu.violations:
-                self.log.add(unit.name, WARNING, MASTER, violation.message, self.plan.time(0))
-            self._fmu_instances[unit.name] = opener(unit, self.log, corrupted)
+        for instance in self.plan.instances:
+            for violation in instance.fmu.violations:
+                self.log.add(instance.name, WARNING, MASTER, violation.message, self.plan.time(0))
+            self._fmu_instances[instance.name] = opener(instance, self.log, corrupted)
             self._copies.end()
             self._returned.value = time.monotonic()
         observed = self._reached, self._copies, self._returned
@@ -194,12 +194,12 @@ class StepClock:
         return 1e-9 * self.total / self.steps
 
 
-def timing(opener: OpenInstance, unit: str, clock: StepClock) -> OpenInstance:
-    """Return an opener that times the instance named `unit`; the results of the run do not change."""
+def timing(opener: OpenInstance, instance: str, clock: StepClock) -> OpenInstance:
+    """Return an opener that times the instance named `instance`; the results of the run do not change."""
 
     def open_timed(planned: Instance, log: Log, corrupted: set[Path]) -> Any:
         fmu_instance: Any = opener(planned, log, corrupted)
-        if planned.name == unit:
+        if planned.name == instance:
             connect = fmu_instance.connect
             fmu_instance.connect = lambda buffers: _timed(connect(buffers), clock)
         return fmu_instance

@@ -273,27 +273,27 @@ def _make_slots(plan: Plan, fmu_instances: Mapping[str, FmuInstance]) -> list[In
     """Return the slots, in evaluation order, without their arrays."""
     driver = {(w.target, w.input): w for w in plan.wires}
     needed = {(w.source, w.output) for w in plan.wires} | set(plan.record)
-    of = {unit.name: unit.fmu.variables for unit in plan.instances}
+    of = {instance.name: instance.fmu.variables for instance in plan.instances}
     to_reals = {(w.source, w.output) for w in plan.wires if of[w.target][w.input].type == "Real"}
     slots = []
-    for position, unit in enumerate(plan.instances):
+    for position, instance in enumerate(plan.instances):
         driven = [
-            (v, driver.get((unit.name, v.name)))
-            for v in unit.fmu.of("input")
-            if (unit.name, v.name) in driver or v.name in unit.constants
+            (v, driver.get((instance.name, v.name)))
+            for v in instance.fmu.of("input")
+            if (instance.name, v.name) in driver or v.name in instance.constants
         ]
-        read = [v for v in unit.fmu.variables.values() if (unit.name, v.name) in needed]
+        read = [v for v in instance.fmu.variables.values() if (instance.name, v.name) in needed]
         slots.append(
             InstanceSlot(
-                unit,
-                fmu_instances[unit.name],
+                instance,
+                fmu_instances[instance.name],
                 position,
                 [v for v, _ in driven if v.type == "Real"],
                 [wire for v, wire in driven if v.type == "Real"],
                 [v for v in read if v.type == "Real"],
                 [(v, w) for v, w in driven if v.type != "Real"],
                 [v for v in read if v.type != "Real"],
-                [v for v in read if v.type != "Real" and (unit.name, v.name) in to_reals],
+                [v for v in read if v.type != "Real" and (instance.name, v.name) in to_reals],
             )
         )
     return slots
@@ -304,7 +304,7 @@ def _allowed_numbers(plan: Plan) -> dict[tuple[str, str], range | frozenset[int]
 
     Numbers that no wire has changed are checked when they are set.
     """
-    of = {unit.name: unit.fmu.variables for unit in plan.instances}
+    of = {instance.name: instance.fmu.variables for instance in plan.instances}
     allowed: dict[tuple[str, str], range | frozenset[int]] = {}
     for wire in plan.wires:
         source, target = of[wire.source][wire.output], of[wire.target][wire.input]

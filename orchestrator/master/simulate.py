@@ -122,8 +122,10 @@ def simulate_in_memory(
 
 def _columns(plan: Plan) -> tuple[list[str], list[bool], dict[str, str | None]]:
     """Return the names of the recorded columns, whether each is Real, and the units of measurement."""
-    units = {unit.name: unit for unit in plan.instances}
-    recorded = {str(signal): units[signal.instance].fmu.variables[signal.variable] for signal in plan.record}
+    instances = {instance.name: instance for instance in plan.instances}
+    recorded = {
+        str(signal): instances[signal.instance].fmu.variables[signal.variable] for signal in plan.record
+    }
     units_of = {"time": "s", **{column: variable.unit for column, variable in recorded.items()}}
     return list(recorded), [variable.type == "Real" for variable in recorded.values()], units_of
 
@@ -245,11 +247,11 @@ class Simulation:
     def _explained(self, error: BaseException | None) -> ErrorRecord | None:
         if error is None:
             return None
-        unit = getattr(error, "instance", None)
+        instance = getattr(error, "instance", None)
         return ErrorRecord(
             message=str(error) or type(error).__name__,
-            unit=unit,
+            unit=instance,
             time=getattr(error, "time", None),
-            inputs=self.course.inputs_of(unit) if unit else {},
-            traceback=self.log.tracebacks(unit) if unit else [],
+            inputs=self.course.inputs_of(instance) if instance else {},
+            traceback=self.log.tracebacks(instance) if instance else [],
         )

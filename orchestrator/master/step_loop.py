@@ -233,9 +233,9 @@ class Master:
             code="process-state-changed",
         )
 
-    def inputs_of(self, unit: str) -> dict[str, Value]:
+    def inputs_of(self, instance: str) -> dict[str, Value]:
         """Return the inputs with which an instance was last stepped."""
-        s = self.signals.of[unit]
+        s = self.signals.of[instance]
         real = {v.name: float(u) for v, u in zip(s.inputs, s.u, strict=True)}
         return real | self.signals.given_others(s)
 
@@ -254,17 +254,17 @@ class Master:
     def _values_of_others(self) -> list[Value]:
         return [self.signals.others[key] for key in self._recorded_others]
 
-    def _check_initialization(self, unit: str, what: str, status: Status) -> None:
+    def _check_initialization(self, instance: str, what: str, status: Status) -> None:
         """Check a call made during initialization, where a logged error counts whatever the status is."""
         self._returned.value = time.monotonic()
         self._copies.end()
-        self._process_state.restore(unit, self.log)
-        status = self.signals.of[unit].fmu_instance.note(status)
-        if status > WARNING or self.log.errors(unit):
+        self._process_state.restore(instance, self.log)
+        status = self.signals.of[instance].fmu_instance.note(status)
+        if status > WARNING or self.log.errors(instance):
             start = self.plan.time(0)
-            raise self._failure(describe(unit, what, start, status, self.log), unit, start)
+            raise self._failure(describe(instance, what, start, status, self.log), instance, start)
         if status == WARNING:
-            self._note_warning(unit, what)
+            self._note_warning(instance, what)
         if self.stop.requested:
             raise self.stop.interrupted("during initialization", time=self.plan.time(0))
 
@@ -284,12 +284,16 @@ class Master:
         sentence = describe(operation.instance, WORDS[kind], time, status, self.log)
         raise self._failure(sentence, operation.instance, time)
 
-    def _end(self, k: int, unit: str, time: float) -> None:
+    def _end(self, k: int, instance: str, time: float) -> None:
         """End the run at the request of an instance: now, or after this step if it completed the step."""
         now = self.log.time.value
-        texts = [" ".join(m.text.split()) for m in self.log.messages if m.instance == unit and m.time >= now]
+        texts = [
+            " ".join(m.text.split()) for m in self.log.messages if m.instance == instance and m.time >= now
+        ]
         reason = f": {texts[-1]}" if texts else ", without a reason"
-        ending = EndRequested(f"{unit} ended the run at t = {time:.9g} s{reason}", instance=unit, time=time)
+        ending = EndRequested(
+            f"{instance} ended the run at t = {time:.9g} s{reason}", instance=instance, time=time
+        )
         if time < self.plan.time(k) - ALMOST * float(self.plan.step):
             raise ending
         self._ending = self._ending or ending
@@ -300,16 +304,16 @@ class Master:
         now = self.plan.time(k - 1)
         return self.stop.interrupted(f"at t = {now:.9g} s", time=now)
 
-    def _failure(self, sentence: str, unit: str, time: float) -> SimulationError | Interrupted:
+    def _failure(self, sentence: str, instance: str, time: float) -> SimulationError | Interrupted:
         """Return the exception for a failed instance: an interruption if a stop was requested."""
         if self.stop.requested:
-            return self.stop.interrupted(f": {sentence}", unit=unit, time=time)
-        return SimulationError(sentence, instance=unit, time=time, code="fmu-call-failed")
+            return self.stop.interrupted(f": {sentence}", instance=instance, time=time)
+        return SimulationError(sentence, instance=instance, time=time, code="fmu-call-failed")
 
-    def _note_warning(self, unit: str, what: str) -> None:
+    def _note_warning(self, instance: str, what: str) -> None:
         """Log the status Warning of an instance that has not logged a message itself."""
-        if not any(m.instance == unit and m.category != MASTER for m in self.log.warnings()):
-            self.log.add(unit, WARNING, "", f"{what}: the FMU returned Warning and gave no reason")
+        if not any(m.instance == instance and m.category != MASTER for m in self.log.warnings()):
+            self.log.add(instance, WARNING, "", f"{what}: the FMU returned Warning and gave no reason")
 
     def _check_finite(self, k: int) -> None:
         """Find the non-finite values that made the sum of all outputs non-finite.
@@ -334,10 +338,12 @@ class Master:
                     f"on the wire {wire.source}.{wire.output} -> {wire.target}.{wire.input}"
                 )
             raise SimulationError(problem, instance=wire.source, time=time, code="value-not-finite")
-        for (unit, name), at in list(self._spare.items()):
+        for (instance, name), at in list(self._spare.items()):
             if not math.isfinite(value := signals.pool[at]):
-                del self._spare[unit, name]
-                self.log.add(unit, WARNING, MASTER, f"{name} is {_spelled(value)}; it is on no wire", time)
+                del self._spare[instance, name]
+                self.log.add(
+                    instance, WARNING, MASTER, f"{name} is {_spelled(value)}; it is on no wire", time
+                )
                 self._expected = self._expected[self._expected != at]
 
 

@@ -292,10 +292,14 @@ def results_to_be(plan: Plan) -> Results:
     from ..results.reader import Results
     from ..results.run_record import FmuRecord, RunRecord
 
-    units = {unit.name: unit for unit in plan.instances}
-    variables = {str(signal): units[signal.instance].fmu.variables[signal.variable] for signal in plan.record}
+    instances = {instance.name: instance for instance in plan.instances}
+    variables = {
+        str(signal): instances[signal.instance].fmu.variables[signal.variable] for signal in plan.record
+    }
     columns = {name: np.empty(0, float if v.type != "String" else str) for name, v in variables.items()}
-    fmus = {name: FmuRecord(name=unit.fmu.name, role=unit.role) for name, unit in units.items()}
+    fmus = {
+        name: FmuRecord(name=instance.fmu.name, role=instance.role) for name, instance in instances.items()
+    }
     run = RunRecord(fmus=fmus, connections=connections_of(plan))
     return Results(Path(), np.empty(0), columns, {n: v.unit or "" for n, v in variables.items()}, run)
 

@@ -91,11 +91,11 @@ class PlausibilityWatch:
 
     def __init__(self, plan: Plan, checks: Iterable[PlausibilityCheck] = CHECKS) -> None:
         results = results_to_be(plan)
-        units = {unit.name: unit.fmu.variables for unit in plan.instances}
+        instances = {instance.name: instance.fmu.variables for instance in plan.instances}
         reals = [
             str(signal_name)
             for signal_name in plan.record
-            if units[signal_name.instance][signal_name.variable].type == "Real"
+            if instances[signal_name.instance][signal_name.variable].type == "Real"
         ]
         index = {column: 1 + k for k, column in enumerate(reals)}
         friction = _highest_friction(plan)
@@ -160,13 +160,13 @@ class _CheckState:
 
 def _ranges(plan: Plan) -> Iterator[PlausibilityCheck]:
     """Yield a check for every recorded output whose range is limited by its FMU or by one that it feeds."""
-    units = {unit.name: unit.fmu.variables for unit in plan.instances}
-    limits = {(unit, name): [units[unit][name]] for unit, name in plan.record}
+    instances = {instance.name: instance.fmu.variables for instance in plan.instances}
+    limits = {(instance, name): [instances[instance][name]] for instance, name in plan.record}
     for wire in plan.wires:
         if (wire.source, wire.output) in limits and not wire.converts:
-            limits[wire.source, wire.output].append(units[wire.target][wire.input])
+            limits[wire.source, wire.output].append(instances[wire.target][wire.input])
     why = "the model description"
-    for (unit, name), variables in limits.items():
+    for (instance, name), variables in limits.items():
         lowest = max((v.minimum for v in variables if v.minimum is not None), default=None)
         highest = min((v.maximum for v in variables if v.maximum is not None), default=None)
         for limit, below in ((lowest, True), (highest, False)):
@@ -175,7 +175,13 @@ def _ranges(plan: Plan) -> Iterator[PlausibilityCheck]:
                 # tolerate rounding
                 rounding = 1e-9 * max(1.0, abs(limit)) * (-1 if below else 1)
                 yield PlausibilityCheck(
-                    "range-left", (f"{unit}.{name}",), itemgetter(0), limit + rounding, message, why, below
+                    "range-left",
+                    (f"{instance}.{name}",),
+                    itemgetter(0),
+                    limit + rounding,
+                    message,
+                    why,
+                    below,
                 )
 
 
@@ -183,10 +189,12 @@ def _highest_friction(plan: Plan) -> float | None:
     """Return the highest constant friction of any instance; None if there is none, or if friction varies."""
     known = [
         float(value)
-        for unit in plan.instances
-        for name, value in unit.constants.items()
+        for instance in plan.instances
+        for name, value in instance.constants.items()
         if name in ("friction", *wheels("friction_*"))
     ]
-    driven = [wire.input for wire in plan.wires] + [name for unit in plan.instances for name in unit.series]
+    driven = [wire.input for wire in plan.wires] + [
+        name for instance in plan.instances for name in instance.series
+    ]
     varies = any(name.startswith("friction") for name in driven)
     return max(known, default=0.0) or None if not varies else None

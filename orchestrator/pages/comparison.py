@@ -80,7 +80,7 @@ def divergence(first: Results, second: Results) -> RunComparison:
         if parting is not None:
             known = by_signal.get(parting.signal)
             by_signal[parting.signal] = parting if known is None else _together(known, parting)
-    order = {unit: i for i, unit in enumerate(first.record.evaluation_order)}
+    order = {instance: i for i, instance in enumerate(first.record.evaluation_order)}
     ranked = sorted(
         by_signal.values(),
         key=lambda p: (p.first, order.get(SignalName.parse(p.signal).instance, len(order))),
@@ -161,7 +161,9 @@ class RecordDifference(NamedTuple):
 def differences(a: RunRecord, b: RunRecord) -> list[RecordDifference]:
     """Return the differences between the records of two runs: scenario, instances, wires, versions."""
     first, second = dict(_facts(a)), dict(_facts(b))
-    exchanged = tuple(f"{unit}." for unit in _names(a) if _names(a)[unit] != _names(b).get(unit))
+    exchanged = tuple(
+        f"{instance}." for instance in _names(a) if _names(a)[instance] != _names(b).get(instance)
+    )
     both = first.keys() & second.keys()
     return [
         RecordDifference(place, first.get(place), second.get(place))
@@ -172,7 +174,7 @@ def differences(a: RunRecord, b: RunRecord) -> list[RecordDifference]:
 
 
 def _names(record: RunRecord) -> dict[str, str]:
-    return {unit: fmu.name for unit, fmu in record.fmus.items()}
+    return {instance: fmu.name for instance, fmu in record.fmus.items()}
 
 
 def _facts(record: RunRecord) -> Iterator[tuple[str, Any]]:
@@ -182,12 +184,12 @@ def _facts(record: RunRecord) -> Iterator[tuple[str, Any]]:
     yield "changed", changed(record.overrides) or None
     for key in OF_RUN:
         yield key, getattr(record, key) if key in record.model_fields_set else None
-    for unit, fmu in record.fmus.items():
-        yield unit, f"{fmu.name} ({fmu.sha256[:8]})"
-        yield f"{unit}.step_size", fmu.step_size
+    for instance, fmu in record.fmus.items():
+        yield instance, f"{fmu.name} ({fmu.sha256[:8]})"
+        yield f"{instance}.step_size", fmu.step_size
         for values in (fmu.defaults, fmu.parameters, fmu.constants):
             for name, value in values.items():
-                yield f"{unit}.{name}", value
+                yield f"{instance}.{name}", value
     for wire in record.connections:
         yield f"{wire.source} -> {wire.target}", "connected"
     for fault in record.faults:

@@ -43,7 +43,7 @@ def system_of(plans: Iterable[Plan]) -> SystemDiagram:
     fmus: dict[str, dict[str, None]] = {}
     wires: dict[tuple[str, str], dict[tuple[str, str], None]] = {}
     for plan in plans:
-        by_name = {unit.name: unit for unit in plan.instances}
+        by_name = {instance.name: instance for instance in plan.instances}
         for name in [*plan.scenario.get("units", {}), *by_name]:
             if name in by_name:
                 fmus.setdefault(name, {})[by_name[name].fmu.name] = None
@@ -64,7 +64,7 @@ def systems_of(plans: Sequence[Plan]) -> list[tuple[SystemDiagram, list[int]]]:
     """Return a diagram for each set of instances that occurs in the plans, with the indices of its plans."""
     groups: dict[frozenset[str], list[int]] = {}
     for number, plan in enumerate(plans):
-        groups.setdefault(frozenset(unit.name for unit in plan.instances), []).append(number)
+        groups.setdefault(frozenset(instance.name for instance in plan.instances), []).append(number)
     return [(system_of([plans[k] for k in numbers]), numbers) for numbers in groups.values()]
 
 

@@ -89,20 +89,20 @@ def fmus_of(runs: Iterable[Results | Plan]) -> Table:
     """Return the table of all FMUs in the runs, taken from their records or plans."""
     by_fmu: dict[tuple[str, str], dict[str, None]] = {}
     for run in runs:
-        for unit, name, sha256 in _fmus_in(run):
-            by_fmu.setdefault((name, sha256), {})[unit] = None
+        for instance, name, sha256 in _fmus_in(run):
+            by_fmu.setdefault((name, sha256), {})[instance] = None
     ordered = sorted(by_fmu.items(), key=lambda item: (min(item[1]), item[0][0]))
-    rows = [(name, ", ".join(units), sha256) for (name, sha256), units in ordered]
+    rows = [(name, ", ".join(instances), sha256) for (name, sha256), instances in ordered]
     return Table("", ["FMU", "as", "SHA-256"], [*rows])
 
 
 def _fmus_in(run: Results | Plan) -> Iterator[tuple[str, str, str]]:
     """Yield instance, FMU and its hash."""
     if isinstance(run, Plan):
-        yield from ((unit.name, unit.fmu.name, unit.fmu.sha256) for unit in run.instances)
+        yield from ((instance.name, instance.fmu.name, instance.fmu.sha256) for instance in run.instances)
     else:
-        for unit, fmu in run.record.fmus.items():
-            yield unit, fmu.name or unit, fmu.sha256
+        for instance, fmu in run.record.fmus.items():
+            yield instance, fmu.name or instance, fmu.sha256
 
 
 def programs_of(runs: Iterable[Results | Plan]) -> dict[str, str]:
@@ -312,32 +312,32 @@ def groups_of(runs: Sequence[tuple[RunRecord, Plan]]) -> list[ParameterGroup]:
     constants = ParameterGroup("Constant inputs", "driven by no instance")
     order: dict[str, None] = {}
     for record, plan in runs:
-        by_name = {unit.name: unit for unit in plan.instances if unit.name in record.fmus}
+        by_name = {instance.name: instance for instance in plan.instances if instance.name in record.fmus}
         instances = record.scenario.get("units", {})
         for name in [name for name in instances if name in by_name]:
             order[name] = None
-            unit, fmu = by_name[name], record.fmus[name]
+            instance, fmu = by_name[name], record.fmus[name]
             own = units.setdefault(
-                (name, fmu.name), ParameterGroup(f"{name}: {fmu.name}", unit.fmu.description)
+                (name, fmu.name), ParameterGroup(f"{name}: {fmu.name}", instance.fmu.description)
             )
             values = fmu.defaults | fmu.parameters
             own_names = instances[name].get("parameters", {})
             of_vehicle = record.scenario.get("vehicle_parameters", {}).keys() - own_names
-            for variable in unit.fmu.of("parameter"):
+            for variable in instance.fmu.of("parameter"):
                 if variable.name not in values:
                     continue
                 group = _vehicle_group(vehicles, record) if variable.name in of_vehicle else own
-                default = _default(record, unit, variable)
+                default = _default(record, instance, variable)
                 value, source = text_of(values[variable.name]), record.source(name, variable.name)
                 group.note(variable.name, variable, variable.description, value, source, default)
-            _constants(constants, record, unit)
+            _constants(constants, record, instance)
     ordered = [units[key] for name in order for key in units if key[0] == name]
     return [group for group in (*vehicles.values(), *ordered, constants) if group.parameters]
 
 
-def _default(record: RunRecord, unit: Instance, variable: Variable) -> ValueSource:
+def _default(record: RunRecord, instance: Instance, variable: Variable) -> ValueSource:
     """Return the source of a variable's default, which only the FMU of the run knows."""
-    same = record.fmus[unit.name].sha256 == unit.fmu.sha256
+    same = record.fmus[instance.name].sha256 == instance.fmu.sha256
     return ValueSource.parse(variable.source) if same else NOT_RECORDED
 
 
@@ -352,24 +352,24 @@ def _vehicle_group(vehicles: dict[str, ParameterGroup], record: RunRecord) -> Pa
     return vehicles.setdefault(str(file), ParameterGroup(f"The car: {title}", f"{file.name}; {source}"))
 
 
-def _constants(group: ParameterGroup, record: RunRecord, unit: Instance) -> None:
+def _constants(group: ParameterGroup, record: RunRecord, instance: Instance) -> None:
     """Add the constants of an instance; four equal wheels become one name that ends with `*`."""
-    fmu = record.fmus[unit.name]
+    fmu = record.fmus[instance.name]
     texts = {name: text_of(value) for name, value in fmu.constants.items()}
     texts |= {name: f"{series.file}: {series.column}" for name, series in fmu.series.items()}
     alike: dict[str, list[str]] = {}
-    for name in dict.fromkeys((*unit.constants, *unit.fmu.variables)):
+    for name in dict.fromkeys((*instance.constants, *instance.fmu.variables)):
         if name in texts:
             alike.setdefault(texts[name], []).append(name)
     for value_text, names in alike.items():
         for name in fold(names):
             first = name.removesuffix("*") + WHEELS[0] if name.endswith("*") else name
-            variable = unit.fmu.variables[first]
+            variable = instance.fmu.variables[first]
             meaning = variable.description
             if first != name:
                 meaning = meaning.removesuffix(f", {WHEEL_NAMES[WHEELS[0]]}")
-            source, default = record.source(unit.name, first), _default(record, unit, variable)
-            group.note(f"{unit.name}.{name}", variable, meaning, value_text, source, default)
+            source, default = record.source(instance.name, first), _default(record, instance, variable)
+            group.note(f"{instance.name}.{name}", variable, meaning, value_text, source, default)
 
 
 def text_of(value: Value | None) -> str:

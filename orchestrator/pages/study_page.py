@@ -171,7 +171,7 @@ def plans_of(findings: ExperimentResult) -> list[tuple[Job, tuple[LoadedScenario
     """Return jobs with scenario and plan: all named runs; along axes the first with each set of FMUs."""
     jobs: dict[Any, Job] = {}
     for job in findings.planned.jobs if findings.planned else ():
-        fmus = tuple(unit.fmu.sha256 for unit in job.plan.instances) if job.plan else ()
+        fmus = tuple(instance.fmu.sha256 for instance in job.plan.instances) if job.plan else ()
         jobs.setdefault((job.scenario, fmus) if findings.spec.axes else job.label, job)
     planner = Planner()
     return [

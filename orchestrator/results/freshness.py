@@ -49,7 +49,7 @@ def run_record(plan: Plan, *, status: RunStatus, started: datetime) -> RunRecord
         status: of the run at that time.
         started: when the run began, with a time zone.
     """
-    units = {unit.name: unit for unit in plan.instances}
+    instances = {instance.name: instance for instance in plan.instances}
     sources: dict[ValueSource, int] = {}
     record = RunRecord(
         status=status,
@@ -63,10 +63,12 @@ def run_record(plan: Plan, *, status: RunStatus, started: datetime) -> RunRecord
         start_time=plan.time(0),
         stop_time=plan.time(plan.n_steps),
         ended=None,
-        evaluation_order=list(units),
+        evaluation_order=list(instances),
         units=units_of(plan),
-        texts=[str(n) for n in plan.record if units[n.instance].fmu.variables[n.variable].type == "String"],
-        fmus={name: _fmu(unit, plan, sources) for name, unit in units.items()},
+        texts=[
+            str(n) for n in plan.record if instances[n.instance].fmu.variables[n.variable].type == "String"
+        ],
+        fmus={name: _fmu(instance, plan, sources) for name, instance in instances.items()},
         sources=[SourceRecord(**asdict(source)) for source in sources],
         changes=[OverrideRecord.model_validate(change.record) for change in plan.changes],
         connections=connections_of(plan),
@@ -81,17 +83,17 @@ def run_record(plan: Plan, *, status: RunStatus, started: datetime) -> RunRecord
 
 def units_of(plan: Plan) -> dict[str, str | None]:
     """Return the units of time and of all recorded columns."""
-    units = {unit.name: unit for unit in plan.instances}
+    instances = {instance.name: instance for instance in plan.instances}
     columns = {
-        str(signal): units[signal.instance].fmu.variables[signal.variable].unit for signal in plan.record
+        str(signal): instances[signal.instance].fmu.variables[signal.variable].unit for signal in plan.record
     }
     return {"time": "s", **columns}
 
 
 def connections_of(plan: Plan) -> list[ConnectionRecord]:
     """Return the wires of a plan: source, target, and the conversion if there is one."""
-    units = {unit.name: unit for unit in plan.instances}
-    return [_connection(wire, units) for wire in plan.wires]
+    instances = {instance.name: instance for instance in plan.instances}
+    return [_connection(wire, instances) for wire in plan.wires]
 
 
 def faults_of(plan: Plan) -> list[FaultRecord]:
@@ -105,27 +107,27 @@ def faults_of(plan: Plan) -> list[FaultRecord]:
     return list(records.values())
 
 
-def _connection(wire: Wire, units: Mapping[str, Instance]) -> ConnectionRecord:
+def _connection(wire: Wire, instances: Mapping[str, Instance]) -> ConnectionRecord:
     ends = ConnectionRecord(
         source=SignalName(wire.source, wire.output), target=SignalName(wire.target, wire.input)
     )
     if wire.converts:
         ends.gain, ends.offset = wire.gain, wire.offset
-        if unit := units[wire.target].fmu.variables[wire.input].unit:
+        if unit := instances[wire.target].fmu.variables[wire.input].unit:
             ends.unit = unit
     if wire.delayed:
         ends.delay = "1 step"
     return ends
 
 
-def _fmu(unit: Instance, plan: Plan, sources: dict[ValueSource, int]) -> FmuRecord:
+def _fmu(instance: Instance, plan: Plan, sources: dict[ValueSource, int]) -> FmuRecord:
     """Return the record of an instance; adds the sources of its values, with their index."""
-    fmu = unit.fmu
+    fmu = instance.fmu
     how = fmu.runs_as or runs_as(fmu.path)
-    sourced = {name: origin.source for name, origin in unit.origins.items() if origin.source is not None}
+    sourced = {name: origin.source for name, origin in instance.origins.items() if origin.source is not None}
     record = FmuRecord(
         name=fmu.name,
-        role=unit.role,
+        role=instance.role,
         file=fmu.path.name,
         sha256=fmu.sha256,
         guid=fmu.guid,
@@ -133,16 +135,16 @@ def _fmu(unit: Instance, plan: Plan, sources: dict[ValueSource, int]) -> FmuReco
         fmi_version=f"{fmu.fmi}.0",
         built=None if fmu.built is None else asdict(fmu.built),
         runs_as=str(how) if how else None,
-        step_size=float(unit.period * plan.step),
-        tolerance=unit.tolerance or fmu.tolerance,
-        parameters=dict(unit.parameters),
-        origins={name: str(origin) for name, origin in unit.origins.items() if origin != DEFAULT},
+        step_size=float(instance.period * plan.step),
+        tolerance=instance.tolerance or fmu.tolerance,
+        parameters=dict(instance.parameters),
+        origins={name: str(origin) for name, origin in instance.origins.items() if origin != DEFAULT},
         sources={name: sources.setdefault(source, len(sources)) for name, source in sourced.items()},
-        defaults={v.name: v.start for v in fmu.of("parameter") if v.name not in unit.parameters},
-        constants={name: value for name, value in unit.constants.items() if name not in unit.series},
+        defaults={v.name: v.start for v in fmu.of("parameter") if v.name not in instance.parameters},
+        constants={name: value for name, value in instance.constants.items() if name not in instance.series},
     )
-    if unit.series:
-        record.series = {name: _series(series) for name, series in unit.series.items()}
+    if instance.series:
+        record.series = {name: _series(series) for name, series in instance.series.items()}
     return record
 
 
@@ -214,7 +216,7 @@ class _Described:
         self._described: list[dict[str, Any]] = []
 
     def of(self, plan: Plan) -> list[dict[str, Any]]:
-        fmus = [unit.fmu for unit in plan.instances]
+        fmus = [instance.fmu for instance in plan.instances]
         if not (plan.wires is self._wires and all(map(is_, fmus, self._fmus))):
             self._wires, self._fmus = plan.wires, fmus
             records = connections_of(plan)
@@ -290,13 +292,13 @@ def _reason(plan: Plan, recorded: RunRecord) -> str:
     for key, sentence in COMPARED.items():
         if getattr(recorded, key) != getattr(planned, key):
             return sentence
-    for unit, fmu in planned.fmus.items():
-        known = recorded.fmus.get(unit, FmuRecord())
+    for instance, fmu in planned.fmus.items():
+        known = recorded.fmus.get(instance, FmuRecord())
         if known.sha256 != fmu.sha256:
-            return f"{unit}: another {fmu.name}.fmu"
+            return f"{instance}: another {fmu.name}.fmu"
         for key, words in _OF_UNIT.items():
             if getattr(known, key) != getattr(fmu, key):
-                return f"{unit}: other {words}"
+                return f"{instance}: other {words}"
     for program in (*PROGRAMS, "orchestrator"):
         version, earlier = planned.versions[program], recorded.versions.get(program, "an unknown one")
         if version != earlier:

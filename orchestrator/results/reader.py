@@ -208,8 +208,8 @@ class Results:
             return [variable]
         columns = [column for column, name in self.names.items() if name.variable == variable]
         if role is not None:
-            units = self.instances_of_role(role)
-            columns = [column for column in columns if self.names[column].instance in units]
+            instances = self.instances_of_role(role)
+            columns = [column for column in columns if self.names[column].instance in instances]
         return columns if columns or role is not None else self._feeding(variable)
 
     def _feeding(self, variable: str) -> list[str]:

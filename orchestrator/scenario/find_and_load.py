@@ -65,7 +65,7 @@ def load_scenario(
     vehicle = schema_validation.validate(Vehicle, vehicle_document)
     if isinstance(document.data, dict):
         _check_time_grid(document)
-        _check_unit_names(document)
+        _check_instance_names(document)
     tyres = _read_tyres(file, vehicle, document, vehicle_document)
     errors = document.sorted_errors() + vehicle_document.sorted_errors()
     if errors or file is None or vehicle is None:
@@ -149,10 +149,10 @@ def _check_time_grid(document: Document) -> None:
         )
         return
     times: list[tuple[KeyPath, object]] = [(("stop_time",), None if stop is None else stop - (start or 0))]
-    units = data.get("units")
-    for name, unit in units.items() if isinstance(units, dict) else ():
-        if isinstance(unit, dict):
-            times.append((("units", name, "step_size"), unit.get("step_size")))
+    instances = data.get("units")
+    for name, instance in instances.items() if isinstance(instances, dict) else ():
+        if isinstance(instance, dict):
+            times.append((("units", name, "step_size"), instance.get("step_size")))
     for key, value in times:
         time = _seconds(value)
         if time is None or time % step == 0:
@@ -194,11 +194,11 @@ def _read(parse: Callable[[object], Fraction], value: object) -> Fraction | None
         return None
 
 
-def _check_unit_names(document: Document) -> None:
+def _check_instance_names(document: Document) -> None:
     """Report every instance that is named in `connections` or `record` but does not exist."""
     data = document.data
-    units = data.get("units")
-    if not isinstance(units, dict):
+    instances = data.get("units")
+    if not isinstance(instances, dict):
         return
     named: list[tuple[KeyPath, object]] = []
     connections, record = data.get("connections"), data.get("record")
@@ -207,16 +207,16 @@ def _check_unit_names(document: Document) -> None:
             named += [(("connections", i, end), connection.get(end)) for end in ("from", "to")]
     named += [(("record", i), item) for i, item in enumerate(record if isinstance(record, list) else ())]
     for key, value in named:
-        for unit in _units_in(value):
-            if unit not in units and not (unit == "*" and key[0] == "record"):
+        for instance in _instances_in(value):
+            if instance not in instances and not (instance == "*" and key[0] == "record"):
                 document.report(
                     key,
-                    f"there is no instance {unit!r}{hint(unit, units, lead='instances')}",
+                    f"there is no instance {instance!r}{hint(instance, instances, lead='instances')}",
                     "instance-unknown",
                 )
 
 
-def _units_in(value: object) -> list[str]:
+def _instances_in(value: object) -> list[str]:
     """Return the instances that an end of a connection names; none if it is malformed."""
     if isinstance(value, list):
         return [name for name in value if isinstance(name, str)]

@@ -58,9 +58,9 @@ def read_changes(
     changes: list[Override] = []
     errors: list[str | Diagnostic] = []
     for text in swaps:
-        unit, equals, fmu = (part.strip() for part in text.partition("="))
-        if unit and equals and fmu:
-            changes += swap_of(unit, fmu, "--swap")
+        instance, equals, fmu = (part.strip() for part in text.partition("="))
+        if instance and equals and fmu:
+            changes += swap_of(instance, fmu, "--swap")
         else:
             errors.append(f"--swap {text}: write --swap INSTANCE=FMU")
     for text in settings:
@@ -140,8 +140,8 @@ def changes_of(
         setting(target, str(folder / str(value)) if target.kind == "tyres" else value, origin)
         for target, value in settings.items()
     ]
-    for unit, text in swaps.items():
-        fmu, *brought = swap_of(unit, text, origin)
+    for instance, text in swaps.items():
+        fmu, *brought = swap_of(instance, text, origin)
         path = str(folder / str(fmu.value)) if is_path(str(fmu.value)) else fmu.value
         changes += [replace(fmu, value=path), *brought]
     return changes
@@ -157,16 +157,16 @@ def changes_of_run(spec: Any, origin: OverrideOrigin) -> list[Override]:
     ]
 
 
-def swap_of(unit: str, text: str, origin: OverrideOrigin) -> list[Override]:
+def swap_of(instance: str, text: str, origin: OverrideOrigin) -> list[Override]:
     """Parse `fmu:parameter=value:parameter=value` for an instance into overrides, its FMU first."""
     match = re.fullmatch(r"(.*?)((?::\w+=[^:]*)*)", text, re.DOTALL)
     assert match is not None
     parameters = (part.partition("=") for part in match[2].split(":")[1:])
     brought = [
-        Override(Target.of_instance(unit, name), yaml_lines.scalar(value), origin)
+        Override(Target.of_instance(instance, name), yaml_lines.scalar(value), origin)
         for name, _, value in parameters
     ]
-    return [Override(Target.of_instance(unit), match[1], origin), *brought]
+    return [Override(Target.of_instance(instance), match[1], origin), *brought]
 
 
 def apply_changes(
@@ -181,10 +181,10 @@ def apply_changes(
     """
     replaced: dict[str, str] = {}
     effective: list[Override] = []
-    units = _mapping(document.data, "units")
+    instances = _mapping(document.data, "units")
     for change in {change.target: change for change in changes}.values():
         kind, holder, name = change.target.kind, change.target.instance, change.target.variable
-        spec = units.get(holder)
+        spec = instances.get(holder)
         if kind in ("run", "fact"):
             differs = _put(document, (name,), change)
         elif kind == "vehicle_file":
@@ -198,7 +198,7 @@ def apply_changes(
         elif kind == "input":
             differs = _put(document, (INPUTS, name), change)
         elif not isinstance(spec, dict):
-            known = (*units, VEHICLE, INPUTS) if name else units
+            known = (*instances, VEHICLE, INPUTS) if name else instances
             sentence = f"the scenario has no instance {holder!r}{hint(holder, known, lead='it has')}"
             document.add(Diagnostic("instance-unknown", sentence, location=Location(target=str(change))))
             continue
@@ -282,11 +282,11 @@ def apply_to_all_runs(document: Document, changes: Iterable[Override]) -> None:
             _put(document, ("swap" if change.swaps else "set", target), change)
 
 
-def _swap(document: Document, unit: str, change: Override) -> bool:
+def _swap(document: Document, instance: str, change: Override) -> bool:
     """Replace the FMU of an instance; return whether it differs."""
     fmu = str(change.value)
-    key: KeyPath = ("units", unit, "fmu")
-    before = document.data["units"][unit].get("fmu")
+    key: KeyPath = ("units", instance, "fmu")
+    before = document.data["units"][instance].get("fmu")
     if is_path(fmu):
         fmu = os.path.abspath(fmu)
         own = isinstance(before, str) and os.path.abspath(document.path.parent / before)

@@ -135,7 +135,7 @@ SourceEndpoint = Annotated[
     WithJsonSchema({"anyOf": [*_ENDS, {"type": "null"}]}),
 ]
 TargetEndpoint = Annotated[SignalName | list[str], PlainValidator(_end), WithJsonSchema({"anyOf": _ENDS})]
-UnitName = Annotated[
+InstanceName = Annotated[
     str,
     AfterValidator(_unit_name),
     WithJsonSchema({"type": "string", "pattern": rf"^(?!({'|'.join(RESERVED)})$)[A-Za-z_][A-Za-z0-9_]*$"}),
@@ -157,7 +157,7 @@ ParameterValue = Annotated[
 ]
 
 
-class UnitSpec(StrictModel):
+class InstanceSpec(StrictModel):
     """An instance of an FMU."""
 
     fmu: str = Field(description="Name of an FMU in fmus/, or the path of any .fmu", min_length=1)
@@ -303,7 +303,7 @@ class ScenarioSpec(StrictModel):
     friction: Friction | None = Field(None, description="Friction of the road, for all instances that use it")
     speed: Speed | None = Field(None, description="m/s, initial speed, and target of the driver")
     inputs: dict[str, InputValue] = Field({}, description="[instance.]pattern -> constant or time series")
-    units: dict[UnitName, UnitSpec] = Field(description="Name -> instance", min_length=1)
+    units: dict[InstanceName, InstanceSpec] = Field(description="Name -> instance", min_length=1)
     connections: list[Connection] = Field([], description="Connections beyond equal names")
     record: list[Variables] | None = Field(
         None, description="instance.pattern, *.pattern for all instances; default: all outputs but text"

@@ -127,7 +127,7 @@ def _scenario(archive: SspArchive, document: Document) -> dict[str, Any]:
     if system is None:
         raise SspError(f"{DESCRIPTION_FILE} contains no system")
     structure = read_structure(archive, system)
-    names = _unit_names(structure, document)
+    names = _instance_names(structure, document)
     values = read_values(archive, structure)
     if values.unknown:
         shown = listed(fold(list(dict.fromkeys(values.unknown))))
@@ -137,15 +137,15 @@ def _scenario(archive: SspArchive, document: Document) -> dict[str, Any]:
     connections, driven = _connections(structure, names)
     by_end = {end: ssp_value for end, ssp_value in by_end.items() if end not in driven}
 
-    units: dict[str, Any] = {}
+    instances: dict[str, Any] = {}
     inputs: dict[str, Any] = {}
     for path, component in structure.components.items():
         name = names[path]
-        units[name] = {"fmu": f"{archive.path.name}/{component.member}", "parameters": {}}
+        instances[name] = {"fmu": f"{archive.path.name}/{component.member}", "parameters": {}}
         document.lines[("units", name)] = component.element.sourceline or 1
         hint = component.element.find(f".//{{{OSP}}}StepSizeHint")
         if hint is not None:
-            units[name]["step_size"] = number(hint, "value")
+            instances[name]["step_size"] = number(hint, "value")
     for (path, variable), ssp_value in by_end.items():
         if path not in structure.components:
             continue
@@ -154,11 +154,11 @@ def _scenario(archive: SspArchive, document: Document) -> dict[str, Any]:
         if declared is not None and declared.causality == "input":
             inputs[f"{names[path]}.{variable}"] = value
         else:
-            units[names[path]]["parameters"][variable] = value
+            instances[names[path]]["parameters"][variable] = value
     return {
         "title": _title(root),
         "source": root.get("description", ""),
-        "units": units,
+        "units": instances,
         "connections": connections,
         "inputs": inputs,
     } | _experiment(root)
@@ -171,7 +171,7 @@ def _title(root: _Element) -> str:
     return str(name if own is None else own.get("title", name))
 
 
-def _unit_names(structure: SspStructure, document: Document) -> dict[ElementPath, str]:
+def _instance_names(structure: SspStructure, document: Document) -> dict[ElementPath, str]:
     """Return the instance name of each component: that in the archive, changed where it is not allowed."""
     names: dict[ElementPath, str] = {}
     for path, component in structure.components.items():

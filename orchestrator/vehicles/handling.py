@@ -119,18 +119,18 @@ class TestTrack:
         open_role(
             self.tyres, "tyre", KNOWN_BY, near=self.scenario_path, fmus=self.fmus, opener=self.planner.opener
         )
-        units: dict[str, Any] = {"driver": dict(driver)}
+        instances: dict[str, Any] = {"driver": dict(driver)}
         plant: dict[str, Any] = {"fmu": self._named(self.plant), "parameters": of_plant}
         inputs: dict[str, Any] = {}
         connections = []
         if self.has(TORQUES):
-            units["allocator"] = {"fmu": "allocator_load_proportional"}
-            units["wheel_control"] = {"fmu": "wheel_control_hydraulic"}
+            instances["allocator"] = {"fmu": "allocator_load_proportional"}
+            instances["wheel_control"] = {"fmu": "wheel_control_hydraulic"}
             connections.append({"from": "wheel_control.torque_request_*", "to": "plant.wheel_torque_*"})
             inputs["allocator.yaw_moment"] = 0.0
         if self.has("yaw_moment"):
             inputs["plant.yaw_moment"] = 0.0
-        units |= {"plant": plant, "tyre": {"fmu": self._named(self.tyres)}}
+        instances |= {"plant": plant, "tyre": {"fmu": self._named(self.tyres)}}
         data = {
             "title": Path(self.vehicle).name,
             "vehicle": os.path.abspath(self.vehicle),
@@ -138,7 +138,7 @@ class TestTrack:
             "speed": speed,
             "step_size": STEP,
             "stop_time": round(round(stop_time / STEP) * STEP, 6),
-            "units": units,
+            "units": instances,
             "inputs": inputs,
             "connections": connections,
         }

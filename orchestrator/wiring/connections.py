@@ -52,7 +52,7 @@ class Connector:
         """
         wires = self._by_connections()
         self._put_in_order()
-        own = {target for target, constant in by_input.items() if constant.of_unit}
+        own = {target for target, constant in by_input.items() if constant.of_instance}
         self._note_overruled(own - wires.keys())
         ambiguous = self._by_names(wires, own | self._refused)
         self._refuse_overruled(by_input, wires)
@@ -270,7 +270,7 @@ class Connector:
             wire, constant = wires[target][0], by_input[target]
             if constant.of_fact:
                 continue
-            unless = "" if constant.of_unit else f", unless its key names {wire.target}"
+            unless = "" if constant.of_instance else f", unless its key names {wire.target}"
             driven = f"{wire.target}.{wire.input} is driven by {wire.source}.{wire.output}"
             self._report(
                 constant.key,

@@ -39,14 +39,14 @@ class Constant:
     value: Value | InputSeries
     key: KeyPath
     origin: ValueOrigin
-    of_unit: bool  # the key names the instance, so it takes precedence over equal names
+    of_instance: bool  # the key names the instance, so it takes precedence over equal names
     exact: bool  # the key is not a pattern
     precedence: int = INPUTS
 
     @property
     def rank(self) -> tuple[int, bool, bool]:
         """Sort key: by precedence, then names before patterns, then keys with the instance before others."""
-        return self.precedence, self.exact, self.of_unit
+        return self.precedence, self.exact, self.of_instance
 
     @property
     def of_fact(self) -> bool:
@@ -65,8 +65,8 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
     for pattern, raw in scenario.inputs.items():
         key: KeyPath = ("inputs", pattern)
         prefix, name_pattern = SignalName.parse_input(pattern, fmus)
-        of_unit = prefix in fmus
-        instances = [prefix] if of_unit else list(fmus)
+        of_instance = prefix in fmus
+        instances = [prefix] if of_instance else list(fmus)
         parts = {
             (u, name): part
             for u in instances
@@ -95,12 +95,12 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
                 system.report(key, f"{error}, for {instance}.{name}", code_of(error))
             precedence = CHANGED_INPUTS if fact_changed and scenario.document.override(key) else INPUTS
             given_by = origin(scenario, key)
-            constant = Constant(value, key, given_by, of_unit, "*" not in pattern, precedence)
+            constant = Constant(value, key, given_by, of_instance, "*" not in pattern, precedence)
             other = by_input.setdefault((instance, name), constant)
             if other.rank < constant.rank:
                 by_input[instance, name] = constant
-            elif other.of_fact and of_unit:  # the overridden fact replaces a constant of the instance
-                by_input[instance, name] = replace(other, of_unit=True)
+            elif other.of_fact and of_instance:  # the overridden fact replaces a constant of the instance
+                by_input[instance, name] = replace(other, of_instance=True)
             elif other.rank == constant.rank and other is not constant:
                 system.report(
                     key,

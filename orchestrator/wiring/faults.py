@@ -27,23 +27,27 @@ def faults_of(
     for i, fault in enumerate(spec.fault for spec in scenario.faults):
         key: KeyPath = ("faults", i)
         at = _Finder(system, wires, record, key).at(fault)
-        for unit, name, of_output in at:
-            variable = system.fmus[unit].variables[name]
+        for instance, name, of_output in at:
+            variable = system.fmus[instance].variables[name]
             if variable.type != "Real":
                 system.report(
-                    (*key, "on"), f"{unit}.{name} is {variable.type}: faults are for Real", "fault-invalid"
+                    (*key, "on"),
+                    f"{instance}.{name} is {variable.type}: faults are for Real",
+                    "fault-invalid",
                 )
                 continue
             try:
                 value = _value(fault, variable)
             except ValueError as error:
-                system.report((*key, "value"), f"{unit}.{name}: {error}", "fault-invalid")
+                system.report((*key, "value"), f"{instance}.{name}: {error}", "fault-invalid")
                 continue
-            before = sum((f.instance, f.variable, f.of_output) == (unit, name, of_output) for f in signals)
-            text = f"{fault.seed or 0} {unit}.{name} {of_output} {before}"
+            before = sum(
+                (f.instance, f.variable, f.of_output) == (instance, name, of_output) for f in signals
+            )
+            text = f"{fault.seed or 0} {instance}.{name} {of_output} {before}"
             stream = int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big")
             drawn = KINDS[fault.kind].drawn
-            signals.append(FaultySignal(fault, unit, name, of_output, value, stream if drawn else 0))
+            signals.append(FaultySignal(fault, instance, name, of_output, value, stream if drawn else 0))
         if at and fault.begin >= scenario.stop_time:
             ends = f"the run ends at {float(scenario.stop_time):g} s"
             sentence = f"{_said(scenario, key)} never acts: it begins at {fault.begin:g} s, {ends}"
@@ -93,10 +97,10 @@ class _Finder:
     def at(self, fault: Fault) -> list[tuple[str, str, bool]]:
         """Return (instance, variable, whether it is an output) of everything that the fault acts on."""
         location = fault.on
-        for unit in filter(None, (location.instance, location.target)):
-            if unit not in self.system.fmus:
+        for instance in filter(None, (location.instance, location.target)):
+            if instance not in self.system.fmus:
                 self._report(
-                    f"there is no instance {unit!r}{hint(unit, self.system.fmus, lead='instances')}",
+                    f"there is no instance {instance!r}{hint(instance, self.system.fmus, lead='instances')}",
                     "instance-unknown",
                 )
                 return []
@@ -105,24 +109,24 @@ class _Finder:
         signal = location.instance, location.variable
         return self._on_outputs(*signal) or self._on_inputs(*signal)
 
-    def _on_outputs(self, unit: str, pattern: str) -> list[tuple[str, str, bool]]:
-        names = matching(pattern, self.system.outputs[unit]).values()
+    def _on_outputs(self, instance: str, pattern: str) -> list[tuple[str, str, bool]]:
+        names = matching(pattern, self.system.outputs[instance]).values()
         used = {(w.source, w.output) for w in self.wires} | self.record
-        if names and not any((unit, name) in used for name in names):
-            self._report(f"{unit}.{pattern} is neither recorded nor on a wire", "fault-without-effect")
-        return [(unit, name, True) for name in names if (unit, name) in used or "*" not in pattern]
+        if names and not any((instance, name) in used for name in names):
+            self._report(f"{instance}.{pattern} is neither recorded nor on a wire", "fault-without-effect")
+        return [(instance, name, True) for name in names if (instance, name) in used or "*" not in pattern]
 
-    def _on_inputs(self, unit: str, pattern: str) -> list[tuple[str, str, bool]]:
-        names = self.system.matching_inputs(unit, pattern).values()
-        driven = {w.input for w in self.wires if w.target == unit}
+    def _on_inputs(self, instance: str, pattern: str) -> list[tuple[str, str, bool]]:
+        names = self.system.matching_inputs(instance, pattern).values()
+        driven = {w.input for w in self.wires if w.target == instance}
         if names and not driven & set(names):
             self._report(
-                f"{unit}.{pattern} is on no wire: faults of inputs act on outputs of instances",
+                f"{instance}.{pattern} is on no wire: faults of inputs act on outputs of instances",
                 "fault-without-effect",
             )
-        if not names and not matching(pattern, self.system.outputs[unit]):
-            self._no_such(unit, pattern)
-        return [(unit, name, False) for name in names if name in driven]
+        if not names and not matching(pattern, self.system.outputs[instance]):
+            self._no_such(instance, pattern)
+        return [(instance, name, False) for name in names if name in driven]
 
     def _on_wires(self, fault: Fault) -> list[tuple[str, str, bool]]:
         location = fault.on
@@ -150,13 +154,13 @@ class _Finder:
         there = fold([w.output for w in of if w.target == location.target])
         return hint(location.variable, there, lead="there are") if there else "; nothing goes there"
 
-    def _no_such(self, unit: str, pattern: str) -> None:
-        if self.system.had([unit], pattern):
+    def _no_such(self, instance: str, pattern: str) -> None:
+        if self.system.had([instance], pattern):
             self._left_out()
             return
-        names = fold([*self.system.outputs[unit], *self.system.inputs[unit]])
+        names = fold([*self.system.outputs[instance], *self.system.inputs[instance]])
         guess = hint(pattern, names, lead="it has")
-        self._report(f"{unit} has neither an output nor an input {pattern!r}{guess}", "variable-unknown")
+        self._report(f"{instance} has neither an output nor an input {pattern!r}{guess}", "variable-unknown")
 
     def _left_out(self) -> None:
         fault = _said(self.system.scenario, self.key)

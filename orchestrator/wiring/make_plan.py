@@ -152,9 +152,9 @@ def _network(
     """
     scenario, data = system.scenario, system.scenario.document.data
     follows = *system.fmus.values(), data.get("connections"), data.get("record")
-    constant = tuple((target, c.key, c.of_unit, c.of_fact) for target, c in by_input.items())
-    swapped, units = tuple(scenario.replaced.items()), tuple(system.fmus)
-    key = tuple(map(id, follows)), units, constant, swapped, scenario.explicit, isolated
+    constant = tuple((target, c.key, c.of_instance, c.of_fact) for target, c in by_input.items())
+    swapped, instances = tuple(scenario.replaced.items()), tuple(system.fmus)
+    key = tuple(map(id, follows)), instances, constant, swapped, scenario.explicit, isolated
     if key not in networks:
         errors, notes = len(system.reported), len(system.notes)
         wires, kept = Connector(system).connect(by_input)
@@ -220,7 +220,7 @@ def make_plan(
     opened, notes = system.fmus, system.notes
     notes += [*scenario.document.notes, *stale_fmus(opened.values()), *host_needs(opened.values())]
     distributed = Parameters(system)
-    parameters = distributed.of_units()
+    parameters = distributed.of_instances()
     by_input = constants(system)
     network = _network(system, by_input, isolated, {} if networks is None else networks)
     wires, record, evaluation = network.wires, network.record, network.evaluation

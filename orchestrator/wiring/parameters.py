@@ -141,30 +141,32 @@ class Parameters:
         self._system = system
         self._scenario = system.scenario
         self._fmus = system.fmus
-        self._given: dict[str, dict[str, Value]] = {unit: {} for unit in system.fmus}
+        self._given: dict[str, dict[str, Value]] = {instance: {} for instance in system.fmus}
         self.car = CarQuantities({})
         self.lacking: dict[str, list[str]] = {}
         """Instance -> those of its `STIFFNESSES` that have to be measured on the tyres at static loads."""
 
-    def of_units(self) -> dict[str, dict[str, Value]]:
+    def of_instances(self) -> dict[str, dict[str, Value]]:
         """Return the parameter values of each instance."""
-        for unit, fmu in self._fmus.items():
-            self._system.origins[unit].update((variable.name, DEFAULT) for variable in fmu.of("parameter"))
+        for instance, fmu in self._fmus.items():
+            self._system.origins[instance].update(
+                (variable.name, DEFAULT) for variable in fmu.of("parameter")
+            )
         self._from_tyre_files()
         self._from_vehicle()
         by_change = self._from_facts()
-        for unit in self._fmus:
-            for name, raw in self._scenario.units[unit].parameters.items():
-                key = ("units", unit, "parameters", name)
-                if (unit, name) not in by_change or self._scenario.document.override(key):
-                    self._give_own(unit, name, raw, key)
+        for instance in self._fmus:
+            for name, raw in self._scenario.units[instance].parameters.items():
+                key = ("units", instance, "parameters", name)
+                if (instance, name) not in by_change or self._scenario.document.override(key):
+                    self._give_own(instance, name, raw, key)
         self._settle_stiffnesses()
         self._refuse_half_a_car()
         return self._given
 
     def _give(
         self,
-        unit: str,
+        instance: str,
         name: str,
         raw: Value,
         place: tuple[Document, KeyPath],
@@ -174,26 +176,26 @@ class Parameters:
         """Set a parameter of an instance; report errors at `place`, with the prefix `says`."""
         document, key = place
         try:
-            self._given[unit][name] = value_for(self._fmus[unit].variables[name], raw)
+            self._given[instance][name] = value_for(self._fmus[instance].variables[name], raw)
         except ValueError as error:
             self._system.report(key, f"{says}{error}", code_of(error), document)
-        unit_of = self._fmus[unit].variables[name].unit
-        self._system.origins[unit][name] = came or origin(self._scenario, key, unit=unit_of)
+        unit_of = self._fmus[instance].variables[name].unit
+        self._system.origins[instance][name] = came or origin(self._scenario, key, unit=unit_of)
 
     def _takers(self, name: str) -> list[str]:
-        return [unit for unit, fmu in self._fmus.items() if _is_parameter(fmu, name)]
+        return [instance for instance, fmu in self._fmus.items() if _is_parameter(fmu, name)]
 
-    def _give_own(self, unit: str, name: str, raw: Value | TextSpec, key: KeyPath) -> None:
+    def _give_own(self, instance: str, name: str, raw: Value | TextSpec, key: KeyPath) -> None:
         """Set a parameter listed under its instance: to a value, or the text of a file."""
-        fmu, place = self._fmus[unit], (self._scenario.document, key)
+        fmu, place = self._fmus[instance], (self._scenario.document, key)
         if not _is_parameter(fmu, name):
-            if self._is_left_out(unit, name, key):
-                sentence = f"{unit}.{name} is left out: {fmu.name} has no such parameter"
+            if self._is_left_out(instance, name, key):
+                sentence = f"{instance}.{name} is left out: {fmu.name} has no such parameter"
                 self._system.note("left-out-after-swap", sentence)
             else:
-                self._system.report(key, _unknown(unit, fmu, name), "parameter-unknown")
+                self._system.report(key, _unknown(instance, fmu, name), "parameter-unknown")
         elif not isinstance(raw, TextSpec):
-            self._give(unit, name, raw, place)
+            self._give(instance, name, raw, place)
         elif fmu.variables[name].type != "String":
             self._system.report(
                 key, "takes a value: only parameters that are text take a file", "value-wrong-type"
@@ -205,15 +207,15 @@ class Parameters:
                 self._system.report(key, f"{raw.file}: {error}", "file-unreadable")
             else:
                 came = _from_file(raw.file, f"file {raw.file}", place)
-                self._give(unit, name, text, place, came, f"{raw.file}: ")
+                self._give(instance, name, text, place, came, f"{raw.file}: ")
 
     def _from_facts(self) -> set[tuple[str, str]]:
         """Set the parameters that facts reach; return the (instance, parameter) of overridden facts."""
         by_change: set[tuple[str, str]] = set()
         for fact_name, fact, raw, changed in facts_of(self._scenario):
-            takers = [(unit, name) for name in fact.parameters for unit in self._takers(name)]
-            for unit, name in takers:
-                self._give(unit, name, raw, (self._scenario.document, (fact_name,)))
+            takers = [(instance, name) for name in fact.parameters for instance in self._takers(name)]
+            for instance, name in takers:
+                self._give(instance, name, raw, (self._scenario.document, (fact_name,)))
             by_change.update(takers if changed else ())
             if not fact.parameters or fact.inputs or takers:
                 continue  # for a fact with inputs, `constants` reports whether it has an effect
@@ -234,8 +236,10 @@ class Parameters:
         for axle, file in self._scenario.tyre_files.items():
             came = _from_file(file.path.name, f"tyre property file {file.path.name}", place)
             for name, value in file.values.items():
-                for unit in self._takers(f"{name}_{axle}"):
-                    self._give(unit, f"{name}_{axle}", value, place, came, f"{file.path}: {name.upper()}: ")
+                for instance in self._takers(f"{name}_{axle}"):
+                    self._give(
+                        instance, f"{name}_{axle}", value, place, came, f"{file.path}: {name.upper()}: "
+                    )
         if self._scenario.tyre_files and not any(map(_takes_tyre_files, self._fmus.values())):
             if any(map(_takes_tyre_files, self._system.before())):
                 self._system.note(
@@ -253,8 +257,8 @@ class Parameters:
         for name, raw in self._scenario.vehicle_file.parameters.items():
             key = ("parameters", name)
             takers = self._takers(name)
-            for unit in takers:
-                self._give(unit, name, raw, (document, key))
+            for instance in takers:
+                self._give(instance, name, raw, (document, key))
             if name in CAR:
                 try:
                     numbers[name] = float(value_for(_quantity(name), raw))
@@ -279,9 +283,9 @@ class Parameters:
             self._system.report(("parameters", name), sentence, "vehicle-contradictory", document)
         self.car = car_of(numbers)
         for name, formula in self.car.formulas.items():
-            for unit in self._takers(name):
-                came, says = ValueOrigin.derived(formula), f"{unit}.{name} = {formula}: "
-                self._give(unit, name, self.car.values[name], (document, ("parameters",)), came, says)
+            for instance in self._takers(name):
+                came, says = ValueOrigin.derived(formula), f"{instance}.{name} = {formula}: "
+                self._give(instance, name, self.car.values[name], (document, ("parameters",)), came, says)
         for name in idle:
             if name not in self.car.used and document.override(("parameters", name)):
                 self._system.note(
@@ -290,12 +294,12 @@ class Parameters:
 
     def _settle_stiffnesses(self) -> None:
         """Leave out the vehicle file's stiffness of an axle where the scenario gives that of one tyre."""
-        for unit in self._takers("cornering_stiffness"):
-            origins = self._system.origins[unit]
+        for instance in self._takers("cornering_stiffness"):
+            origins = self._system.origins[instance]
             own = _level(origins["cornering_stiffness"])
             for name in STIFFNESSES:
-                if name in self._given[unit] and own > _level(origins[name]):
-                    del self._given[unit][name]
+                if name in self._given[instance] and own > _level(origins[name]):
+                    del self._given[instance][name]
                     origins[name] = DEFAULT
 
     def _refuse_half_a_car(self) -> None:
@@ -307,27 +311,27 @@ class Parameters:
         wrong = any(of_vehicle for (of_vehicle, *_), _ in self._system.reported)
         if wrong or not self.car.values.keys() >= {*STATIC_LOADS}:
             return
-        for unit, fmu in self._fmus.items():
-            by_name = self._given[unit]
+        for instance, fmu in self._fmus.items():
+            by_name = self._given[instance]
             lacks = [v.name for v in fmu.of("parameter") if v.name in CAR and v.name not in by_name]
             of_tyres = [name for name in lacks if name in STIFFNESSES]
             if of_tyres and "tyre_force_y_fl" not in fmu.variables:
-                self.lacking[unit] = of_tyres
+                self.lacking[instance] = of_tyres
             needed = [name for name in lacks if CAR[name].needed]
             if needed and any(name in self.car.values for name in by_name):
                 self._system.report(
-                    ("units", unit),
+                    ("units", instance),
                     f"{fmu.name} takes its car from the vehicle file, which gives neither "
                     f"{listed(needed, last='nor')} nor what {'they' if len(needed) > 1 else 'it'} would "
                     "follow from: give them there, or to this instance",
                     "vehicle-incomplete",
                 )
 
-    def _is_left_out(self, unit: str, name: str, key: KeyPath) -> bool:
+    def _is_left_out(self, instance: str, name: str, key: KeyPath) -> bool:
         """Return whether a value was meant for the replaced FMU of an instance."""
-        if unit not in self._scenario.replaced or self._scenario.document.override(key):
+        if instance not in self._scenario.replaced or self._scenario.document.override(key):
             return False
-        before = self._system.replaced(unit)
+        before = self._system.replaced(instance)
         return before is None or _is_parameter(before, name)
 
 
@@ -381,13 +385,15 @@ def _takes_tyre_files(fmu: Fmu) -> bool:
     return _is_parameter(fmu, "pcy1_front") and "tyre_force_y_fl" in fmu.variables
 
 
-def _unknown(unit: str, fmu: Fmu, name: str) -> str:
+def _unknown(instance: str, fmu: Fmu, name: str) -> str:
     if name in fmu.variables and fmu.variables[name].causality == "input":
-        return f"{name!r} is an input of {unit}, not a parameter: give constants under 'inputs'"
+        return f"{name!r} is an input of {instance}, not a parameter: give constants under 'inputs'"
     if name in fmu.variables and fmu.variables[name].causality == "structuralParameter":
         start = fmu.variables[name].start
-        return f"{name!r} of {unit} is a structural parameter, which can only keep its start value, {start}"
+        return (
+            f"{name!r} of {instance} is a structural parameter, which can only keep its start value, {start}"
+        )
     if name in fmu.refused:
-        return f"{unit}.{name} {fmu.refused[name]}"
+        return f"{instance}.{name} {fmu.refused[name]}"
     names = fold([v.name for v in fmu.of("parameter")])
-    return f"{unit} ({fmu.name}) has no parameter {name!r}" + hint(name, names, lead="it has")
+    return f"{instance} ({fmu.name}) has no parameter {name!r}" + hint(name, names, lead="it has")

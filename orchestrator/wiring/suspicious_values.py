@@ -35,41 +35,41 @@ CONTROL = ("reference", "controller", "allocator", "wheel_control", "monitor")
 TRUTH = "truth"
 
 
-def seen_as(wire: Wire, units: Iterable[Instance]) -> str:
+def seen_as(wire: Wire, instances: Iterable[Instance]) -> str:
     """Return the kind of a wire to the control side: "truth", "late truth", "measurement" or "estimate".
 
     "" if the source is on the control side itself, or the target is not.
     """
-    roles = {unit.name: unit.role for unit in units}
+    roles = {instance.name: instance.role for instance in instances}
     if roles[wire.target] not in (*CONTROL, "estimator") or roles[wire.source] in CONTROL:
         return ""
     truth = "late truth" if wire.output.endswith("_delayed") else TRUTH
     return SENSING.get(roles[wire.source], truth)
 
 
-def exact(units: Sequence[Instance], wires: Iterable[Wire]) -> list[Diagnostic]:
+def exact(instances: Sequence[Instance], wires: Iterable[Wire]) -> list[Diagnostic]:
     """Return a note on signals that the control side gets exactly although there is a sensor.
 
     Instances that only observe, such as a reference for comparison, may use the truth: they do not affect
     the car.
     """
     wires = list(wires)
-    if not any(unit.role == "sensor" for unit in units):
+    if not any(instance.role == "sensor" for instance in instances):
         return []
-    steering = _steering(units, wires)
+    steering = _steering(instances, wires)
     inputs: dict[tuple[str, str], list[str]] = {}
     for wire in wires:
-        if wire.target in steering and seen_as(wire, units) == TRUTH:
+        if wire.target in steering and seen_as(wire, instances) == TRUTH:
             inputs.setdefault((wire.target, wire.source), []).append(wire.input)
     parts = [f"{listed(fold(names))} of {to} (from {of})" for (to, of), names in inputs.items()]
     sentence = f"exact, though there is a sensor: {'; '.join(parts)}"
     return [Diagnostic("sensor-bypassed", sentence, "info")] if parts else []
 
 
-def _steering(units: Iterable[Instance], wires: Iterable[Wire]) -> set[str]:
+def _steering(instances: Iterable[Instance], wires: Iterable[Wire]) -> set[str]:
     """Return the instances that affect, directly or through others, one outside the control side."""
-    inside = {unit.name for unit in units if unit.role in (*CONTROL, "estimator")}
-    reached = {unit.name for unit in units} - inside
+    inside = {instance.name for instance in instances if instance.role in (*CONTROL, "estimator")}
+    reached = {instance.name for instance in instances} - inside
     while more := {w.source for w in wires if w.target in reached} - reached:
         reached |= more
     return reached
@@ -88,12 +88,12 @@ class _Given(NamedTuple):
     raw: object  # as written
 
 
-def suspicious_car(scenario: LoadedScenario, units: Mapping[str, Instance]) -> list[Diagnostic]:
+def suspicious_car(scenario: LoadedScenario, instances: Mapping[str, Instance]) -> list[Diagnostic]:
     """Return a warning for every implausible quantity of the car, and for inertias that do not fit."""
     of_file = suspicious_vehicle(scenario.vehicle_file.parameters)
     in_file = {(item.name, item.value) for item in _of_file(scenario.vehicle_file.parameters)}
-    own = [item for item in _of_units(scenario, units) if (item.name, item.value) not in in_file]
-    return [*of_file, *filter(None, map(_beyond, own)), *_index(units)]
+    own = [item for item in _of_instances(scenario, instances) if (item.name, item.value) not in in_file]
+    return [*of_file, *filter(None, map(_beyond, own)), *_index(instances)]
 
 
 def suspicious_vehicle(parameters: Mapping[str, Value]) -> list[Diagnostic]:
@@ -114,15 +114,15 @@ def _quantity(name: str, raw: Value) -> _Given | None:
         return None
 
 
-def _of_units(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[_Given]:
+def _of_instances(scenario: LoadedScenario, instances: Mapping[str, Instance]) -> Iterator[_Given]:
     """Yield the quantities that the scenario or an override gives to single instances."""
-    for unit in units.values():
-        for name, value in unit.parameters.items():
-            origin = unit.origins.get(name, DEFAULT).kind
-            as_said = unit.fmu.variables[name].unit == CAR[name].unit if name in CAR else False
+    for instance in instances.values():
+        for name, value in instance.parameters.items():
+            origin = instance.origins.get(name, DEFAULT).kind
+            as_said = instance.fmu.variables[name].unit == CAR[name].unit if name in CAR else False
             if as_said and origin not in ("default", "vehicle", "derived") and isinstance(value, float):
-                raw = scenario.units[unit.name].parameters.get(name, value)
-                yield _Given(f"{unit.name}.{name}", name, value, raw)
+                raw = scenario.units[instance.name].parameters.get(name, value)
+                yield _Given(f"{instance.name}.{name}", name, value, raw)
 
 
 def _beyond(item: _Given) -> Diagnostic | None:
@@ -146,15 +146,15 @@ def _beyond(item: _Given) -> Diagnostic | None:
     return _warning("value-implausible", item.where, says, item.value)
 
 
-def _index(units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
+def _index(instances: Mapping[str, Instance]) -> Iterator[Diagnostic]:
     """Yield a warning about the first instance whose yaw inertia does not fit its mass and wheelbase.
 
     None if one of the values is implausible by itself, or all are defaults of the FMU.
     """
-    for unit in units.values():
-        values = {name: unit.parameter(name) for name in INERTIA if name in unit.fmu.variables}
+    for instance in instances.values():
+        values = {name: instance.parameter(name) for name in INERTIA if name in instance.fmu.variables}
         numbers = [value for value in values.values() if isinstance(value, float)]
-        is_set = any(unit.origins.get(name, DEFAULT) != DEFAULT for name in INERTIA)
+        is_set = any(instance.origins.get(name, DEFAULT) != DEFAULT for name in INERTIA)
         if not is_set or len(numbers) < len(INERTIA):
             continue
         items = (_Given("", name, number, number) for name, number in zip(INERTIA, numbers, strict=True))
@@ -165,10 +165,10 @@ def _index(units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
         low, high = DYNAMIC_INDEX
         if not low <= index <= high:
             says = (
-                f"{unit.name}: the yaw inertia, {inertia:.6g} kg.m2, is {index:.3g} times mass times the "
+                f"{instance.name}: the yaw inertia, {inertia:.6g} kg.m2, is {index:.3g} times mass times the "
                 f"distances of both axles from the centre of mass; that of cars is {low:g} to {high:g} times"
             )
-            yield _warning("value-implausible", f"{unit.name}.yaw_inertia", says, inertia)
+            yield _warning("value-implausible", f"{instance.name}.yaw_inertia", says, inertia)
             return
 
 
@@ -200,43 +200,43 @@ class GivenValue(NamedTuple):
     variable: Variable
 
 
-def suspicious_values(scenario: LoadedScenario, units: Mapping[str, Instance]) -> list[Diagnostic]:
+def suspicious_values(scenario: LoadedScenario, instances: Mapping[str, Instance]) -> list[Diagnostic]:
     """Return warnings about the values of a scenario's instances."""
-    parameters, constants = [*_parameters(units.values())], [*_constants(units.values())]
+    parameters, constants = [*_parameters(instances.values())], [*_constants(instances.values())]
     return [
-        *_two_values(units, parameters, constants),
+        *_two_values(instances, parameters, constants),
         *_other_cars(scenario, parameters),
         *_slips(scenario, parameters, constants),
-        *_of_tyres(scenario, units, parameters),
-        *suspicious_car(scenario, units),
-        *_idle_units(scenario, units),
+        *_of_tyres(scenario, instances, parameters),
+        *suspicious_car(scenario, instances),
+        *_idle_units(scenario, instances),
     ]
 
 
-def _idle_units(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Diagnostic]:
+def _idle_units(scenario: LoadedScenario, instances: Mapping[str, Instance]) -> Iterator[Diagnostic]:
     """Yield a warning for every instance that would take its first step after the end of the run."""
     lasts = scenario.stop_time - scenario.start_time
     steps = lasts / scenario.step_size
-    for unit in units.values():
-        if unit.period > steps:
-            step = unit.period * scenario.step_size
+    for instance in instances.values():
+        if instance.period > steps:
+            step = instance.period * scenario.step_size
             says = (
-                f"{unit.name} never takes a step: its step_size, {float(step):g} s, is longer than the run, "
-                f"{float(lasts):g} s; its outputs keep their initial values"
+                f"{instance.name} never takes a step: its step_size, {float(step):g} s, is longer than the "
+                f"run, {float(lasts):g} s; its outputs keep their initial values"
             )
-            yield _warning("instance-never-steps", f"{unit.name}.step_size", says, float(step))
+            yield _warning("instance-never-steps", f"{instance.name}.step_size", says, float(step))
 
 
 def _of_tyres(
-    scenario: LoadedScenario, units: Mapping[str, Instance], parameters: Sequence[GivenValue]
+    scenario: LoadedScenario, instances: Mapping[str, Instance], parameters: Sequence[GivenValue]
 ) -> Iterator[Diagnostic]:
     """Yield a warning for every value that contradicts the tyre property files."""
-    tyres = [unit for unit in units.values() if "pcy1_front" in unit.parameters]
+    tyres = [instance for instance in instances.values() if "pcy1_front" in instance.parameters]
     if not tyres or not scenario.tyre_files:
         return
     law = without_role(tyres[0].fmu.name).removesuffix("_transient")
     for item in parameters:
-        if item.name == "tyre" and "pcx1_front" in units[item.instance].parameters and item.value != law:
+        if item.name == "tyre" and "pcx1_front" in instances[item.instance].parameters and item.value != law:
             says = f"{item.instance}.tyre is {item.value}: {tyres[0].name} follows {law}"
             yield _warning("tyre-mismatch", f"{item.instance}.tyre", says)
     radii = {str(f.path.name): f.rolling_radius for f in scenario.tyre_files.values() if f.rolling_radius}
@@ -251,7 +251,7 @@ def _of_tyres(
 
 
 def _two_values(
-    units: Mapping[str, Instance], parameters: Sequence[GivenValue], constants: Sequence[GivenValue]
+    instances: Mapping[str, Instance], parameters: Sequence[GivenValue], constants: Sequence[GivenValue]
 ) -> Iterator[Diagnostic]:
     """Yield a warning for every quantity that has different values in several instances.
 
@@ -270,7 +270,7 @@ def _two_values(
             yield _values_differ(name, items, vehicle)
     for name, fact in FACTS.items():
         of_fact = [item for item in parameters if item.name in fact.parameters]
-        items = [item for item in of_fact if fact.counts(units[item.instance], item.name)]
+        items = [item for item in of_fact if fact.counts(instances[item.instance], item.name)]
         items += [item for item in constants if item.name in fact.inputs]
         meant = ({"scenario"}, {"default"}) if fact.inputs else ()  # a road may differ from wheel to wheel
         if _differ(items) and {item.origin for item in items} not in meant:
@@ -297,21 +297,21 @@ def _differ(items: list[GivenValue], *, start: bool = False) -> bool:
     return len(numbers) > 1 and max(numbers) - min(numbers) > SAME * max(map(abs, numbers))
 
 
-def _parameters(units: Iterable[Instance]) -> Iterator[GivenValue]:
-    for unit in units:
-        for variable in unit.fmu.of("parameter"):
-            value = unit.parameter(variable.name)
-            origin = unit.origins.get(variable.name, DEFAULT).kind
+def _parameters(instances: Iterable[Instance]) -> Iterator[GivenValue]:
+    for instance in instances:
+        for variable in instance.fmu.of("parameter"):
+            value = instance.parameter(variable.name)
+            origin = instance.origins.get(variable.name, DEFAULT).kind
             if value is not None and (value != 0 or origin != DEFAULT.kind):  # 0 by default: not given
-                yield GivenValue(unit.name, variable.name, value, origin, variable)
+                yield GivenValue(instance.name, variable.name, value, origin, variable)
 
 
-def _constants(units: Iterable[Instance]) -> Iterator[GivenValue]:
-    for unit in units:
-        for name, value in unit.constants.items():
-            if name not in unit.series:
-                origin = unit.origins.get(name, DEFAULT).kind
-                yield GivenValue(unit.name, name, value, origin, unit.fmu.variables[name])
+def _constants(instances: Iterable[Instance]) -> Iterator[GivenValue]:
+    for instance in instances:
+        for name, value in instance.constants.items():
+            if name not in instance.series:
+                origin = instance.origins.get(name, DEFAULT).kind
+                yield GivenValue(instance.name, name, value, origin, instance.fmu.variables[name])
 
 
 def _values_differ(name: str, items: list[GivenValue], way_out: str) -> Diagnostic:
