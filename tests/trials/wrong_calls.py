@@ -186,14 +186,14 @@ def _parameters() -> Iterator[Parameter]:
     plan = yb.Scenario.plan
     names = {"unit", "controller"}
     yield of(
-        "Scenario.swap.units",
+        "Scenario.swap.instances",
         lambda x: b.base.swap(**{x: "controller_off"}),
         "instance",
         skip=set(WRONG) - set(TEXTS) | {"hostile text"},
     )
     yield of("Scenario.swap.replacements", lambda x: b.base.swap(x), "replacements", "instance",
              right={"None"}, may={"dict"})  # fmt: skip
-    yield of("Scenario.swap.units [controller]", lambda x: plan(b.base.swap(controller=x)), *names,
+    yield of("Scenario.swap.instances [controller]", lambda x: plan(b.base.swap(controller=x)), *names,
              may={"lambda", "builtin"})  # fmt: skip
     yield of("Scenario.set.values", lambda x: b.base.set(x), "values", "has no instance", "set ")
     yield of("Scenario.set.values [place]", lambda x: b.base.set({x: 1}), "values", "has no instance", "set ",
