@@ -39,14 +39,7 @@ from typing import Any
 
 import numpy as np
 
-from ..interrupts import StopFlag
-from ..master.fmi import open_instance
-from ..master.instance import FmuInstance
-from ..master.process_state import Log
-from ..master.step_loop import Master
 from ..plan import Override
-from ..planner import Planner
-from ..scenario import ssp_read
 from ..scenario.ssp_archive import PARAMETER_SET
 from ..signal_names import SignalName
 
@@ -100,6 +93,13 @@ def run_own(request: Request) -> Recording:
     Raises:
         YawbenchError: the archive cannot be read, or the run fails.
     """
+    from ..interrupts import StopFlag  # slow to import, and the other masters need none of it
+    from ..master.fmi import open_instance
+    from ..master.instance import FmuInstance
+    from ..master.process_state import Log
+    from ..master.step_loop import Master
+    from ..planner import Planner
+
     jacobi = Override.of("algorithm", "jacobi", "second-opinion")
     planner = Planner()
     plan = planner.plan(planner.load(Path(request.archive), [jacobi]))
@@ -140,6 +140,8 @@ def run_fmpy_ssp(request: Request) -> Recording:
 
 def _parameters(archive: str) -> list[Any]:
     """Return the values of the archive that fmpy can set, named `instance.variable`."""
+    from ..scenario import ssp_read
+
     data = ssp_read.read(Path(archive)).data
     values = dict(data["inputs"])
     for instance, spec in data["units"].items():
