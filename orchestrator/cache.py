@@ -36,6 +36,15 @@ from .messages import listed, short
 from .safe_files import fcntl, open_regular, write_whole
 
 _PLAIN_PATH = re.compile(r"[A-Za-z0-9_.~/\\: -]+")
+STORES = {
+    "launcher": "launchers",
+    "native": "native libraries",
+    "step_loop": "step loops",
+    "rows_text": "writers of CSV",
+    "keys": "keys of sources",
+    "efforts": "times of builds",
+}
+"""Name of a store -> its entries, as `yawbench cache` lists them; `keep` knows no others."""
 KEEP_DAYS = 60
 """Files that have not been written for this many days are deleted when a process first stores another one."""
 _DIGITS = 32
@@ -174,6 +183,7 @@ def keep(store: str, key: str, content: bytes) -> None:
 
     If none can, nothing is stored: the content will be computed again.
     """
+    assert store in STORES
     with contextlib.suppress(ModelDescriptionError):
         for folder in cache_folders():
             file = folder / store / key

@@ -106,7 +106,7 @@ CacheAction = Annotated[
 def cache(action: CacheAction = "show") -> None:
     """Show, verify or clear the cache.
 
-    Unpacked FMUs, the compiled launcher, keys of sources, and FMUs whose own folder cannot be
+    Unpacked FMUs, compiled libraries, keys of sources, and FMUs whose own folder cannot be
     written. Deleted entries are made again when needed.
     Nothing is deleted while another command uses the cache.
     """

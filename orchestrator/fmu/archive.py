@@ -30,7 +30,7 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from ..cache import cache_folders, content_of, delete_unused, hold
+from ..cache import STORES, cache_folders, content_of, delete_unused, hold
 from ..errors import ModelDescriptionError
 from ..messages import closest, listed
 from ..plan import Fmu
@@ -251,8 +251,7 @@ def kept_in(folder: Path) -> dict[str, list[CacheEntry]]:
     """Return kind -> entries of a cache folder; other files there are not ours and left out."""
     entries_by_kind: dict[str, list[CacheEntry]] = {
         "unpacked FMUs": [],
-        "launchers": [_file(file) for file in folder.glob("launcher/*")],
-        "keys of sources": [_file(file) for file in folder.glob("keys/*")],
+        **{name: [_file(file) for file in folder.glob(f"{store}/*")] for store, name in STORES.items()},
         "FMUs": [CacheEntry(file, partial(_zip_is_whole, file)) for file in folder.glob("fmus/*/*.fmu")],
         "left over": [],
     }

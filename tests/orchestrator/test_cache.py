@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cache import cache_folder, keep, recall
+from orchestrator.cache import STORES, cache_folder, keep, recall
 from orchestrator.cli import main
 from orchestrator.fmu.archive import open_fmu
 from orchestrator.safe_files import write_whole
@@ -38,30 +38,30 @@ def told(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[str, str]
 
 
 def test_what_is_kept_comes_back_until_something_else_is_kept(cache):
-    keep("store", "key", b"one")
-    assert recall("store", "key") == b"one"
-    keep("store", "key", b"two")
-    assert recall("store", "key") == b"two"
-    assert len(list(cache.glob("store/*"))) == 1
-    assert recall("store", "other") is None
+    keep("keys", "key", b"one")
+    assert recall("keys", "key") == b"one"
+    keep("keys", "key", b"two")
+    assert recall("keys", "key") == b"two"
+    assert len(list(cache.glob("keys/*"))) == 1
+    assert recall("keys", "other") is None
 
 
 def test_what_is_kept_is_found_without_a_look_at_all_that_is_kept(cache, monkeypatch):
     def refuse(*_):
         raise AssertionError("the folder is listed")
 
-    keep("store", "key", b"one")
+    keep("keys", "key", b"one")
     monkeypatch.setattr(os, "listdir", refuse)
     monkeypatch.setattr(os, "scandir", refuse)
-    assert recall("store", "key") == b"one"
+    assert recall("keys", "key") == b"one"
 
 
 @pytest.mark.parametrize("harm", [b"", b"tw", b"twx"])
 def test_what_is_damaged_does_not_come_back(cache, harm):
-    keep("store", "key", b"two")
-    (file,) = cache.glob("store/*")
+    keep("keys", "key", b"two")
+    (file,) = cache.glob("keys/*")
     file.write_bytes(harm)
-    assert recall("store", "key") is None
+    assert recall("keys", "key") is None
 
 
 def test_a_file_that_cannot_be_put_in_place_leaves_what_stood_there(tmp_path, monkeypatch):
@@ -100,9 +100,11 @@ def test_verify_deletes_what_is_damaged_and_nothing_else(full, capsys):
 
 
 def test_clear_deletes_what_is_ours(full, capsys):
+    for store in STORES:
+        keep(store, "4567", b"an entry")
     told(capsys, "clear")
-    assert sorted(path.name for path in full.iterdir()) == ["launcher", "letters"]
-    assert list((full / "launcher").iterdir()) == []
+    assert sorted(path.name for path in full.iterdir()) == sorted([*STORES, "letters"])
+    assert [path for store in STORES for path in (full / store).iterdir()] == []
 
 
 def test_a_home_that_is_none_gives_a_temporary_cache(tmp_path, monkeypatch):
@@ -122,8 +124,8 @@ def test_a_cache_that_cannot_be_made_is_passed_over(tmp_path, monkeypatch):
     monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "file" / "cache"))
     monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))
     assert cache_folder() == tmp_path / f"yawbench-{os.getuid()}"
-    keep("store", "key", b"two")
-    assert recall("store", "key") == b"two"
+    keep("keys", "key", b"two")
+    assert recall("keys", "key") == b"two"
     assert open_fmu(make_fmu(tmp_path / "a.fmu")).directory.is_relative_to(cache_folder())
 
 
