@@ -334,7 +334,7 @@ def report(context: typer.Context, options: RunOptions, studies: Studies = None)
     with the figures beside it as SVG and PNG. Of several studies also an overview, which shows the runs
     of every claim. Runs whose results are missing or out of date are made first. Without --out, pages go
     to the studies' folders below results/, the overview to results/. All studies in scenarios/ take some
-    five minutes on two cores; --quick omits the regions.
+    four minutes on two cores; --quick omits the regions.
     """
     from ..experiments.experiment import found_studies
 
