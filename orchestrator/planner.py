@@ -12,7 +12,7 @@ from .fmu.opener import Opener, report_to_stderr
 from .messages import hint
 from .plan import Fmu, Instance, Override, Plan
 from .scenario import yaml_lines
-from .scenario.find_and_load import LoadedScenario, load_scenario
+from .scenario.loader import LoadedScenario, load_scenario
 from .scenario.yaml_lines import Document
 from .signal_names import match
 from .tyre_stand import cornering_stiffness

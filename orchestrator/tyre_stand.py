@@ -20,7 +20,7 @@ from .fmu.opener import Opener, find_fmu, find_folder
 from .master.simulate import simulate_in_memory
 from .messages import listed
 from .plan import Fmu, InputSeries, Instance, Plan, Value
-from .scenario.find_and_load import load_scenario
+from .scenario.loader import load_scenario
 from .scenario.overrides import is_path
 from .signal_names import SignalName
 from .wiring.make_plan import make_plan

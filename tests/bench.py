@@ -33,7 +33,7 @@ from orchestrator.master.process_state import Log
 from orchestrator.master.step_loop import Master
 from orchestrator.master.step_program import Operation
 from orchestrator.plan import Plan
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 
 DEFAULT = Path(__file__).parents[1] / "scenarios" / "fnn_sideslip" / "25mps.yaml"

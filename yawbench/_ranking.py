@@ -25,7 +25,7 @@ from orchestrator.experiments.ranking_tables import (
 from orchestrator.experiments.tables import to_pandas
 from orchestrator.messages import hint
 from orchestrator.results.run_folder import writing
-from orchestrator.scenario import find_and_load
+from orchestrator.scenario import loader
 
 from . import arguments
 from ._controller import Controller, ControllerLike, PythonComponent
@@ -87,7 +87,7 @@ def rank(
     progress = None if progress is None else arguments.flag(progress, "progress")
     workers = None if workers is None else arguments.count(workers, "workers")
     kept_in = None if out is None else arguments.path(out, "out")
-    file = find_and_load.find(arguments.path(ranking, "ranking"), "a ranking file")
+    file = loader.find(arguments.path(ranking, "ranking"), "a ranking file")
     more, programs = _entries(controller, arguments.text(name, "name", empty=True))
     loaded = load_ranking(file, more=more, quick=quick, chosen=chosen)
     wanted = set(loaded.entries if others is None else others)

@@ -25,7 +25,7 @@ from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.messages import hint, short
 from orchestrator.plan import Fmu, Instance, Override, Plan, Value
 from orchestrator.planner import Planner
-from orchestrator.scenario import find_and_load
+from orchestrator.scenario import loader
 from orchestrator.scenario.overrides import faults_at, setting
 from orchestrator.scenario.schema import LoadedScenario
 from orchestrator.signal_names import Target
@@ -53,7 +53,7 @@ def load(source: str | Path) -> Scenario:
     Raises:
         ScenarioError: the scenario does not exist or is invalid.
     """
-    scenario = Scenario(find_and_load.find(arguments.path(source, "source"), "a scenario").absolute())
+    scenario = Scenario(loader.find(arguments.path(source, "source"), "a scenario").absolute())
     scenario._loaded  # noqa: B018 - raises now if it is invalid
     return scenario
 

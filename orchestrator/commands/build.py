@@ -182,7 +182,7 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
     )
     from ..fmu.opener import hidden
     from ..results.reader import found_runs
-    from ..scenario import find_and_load
+    from ..scenario import loader
     from .progress import print_tables
 
     further = [] if place or options.fmus else _further_folders(build=options.build)
@@ -206,7 +206,7 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
     elif what == "metrics":
         table = metrics_table()
     elif what == "signals" and place is not None:
-        scenario = find_and_load.find(place, "a scenario")
+        scenario = loader.find(place, "a scenario")
         table = recorded_table(plan_of_scenario(scenario, options))
     else:
         folder = _folder_of_fmus(place or options.fmus)

@@ -19,19 +19,19 @@ if TYPE_CHECKING:
 
 
 def named(kind: str, **settings: Any) -> Any:
-    """Return an argument for a file of a kind, given as a path or a name (see `scenario.find_and_load`)."""
+    """Return an argument for a file of a kind, given as a path or a name (see `scenario.loader`)."""
 
     def find(value: Any) -> Any:
-        from ..scenario import find_and_load
+        from ..scenario import loader
 
         if isinstance(value, (list, tuple)):
-            return [find_and_load.find(name, kind) for name in value]
-        return value and find_and_load.find(value, kind)
+            return [loader.find(name, kind) for name in value]
+        return value and loader.find(value, kind)
 
     def complete(incomplete: str) -> list[str]:
-        from ..scenario import find_and_load
+        from ..scenario import loader
 
-        return [name for name in find_and_load.names(kind) if name.startswith(incomplete)]
+        return [name for name in loader.names(kind) if name.startswith(incomplete)]
 
     return typer.Argument(callback=find, autocompletion=complete, **settings)
 

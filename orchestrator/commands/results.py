@@ -47,13 +47,13 @@ def recorded(sources: Sequence[Path], options: RunOptions) -> list[Path]:
     from ..results.freshness import staleness
     from ..results.measurement_results import is_measurement, segments_of
     from ..results.run_folder import default_folder
-    from ..scenario import find_and_load
-    from ..scenario.find_and_load import MEASUREMENT
+    from ..scenario import loader
+    from ..scenario.loader import MEASUREMENT
     from .progress import reported, say, stoppable
 
-    sources = [path if os.path.exists(path) else find_and_load.named(path) or path for path in sources]
-    files = [path for path in sources if path.suffix in find_and_load.ENDINGS and not os.path.isdir(path)]
-    scenarios = [path for path in files if find_and_load.kind_of(path) != MEASUREMENT]
+    sources = [path if os.path.exists(path) else loader.named(path) or path for path in sources]
+    files = [path for path in sources if path.suffix in loader.ENDINGS and not os.path.isdir(path)]
+    scenarios = [path for path in files if loader.kind_of(path) != MEASUREMENT]
     if options.changes and not scenarios:
         raise ScenarioError(
             "--swap, --set and --fault apply to scenarios, not to results folders",

@@ -88,11 +88,11 @@ def drive(
     from ..errors import ScenarioError
     from ..experiments.standard_test_runs import TestDriver
     from ..results.run_folder import default_folder
-    from ..scenario import find_and_load
+    from ..scenario import loader
 
     chosen = DRIVEN[test]
     changes = (*_vehicle(vehicle), *options.changes)
-    one_run = find_and_load.find(scenario or f"{GROUND}/{str(test).replace('-', '_')}", "a scenario")
+    one_run = loader.find(scenario or f"{GROUND}/{str(test).replace('-', '_')}", "a scenario")
     folder = options.out or default_folder(one_run, changes, suffix="_series")
     execute = context.with_resource(executor_of(folder, str(one_run), options, format="parquet"))
     if (angle or slow_steer) and not chosen.needs_angle:
@@ -102,7 +102,7 @@ def drive(
             why = "set by the series itself"
             raise ScenarioError(f"{change.target}: {why}", code="option-invalid")
     steer = f"{GROUND}/slowly_increasing_steer"
-    slow = find_and_load.find(slow_steer or steer, "a scenario") if chosen.needs_angle else None
+    slow = loader.find(slow_steer or steer, "a scenario") if chosen.needs_angle else None
     hold(context, folder)
     known = None
     if slow:
@@ -158,11 +158,11 @@ def _vehicle(name: str | None) -> tuple[Override, ...]:
         ScenarioError: the file does not exist.
     """
     from ..plan import Override
-    from ..scenario import find_and_load
+    from ..scenario import loader
 
     if name is None:
         return ()
-    return (Override.of("vehicle", str(find_and_load.find(name, "a vehicle file").resolve()), "--vehicle"),)
+    return (Override.of("vehicle", str(loader.find(name, "a vehicle file").resolve()), "--vehicle"),)
 
 
 TestName = Literal[tuple(TESTS)]  # type: ignore[valid-type]

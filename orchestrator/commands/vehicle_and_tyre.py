@@ -61,14 +61,14 @@ def vehicle(
     """
     from ..planner import Planner
     from ..results.run_folder import below_results
-    from ..scenario import find_and_load, yaml_lines
+    from ..scenario import loader, yaml_lines
     from ..scenario.schema import Vehicle
     from ..scenario.schema_validation import validated
     from ..vehicles.handling import TestTrack, draw_cars, fitting_plant, handling_of
     from ..wiring.suspicious_values import suspicious_vehicle
     from .progress import print_tables, save_figure, say
 
-    file = find_and_load.find(file, "a vehicle file")
+    file = loader.find(file, "a vehicle file")
     document = yaml_lines.read(file, what="vehicle file")
     spec = validated(Vehicle, document)
     for warning in suspicious_vehicle(spec.parameters):

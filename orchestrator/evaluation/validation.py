@@ -41,7 +41,7 @@ from ..metrics.measures import words
 from ..metrics.verdict import Verdict, apart, compare, not_judged, worst
 from ..results.reader import Results
 from ..safe_files import reads
-from ..scenario import find_and_load, yaml_lines
+from ..scenario import loader, yaml_lines
 from ..scenario.quantities import convert
 from ..scenario.schema_validation import StrictModel, validated
 from ..scenario.yaml_lines import Document
@@ -131,7 +131,7 @@ def load_bands(name: str | Path) -> Bands:
     Raises:
         ScenarioError: there is no such file, or it is invalid; lists all errors.
     """
-    path = find_and_load.find(name, "a file of bands")
+    path = loader.find(name, "a file of bands")
     document = yaml_lines.read(path, what="file of bands")
     spec = validated(BandsSpec, document)
     tolerances = {name: _tolerance(document, name, tolerance) for name, tolerance in spec.bands.items()}

@@ -30,7 +30,7 @@ from ..metrics.measures import variable_of, words
 from ..plan import Override
 from ..plan import Value as Plain
 from ..results.reader import Results
-from ..scenario.find_and_load import load_scenario
+from ..scenario.loader import load_scenario
 from ..scenario.overrides import is_path, swap_of
 from ..signal_names import SignalName
 from .claim_schema import text_of

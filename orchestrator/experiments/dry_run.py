@@ -23,9 +23,9 @@ from ..messages import counted
 from ..plan import Plan
 from ..results.file_formats import expected_size, in_bytes
 from ..results.run_folder import RUN_FILE
-from .axes_and_sampling import VariantSpec
 from .executor import Executor, left_to_do
 from .experiment import LoadedExperiment
+from .experiment_design import VariantSpec
 from .experiment_result import judge_records
 from .jobs import Job
 from .journal import records_in

@@ -20,12 +20,12 @@ from ..messages import hint, short
 from ..metrics.expressions import TimeWindow
 from ..plan import Override, OverrideOrigin
 from ..safe_files import reads
-from ..scenario import find_and_load, overrides, yaml_lines
+from ..scenario import loader, overrides, yaml_lines
 from ..scenario.schema_validation import validated
 from ..scenario.yaml_lines import Document, KeyPath
 from ..signal_names import Target
-from .axes_and_sampling import DesignAxisSpec, DesignPoint, changes_at, changes_of_file, points
 from .claim_schema import Claim, DerivedSpec, ValidationSpec
+from .experiment_design import DesignAxisSpec, DesignPoint, changes_at, changes_of_file, points
 from .jobs import TestRequest
 from .names_check import check_axes, check_names
 from .schema import ChoiceSpec, ExperimentSpec, RunSpec
@@ -361,7 +361,7 @@ def found_studies(folder: Path = SCENARIOS) -> list[Path]:
         ScenarioError: there are none.
     """
     titles: dict[Path, str] = {}
-    for path, _ in find_and_load.files(folder, ["a study file"], depth=2):
+    for path, _ in loader.files(folder, ["a study file"], depth=2):
         data = yaml_lines.read(path, what="study file").data
         titles[path] = str(data.get("title", "")) if isinstance(data, dict) else ""
     if not titles:

@@ -19,11 +19,11 @@ from ..metrics.expressions import MetricValue
 from ..metrics.verdict import Status, Verdict, not_judged, worst
 from ..results.reader import Results
 from ..results.run_folder import RUN_FILE
-from .axes_and_sampling import RUN, DesignPoint, Level
 from .claim_schema import Claim, LimitSpec, calculate
 from .claims import ClaimResult, Judgement, MetricTable, Region, judge
 from .confidence import interval, share_bounds
 from .experiment import Case, LoadedExperiment, NamedRun
+from .experiment_design import RUN, DesignPoint, Level
 from .jobs import NOT_MADE, MeasuredRun, Outcome, measured, read_back
 from .plan_experiment import PlannedExperiment, metrics_of
 from .published_tables import correlation

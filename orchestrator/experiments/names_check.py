@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from ..messages import hint
 from ..scenario.yaml_lines import Document, KeyPath
 from ..signal_names import Target
-from .axes_and_sampling import RUN, levels_of, names_of
 from .claim_schema import MetricReference, text_of
+from .experiment_design import RUN, levels_of, names_of
 from .published_tables import cells
 from .schema import ExperimentSpec, FigureSpec
 

@@ -20,7 +20,11 @@ from ..plan import Override
 from ..plan import Value as Given
 from ..planner import Planner
 from ..signal_names import Target
-from .axes_and_sampling import (
+from .claim_schema import Claim, MetricReference
+from .claims import ONE_IN, TIMES, ClaimResult, LevelVerdict, OpenValueScan, Region, judge
+from .confidence import Decision, SequentialTest
+from .experiment import RUNS, LoadedExperiment, NamedRun
+from .experiment_design import (
     Level,
     OpenValueSpec,
     OpenVariantSpec,
@@ -28,10 +32,6 @@ from .axes_and_sampling import (
     extended_hypercube,
     levels_of,
 )
-from .claim_schema import Claim, MetricReference
-from .claims import ONE_IN, TIMES, ClaimResult, LevelVerdict, OpenValueScan, Region, judge
-from .confidence import Decision, SequentialTest
-from .experiment import RUNS, LoadedExperiment, NamedRun
 from .experiment_result import ExperimentResult, derive
 from .jobs import Job, MeasuredRun, keyed, ready
 from .plan_experiment import PlannedExperiment, found_at, metrics_of, number_of

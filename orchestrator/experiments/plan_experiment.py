@@ -17,9 +17,9 @@ from ..scenario import quantities
 from ..scenario.yaml_lines import dotted
 from ..signal_names import OF_RUN, SignalName, Target
 from ..wiring.context import FACTS
-from .axes_and_sampling import AxisSpec, Level
 from .claim_schema import MetricReference, MetricSpec, si_number
 from .experiment import RUNS, Case, LoadedExperiment, NamedRun
+from .experiment_design import AxisSpec, Level
 from .jobs import Job, MetricRequests, keyed, ready
 
 

@@ -47,7 +47,10 @@ from ..scenario import overrides, yaml_lines
 from ..scenario.schema import Scalar
 from ..scenario.schema_validation import StrictModel, Time, validated
 from ..signal_names import Target
-from .axes_and_sampling import (
+from .claim_schema import text_of
+from .executor import Executor
+from .experiment import LoadedExperiment, NamedRun, experiment_of
+from .experiment_design import (
     DesignAxisSpec,
     Level,
     OverrideSpec,
@@ -55,9 +58,6 @@ from .axes_and_sampling import (
     axis_of_levels,
     changes_of_file,
 )
-from .claim_schema import text_of
-from .executor import Executor
-from .experiment import LoadedExperiment, NamedRun, experiment_of
 from .experiment_result import ExperimentResult
 from .standard_test_runs import slow_steer_amplitude
 

@@ -14,7 +14,7 @@ from ..evaluation.standard_tests import Evaluation, SeriesRun, StandardTest
 from ..evaluation.trace import Trace, trace_of
 from ..plan import Override, Plan
 from ..results.reader import load_results
-from ..scenario.find_and_load import LoadedScenario
+from ..scenario.loader import LoadedScenario
 from ..scenario.quantities import convert
 from ..signal_names import Target
 from .executor import Executor, highest_passing, side_by_side

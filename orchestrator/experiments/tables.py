@@ -27,7 +27,7 @@ from ..metrics.measures import si, symbol
 from ..plan import Fmu, Plan
 from ..results.reader import FoundRun, Results
 from ..results.run_record import RunRecord
-from ..scenario import find_and_load, yaml_lines
+from ..scenario import loader, yaml_lines
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -215,19 +215,6 @@ def to_latex(table: Table) -> str:
     return "\n".join([r"\begin{table}", r"\centering", *lines, r"\end{table}", ""])
 
 
-def to_markdown(table: Table) -> str:
-    """Return a table for Markdown."""
-
-    def line(cells: Iterable[str]) -> str:
-        escaped = (cell.replace("|", r"\|").replace("\n", "<br>") for cell in cells)
-        return f"| {' | '.join(escaped)} |"
-
-    marks = ["---:" if table.is_number(k) else "---" for k in range(len(table.columns))]
-    title = [f"**{table.title}**", ""] if table.title else []
-    notes = [text for note in table.notes for text in ("", note)]
-    return "\n".join([*title, line(table.headings), line(marks), *map(line, table.text()), *notes, ""])
-
-
 _LATEX = str.maketrans({
     "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "\n": r" \newline ",
     **{sign: f"\\{sign}" for sign in "&%$#_{}"},
@@ -325,17 +312,17 @@ def files_table(folder: Path | None, kinds: Sequence[str]) -> Table:
         raise ScenarioError(f"{folder}: there is no such folder", code="file-missing")
     table = Table("", ["name" if folder is None else "file", "kind", "title"])
     rows: dict[str, Sequence[Cell]] = {}
-    for base in find_and_load.folders() if folder is None else [folder]:
-        for path, kind in find_and_load.files(base, kinds):
+    for base in loader.folders() if folder is None else [folder]:
+        for path, kind in loader.files(base, kinds):
             archive = path.suffix == ".ssp"
             data = None if archive else yaml_lines.read(path, what="file").data
             title = str(data.get("title") or "") if isinstance(data, dict) else ""
-            by_name = folder is None and kind in find_and_load.COMMANDS
+            by_name = folder is None and kind in loader.COMMANDS
             name = path.relative_to(base).with_suffix("").as_posix() if by_name else str(path)
             rows.setdefault(name, [name, "SSP archive" if archive else kind.partition(" ")[2], title or None])
     table.rows = [*rows.values()]
     if not table.rows:
-        where = folder or " and ".join(map(str, find_and_load.folders()))
+        where = folder or " and ".join(map(str, loader.folders()))
         raise ScenarioError(f"{where}: holds no file that is {' or '.join(kinds)}", code="file-wrong-kind")
     return table
 

@@ -220,7 +220,7 @@ class Simulation:
         record.units_freed = False
         record.diagnostics = [*map(DiagnosticRecord.of, (*self.plan.diagnostics, *self.watch.warnings()))]
         if ended is not None:
-            record.ended = EndRecord(unit=ended.instance, time=ended.time, message=str(ended))
+            record.ended = EndRecord(instance=ended.instance, time=ended.time, message=str(ended))
         self._note_warnings()
         self.recorder.finish(record)
         self._saved, self._saving = True, False
@@ -239,7 +239,7 @@ class Simulation:
         """Set the warnings of the record to those logged so far."""
         warnings = list(self.log.warnings(self._ended_by))
         self.record.warnings = [
-            WarningRecord(unit=m.instance, time=m.time, status=STATUS[m.status], text=m.text)
+            WarningRecord(instance=m.instance, time=m.time, status=STATUS[m.status], text=m.text)
             for m in warnings[:WRITTEN]
         ]
         self.record.more_warnings = max(0, len(warnings) - WRITTEN) + self.log.dropped
@@ -250,7 +250,7 @@ class Simulation:
         instance = getattr(error, "instance", None)
         return ErrorRecord(
             message=str(error) or type(error).__name__,
-            unit=instance,
+            instance=instance,
             time=getattr(error, "time", None),
             inputs=self.course.inputs_of(instance) if instance else {},
             traceback=self.log.tracebacks(instance) if instance else [],

@@ -36,7 +36,7 @@ from ..results.file_formats import FILES
 from ..results.reader import FoundRun, found_runs, load_results
 from ..results.run_folder import RUN_FILE
 from ..safe_files import NO_FOLLOW
-from ..scenario import find_and_load
+from ..scenario import loader
 from .page_parts import render
 from .sliders import Bench, Superseded, wanted_of
 from .viewer import page
@@ -197,7 +197,7 @@ class Request(BaseHTTPRequestHandler):
         runs = list(runs_below(folder))
         text = render(
             "results.html.j2", title=f"Results in {folder}", pages=pages, runs=runs,
-            scenarios=find_and_load.names("a scenario"),
+            scenarios=loader.names("a scenario"),
         )  # fmt: skip
         self._send_own(text)
 
@@ -227,7 +227,7 @@ class Request(BaseHTTPRequestHandler):
 
     def _bench(self, rest: str, query: Query) -> None:
         """Send the bench of a scenario."""
-        names = find_and_load.names("a scenario")
+        names = loader.names("a scenario")
         scenario = query.get("scenario", names)[0]
         self._send_own(self.server.bench.page(scenario, names))
 

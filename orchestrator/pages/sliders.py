@@ -29,7 +29,7 @@ from ..messages import hint, short
 from ..plan import Instance, Plan, Variable
 from ..planner import Planner
 from ..results.reader import Results
-from ..scenario import find_and_load
+from ..scenario import loader
 from ..scenario.overrides import is_path, read_changes
 from ..scenario.schema import LoadedScenario
 from ..wiring.context import FACTS
@@ -243,11 +243,11 @@ class Bench:
     def _scenario(self, name: str) -> Path:
         """Return the scenario of a name; a path is refused."""
         if name not in self._paths:
-            known = find_and_load.names("a scenario")
+            known = loader.names("a scenario")
             if name not in known:
                 others = hint(name, known, lead="by name there are")
                 raise ScenarioError(f"there is no scenario {short(name)}{others}", code="scenario-unknown")
-            self._paths[name] = find_and_load.find(name, "a scenario")
+            self._paths[name] = loader.find(name, "a scenario")
         return self._paths[name]
 
     def run(self, wanted: Wanted) -> tuple[str, list[str]]:

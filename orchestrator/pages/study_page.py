@@ -50,7 +50,7 @@ from ..results.measurement_results import filtered_alike
 from ..results.reader import Results
 from ..results.run_folder import RunStatus
 from ..results.run_record import RunRecord, load_record
-from ..scenario.find_and_load import LoadedScenario
+from ..scenario.loader import LoadedScenario
 from .diagram import diagram, systems_of
 from .evaluation_page import validation_facts
 from .page_parts import FigureImage, anchor, count_kinds, fmus_of, groups_of, image_of, programs_of, render

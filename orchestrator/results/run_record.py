@@ -92,7 +92,7 @@ class ErrorRecord(_Part):
     """Failure of a run."""
 
     message: str = ""
-    unit: str | None = None
+    instance: str | None = Field(None, validation_alias="unit", serialization_alias="unit")
     time: float | None = None
     inputs: dict[str, Any] = {}
     traceback: list[str] = []
@@ -101,7 +101,7 @@ class ErrorRecord(_Part):
 class EndRecord(_Part):
     """Early end of a run: the instance that ended it, the time [s] and its reason."""
 
-    unit: str | None = None
+    instance: str | None = Field(None, validation_alias="unit", serialization_alias="unit")
     time: float | None = None
     message: str = ""
 
@@ -198,7 +198,7 @@ EARLIER = {
 class WarningRecord(_Part):
     """A message of an instance that did not end the run, with its time [s] and FMI status."""
 
-    unit: str = ""
+    instance: str = Field("", validation_alias="unit", serialization_alias="unit")
     time: float | str = 0.0
     status: str = ""
     text: str = ""

@@ -17,7 +17,7 @@ from itertools import pairwise
 
 from ..messages import fold, hint, listed
 from ..plan import Variable, Wire
-from ..scenario.find_and_load import Connection
+from ..scenario.loader import Connection
 from ..scenario.yaml_lines import KeyPath, dotted
 from ..signal_names import SignalName, matching
 from .compatibility import DIFFERENCES, alike, contradicts_its_name, conversion_between, difference, fits

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InvalidValueError, ScenarioError, code_of, text_of
 from ..messages import fold, hint
 from ..plan import InputSeries, Value, ValueOrigin, Variable
-from ..scenario.find_and_load import LoadedScenario
+from ..scenario.loader import LoadedScenario
 from ..scenario.quantities import measure_of
 from ..scenario.schema import SeriesSpec
 from ..scenario.yaml_lines import KeyPath

@@ -23,7 +23,7 @@ from vocabulary.wheels import WHEELS, wheels
 from ..errors import Diagnostic, Severity, WiringError
 from ..messages import fold_sentences
 from ..plan import Fmu, Instance, Value, ValueOrigin, Variable
-from ..scenario.find_and_load import LoadedScenario
+from ..scenario.loader import LoadedScenario
 from ..scenario.yaml_lines import MOST_ERRORS, Document, KeyPath
 from ..signal_names import FACTS as NAMES
 from ..signal_names import match, matching

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from ..fault_kinds import KINDS, Fault, FaultLocation, FaultySignal
 from ..messages import fold, hint, listed
 from ..plan import Variable, Wire
-from ..scenario.find_and_load import LoadedScenario
+from ..scenario.loader import LoadedScenario
 from ..scenario.quantities import convert
 from ..scenario.yaml_lines import KeyPath, dotted
 from ..signal_names import match, matching

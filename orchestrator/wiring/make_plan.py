@@ -27,7 +27,7 @@ from ..fmu.description import shadowed_modules
 from ..fmu.opener import Opener, find_fmu, find_folder, hidden, host_needs, stale_fmus
 from ..messages import closest, fold, hint, listed
 from ..plan import DEFAULT, Fmu, InputSeries, Instance, Plan, Value, ValueOrigin, Variable, Wire
-from ..scenario.find_and_load import LoadedScenario
+from ..scenario.loader import LoadedScenario
 from ..scenario.overrides import is_path
 from ..signal_names import SignalName, match
 from .connections import Connector

@@ -24,7 +24,7 @@ from ..messages import closest, fold, hint, listed, short
 from ..plan import DEFAULT, LITERATURE, VARIED, Fmu, OriginKind, Value, ValueOrigin, ValueSource, Variable
 from ..safe_files import TEXT, read_bytes
 from ..scenario import quantities
-from ..scenario.find_and_load import LoadedScenario
+from ..scenario.loader import LoadedScenario
 from ..scenario.schema import TextSpec
 from ..scenario.yaml_lines import Document, KeyPath
 from .context import WiringContext, facts_of

@@ -25,7 +25,7 @@ from vocabulary.vehicle import CAR, DYNAMIC_INDEX
 from ..errors import Diagnostic, Location
 from ..messages import fold, listed
 from ..plan import DEFAULT, SENSING, Instance, OriginKind, Value, Variable, Wire
-from ..scenario.find_and_load import LoadedScenario
+from ..scenario.loader import LoadedScenario
 from ..scenario.quantities import meant_unit, number_and_unit
 from .context import FACTS
 from .parameters import STIFFNESSES, known_car

@@ -12,7 +12,7 @@ import pytest
 
 import yawbench as yb
 from orchestrator.errors import ScenarioError
-from orchestrator.scenario import find_and_load
+from orchestrator.scenario import loader
 from tests.sentences import golden, refused
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -48,10 +48,10 @@ def test_the_nearest_folder_of_scenarios_comes_before_the_one_that_comes_along(t
     below = tmp_path / "deep" / "er"
     below.mkdir(parents=True)
     monkeypatch.chdir(below)
-    assert find_and_load.find(NAME, "a scenario") == own.with_suffix(".yaml")
-    assert find_and_load.names("a scenario").count(NAME) == 1
+    assert loader.find(NAME, "a scenario") == own.with_suffix(".yaml")
+    assert loader.names("a scenario").count(NAME) == 1
     monkeypatch.chdir(tmp_path)
-    assert find_and_load.find(NAME, "a scenario") == Path("scenarios", f"{NAME}.yaml")
+    assert loader.find(NAME, "a scenario") == Path("scenarios", f"{NAME}.yaml")
 
 
 def test_the_library_knows_the_names_that_the_commands_know(tmp_path, monkeypatch):
@@ -84,17 +84,17 @@ def test_a_folder_in_place_of_a_file_names_the_files_in_it(yawbench, command, fo
 
 
 def test_a_vehicle_file_goes_by_its_name_with_or_without_its_folder():
-    van = find_and_load.find("van", "a vehicle file")
-    assert van == find_and_load.find("vehicles/van", "a vehicle file")
+    van = loader.find("van", "a vehicle file")
+    assert van == loader.find("vehicles/van", "a vehicle file")
     assert van.samefile(SCENARIOS / "vehicles" / "van.yaml")
     with refused(ScenarioError, "scenario-unknown"):
-        find_and_load.find("large_salon", "a vehicle file")
+        loader.find("large_salon", "a vehicle file")
     with refused(ScenarioError, "scenario-unknown"):
-        find_and_load.find("25mps", "a scenario")
+        loader.find("25mps", "a scenario")
 
 
 def test_the_glance_at_a_file_sees_the_kind_that_its_schema_sees():
-    kinds = {path.name: kind for path, kind in find_and_load.files(SCENARIOS / "fnn_sideslip", list(KINDS))}
+    kinds = {path.name: kind for path, kind in loader.files(SCENARIOS / "fnn_sideslip", list(KINDS))}
     assert kinds == {
         **dict.fromkeys(("15mps.yaml", "25mps.yaml", "40mps.yaml"), "a scenario"),
         **dict.fromkeys((f"{speed}mps_actuators.yaml" for speed in (15, 25, 40)), "a scenario"),

@@ -145,7 +145,7 @@ def test_every_problem_is_a_line_on_stderr_and_the_status_is_2(
 
 def test_checking_loads_no_simulation_and_no_figures() -> None:
     code = (
-        "import sys; from orchestrator.scenario.find_and_load import load_scenario\n"
+        "import sys; from orchestrator.scenario.loader import load_scenario\n"
         "from orchestrator.wiring.make_plan import make_plan\n"
         "make_plan(load_scenario('Läufe 2/a.yaml'))\n"
         "print(sorted({'fmpy', 'numpy', 'lxml', 'matplotlib', 'rich', 'components'} & set(sys.modules)))"

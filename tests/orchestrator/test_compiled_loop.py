@@ -22,7 +22,7 @@ from orchestrator.errors import Interrupted
 from orchestrator.master import compiled_loop
 from orchestrator.master.simulate import simulate
 from orchestrator.results.reader import load_results
-from orchestrator.scenario.find_and_load import load_scenario, names
+from orchestrator.scenario.loader import load_scenario, names
 from orchestrator.wiring.make_plan import make_plan
 from tests.sentences import golden_in, refused
 

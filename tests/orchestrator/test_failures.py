@@ -57,8 +57,9 @@ def test_a_failed_step_is_one_sentence_with_unit_time_and_reason(tmp_path):
     assert golden(sentence)
     assert results.record.status == "failed"
     assert results.record.error.message == sentence
-    assert results.record.error.unit == "target"
+    assert results.record.error.instance == "target"
     assert results.record.error.time == 0.5
+    assert json.loads(results.record.to_json())["error"]["unit"] == "target"  # the key of earlier versions
 
 
 def test_a_failed_run_keeps_the_rows_before_and_the_inputs_of_the_failed_step(tmp_path):
@@ -287,7 +288,7 @@ def test_a_value_on_no_wire_that_is_not_finite_is_a_warning_with_its_first_time(
     assert golden(said)
     results = load_results(tmp_path)
     assert results.record.status == "completed"
-    assert [(w.unit, w.time) for w in results.record.warnings] == [("source", time)]
+    assert [(w.instance, w.time) for w in results.record.warnings] == [("source", time)]
     assert len(results.time) == 11
     assert math.isnan(results["source.spare"][-1])
 

@@ -26,7 +26,7 @@ from orchestrator.master.step_loop import Master
 from orchestrator.plan import Override
 from orchestrator.results.freshness import key_of, staleness
 from orchestrator.results.reader import load_results
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.scenario.overrides import read_changes
 from orchestrator.wiring.make_plan import make_plan as plan_of_scenario
 from tests.sentences import golden, golden_in, texts_of

@@ -200,7 +200,7 @@ def test_a_number_that_its_input_cannot_be_ends_the_run(
     status, _, results = run(units, *isolate, inputs=inputs, connections=[wire], stop_time=3)
     assert status == 1
     assert golden(results.record.error.message)
-    assert results.record.error.unit == unit
+    assert results.record.error.instance == unit
     assert results.record.error.time == pytest.approx(time, abs=0.11)
 
 

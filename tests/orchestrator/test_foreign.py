@@ -14,7 +14,7 @@ from orchestrator.master import child_run
 from orchestrator.metrics.expressions import evaluate, metric
 from orchestrator.results.freshness import staleness
 from orchestrator.results.reader import load_results
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.sentences import golden_in
 
@@ -185,7 +185,7 @@ def test_a_parameter_that_does_not_take_ends_the_run(run, isolate):
     assert status == 1
     assert golden_in(said)
     assert results.record.status == "failed"
-    assert results.record.error.unit == "b"
+    assert results.record.error.instance == "b"
 
 
 @together_and_apart
@@ -250,7 +250,7 @@ def test_an_fmu_that_wants_to_end_ends_the_run_in_good_order(run, isolate, guid,
     assert golden_in(said)
     assert results.time.size == rows
     assert (results.record.status, results.record.error) == ("completed", None)
-    assert results.record.ended.unit == "a"
+    assert results.record.ended.instance == "a"
     assert results.record.ended.time == pytest.approx(reached)
     assert results["b.Real_out"].tolist() == [3.0] * rows
 
@@ -309,7 +309,7 @@ def test_a_description_that_is_formally_wrong_runs_with_a_warning_if_asked_to(ru
     status, said, results = run("--no-validate", **WRONG)
     assert status == 0, said
     assert golden_in(said)
-    assert [w.unit for w in results.record.warnings] == ["a", "b"]
+    assert [w.instance for w in results.record.warnings] == ["a", "b"]
     assert results["b.Real_out"][-1] == 3.0
 
 

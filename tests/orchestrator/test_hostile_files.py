@@ -22,7 +22,7 @@ from orchestrator.experiments.tables import Table
 from orchestrator.pages.study_page import chapter, study_page
 from orchestrator.safe_files import reading
 from orchestrator.scenario import yaml_lines
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.scenario.overrides import read_changes
 from orchestrator.wiring.make_plan import make_plan
 from tests.sentences import golden, golden_in, places_of, refused, texts_of

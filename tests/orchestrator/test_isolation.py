@@ -17,7 +17,7 @@ from orchestrator.errors import SimulationError
 from orchestrator.master.isolation import Isolation
 from orchestrator.master.simulate import simulate
 from orchestrator.results.reader import load_results
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.sentences import golden_in
@@ -101,7 +101,7 @@ def test_units_end_when_the_master_is_killed(fmus, tmp_path):
     code = (
         "import sys, os, signal; from pathlib import Path\n"
         "from orchestrator.plan import Override\n"
-        "from orchestrator.scenario.find_and_load import load_scenario\n"
+        "from orchestrator.scenario.loader import load_scenario\n"
         "from orchestrator.wiring.make_plan import make_plan\n"
         "from orchestrator.master.isolation import Isolation\n"
         "from orchestrator.master.simulate import simulate\n"
@@ -127,7 +127,7 @@ def test_an_fmu_that_crashes_costs_the_run_and_not_its_results(foreign, run):
     assert status == 1
     assert golden_in(said)
     assert results.record.status == "failed"
-    assert results.record.error.unit == "controller"
+    assert results.record.error.instance == "controller"
     assert 0.049 <= results.time[-1] <= 0.052
     assert np.all(np.isfinite(results["plant.velocity_x"]))
 
@@ -166,7 +166,7 @@ def test_without_isolation_too_an_end_without_a_word_is_a_sentence_and_the_resul
     assert status == 1
     assert golden_in(said)
     assert results.record.status == "failed"
-    assert results.record.error.unit == "controller"
+    assert results.record.error.instance == "controller"
     assert results.time[-1] == 0.051  # the controller takes two steps at once
     assert np.all(np.isfinite(results["plant.velocity_x"]))
 

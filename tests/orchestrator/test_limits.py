@@ -12,7 +12,7 @@ import pytest
 
 from orchestrator.commands.check import show
 from orchestrator.errors import WiringError
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.sentences import golden, texts_of
 

@@ -17,7 +17,7 @@ from orchestrator.measured.segment import LowPass
 from orchestrator.plan import InputSeries
 from orchestrator.planner import Planner
 from orchestrator.results.measurement_results import load_run
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from tests.pages.made_up import unpacked
 from tests.sentences import golden
 

@@ -10,7 +10,7 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.errors import ScenarioError, WiringError
 from orchestrator.experiments.experiment import load_experiment
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.scenario.quantities import exact_text, seconds
 from orchestrator.wiring.make_plan import make_plan
 from tests.commands import status_of

@@ -11,7 +11,7 @@ from components.cars.sprung_car import FourteenDofParameters, ride_of
 from orchestrator.commands.check import show
 from orchestrator.errors import WiringError
 from orchestrator.plan import ValueOrigin
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.derivations import DERIVATIONS, car_of, contradictions
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from orchestrator.errors import warnings_in
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from orchestrator.wiring.parameters import known_car
 from orchestrator.wiring.suspicious_values import suspicious_vehicle

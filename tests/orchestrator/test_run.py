@@ -17,7 +17,7 @@ from orchestrator.master import process_state as log
 from orchestrator.master.fmi import open_instance
 from orchestrator.master.simulate import simulate
 from orchestrator.results.reader import load_results
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.fmu_copies import put_fmus
 from tests.sentences import golden, golden_in
@@ -238,7 +238,7 @@ def test_an_exception_in_a_component_is_one_sentence_with_file_and_line(yawbench
     error = results.record.error
     assert results.record.status == "failed"
     assert error.message == said.splitlines()[0]
-    assert (error.unit, error.time) == ("controller", 0.05)
+    assert (error.instance, error.time) == ("controller", 0.05)
     assert error.inputs["steer_angle"] == pytest.approx(results["driver.steer_angle"][5], rel=0.5)
     assert "in advance\n" in error.traceback[0]
     assert error.traceback[0].rstrip().endswith("100 % größer 1")

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from orchestrator.errors import Diagnostic, ScenarioError
-from orchestrator.scenario.find_and_load import ScenarioSpec, load_scenario
+from orchestrator.scenario.loader import ScenarioSpec, load_scenario
 from orchestrator.signal_names import SignalName
 from tests.changed import changed
 from tests.sentences import golden, golden_in, places_of

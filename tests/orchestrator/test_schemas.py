@@ -20,7 +20,7 @@ from orchestrator.commands.schema import FOLDER, MODELS, model_of, schema_of, sc
 from orchestrator.experiments import fit, ranking, threats
 from orchestrator.measured import measurement
 from orchestrator.scenario import yaml_lines
-from orchestrator.scenario.find_and_load import kind_of
+from orchestrator.scenario.loader import kind_of
 from orchestrator.scenario.schema_validation import validate
 from orchestrator.scenario.yaml_lines import Document
 

@@ -26,7 +26,7 @@ from orchestrator.interop.second_opinion import (
     still_signals,
 )
 from orchestrator.master.simulate import simulate_in_memory
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.evidence import measured

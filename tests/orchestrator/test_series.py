@@ -20,7 +20,7 @@ from orchestrator.measured.recording_formats import ColumnFile
 from orchestrator.plan import InputSeries, Plan
 from orchestrator.results.freshness import staleness
 from orchestrator.results.reader import load_results
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.sentences import golden, golden_in, refused, texts_of
 from vocabulary.wheels import WHEELS

@@ -19,7 +19,7 @@ from orchestrator.figures.style import LabelledRun
 from orchestrator.metrics.expressions import evaluate, metric
 from orchestrator.pages.comparison import divergence
 from orchestrator.results.reader import load_results
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.signal_names import SignalName, Target, match, matching
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed

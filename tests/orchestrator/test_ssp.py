@@ -17,7 +17,7 @@ from orchestrator.cli import main
 from orchestrator.errors import ResultsError, YawbenchError
 from orchestrator.interop.ssp_write import for_omsimulator, write_ssp
 from orchestrator.master.simulate import simulate
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.scenario.ssp_archive import DESCRIPTION_FILE, SSC, SSD, SSM, SSV
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed

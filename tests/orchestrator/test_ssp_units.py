@@ -11,7 +11,7 @@ import pytest
 from orchestrator.errors import YawbenchError
 from orchestrator.interop.ssp_write import for_omsimulator, system_structure, write_ssp
 from orchestrator.plan import Plan, Wire
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.scenario.ssp_archive import SSC, SSD, SSV
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed

@@ -20,7 +20,7 @@ from orchestrator.evaluation.trace import Trace, trace_of
 from orchestrator.metrics.verdict import Status, Verdict
 from orchestrator.results.reader import Results
 from orchestrator.results.run_record import RunRecord
-from orchestrator.scenario.find_and_load import SHIPPED, load_scenario
+from orchestrator.scenario.loader import SHIPPED, load_scenario
 from orchestrator.tyre_stand import cornering_stiffness
 from orchestrator.wiring.make_plan import make_plan
 from tests.sentences import golden, golden_in

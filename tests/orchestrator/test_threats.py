@@ -26,7 +26,7 @@ from orchestrator.experiments.threat_scores import (
 )
 from orchestrator.experiments.threats import LoadedThreats, QuantitySpec, ThreatSpec, load_threats
 from orchestrator.pages.threats_page import car_tables, discipline_table, disciplines, overview
-from orchestrator.scenario.find_and_load import SHIPPED
+from orchestrator.scenario.loader import SHIPPED
 from tests.checkout import ROOT
 from tests.commands import status_of
 from tests.pages.made_up import unpacked

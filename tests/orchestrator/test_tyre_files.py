@@ -19,7 +19,7 @@ from orchestrator.pages.page_parts import groups_of
 from orchestrator.results.freshness import key_of, run_record
 from orchestrator.results.reader import load_results
 from orchestrator.results.run_folder import default_folder
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.scenario.overrides import changes_of, read_changes
 from orchestrator.signal_names import Target
 from orchestrator.wiring.make_plan import make_plan

@@ -13,7 +13,7 @@ import pytest
 from orchestrator.errors import Diagnostic, Location, ModelDescriptionError, WiringError, YawbenchError
 from orchestrator.plan import Instance, Override, Plan, ValueOrigin, Wire
 from orchestrator.planner import Planner
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.sentences import golden, golden_in, places_of, refused, texts_of

@@ -13,7 +13,7 @@ from orchestrator.pages.page_parts import groups_of
 from orchestrator.plan import CHOSEN, ERRATUM, LITERATURE, NEUTRAL, PAPER, ValueSource
 from orchestrator.results.freshness import key_of, run_record, staleness
 from orchestrator.results.run_record import RunRecord
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.fmu_copies import put_fmus

@@ -10,7 +10,7 @@ import pytest
 
 from orchestrator.master.simulate import simulate
 from orchestrator.results.reader import load_results
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.conftest import evenly

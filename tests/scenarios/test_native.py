@@ -14,7 +14,7 @@ from fmus.build import HERE as FMUS
 from fmus.build import build_all, find_components
 from orchestrator.fmu.binary import runs_as
 from orchestrator.plan import RunsAs
-from orchestrator.scenario.find_and_load import names
+from orchestrator.scenario.loader import names
 
 SHORT = ("--set", "stop_time=1.2")
 RUNS = {

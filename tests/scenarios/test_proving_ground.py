@@ -14,7 +14,7 @@ from orchestrator.evaluation.steering_tests import evaluate_slow_steer
 from orchestrator.evaluation.trace import trace_of
 from orchestrator.metrics.verdict import Status
 from orchestrator.plan import Override
-from orchestrator.scenario.find_and_load import SHIPPED
+from orchestrator.scenario.loader import SHIPPED
 from yawbench._scenario import Scenario
 
 pytestmark = pytest.mark.exhaustive

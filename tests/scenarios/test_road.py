@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from orchestrator.master.simulate import simulate_in_memory
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.fmu_copies import put_fmus

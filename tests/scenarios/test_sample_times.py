@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from orchestrator.scenario.find_and_load import SHIPPED, files, load_scenario
+from orchestrator.scenario.loader import SHIPPED, files, load_scenario
 from tests.components.test_conformance import COMPONENTS
 
 SCENARIOS = [path for path, _ in files(SHIPPED, ["a scenario"])]

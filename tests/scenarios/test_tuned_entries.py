@@ -10,10 +10,10 @@ from ruamel.yaml import YAML
 
 import yawbench as yb
 from orchestrator.cli import main
-from orchestrator.experiments.axes_and_sampling import level_at
 from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.experiment_design import level_at
 from orchestrator.experiments.tuning import DIGITS, tuning_of
-from orchestrator.scenario.find_and_load import SHIPPED
+from orchestrator.scenario.loader import SHIPPED
 from tests.checkout import ROOT
 
 HERE = SHIPPED / "proving_ground"

@@ -16,7 +16,7 @@ from orchestrator.commands.check import show
 from orchestrator.errors import WiringError, warnings_in
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.planner import Planner
-from orchestrator.scenario.find_and_load import load_scenario
+from orchestrator.scenario.loader import load_scenario
 from orchestrator.tyre_stand import cornering_stiffness
 from orchestrator.vehicles import handling as handling
 from orchestrator.vehicles.handling import (

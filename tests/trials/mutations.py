@@ -138,7 +138,7 @@ def load(file: Path, kind: str, planner: Any) -> None:
     from orchestrator.metrics.expressions import evaluate_all
     from orchestrator.plan import Override
     from orchestrator.results.reader import load_results
-    from orchestrator.scenario.find_and_load import load_scenario
+    from orchestrator.scenario.loader import load_scenario
     from orchestrator.wiring.make_plan import make_plan
 
     fmus, opener = ROOT / "fmus", planner.opener
@@ -272,7 +272,7 @@ def through_loaders(
 def command_of(number: int, seed: int, box: Sandbox) -> tuple[list[str], Path]:
     """Return a command line for a case, and its file."""
     from orchestrator.experiments.experiment import load_experiment
-    from orchestrator.scenario.find_and_load import load_scenario
+    from orchestrator.scenario.loader import load_scenario
 
     r = random.Random(f"{seed}/command/{number}")
     file, kind = case_of("commands", number, seed, box)

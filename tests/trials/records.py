@@ -30,7 +30,7 @@ from fmus.build import build_all
 from orchestrator.cli import main as yawbench
 from orchestrator.errors import RecordWarning, YawbenchError
 from orchestrator.experiments.ranking import load_ranking
-from orchestrator.scenario.find_and_load import SHIPPED
+from orchestrator.scenario.loader import SHIPPED
 from tests.orchestrator.test_batch_commands import SCENARIO, STUDY, UNITS
 
 from .kills import SWEEP

@@ -184,7 +184,6 @@ def _parameters() -> Iterator[Parameter]:
              may={label for label in WRONG if label.startswith("dict of")} | {"hostile dict"})  # fmt: skip
     # Changes.
     plan = yb.Scenario.plan
-    names = {"unit", "controller"}
     yield of(
         "Scenario.swap.instances",
         lambda x: b.base.swap(**{x: "controller_off"}),
@@ -193,7 +192,7 @@ def _parameters() -> Iterator[Parameter]:
     )
     yield of("Scenario.swap.replacements", lambda x: b.base.swap(x), "replacements", "instance",
              right={"None"}, may={"dict"})  # fmt: skip
-    yield of("Scenario.swap.instances [controller]", lambda x: plan(b.base.swap(controller=x)), *names,
+    yield of("Scenario.swap.instances [controller]", lambda x: plan(b.base.swap(controller=x)), "controller",
              may={"lambda", "builtin"})  # fmt: skip
     yield of("Scenario.set.values", lambda x: b.base.set(x), "values", "has no instance", "set ")
     yield of("Scenario.set.values [place]", lambda x: b.base.set({x: 1}), "values", "has no instance", "set ",

@@ -1,4 +1,4 @@
-"""An FMU written in C behind the master: what does not come from PythonFMU."""
+"""An FMU written in C, run by the master: data types, statuses and failures that PythonFMU never makes."""
 
 import ctypes
 import sys
@@ -52,14 +52,14 @@ CONSTANTS = {"Real_in": 0.75, "Integer_in": -21, "Boolean_in": True, "String_in"
 
 
 def chain(fmu, answer=0, algorithm="extrapolated"):
-    """Two units of one FMU, the second fed by the first."""
-    units = (
+    """Two instances of an FMU, the first wired to the second."""
+    instances = (
         Instance("a", fmu, 1, {"answer": 0}, dict(CONSTANTS)),
         Instance("b", fmu, 1, {"answer": answer}, {}),
     )
     wires = tuple(Wire("a", f"{kind}_out", "b", f"{kind}_in") for kind in TYPES)
-    record = tuple(SignalName(unit, f"{kind}_out") for unit in "ab" for kind in TYPES)
-    return Plan(units, wires, record, Fraction(1, 20), 10, algorithm)
+    record = tuple(SignalName(instance, f"{kind}_out") for instance in "ab" for kind in TYPES)
+    return Plan(instances, wires, record, Fraction(1, 20), 10, algorithm)
 
 
 def counters(fmu):
@@ -109,7 +109,7 @@ def test_a_warning_with_printf_arguments_is_readable(fmu, held, tmp_path):
 
 @pytest.mark.parametrize("isolated", [False, True], ids=["together", "apart"])
 @pytest.mark.parametrize("answer", [-1, 42])
-def test_a_number_that_is_no_status_ends_the_run(fmu, answer, isolated, tmp_path):
+def test_an_invalid_status_ends_the_run(fmu, answer, isolated, tmp_path):
     plan = chain(fmu, answer)
     with Isolation(plan.instances) as isolation, pytest.raises(SimulationError) as caught:
         simulate(plan, tmp_path / "out", opener=isolation if isolated else open_instance)
@@ -143,7 +143,7 @@ def test_an_fmu_for_other_platforms_only_is_refused(fmu, tmp_path):
         simulate(chain(fmu), tmp_path / "out")
 
 
-def test_a_library_that_is_none_is_refused(fmu, tmp_path, monkeypatch):
+def test_a_file_other_than_a_library_is_refused(fmu, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (fmu.directory / "binaries" / fmpy.platform / "foreign.so").write_bytes(b"no library")
     with refused(ModelDescriptionError, "fmu-not-loadable"):

@@ -1,4 +1,4 @@
-"""Folders of results, named after the scenario and what was changed in it."""
+"""Names of result folders: the scenario and its overrides."""
 
 from pathlib import Path
 
@@ -23,13 +23,13 @@ def test_a_plain_run_has_the_name_of_its_scenario():
     assert folder(suffix="-compare") == "results/paper/25mps-compare"
 
 
-def test_what_is_changed_stands_behind_the_name():
+def test_overrides_follow_the_name():
     assert folder(("controller", "controller_off"), ("vehicle.mass", 1200), ("stop_time", 0.5)) == (
         "results/paper/25mps,controller=controller_off,vehicle.mass=1200,stop_time=0.5"
     )
 
 
-def test_what_no_path_can_hold_is_told_apart_by_a_hash():
+def test_characters_that_no_path_can_hold_are_replaced_and_a_hash_added():
     all_wheels, told = folder(("inputs.friction*", 0.3)), folder(("inputs.friction_", 0.3))
     assert all_wheels.startswith("results/paper/25mps,inputs.friction_=0.3~")
     assert told == "results/paper/25mps,inputs.friction_=0.3"
@@ -41,7 +41,7 @@ def test_what_no_path_can_hold_is_told_apart_by_a_hash():
     assert here.startswith("results/paper/25mps,controller=it.fmu~")
 
 
-def test_a_long_name_is_cut_and_told_apart_by_a_hash():
+def test_a_long_name_is_cut_and_a_hash_added():
     many = [(f"unit.parameter_{i}", i) for i in range(40)]
     name = Path(folder(*many)).name
     assert len(name) <= LONGEST
@@ -53,6 +53,6 @@ def test_a_name_may_be_given():
 
 
 @pytest.mark.parametrize("name", ["", ".", "..", "a/b", "a\\b", "a\nb", "x" * 300])
-def test_a_name_that_is_no_name_of_a_folder_is_a_sentence(name):
+def test_an_invalid_folder_name_is_refused(name):
     with refused(ScenarioError):
         folder(name=name)
