@@ -17,7 +17,7 @@ import sys
 import sysconfig
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from types import CellType, FunctionType, MethodType
+from types import CellType, CodeType, FunctionType, MethodType, ModuleType
 from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
@@ -185,41 +185,56 @@ def brought_along(program: Any, component: type[Component]) -> dict[str, Value]:
 
 def text_of(program: Any) -> bytes:
     """Return a program's source text and state, as far as Python knows them, to distinguish programs."""
-    parts = [] if isinstance(program, (type, FunctionType)) else [_pickled(program)]
-    for function in functions_of(program, named=True):
-        try:
-            parts.append(inspect.getsource(function).encode())
-        except Exception:  # there is none
-            parts.append(function.__code__.co_code + _pickled(function.__code__.co_consts))
-        values = [function.__defaults__, function.__kwdefaults__]
-        values += [cell.cell_contents for cell in function.__closure__ or () if not _is_empty(cell)]
-        values += [function.__globals__.get(name) for name in function.__code__.co_names]
-        parts += map(_pickled, values)
+    parts = []
+    for value in _reached([program], named=True):
+        if isinstance(value, FunctionType):
+            try:
+                parts.append(inspect.getsource(value).encode())
+            except Exception:  # there is none
+                parts.append(value.__code__.co_code + _pickled(value.__code__.co_consts))
+            parts += map(
+                _pickled, [value.__defaults__, value.__kwdefaults__, *_closed_over(value), *_used(value)]
+            )
+        elif issubclass(type(value), type):
+            parts.append(_pickled({k: x for k, x in vars(value).items() if not k.startswith("__")}))
+        else:
+            parts.append(_pickled(value))
     return b"".join(parts)
 
 
-def functions_of(*programs: Any, named: bool = False) -> list[FunctionType]:
+def functions_of(*programs: Any) -> list[FunctionType]:
     """Return the functions of programs: their own, of their classes, and of what they hold.
 
     Args:
         programs: functions, classes, and objects.
-        named: with those of the user that they call by the names of modules.
     """
-    functions: list[FunctionType] = []
-    waiting, seen = list(reversed(programs)), set()
+    return [value for value in _reached(programs) if isinstance(value, FunctionType)]
+
+
+def _reached(programs: Sequence[Any], named: bool = False) -> list[Any]:
+    """Return programs, their classes and what they hold, except numbers and texts.
+
+    Args:
+        programs: functions, classes, and objects.
+        named: with what their functions use by the names of modules.
+    """
+    reached: dict[int, Any] = {}
+    waiting = list(reversed(programs))
     while waiting:
         value = waiting.pop()
-        if id(value) in seen or type(value) in (*PLAIN, type(None), np.ndarray):
+        if id(value) in reached or type(value) in (*PLAIN, type(None), np.ndarray):
             continue
-        seen.add(id(value))
+        reached[id(value)] = value
         if isinstance(value, FunctionType):
-            functions.append(value)
-            waiting += [cell.cell_contents for cell in value.__closure__ or () if not _is_empty(cell)]
+            waiting += _closed_over(value)
             if named:
-                there = (value.__globals__.get(name) for name in value.__code__.co_names)
-                waiting += [x for x in there if isinstance(x, (FunctionType, type)) and _is_of_user(x)]
+                waiting += [value.__defaults__, value.__kwdefaults__]
+                waiting += [
+                    x for x in _used(value) if not isinstance(x, (FunctionType, type)) or _is_of_user(x)
+                ]
         elif issubclass(type(value), type):  # `isinstance` would ask the object
-            waiting += [x for base in value.__mro__[:-1] for x in vars(base).values()]
+            waiting += value.__mro__[1:-1]
+            waiting += [x for name, x in vars(value).items() if name != "__slotnames__"]  # which pickle adds
         elif type(value) in (list, tuple):
             waiting += value
         elif type(value) is dict:
@@ -232,15 +247,42 @@ def functions_of(*programs: Any, named: bool = False) -> list[FunctionType]:
             waiting.append(value.__func__)
         elif type(value) is property:
             waiting += [value.fget, value.fset]
+        elif type(value) is functools.cached_property:
+            waiting.append(value.func)
+        elif type(value) is functools._lru_cache_wrapper:
+            waiting.append(value.__wrapped__)
         elif any(value is program for program in programs) or _is_of_user(type(value)):
             waiting += [type(value), getattr(value, "__dict__", None)]
-    return functions
+    return list(reached.values())
+
+
+def _closed_over(function: FunctionType) -> list[Any]:
+    return [cell.cell_contents for cell in function.__closure__ or () if not _is_empty(cell)]
+
+
+def _used(function: FunctionType) -> list[Any]:
+    """Return what a function uses by the names of its module, and of modules of the user that it uses."""
+    names: dict[str, None] = {}
+    codes = [function.__code__]
+    for code in codes:  # which grows by the codes within
+        names |= dict.fromkeys(code.co_names)
+        codes += [x for x in code.co_consts if isinstance(x, CodeType)]
+    spaces, used = {id(function.__globals__): function.__globals__}, []
+    waiting = list(spaces.values())
+    for space in waiting:  # which grows by the modules within
+        there = [space[name] for name in names if name in space]
+        modules = [vars(x) for x in there if isinstance(x, ModuleType) and _is_of_user(x)]
+        waiting += [x for x in modules if id(x) not in spaces]
+        spaces |= {id(x): x for x in modules}
+        used += [x for x in there if not isinstance(x, ModuleType)]
+    return used
 
 
 def _is_of_user(value: Any) -> bool:
-    """Return whether a function or class is neither Python's nor of an installed package."""
-    file = getattr(sys.modules.get(value.__module__ or ""), "__file__", None) or ""
-    return value.__module__ != "builtins" and not file.startswith(INSTALLED)
+    """Return whether a function, class or module is neither Python's nor of an installed package."""
+    module = value.__name__ if isinstance(value, ModuleType) else value.__module__ or ""
+    file = getattr(sys.modules.get(module), "__file__", None) or ""
+    return module != "builtins" and not file.startswith(INSTALLED)
 
 
 def _is_empty(cell: CellType) -> bool:
@@ -251,10 +293,14 @@ def _is_empty(cell: CellType) -> bool:
 
 
 def _pickled(value: Any) -> bytes:
+    """Return a value as bytes; of what Python cannot pickle, its type and the values that it can."""
     try:
         return pickle.dumps(value)
     except Exception:
-        return type(value).__name__.encode()
+        held = value if type(value) is dict else getattr(value, "__dict__", None)
+        items = held.items() if held is not None else enumerate(value) if type(value) in (list, tuple) else ()
+        plain = {name: x for name, x in items if type(x) in (*PLAIN, np.ndarray)}
+        return type(value).__name__.encode() + pickle.dumps(plain)
 
 
 def has_constructor(cls: type) -> bool:

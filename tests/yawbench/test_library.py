@@ -1,6 +1,7 @@
 """The Python library: scenarios as values, runs in memory, units in plain Python."""
 
 import functools
+import importlib
 import json
 import re
 import sys
@@ -19,6 +20,7 @@ from orchestrator.cli import main
 from orchestrator.errors import warnings_in
 from tests.pages.made_up import unpacked
 from tests.sentences import golden, golden_in, refused, texts_of
+from yawbench._controller import PythonComponent
 
 SCENARIO = "fnn_sideslip/25mps"
 ROOT = Path(__file__).parents[2]
@@ -350,6 +352,191 @@ def test_code_that_was_edited_since_it_was_imported_is_not_translated(base, monk
     run = base.swap(controller=edited_law.law).set({"stop_time": 0.01}).run()
     assert run["controller.yaw_moment"][-1] == 1.0
     assert golden(run.record["fmus"]["controller"]["runs_as"])
+
+
+HELPERS = {
+    "a function": """
+def helper(x):
+    return 1.0 * x
+""",
+    "a function of a function": """
+def inner(x):
+    return 1.0 * x
+def helper(x):
+    return inner(x)
+""",
+    "a default value": """
+def helper(x, k=1.0):
+    return k * x
+""",
+    "a default function": """
+def by(x):
+    return 1.0 * x
+def helper(x, f=by):
+    return f(x)
+""",
+    "in a generator": """
+def f(x):
+    return 1.0 * x
+def helper(x):
+    return sum(f(y) for y in (x, x))
+""",
+    "in a lambda": """
+def f(x):
+    return 1.0 * x
+helper = lambda x: (lambda y: f(y))(x)
+""",
+    "a number in a generator": """
+K = 1.0
+def helper(x):
+    return sum(K * y for y in (x, x))
+""",
+    "a decorated function": """
+def twice(f):
+    return lambda x: f(f(x))
+@twice
+def helper(x):
+    return 1.0 * x
+""",
+    "a cached function": """
+@functools.lru_cache
+def helper(x):
+    return 1.0 * x
+""",
+    "a partial function": """
+def f(k, x):
+    return 1.0 * x
+helper = functools.partial(f, 0)
+""",
+    "a function in a table": """
+T = {'a': lambda x: 1.0 * x}
+def helper(x):
+    return T['a'](x)
+""",
+    "a closure": """
+def make():
+    def helper(x):
+        return 1.0 * x
+    return helper
+helper = make()
+""",
+    "what a closure has": """
+def make(k):
+    return lambda x: k * x
+helper = make(1.0)
+""",
+    "a class": """
+class helper(float):
+    def __new__(cls, x):
+        return 1.0 * x
+""",
+    "an attribute of a class": """
+class H:
+    k = 1.0
+def helper(x):
+    return H.k * x
+""",
+    "a base class": """
+class B:
+    def f(self, x):
+        return 1.0 * x
+class H(B):
+    pass
+def helper(x):
+    return H().f(x)
+""",
+    "a property": """
+class H:
+    @property
+    def k(self):
+        return 1.0
+def helper(x):
+    return H().k * x
+""",
+    "a cached property": """
+class H:
+    @functools.cached_property
+    def k(self):
+        return 1.0
+def helper(x):
+    return H().k * x
+""",
+    "an object": """
+class H:
+    def f(self, x):
+        return 1.0 * x
+helper = H().f
+""",
+    "an object in a list": """
+class H:
+    def f(self, x):
+        return 1.0 * x
+L = [H()]
+def helper(x):
+    return L[0].f(x)
+""",
+    "what an object keeps beside a function": """
+class H:
+    pass
+h = H()
+h.f, h.k = lambda x: x, 1.0
+def helper(x):
+    return h.f(x) * h.k
+""",
+    "another module": """
+import law_helpers
+def helper(x):
+    return law_helpers.helper(x)
+""",
+}
+USERS = {
+    "a function": """
+def law(yaw_rate):
+    return helper(yaw_rate)
+""",
+    "an object": """
+class Law:
+    inputs = ('yaw_rate',)
+    outputs = ('yaw_moment',)
+    def output(self, t, u):
+        return helper(u.yaw_rate)
+law = Law()
+""",
+    "an object that is called": """
+class Law:
+    def __call__(self, yaw_rate):
+        return self.f(yaw_rate)
+law = Law()
+law.f = helper
+""",
+    "a component": """
+from components.fmi.component import Component
+from components.fmi.variables import output, signal
+class law(Component):
+    'A law.'
+    inputs = (signal('yaw_rate', 'rad/s', 'Yaw rate'),)
+    outputs = (output('yaw_moment', 'yaw_rate', unit='N.m', text='Moment'),)
+    def output(self, t, u):
+        return (helper(u[0]),)
+""",
+}
+
+
+@pytest.mark.parametrize("user", USERS)
+@pytest.mark.parametrize("what", HELPERS)
+def test_a_law_whose_helper_was_edited_is_another_program(what, user, monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    digests = []
+    for value in ("1.0", "1.0", "2.0"):
+        (tmp_path / "law_helpers.py").write_text(f"def helper(x):\n    return {value} * x\n")
+        text = f"import functools\n{HELPERS[what].replace('1.0', value)}{USERS[user]}"
+        (tmp_path / "law_and_helpers.py").write_text(text)
+        for module in ("law_helpers", "law_and_helpers"):
+            monkeypatch.delitem(sys.modules, module, raising=False)
+        law = importlib.import_module("law_and_helpers").law
+        digests.append(PythonComponent(law, instance="controller", role="controller").fmu.sha256)
+    assert digests[0] == digests[1] != digests[2]
 
 
 def test_every_run_begins_with_a_copy_of_the_object(base):
