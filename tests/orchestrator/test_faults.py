@@ -1,39 +1,24 @@
-"""Faults of outputs and inputs against closed forms; what a scenario, an option and a file say of them."""
+"""Faults of outputs and inputs in a run: closed forms, random numbers, and what they cost."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.colors import to_hex
 
-import yawbench as yb
-from orchestrator.cli import main
-from orchestrator.commands.experiments import command_of
-from orchestrator.errors import ScenarioError, YawbenchError
-from orchestrator.experiments.experiment import load_experiment
 from orchestrator.fault_kinds import KINDS, CountedNoise, Fault, FaultLocation, FaultySignal
-from orchestrator.figures.panels import FAULTY, LabelledRun
-from orchestrator.figures.plots import draw
 from orchestrator.interrupts import StopFlag
 from orchestrator.master.process_state import Log
 from orchestrator.master.simulate import simulate, simulate_in_memory
 from orchestrator.master.step_loop import Master
-from orchestrator.plan import Override
-from orchestrator.results.freshness import key_of, staleness
+from orchestrator.results.freshness import staleness
 from orchestrator.results.reader import load_results
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.scenario.overrides import read_changes
-from orchestrator.wiring.make_plan import make_plan as plan_of_scenario
-from tests.sentences import golden, golden_in, texts_of
+from tests.sentences import golden
 
-from .fake_fmus import Var, make_fmu, out
 from .fakes import Clock, Function, Integrator, Stage, Witness, make_plan
-from .recorded import car, noted
 
 ALGORITHMS = ("jacobi", "gauss_seidel", "extrapolated")
 BEGIN, END, STEP = 1.0, 2.0, 1 / 8
@@ -228,6 +213,21 @@ def test_numbers_are_those_of_their_message_whatever_was_asked_before():
     ) != forth.at(0.0)
 
 
+# Records
+
+
+def test_the_record_says_what_was_faulty_and_results_are_known_to_be_of_another_fault(tmp_path):
+    units = {"source": Clock(x=signal), "target": Witness()}
+    frozen = faulty("freeze", of_output=True)
+    made = make_plan(units, WIRES, faults=[frozen])
+    simulate(made, tmp_path, opener=Stage(units))
+    assert golden(load_results(tmp_path).record.content()["faults"])
+    assert staleness(made, tmp_path) is None
+    assert golden(staleness(replace(made, faults=()), tmp_path))
+    simulate(replace(made, faults=()), tmp_path / "healthy", opener=Stage(units))
+    assert "faults" not in load_results(tmp_path / "healthy").record.content()
+
+
 # What it costs
 
 
@@ -253,269 +253,3 @@ def test_a_step_has_one_operation_more_for_a_unit_with_faults_and_none_without(a
         at = given.index((unit, "fault"))
         assert given[:at] + given[at + 1 :] == without
         assert given[at - 1][1] == follows
-
-
-# Scenarios
-
-SCENARIO = """\
-title: Faulty
-stop_time: 2
-step_size: 10 ms
-units:
-  plant: {fmu: plant_a}
-  gyro: {fmu: sensor_a}
-  law: {fmu: controller_a}
-connections:
-  - {from: plant.yaw_rate, to: gyro.yaw_rate_true}
-  - {from: [gyro], to: [law]}
-"""
-
-
-@pytest.fixture
-def folder(cache, tmp_path, monkeypatch):
-    """A working directory with a scenario, `a.yaml`, and its FMUs."""
-    monkeypatch.chdir(tmp_path)
-    make_fmu(
-        tmp_path / "fmus/plant_a.fmu",
-        inputs=[Var("yaw_moment", "N.m")],
-        outputs=[out("yaw_rate", unit="rad/s"), out("slip_*"), Var("gear", type="Integer", start=1)],
-    )
-    make_fmu(
-        tmp_path / "fmus/sensor_a.fmu",
-        inputs=[Var("yaw_rate_true", "rad/s")],
-        outputs=[out("yaw_rate", unit="rad/s", variability="discrete")],
-    )
-    make_fmu(
-        tmp_path / "fmus/controller_a.fmu",
-        inputs=[Var("yaw_rate", "rad/s"), Var("friction", optional=True, start=1.0)],
-        outputs=[out("yaw_moment", "yaw_rate", unit="N.m")],
-    )
-    (tmp_path / "a.yaml").write_text(SCENARIO)
-    return tmp_path
-
-
-def planned(*faults, text=SCENARIO, changes=()):
-    Path("a.yaml").write_text(text)
-    return plan_of_scenario(load_scenario("a.yaml", changes=(*changes, *read_changes(faults=faults))))
-
-
-def test_an_option_and_a_file_say_the_same(folder):
-    text = SCENARIO + (
-        "faults:\n  - {on: gyro.yaw_rate, kind: freeze, from: 0.5, until: 1.5}\n"
-        "  - {on: plant.yaw_rate -> gyro, kind: noise, value: 0.5 deg/s, seed: 3, every: 20 ms}\n"
-    )
-    by_file = planned(text=text)
-    by_option = planned(
-        "gyro.yaw_rate: freeze from 0.5 s until 1500 ms",
-        "plant.yaw_rate->gyro: noise 0.5 deg/s seed 3 every 0.02",
-    )
-    assert by_file.faults == by_option.faults
-    frozen, noisy = by_file.faults
-    assert frozen == on("gyro", "yaw_rate", True, "freeze", begin=0.5, end=1.5)
-    assert str(frozen.fault.on) == "gyro.yaw_rate"
-    assert golden(str(frozen.fault))
-    assert (noisy.instance, noisy.variable, noisy.of_output, noisy.fault.every) == (
-        "gyro",
-        "yaw_rate_true",
-        False,
-        0.02,
-    )
-    assert noisy.value == pytest.approx(math.radians(0.5))
-    assert by_file.changes == ()
-    assert golden(str(by_option.changes[0]))
-
-
-def test_an_option_takes_the_place_of_what_the_file_has_there(folder):
-    text = SCENARIO + (
-        "faults:\n  - {on: gyro.yaw_rate, kind: freeze}\n  - {on: plant.yaw_rate, kind: gain, value: 2}\n"
-    )
-    made = planned("gyro.yaw_rate: bias 1; drift 0.1", "gyro.yaw_rate: loss", text=text)
-    assert [(str(f.fault.on), f.fault.kind, f.value) for f in made.faults] == [
-        ("plant.yaw_rate", "gain", 2.0), ("gyro.yaw_rate", "bias", 1.0), ("gyro.yaw_rate", "drift", 0.1),
-        ("gyro.yaw_rate", "loss", 1.0),
-    ]  # fmt: skip
-    assert [str(f.fault.on) for f in planned("gyro.yaw_rate: none", text=text).faults] == ["plant.yaw_rate"]
-    assert planned("gyro.yaw_rate: freeze", text=text).changes == ()
-
-
-def test_a_pattern_stands_for_several_and_each_has_random_numbers_of_its_own(folder):
-    made = planned("plant.slip_*: noise 0.1 seed 1")
-    assert [f.variable for f in made.faults] == ["slip_fl", "slip_fr", "slip_rl", "slip_rr"]
-    assert len({f.stream for f in made.faults}) == 4
-    assert {f.stream for f in planned("plant.slip_*: noise 0.1 seed 2").faults}.isdisjoint(
-        f.stream for f in made.faults
-    )
-    more = planned("plant.yaw_rate: noise 0.1", "plant.slip_*: noise 0.1 seed 1")
-    assert {f.stream for f in made.faults} < {f.stream for f in more.faults}
-
-
-@pytest.mark.parametrize(
-    ("fault", "sentence"),
-    [
-        ("gyro.yaw_rate", "write --fault 'INSTANCE.OUTPUT: KIND VALUE from TIME until TIME'"),
-        ("gyro.yaw_rte: freeze", "gyro has neither an output nor an input 'yaw_rte'; did you mean"),
-        ("gyr.yaw_rate: freeze", "there is no instance 'gyr'; did you mean 'gyro'?"),
-        ("gyro yaw_rate: freeze", "must be instance.output, instance.input or instance.output -> instance,"),
-        ("plant.yaw_rate -> law: freeze", "no wire leads from plant.yaw_rate to law; it goes to gyro"),
-        ("plant.yaw_rat -> gyro: freeze", "no wire leads from plant.yaw_rat to gyro; did you mean"),
-        ("law.yaw_moment -> gyro: freeze", "no wire leads from law.yaw_moment to gyro; it goes to plant"),
-        ("gyro.yaw_rate -> plant: freeze", "no wire leads from gyro.yaw_rate to plant; it goes to law"),
-        ("law.friction: bias 1", "on no wire: faults of inputs act on outputs of instances"),
-        ("plant.gear: freeze", "plant.gear is Integer: faults are for Real"),
-        ("gyro.yaw_rate: freez", "must be 'bias', 'gain', 'drift', 'noise', 'freeze'"),
-        ("gyro.yaw_rate: bias", "bias needs a value: x + value"),
-        ("gyro.yaw_rate: freeze 3", "freeze takes no value"),
-        ("gyro.yaw_rate: freeze seed 3", "freeze takes no seed: nothing of it is random"),
-        ("gyro.yaw_rate: bias 1 share 0.5", "bias takes no share"),
-        ("gyro.yaw_rate: dropout", "dropout needs a share of the messages"),
-        ("gyro.yaw_rate: dropout share 0", "a share must be above 0 and at most 1 (got 0)"),
-        ("gyro.yaw_rate: noise 1 seed -1", "greater than or equal to 0"),
-        ("gyro.yaw_rate: noise -1", "gyro.yaw_rate: noise must be at least 0 rad/s"),
-        ("gyro.yaw_rate: loss 2", "gyro.yaw_rate: loss must be at least 0 and at most 1"),
-        ("gyro.yaw_rate: bias 3 kg", "'3 kg' is not a value in rad/s: use rad/s, deg/s or rpm"),
-        ("gyro.yaw_rate: drift 3 deg/s", "'3 deg/s' is not a value in (rad/s)/s"),
-        ("gyro.yaw_rate: freeze from 2 s until 1 s", "until must be after from, 2 s (got 1 s)"),
-        ("gyro.yaw_rate: freeze from 1 s from 2 s", "has from twice"),
-        ("gyro.yaw_rate: freeze from soon", "'soon' is neither a number in s nor a number with its unit"),
-    ],
-)  # fmt: skip
-def test_a_fault_that_cannot_be_is_one_sentence(fault, sentence, folder):
-    with pytest.raises(YawbenchError) as caught:
-        planned(fault)
-    (problem,) = texts_of(caught.value)
-    assert str(problem).startswith(f"--fault {fault}: ")
-    assert sentence in str(problem)
-
-
-def test_a_fault_of_a_file_is_told_with_its_line_also_after_an_option_has_moved_it(folder):
-    text = SCENARIO + "faults:\n  - {on: gyro.yaw_rate, kind: freeze}\n  - {on: plant.yaw_rate, kind: gain}\n"
-    with pytest.raises(ScenarioError) as caught:
-        planned("gyro.yaw_rate: none", text=text)
-    assert caught.value.code == "value-invalid"
-    assert golden([str(p) for p in texts_of(caught.value)])
-
-
-def test_what_a_fault_never_reaches_is_noted(folder):
-    assert golden_in(texts_of(planned("gyro.yaw_rate: freeze from 3 s")))
-    make_fmu(Path("fmus/controller_off.fmu"), outputs=[out("yaw_moment", unit="N.m")])
-    without = SCENARIO.replace("  - {from: [gyro], to: [law]}\n", "")
-    gone = planned("gyro.yaw_rate -> law: freeze", text=without,
-                   changes=[Override.of("law", "controller_off", "--swap")])  # fmt: skip
-    assert gone.faults == ()
-    assert golden_in(texts_of(gone))
-
-
-def test_a_run_with_a_fault_is_another_run(folder):
-    keys = [key_of(planned(*f)) for f in ([], ["gyro.yaw_rate: freeze"], ["gyro.yaw_rate -> law: freeze"])]
-    assert len(set(keys)) == 3
-    assert keys[0] == key_of(planned())
-
-
-def test_the_record_says_what_was_faulty_and_results_are_known_to_be_of_another_fault(tmp_path):
-    units = {"source": Clock(x=signal), "target": Witness()}
-    frozen = faulty("freeze", of_output=True)
-    made = make_plan(units, WIRES, faults=[frozen])
-    simulate(made, tmp_path, opener=Stage(units))
-    assert golden(load_results(tmp_path).record.content()["faults"])
-    assert staleness(made, tmp_path) is None
-    assert golden(staleness(replace(made, faults=()), tmp_path))
-    simulate(replace(made, faults=()), tmp_path / "healthy", opener=Stage(units))
-    assert "faults" not in load_results(tmp_path / "healthy").record.content()
-
-
-CAMPAIGN = """\
-title: Campaign
-scenario: a.yaml
-faults: [{on: plant.yaw_rate, kind: gain, value: 1.1}]
-axes:
-  gyro:
-    vary: faults.gyro.yaw_rate
-    values: {none: healthy, freeze from 1 s: frozen, "bias 1 deg/s; noise 0.1": off}
-  way:
-    variants:
-      clear: {}
-      late: {faults: [{on: gyro.yaw_rate -> law, kind: delay, value: 20 ms}]}
-metrics:
-  rate: {metric: peak(plant.yaw_rate)}
-"""
-
-
-def test_faults_are_an_axis_of_an_experiment(folder):
-    Path("sweep.yaml").write_text(CAMPAIGN)
-    experiment = load_experiment(Path("sweep.yaml"))
-    plans = [plan_of_scenario(load_scenario("a.yaml", changes=case.changes)) for case in experiment.cases]
-    told = [[f"{f.fault.on}: {f.fault}" for f in plan.faults] for plan in plans]
-    gain, late = "plant.yaw_rate: gain 1.1", "gyro.yaw_rate -> law: delay 20 ms"
-    frozen = "gyro.yaw_rate: freeze from 1 s"
-    off = ["gyro.yaw_rate: bias 1 deg/s", "gyro.yaw_rate: noise 0.1"]
-    assert told == [
-        [gain],
-        [gain, late],
-        [gain, frozen],
-        [gain, frozen, late],
-        [gain, *off],
-        [gain, *off, late],
-    ]
-    assert len({key_of(plan) for plan in plans}) == 6
-    of_option = load_experiment(Path("sweep.yaml"), changes=read_changes(faults=["plant.yaw_rate: none"]))
-    assert plan_of_scenario(load_scenario("a.yaml", changes=of_option.cases[0].changes)).faults == ()
-
-
-def test_faults_stay_data_on_the_way_from_where_they_are_written(folder):
-    """A number with more digits than a line shows arrives with all of them."""
-    exact = 0.12345678901234567
-    Path("sweep.yaml").write_text(CAMPAIGN.replace("value: 1.1", f"value: {exact!r}, from: {exact!r}"))
-    (change, *_) = load_experiment(Path("sweep.yaml")).cases[0].changes
-    (fault,) = plan_of_scenario(load_scenario("a.yaml", changes=[change])).faults
-    assert (fault.value, fault.fault.begin) == (exact, exact)
-    assert change.faults == (Fault(FaultLocation("plant", "yaw_rate"), "gain", exact, begin=exact),)
-    assert golden(str(change))
-    one, other = read_changes(faults=["a.x: bias 1 deg until 2", "a.y: none"])
-    assert one.faults == (Fault(FaultLocation("a", "x"), "bias", "1 deg", end=2.0),)
-    assert other.faults == ()
-    assert str(other) == "--fault a.y: none"
-    assert golden(str(one))
-    both = yb.load("a.yaml").fault("gyro.yaw_rate", kind="freeze", start=exact)
-    both = both.fault("gyro.yaw_rate", kind="noise", value="1 deg/s", seed=3)
-    assert [(f.fault.kind, f.fault.begin, f.value) for f in both.plan().faults] == [
-        ("freeze", exact, None),
-        ("noise", -math.inf, pytest.approx(math.radians(1.0))),
-    ]
-
-
-# What is shown
-
-
-def yawbench_status(*arguments):
-    with pytest.raises(SystemExit) as exit_:
-        main(list(arguments))
-    return exit_.value.code
-
-
-def test_check_shows_faults_and_an_archive_says_that_it_has_none(folder, capsys):
-    assert yawbench_status("check", "a.yaml", "--fault", "plant.slip_*: bias 0.1 from 1 s") == 0
-    assert golden_in(capsys.readouterr().out)
-    assert yawbench_status("export-ssp", "a.yaml", "--fault", "gyro.yaw_rate: freeze") == 0
-    assert golden_in(capsys.readouterr().err)
-    assert yawbench_status("second-opinion", "a.yaml", "--fault", "gyro.yaw_rate: freeze") == 2
-    assert golden_in(capsys.readouterr().err)
-
-
-def test_figures_mark_when_runs_were_faulty_and_the_legend_says_how():
-    healthy, broken = car(), car(1.2)
-    fault = {"on": "gyro.yaw_rate", "fault": "freeze from 2 s", "from": 2.0, "until": None, "at": []}
-    noted(broken, faults=[fault])
-    figure = draw([LabelledRun("healthy", healthy), LabelledRun("broken", broken)], ["sideslip", "path"])
-    legend = [text.get_text() for box in figure.legends for text in box.get_texts()]
-    assert golden(legend[-1])
-    over_time, path = figure.axes
-    (span,) = [p for p in over_time.patches if to_hex(p.get_facecolor()) == FAULTY.lower()]
-    assert (span.get_x(), span.get_x() + span.get_width()) == (2.0, 8.0)
-    assert not path.patches
-    alone = draw([LabelledRun("broken", broken)], ["sideslip"])
-    assert golden([text.get_text() for box in alone.legends for text in box.get_texts()][-1])
-
-
-def test_the_command_of_a_page_gives_faults_as_the_option_takes_them():
-    (change,) = read_changes(faults=["a.x -> b: bias 1 deg from 2 s"])
-    assert golden(command_of("sweep", Path("s.yaml"), fault=[f"{change.faulty}: {change.value}"]))

@@ -1,0 +1,65 @@
+"""The car with 14 degrees of freedom for tests: its parameters, and its run with driver and tyres."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from components.cars.sprung_car import FourteenDofParameters, ride_of
+from components.drivers.sine import Sine
+from components.plants.fourteen_dof import FourteenDof
+from components.tyres.magic_formula import MagicFormula
+from vocabulary.wheels import WHEELS
+
+from .loop import Loop
+
+P = FourteenDofParameters()
+RIDE = ride_of(P)
+A, B, D = P.cg_to_front_axle, P.cg_to_rear_axle, P.track_width
+L = A + B
+FREE = {"drag_coefficient": 0.0, "rolling_resistance": 0.0}
+SCALES = {"cornering_stiffness_scale_front": 0.611, "cornering_stiffness_scale_rear": 1.169}
+SPEED, STEER, MU = 25.0, 1.5 / 17.0, 0.4  # paper C: 90 km/h, hand wheel 1.5 rad
+
+
+def four(name, *values):
+    values = values * 4 if len(values) == 1 else values
+    return {f"{name}_{wheel}": value for wheel, value in zip(WHEELS, values, strict=True)}
+
+
+def wheel_values(y, name):
+    return [y[f"{name}_{wheel}"] for wheel in WHEELS]
+
+
+def lateral(force):
+    """Lateral forces of `force` [N] in all that do not turn the car."""
+    return four("tyre_force_y", *[0.5 * force * B / L] * 2, *[0.5 * force * A / L] * 2)
+
+
+def settle(stand, seconds=6.0, h=2e-3, **inputs):
+    for _ in range(round(seconds / h)):
+        y = stand.step(h, **inputs)
+    return y
+
+
+def drive(
+    tyre=MagicFormula,
+    *,
+    plant=FourteenDof,
+    steer=STEER,
+    mu=MU,
+    until=6.0,
+    h=1e-3,
+    record,
+    torque=(0.0,),
+    frequency=0.2,
+    **parameters,
+):
+    """Return the recorded signals (rows) of driver, car and tyre in a loop."""
+    tyres = SCALES if tyre is MagicFormula else {}
+    sine = {"amplitude": steer, "frequency": frequency, "start_time": 0.5}
+    loop = Loop(
+        [(Sine, sine), (plant, {"initial_speed": SPEED} | parameters), (tyre, tyres)],
+        algorithm="extrapolated",
+        constants={**four("friction", mu), **four("wheel_torque", *torque)},
+    )
+    return np.array(loop.run(until, round(until / h), lambda now: [now[name] for name in record])).T
