@@ -172,7 +172,9 @@ def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
     write_whole(folder / "fit.json", json.dumps(result.data, indent=1, ensure_ascii=False) + "\n")
     write_whole(folder / "vehicle.yaml", vehicle_text(result, folder, planner))
     output.answer(folder=folder, fit=result.data)
-    print_tables([*map(parameter_table, result.models), score_table(result)])
+    scores = score_table(result)
+    scores.notes.append(result.verdict)
+    print_tables([*map(parameter_table, result.models), scores])
     for model in result.models:
         if model.estimate.message != CONVERGED:
             say(f"note: {model.title}: the search ended early: {model.estimate.message} (most_sets)")

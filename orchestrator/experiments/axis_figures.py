@@ -1,4 +1,4 @@
-"""Figures over axes: metrics as curves or maps, grids as lines, limits as lines with a band.
+"""Figures over axes: metrics as curves or maps, grids as lines or markers, limits as lines with a band.
 
 `Drawing` has what they share: the runs of a panel, labels of axes and levels, line styles. Map colours
 increase in lightness, and lines differ in colour, dash and marker, so both survive grey print and
@@ -274,8 +274,8 @@ class CurveDrawing(MetricDrawing):
             drawn[0].set_ylim(bottom=0.0)
 
 
-class GridLines(ValueDrawing):
-    """The columns of a grid as lines over its rows."""
+class GridDrawing(ValueDrawing):
+    """The columns of a grid over its rows: as lines where these are steps in order, or else as markers."""
 
     def __init__(self, findings: ExperimentResult, spec: FigureSpec) -> None:
         super().__init__(findings, spec)
@@ -292,10 +292,11 @@ class GridLines(ValueDrawing):
     def fill(self, axes: Axes, runs: Sequence[Case]) -> None:
         rows = list(dict.fromkeys(cell.row for cell, _ in self.cells))
         columns = list(dict.fromkeys(cell.column for cell, _ in self.cells))
+        joined = {} if self.findings.spec.grids[self.spec.grid].holds else {"linestyle": "none"}
         for number, column in enumerate(columns):
             shift = 0.03 * (number - (len(columns) - 1) / 2)  # keep overlapping points visible
             mine = ((rows.index(c.row) + shift, value) for c, value in self.cells if c.column == column)
-            self.draw_line(axes, mine, {**style_of(number), "label": column})
+            self.draw_line(axes, mine, {**style_of(number), **joined, "label": column})
         self.draw_mark(axes)
         name_ticks(axes, ["\n".join(textwrap.wrap(row, 14)) for row in rows])
 

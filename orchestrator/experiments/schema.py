@@ -260,7 +260,7 @@ FIGURE_KINDS = {
     "curve": FigureKind("metric", "axis_figures:CurveDrawing"),
     "map": FigureKind("metric", "axis_figures:MapDrawing", upwards=True),
     "limit": FigureKind("limit", "axis_figures:LimitDrawing"),
-    "grid": FigureKind("grid", "axis_figures:GridLines"),
+    "grid": FigureKind("grid", "axis_figures:GridDrawing"),
 }
 """Name -> kind of figure."""
 

@@ -126,7 +126,6 @@ def score_table(result: FitResult) -> Table:
                     else [None, None, None]
                 )
             table.rows.append(row)
-    table.notes.append(result.verdict)
     return table
 
 

@@ -182,7 +182,10 @@ class Request(BaseHTTPRequestHandler):
             f"http://{host}" for host in hosts
         }:
             raise Refused(HTTPStatus.FORBIDDEN, "the request comes from another site")
-        parts = urlsplit(self.path)
+        try:
+            parts = urlsplit(self.path)
+        except ValueError as error:
+            raise Refused(HTTPStatus.BAD_REQUEST, f"the address cannot be read: {error}") from error
         token, _, rest = parts.path.removeprefix("/").partition("/")
         if not hmac.compare_digest(token.encode(), self.server.token.encode()):
             raise Refused(
@@ -247,7 +250,7 @@ class Request(BaseHTTPRequestHandler):
             raise Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "the request is too large")
         try:
             request = json.loads(self.rfile.read(int(length)))
-        except ValueError:
+        except (ValueError, RecursionError):
             request = None
         wanted, earlier = wanted_of(request)
         key, made = self.server.bench.run(wanted)

@@ -42,12 +42,14 @@ SCRIPTS = (
 )  # fmt: skip
 MOST = 200
 """Largest number of runs in one viewer. Chosen: beyond the runs of any study; colours repeat after seven."""
+FIRST = 14
+"""Largest number of runs shown at first, where none are chosen. Chosen: two of each of seven colours."""
 PANELS = ("sideslip", "yaw_rate", "acceleration_y", "yaw_moment", "steer_angle")
 """Signals shown first, with their references; chosen: what all four papers draw."""
 METRICS = ("peak(sideslip)", "peak(yaw_rate)", "peak(acceleration_y)", "peak(yaw_moment)")
 """Metrics in the table of runs, by default."""
 FEW = 4
-"""Runs that a page's sentence names each. Chosen: more are read better in the table of runs."""
+"""Runs that a page's heading and sentence name each. Chosen: more are read better in the table of runs."""
 LARGEST = 2_200_000
 """Size of the samples in a page [bytes]. Chosen: with its text a page of 2.5 MB, which opens at once, also by
 mail."""
@@ -63,7 +65,7 @@ class View:
         title: of the choice.
         panels: signals, `instance.variable` or the variable alone, `x_error` for its error, `x - y`; a comma
             overlays further ones.
-        shown: numbers of the runs; None: all.
+        shown: numbers of the runs; None: all, up to `FIRST`.
         x: signal on the horizontal axis, or time.
     """
 
@@ -257,12 +259,12 @@ def page(
 
     Args:
         runs, settings: see `viewer`.
-        title: of the page; default: the labels.
+        title: of the page; default: the labels, of many runs the first.
         below: a line under the title.
         changed: overrides of the scenario that the title names.
     """
     return document(
-        title or " and ".join(run.label for run in runs),
+        title or _title(runs),
         sentence=answer_of(runs),
         below=below,
         changed=changed,
@@ -271,17 +273,26 @@ def page(
     )
 
 
+def _title(runs: Sequence[LabelledRun]) -> str:
+    if len(runs) > FEW:
+        return f"{runs[0].label} and {len(runs) - 1} other runs"
+    return " and ".join(run.label for run in runs)
+
+
 def answer_of(runs: Sequence[LabelledRun]) -> str:
     """Return how runs ended and their largest sideslip angle, or else the first metric that all have.
 
     A sentence; "" if they completed and share no metric.
     """
-    parts = [
+    ends = [
         f"{run.label} failed at {shown(float(run.results.time[-1]), 's')}"
         for run in runs
         if run.results.record.status not in (RunStatus.UNKNOWN, RunStatus.COMPLETED)
     ]
-    parts += [f"{run.label}: {run.results.ended.rstrip('.')}" for run in runs if run.results.ended]
+    ends += [f"{run.label}: {run.results.ended.rstrip('.')}" for run in runs if run.results.ended]
+    parts = ends[:FEW]
+    if len(ends) > FEW:
+        parts.append(f"{len(ends) - FEW} more of {len(runs)} runs failed or ended early")
     for name in METRICS:
         values = [value for run in runs if (value := evaluate(run.results, metric(name)))]
         if 0 < len(values) == len(runs):
@@ -319,11 +330,11 @@ def _columns(results: Sequence[Results], signal: str) -> list[str]:
 
 def _drawn(view: View, results: Sequence[Results]) -> dict[str, Any]:
     """Return a view with the columns of its panels."""
-    shown = list(range(len(results))) if view.shown is None else list(view.shown)
+    shown = list(range(len(results)) if view.shown is None else view.shown)
     runs = [results[number] for number in shown]
     panels = list(dict.fromkeys(panel for spec in view.panels for panel in _panels(runs, spec)))
     x = view.x if view.x == "time" else next(iter(_columns(runs, view.x)), "time")
-    return {"title": view.title, "shown": shown, "panels": panels, "x": x}
+    return {"title": view.title, "shown": shown if view.shown else shown[:FIRST], "panels": panels, "x": x}
 
 
 def _panels(results: Sequence[Results], spec: str) -> Iterator[str]:

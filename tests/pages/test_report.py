@@ -320,6 +320,25 @@ def test_a_run_that_failed_is_named_and_its_claims_are_not_judged(report, half):
     assert golden(verdicts)
 
 
+def test_many_failed_runs_are_folded(report, half):
+    (half / "study.yaml").write_text(HALF.replace("[0.02, 0.05]", "[0.02, 0.03, 0.04, 0.05, 0.06]"))
+    report()
+    for amplitude in ("0.02", "0.03", "0.04", "0.06"):
+        file = Path(f"results/half/study/amplitude/{amplitude}/run.json")
+        record = json.loads(file.read_text()) | {
+            "status": "failed",
+            "error": {"message": "the wheel came off"},
+        }
+        file.write_text(record_text(record))
+    assert report("--no-run")[0] == 1
+    page = unpacked(Path("results/half/study/report.html"))
+    (folded,) = html.fromstring(page).xpath("//details[summary/span[contains(., 'failed')]]")
+    assert " ".join(folded.find("summary").text_content().split()) == "✗ failed 4 of 5 runs"
+    assert page.count("the wheel came off") >= 4
+    first = html.fromstring(page).xpath("//h1/following-sibling::p[contains(., 'the wheel came off')]")
+    assert not first
+
+
 def test_several_studies_make_one_page_with_an_overview(report, half):
     other = half.parent / "whole"
     shutil.copytree(half, other)

@@ -7,11 +7,13 @@ import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -81,6 +83,14 @@ def ask(server, path, *, method="GET", body=None, token=None, **headers) -> tupl
     found = answer.status, dict(answer.getheaders()), answer.read()
     connection.close()
     return found
+
+
+def raw(server, text: str) -> str:
+    """Return the answer to a request as it is sent."""
+    with socket.create_connection(("127.0.0.1", server.server_port), timeout=30) as connection:
+        connection.sendall(text.encode())
+        connection.shutdown(socket.SHUT_WR)
+        return b"".join(iter(lambda: connection.recv(65536), b"")).decode()
 
 
 def own(server) -> str:
@@ -244,6 +254,43 @@ def test_mistakes_are_one_sentence(server):
         assert status == 422
         said[name] = content.decode()
     assert golden(said)
+
+
+@pytest.mark.parametrize(
+    ("content", "length", "status"),
+    [
+        ("{", None, 422),
+        ("[" * 100_000, None, 422),
+        ("[]", None, 422),
+        ("{}", "x", 413),
+        ("{}", "-1", 413),
+        ("{}", "9" * 30, 413),
+    ],
+)
+def test_a_malformed_request_is_refused(server, content, length, status):
+    """JSON that is cut, too deep or of another form; a length that is none."""
+    lines = [
+        f"POST /{server.token}/run HTTP/1.1", f"Host: 127.0.0.1:{server.server_port}",
+        f"Origin: {own(server)}", f"Content-Length: {length or len(content)}", "", content,
+    ]  # fmt: skip
+    answer = raw(server, "\r\n".join(lines))
+    assert answer.startswith(f"HTTP/1.1 {status} "), answer
+    assert "Traceback" not in answer
+
+
+def test_an_address_that_cannot_be_read_is_refused(server):
+    answer = raw(
+        server,
+        f"GET http://[/x HTTP/1.1\r\nHost: 127.0.0.1:{server.server_port}\r\nConnection: close\r\n\r\n",
+    )
+    assert answer.startswith("HTTP/1.1 400 ")
+    assert golden(answer.splitlines()[-1])
+
+
+def test_many_requests_at_once_are_answered_each(server):
+    with ThreadPoolExecutor(40) as pool:
+        answers = list(pool.map(lambda _: ask(server, "files/runs/both.html")[0], range(200)))
+    assert answers == [200] * 200
 
 
 def test_a_later_run_takes_the_place_of_one_that_is_not_done():

@@ -669,6 +669,24 @@ def test_one_run_seven_and_more(chromium, tmp_path, number):
     assert chromium.run(VIEWER + "return viewer.panels[2].shown.length") == number
 
 
+def test_two_hundred_runs_are_listed_few_at_first(chromium, tmp_path):
+    file = tmp_path / "most.html"
+    file.write_text(page(labelled(*(whole_car(1.0 + 0.01 * k, n=101) for k in range(MOST)))), "utf-8")
+    opened(chromium, file, "run?shown=[0,3,170]")
+    listed = (
+        "return [...document.querySelectorAll('.yv-runs tbody tr')].map((row) => Number(row.dataset.run))"
+    )
+    assert chromium.run("return document.querySelectorAll('*').length") <= 2000
+    few = chromium.run(listed)
+    assert few == sorted(few) and few[0] == 0 and few[-1] == 170 and len(few) < MOST / 2
+    assert chromium.run("return document.querySelector('[data-run=\"170\"] .yv-show').checked")
+    chromium.run("document.querySelector('.yv-rest').click()")
+    assert chromium.run(listed) == list(range(MOST))
+    chromium.run("document.querySelector('[data-run=\"120\"] .yv-show').click()")
+    assert chromium.run(VIEWER + "return viewer.state.shown") == [0, 3, 120, 170]
+    assert not chromium.run("return document.querySelector('.yv-rest').checkVisibility()")
+
+
 def test_a_bare_run_is_drawn_without_complaint(chromium, tmp_path):
     file = tmp_path / "bare.html"
     bare = without(whole_car(), "tyre_force", "load", "sideslip", "yaw_rate", "moment", "velocity", "steer")

@@ -2,6 +2,7 @@
 // fragment of the page's address, so that a link shows the same picture.
 
 const ZOOM = [0.1, 8];
+const FEW = 40; // runs listed at once, besides those shown; chosen: more do not fit on a screen
 const PAPER = 3; // dots per pixel in print
 const plotters = new Map(); // dots per pixel -> uPlot, which takes them once, when it is made
 
@@ -100,9 +101,12 @@ class Viewer {
     };
     const head = find('runs').tHead.rows[0];
     if (several) head.append(made('th', 'baseline', {scope: 'col', id: `${key}-baseline`}));
+    const measured = data.runs.some((run) => run.dash);
+    if (measured) head.append(made('th', 'offset in s', {scope: 'col', id: `${key}-offset`}));
     for (const [title] of data.metrics) head.append(made('th', title, {scope: 'col', className: 'yv-metric'}));
-    data.runs.forEach((run, k) => {
-      const row = find('runs').tBodies[0].insertRow();
+    this.rowOf = (k) => {
+      const run = data.runs[k];
+      const row = document.createElement('tr');
       row.dataset.run = k;
       const label = made('label', made('input', '', {type: 'checkbox', className: 'yv-show'}));
       label.append(' ', made('span', '', {className: 'yv-swatch'}), ' ', made('span', run.label, {id: `${key}-run-${k}`}));
@@ -112,8 +116,16 @@ class Viewer {
         base.setAttribute('aria-labelledby', `${key}-run-${k} ${key}-baseline`);
         row.append(made('td', base));
       }
+      if (measured) {
+        const offset = made('input', '', {type: 'number', step: 'any', className: 'yv-offset'});
+        offset.setAttribute('aria-labelledby', `${key}-run-${k} ${key}-offset`);
+        row.append(run.dash ? made('td', offset) : made('td'));
+      }
       for (const [, values] of data.metrics) row.append(made('td', values[k] || '–', {className: 'yv-metric'}));
-    });
+      return row;
+    };
+    find('rest').hidden = data.runs.length <= FEW;
+    find('rest').textContent = `All ${data.runs.length} runs`;
     find('views').append(...data.views.map((view, k) => new Option(view.title, k)));
     find('choice').hidden = data.views.length < 2;
     for (const one of this.root.querySelectorAll('.yv-several')) one.hidden = !several;
@@ -403,21 +415,32 @@ class Viewer {
   drawTable() {
     const table = this.find('runs');
     const body = table.tBodies[0];
-    [...body.rows].forEach((row, k) => {
+    const listed = new Set([...body.rows].map((row) => Number(row.dataset.run)));
+    this.runs.forEach((run, k) => {
+      if (listed.has(k) || !(this.listsAll || k < FEW || this.shows(run) || this.baseline === run)) return;
+      const next = [...body.rows].find((row) => Number(row.dataset.run) > k);
+      body.insertBefore(this.rowOf(k), next || null);
+    });
+    for (const row of body.rows) {
+      const k = Number(row.dataset.run);
       row.querySelector('.yv-show').checked = this.shows(this.runs[k]);
       const base = row.querySelector('.yv-base');
       if (base) base.checked = this.state.baseline === k;
       row.querySelector('.yv-swatch').innerHTML = this.shows(this.runs[k]) ? this.swatch(this.runs[k]) : '';
       const offset = row.querySelector('.yv-offset');
       if (offset) offset.value = this.state.offsets[k] || '';
-    });
-    const first = body.rows[Math.min(...this.state.shown)];
+    }
+    const first = body.querySelector(`[data-run="${Math.min(...this.state.shown)}"]`);
     if (first) table.parentElement.scrollTop = first.offsetTop - table.tHead.offsetHeight;
   }
 
   // ---- what the reader does ----
 
   listen() {
+    this.find('rest').addEventListener('click', () => {
+      this.listsAll = this.find('rest').hidden = true;
+      this.drawTable();
+    });
     this.find('runs').addEventListener('change', (event) => {
       const row = event.target.closest('tr');
       const number = Number(row.dataset.run);
