@@ -185,7 +185,7 @@ class Request(BaseHTTPRequestHandler):
         try:
             parts = urlsplit(self.path)
         except ValueError as error:
-            raise Refused(HTTPStatus.BAD_REQUEST, f"the address cannot be read: {error}") from error
+            raise Refused(HTTPStatus.BAD_REQUEST, "the address cannot be read") from error
         token, _, rest = parts.path.removeprefix("/").partition("/")
         if not hmac.compare_digest(token.encode(), self.server.token.encode()):
             raise Refused(

@@ -19,7 +19,7 @@ from orchestrator.experiments.claim_schema import Claim, GridSpec, calculate, ra
 from orchestrator.experiments.claims import judge
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.experiment_result import judge_results
-from orchestrator.experiments.figures import draw_all
+from orchestrator.experiments.figures import draw_all, draw_over_axes
 from orchestrator.experiments.jobs import Job, Outcome
 from orchestrator.experiments.plan_experiment import jobs_of
 from orchestrator.experiments.published_tables import correlation
@@ -135,6 +135,8 @@ figures:
     made = study(("\nchecks:", grid), ("\nfigures:", figure))
     findings = judge_results(made, out)
     assert golden(draw_all(findings, out)[0]["lines"])
+    lines = draw_over_axes(findings, findings.spec.figures[0]).axes[0].lines
+    assert [(line.get_linestyle(), len(line.get_xdata())) for line in lines] == [("None", 2)] * 2
     drawn = (out / "figures" / "lines.svg").read_text()
     assert golden_in(drawn)
     assert golden_in(drawn)

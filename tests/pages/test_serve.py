@@ -284,7 +284,7 @@ def test_an_address_that_cannot_be_read_is_refused(server):
         f"GET http://[/x HTTP/1.1\r\nHost: 127.0.0.1:{server.server_port}\r\nConnection: close\r\n\r\n",
     )
     assert answer.startswith("HTTP/1.1 400 ")
-    assert golden(answer.splitlines()[-1])
+    assert answer.endswith("\r\n\r\nthe address cannot be read\n")
 
 
 def test_many_requests_at_once_are_answered_each(server):
