@@ -28,7 +28,9 @@ from orchestrator.pages.viewer import (
     without_comments,
 )
 from orchestrator.pages.viewer_data import pack
+from orchestrator.results.measurement_results import MeasuredResults
 from orchestrator.results.reader import Results
+from orchestrator.results.run_record import RunRecord
 from tests.checkout import ROOT
 from tests.orchestrator.recorded import car, noted, write
 from tests.sentences import golden, golden_in
@@ -508,6 +510,27 @@ def test_a_difference_is_that_from_the_baseline_with_its_tolerance(chromium, two
 def test_a_time_offset_shifts_a_run(chromium, two):
     opened(chromium, two, 'run?offsets={"1":0.5}')
     assert chromium.run(VIEWER + "return [viewer.runs[1].shifted[0], viewer.ends()]") == [0.5, [0, 8.5]]
+
+
+def test_a_measured_run_has_a_field_for_its_offset(chromium, tmp_path):
+    run = whole_car()
+    measured = MeasuredResults(Path(), run.time, run.columns, run.units, RunRecord())
+    (file := tmp_path / "measured.html").write_text(page(labelled(whole_car(), measured)), "utf-8")
+    opened(chromium, file)
+    assert chromium.run(
+        "return [...document.querySelectorAll('.yv-offset')].map((x) => x.closest('tr').dataset.run)"
+    ) == ["1"]
+    chromium.run(
+        "const field = document.querySelector('.yv-offset'); field.value = '0.25';"
+        "field.dispatchEvent(new Event('change', {bubbles: true}));"
+    )
+    assert chromium.run(VIEWER + "return [viewer.runs[1].shifted[0], viewer.state.offsets]") == [
+        0.25,
+        {"1": 0.25},
+    ]
+    assert chromium.run("return document.querySelector('.yv-offset').value") == "0.25"
+    chromium.wait_for("location.hash.includes('offsets')")
+    assert inaccessible(chromium) == []
 
 
 def test_signals_over_distance_and_over_another_signal(chromium, two):

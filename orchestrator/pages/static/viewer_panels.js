@@ -2,6 +2,7 @@
 // thinned here to what the pixels can show, smallest and largest value of each column of pixels.
 
 const PANEL_HEIGHT = 94;
+const ROW_HEIGHT = 18; // of the table beside a panel, which is as high while that is no portrait
 const PORTRAIT_HEIGHT = 260; // over another signal: a phase portrait needs both directions
 const CURSOR_DIGITS = 4;
 
@@ -129,10 +130,11 @@ class Panel {
     const shown = this.drawn.filter(({run, reference}) => reference || viewer.shows(run));
     const theme = viewer.theme;
     const {factor} = this.meaning;
+    const beside = Math.min(Math.max(PANEL_HEIGHT, ROW_HEIGHT * shown.length), PORTRAIT_HEIGHT);
     const axis = {stroke: theme.quiet, font: '12px system-ui, sans-serif', grid: {stroke: theme.line, width: 1}, ticks: {show: false}};
     const options = {
       width: Math.max(wide, 160),
-      height: (viewer.state.x in viewer.data.signals ? PORTRAIT_HEIGHT : PANEL_HEIGHT) + (last ? 34 : 0),
+      height: (viewer.state.x in viewer.data.signals ? PORTRAIT_HEIGHT : beside) + (last ? 34 : 0),
       padding: [6, 10, last ? 0 : 4, 0],
       legend: {show: false},
       cursor: {x: false, y: false, points: {show: false}, drag: {x: true, y: false, setScale: false}},
