@@ -288,7 +288,9 @@ class FigureSpec(StrictModel):
     )
     metric: str = Field("", description="Key of `metrics`, for curves and maps")
     limit: str = Field("", description="Key of `limits`, for a limit")
-    grid: str = Field("", description="Key of `grids`, for a line per column over the rows")
+    grid: str = Field(
+        "", description="Key of `grids`, for a line (with `holds`) or markers per column over the rows"
+    )
     x: str = Field("", description="Horizontal axis")
     y: str = Field("", description="Vertical axis, of a map")
     lines: str = Field("", description="Axis with a line per value, of curves and limits")
