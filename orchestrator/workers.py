@@ -32,7 +32,7 @@ FILES, FILES_EACH = 32, 4
 """Required limit of open files: a base, and more per process. Chosen: 32 suffice for two processes; each
 needs two pipes and one that signals its end."""
 FIGURES = (
-    "orchestrator.experiments.figures",
+    "orchestrator.experiments.result_files",
     "matplotlib.backends.backend_agg",
     "matplotlib.backends.backend_svg",
     "matplotlib.figure",

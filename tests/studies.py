@@ -12,10 +12,10 @@ from fmus.build import HERE as FMUS
 from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.experiments.executor import left_to_do
-from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.experiment import plan_experiment
 from orchestrator.experiments.experiment_result import judge_results
 from orchestrator.experiments.jobs import execute
-from orchestrator.experiments.plan_experiment import plan_experiment
+from orchestrator.experiments.load_experiment import load_experiment
 from orchestrator.experiments.result_files import RECORD, write_findings
 
 

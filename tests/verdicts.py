@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from orchestrator.experiments.confidence import Bounds
-from orchestrator.experiments.experiment import found_studies, load_experiment
+from orchestrator.experiments.load_experiment import found_studies, load_experiment
 from orchestrator.experiments.verdict_tables import (
     FAILS,
     HOLDS,

@@ -12,12 +12,10 @@ from typing import TYPE_CHECKING, Any, Literal
 from orchestrator.errors import Diagnostic, Location, ScenarioError
 from orchestrator.experiments.claim_schema import si_number, text_of
 from orchestrator.experiments.experiment import LoadedExperiment as Design
-from orchestrator.experiments.experiment import NamedRun
+from orchestrator.experiments.experiment import NamedRun, metrics_of, plan_experiment
 from orchestrator.experiments.experiment_result import ExperimentResult
-from orchestrator.experiments.figures import draw_over_axes
 from orchestrator.experiments.jobs import Job, Outcome, measured
-from orchestrator.experiments.plan_experiment import metrics_of, plan_experiment
-from orchestrator.experiments.result_files import columns_of
+from orchestrator.experiments.result_files import columns_of, draw_over_axes
 from orchestrator.experiments.schema import ExperimentSpec, FigureSpec
 from orchestrator.experiments.tables import to_pandas
 from orchestrator.master.fmi import open_instance

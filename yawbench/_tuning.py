@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.errors import Diagnostic, Location, ResultsError, ScenarioError
+from orchestrator.experiments.axes import AxisSpec
 from orchestrator.experiments.experiment import LoadedExperiment as Design
 from orchestrator.experiments.experiment import NamedRun
-from orchestrator.experiments.experiment_design import AxisSpec
 from orchestrator.experiments.experiment_result import ExperimentResult
 from orchestrator.experiments.schema import ExperimentSpec
 from orchestrator.experiments.tables import to_pandas

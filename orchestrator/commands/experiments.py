@@ -18,9 +18,8 @@ from .progress import executor_of, hold, pooled, print_tables, say, say_failed, 
 if TYPE_CHECKING:
     from ..experiments.dry_run import Forecast, Pace
     from ..experiments.executor import Executor
-    from ..experiments.experiment import LoadedExperiment
+    from ..experiments.experiment import LoadedExperiment, PlannedExperiment
     from ..experiments.experiment_result import Each, ExperimentResult
-    from ..experiments.plan_experiment import PlannedExperiment
     from ..figures.style import LabelledRun
     from ..pages.viewer import View
 
@@ -49,8 +48,7 @@ def concluded(experiment: LoadedExperiment, execute: Executor, options: RunOptio
     """Return the result of an experiment, drawn and written; see `conduct`."""
     from ..errors import YawbenchError
     from ..experiments.experiment_result import judge_results, kept_cases
-    from ..experiments.figures import draw_all
-    from ..experiments.result_files import write_findings
+    from ..experiments.result_files import draw_all, write_findings
     from ..messages import changed
 
     if options.quick and experiment.spec.repeats:
@@ -221,7 +219,7 @@ def of_files(context: typer.Context, files: Sequence[Path], options: RunOptions)
     import os
 
     from ..errors import ScenarioError
-    from ..experiments.experiment import load_experiment
+    from ..experiments.load_experiment import load_experiment
     from ..experiments.verdict_tables import all_tables, counts_of, reach, tally_words
     from ..results.run_folder import default_folder, names_of
     from .progress import print_tables
@@ -336,7 +334,7 @@ def report(context: typer.Context, options: RunOptions, studies: Studies = None)
     to the studies' folders below results/, the overview to results/. All studies in scenarios/ take some
     four minutes on two cores; --quick omits the regions.
     """
-    from ..experiments.experiment import found_studies
+    from ..experiments.load_experiment import found_studies
 
     paths = list(dict.fromkeys(studies or found_studies()))
     of_files(context, paths, options)
@@ -361,7 +359,7 @@ def tune(context: typer.Context, file: TuningFile, options: RunOptions, seed: Tu
     search is resumed; the same seed gives the same result with any number of workers. The results of --seed
     go to a folder of their own, seed_N.
     """
-    from ..experiments.experiment import load_experiment
+    from ..experiments.load_experiment import load_experiment
     from ..experiments.tables import to_csv
     from ..experiments.tuning import (
         ENTRIES,

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..experiments.executor import Executor
+    from ..experiments.experiment import PlannedExperiment
     from ..experiments.experiment_result import Each
     from ..experiments.jobs import Job, Outcome
-    from ..experiments.plan_experiment import PlannedExperiment
     from ..experiments.tables import Table
     from .options import RunOptions
 

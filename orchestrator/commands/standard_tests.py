@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from ..evaluation.standard_tests import DRIVEN, TESTS, Evaluation, NotJudged, StandardTest, TestSeries
+from ..evaluation.standard_tests import DRIVEN, TESTS, Evaluation, StandardTest, TestSeries
+from ..metrics.verdict import NotJudged
 from . import output
 from .options import CHANGES, MAKING, RunOptions, takes
 from .progress import executor_of, hold, say, stoppable

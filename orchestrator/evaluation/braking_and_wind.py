@@ -56,7 +56,8 @@ import math
 import numpy as np
 
 from ..metrics.measures import running_integral
-from .standard_tests import Evaluation, NotJudged, evaluation
+from ..metrics.verdict import NotJudged
+from .standard_tests import Evaluation, evaluation
 from .trace import Trace, at, first_crossing, refuse_opposed, running_mean
 
 BRAKED = 1.0

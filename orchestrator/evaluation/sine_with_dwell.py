@@ -38,17 +38,8 @@ import numpy as np
 
 from ..figures.style import shown
 from ..metrics.measures import running_integral
-from ..metrics.verdict import Status, Verdict, apart, compare, not_judged, worst
-from .standard_tests import (
-    Evaluation,
-    Limit,
-    Mark,
-    NotJudged,
-    SeriesDriver,
-    SeriesRun,
-    TestSeries,
-    evaluation,
-)
+from ..metrics.verdict import NotJudged, Status, Verdict, apart, compare, not_judged, worst
+from .standard_tests import Evaluation, Limit, Mark, SeriesDriver, SeriesRun, TestSeries, evaluation
 from .trace import Trace, at, first_crossing, likeness, opposed, prepared, refuse_opposed, running_mean
 
 RATE, LASTS, MEAN = math.radians(75.0), 0.2, 0.1

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..figures.style import CHANGED, QUIET, frame, line_style, new_figure
-from ..metrics.verdict import Status
+from ..metrics.verdict import NotJudged, Status
 from .sine_with_dwell import AT, FAR, RATIOS, DwellCourse, course_of, percent
-from .standard_tests import Evaluation, NotJudged, TestSeries
+from .standard_tests import Evaluation, TestSeries
 from .trace import Trace, at
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Concatenate, Literal, ParamSpec, Protocol
 
 from ..errors import Diagnostic, Severity
-from ..metrics.verdict import Verdict, worst
+from ..metrics.verdict import NotJudged, Verdict, worst
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,10 +46,6 @@ class TestQuantity:
 
 
 TestQuantity.__module__ = "yawbench"  # where users import it from
-
-
-class NotJudged(Exception):
-    """Raised when a run cannot be judged; the message is the reason."""
 
 
 @dataclass

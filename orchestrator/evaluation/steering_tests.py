@@ -58,7 +58,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import text_of
-from .standard_tests import Evaluation, NotJudged, evaluation
+from ..metrics.verdict import NotJudged
+from .standard_tests import Evaluation, evaluation
 from .trace import SLOWEST, Trace, at, first_crossing, opposed, prepared, refuse_opposed
 
 FIT_RANGE = (0.5, 2.0)

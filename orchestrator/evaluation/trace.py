@@ -31,9 +31,9 @@ from ..measured.segment import LowPass, even_grid, resample
 from ..messages import with_changes
 from ..metrics.expressions import columns_of
 from ..metrics.measures import si_of
+from ..metrics.verdict import NotJudged
 from ..results.reader import Results
 from ..results.run_record import FmuRecord
-from .standard_tests import NotJudged
 
 CUT_OFF = {"steering_wheel_angle": 10.0, "yaw_rate": 6.0, "acceleration_y": 6.0}
 """Cut-off frequencies of the low pass [Hz]: GTR 8."""

@@ -21,9 +21,9 @@ from ..figures.style import QUIET, line_style, literal, shown, shown_unit
 from ..metrics.expressions import MetricValue, metric
 from ..metrics.measures import variable_of, words
 from ..signal_names import Target
+from .axes import RUN, Level, names_of
 from .claim_schema import si_number, text_of
 from .experiment import Case
-from .experiment_design import RUN, Level, names_of
 from .experiment_result import ExperimentResult, limits_of
 from .published_tables import cells
 from .schema import FigureSpec

@@ -23,14 +23,13 @@ from ..messages import counted
 from ..plan import Plan
 from ..results.file_formats import expected_size, in_bytes
 from ..results.run_folder import RUN_FILE
+from .axes import VariantSpec
 from .executor import Executor, left_to_do
-from .experiment import LoadedExperiment
-from .experiment_design import VariantSpec
+from .experiment import LoadedExperiment, PlannedExperiment
 from .experiment_result import judge_records
 from .jobs import Job
 from .journal import records_in
 from .open_value_regions import RegionCell, plan_region
-from .plan_experiment import PlannedExperiment
 from .ranking import LoadedRanking, angle_experiment, angles_of, dwell_experiment
 from .tables import Table
 from .threat_runs import RESOLUTION, STEP

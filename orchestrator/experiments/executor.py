@@ -25,11 +25,10 @@ from ..planner import Planner
 from ..results.freshness import altered, staleness
 from ..results.run_folder import RUN_FILE
 from ..workers import Pool
-from .experiment import Case, LoadedExperiment, NamedRun
+from .experiment import Case, LoadedExperiment, NamedRun, PlannedExperiment, plan_experiment
 from .experiment_result import Each, ExperimentResult, judge_records, judge_results
 from .jobs import Job, MeasuredRun, MetricRequests, OnOutcome, Outcome, execute, pool_for, read_back, ready
 from .journal import Journal
-from .plan_experiment import PlannedExperiment, plan_experiment
 
 T = TypeVar("T")
 K = TypeVar("K")
@@ -71,7 +70,7 @@ class Executor(AbstractContextManager["Executor"]):
     runner: Runner | None  # None: missing runs are not made
     planner: Planner = field(default_factory=Planner)
     fresh: bool = False  # whether finished runs are made again
-    of_jobs: Mapping[str, Any] = field(default_factory=dict)  # fields of all jobs, see `jobs_of`
+    of_jobs: Mapping[str, Any] = field(default_factory=dict)  # fields of all jobs
     each: Each = map  # to read results with
     display: Display = field(default_factory=NoDisplay)
 

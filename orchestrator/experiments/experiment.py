@@ -1,34 +1,30 @@
-"""Loading of experiment files: entries with `for` and axes expanded into runs and cases.
-
-All errors of a file are reported at once.
-"""
+"""Experiments: named runs, multiplied by axes into cases, and planned before the first of them starts."""
 
 from __future__ import annotations
 
 import itertools
 import math
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
-from ..errors import ScenarioError
-from ..messages import hint, short
-from ..metrics.expressions import TimeWindow
-from ..plan import Override, OverrideOrigin
-from ..safe_files import reads
-from ..scenario import loader, overrides, yaml_lines
-from ..scenario.schema_validation import validated
-from ..scenario.yaml_lines import Document, KeyPath
-from ..signal_names import Target
-from .claim_schema import Claim, DerivedSpec, ValidationSpec
-from .experiment_design import DesignAxisSpec, DesignPoint, changes_at, changes_of_file, points
-from .jobs import TestRequest
-from .names_check import check_axes, check_names
-from .schema import ChoiceSpec, ExperimentSpec, RunSpec
+from ..errors import Diagnostic, Location, ScenarioError
+from ..metrics.expressions import STANDARD, TimeWindow, metric, results_to_be, unit_in
+from ..plan import DEFAULT, Fmu, Instance, Override, OverrideOrigin, Plan, Variable
+from ..plan import Value as Given
+from ..planner import Planner
+from ..results.reader import Results
+from ..scenario import quantities
+from ..scenario.yaml_lines import dotted
+from ..signal_names import OF_RUN, SignalName, Target
+from ..wiring.context import FACTS
+from .axes import AxisSpec, DesignAxisSpec, DesignPoint, Level, changes_at, latin_hypercube, levels_of
+from .claim_schema import MetricReference, MetricSpec, ValidationSpec, si_number
+from .jobs import Job, MetricRequests, TestRequest, keyed, ready
+from .schema import ExperimentSpec
 
 if TYPE_CHECKING:
     from ..evaluation.validation import Bands
@@ -36,14 +32,10 @@ if TYPE_CHECKING:
 
 FIGURES = "figures"
 """Folder of the figures, next to the folders of named runs."""
-SENTENCES = ("says", "short", "source", "note")
-"""Fields of claims and derived numbers that are prose, where `{name}` becomes the label of a value."""
-MOST = 10_000
-"""Largest number of named runs. Chosen: a hundred times our largest study; one report shows them all."""
-LONGEST = 100
-"""Characters of a folder name. Chosen: more do not fit into file names where a letter takes two bytes."""
-_FOLDER = re.compile(rf"[\w.+-]{{1,{LONGEST}}}")
-Texts = TypeVar("Texts", Claim, DerivedSpec)
+RUNS = "runs"
+"""Folder of the results of runs along axes."""
+FEW = 3
+"""Repeats of a quick look. Chosen: fewer give no useful confidence interval."""
 
 
 @dataclass(frozen=True)
@@ -58,127 +50,6 @@ class NamedRun:
     test: TestRequest | None = None  # the standard test that judges it
     windows: Mapping[str, TimeWindow] = field(default_factory=dict)
     """Key of a metric -> window [s] in place of the metric's."""
-
-
-@dataclass(frozen=True)
-class ForBinding:
-    """One combination of the values of an entry's `for`: what `{name}` becomes in its texts."""
-
-    document: Document
-    key: KeyPath  # of the entry
-    values: dict[str, str]  # in names
-    words: dict[str, str]  # in sentences
-    choices: list[ChoiceSpec]  # values that come with overrides
-
-    def fill(self, text: str, *where: str, sentence: bool = False) -> str:
-        """Return a text of the entry with its placeholders filled in; `where`: its key within the entry."""
-        use = self.words if sentence else self.values
-        for word in re.findall(r"\{([^{}]*)\}", text):
-            if word not in use:
-                guess = hint(word, use, lead="'for' has")
-                self.document.report((*self.key, *where), f"{{{word}}} is undefined{guess}", "axis-unknown")
-        return re.sub(r"\{(\w+)\}", lambda match: use.get(match[1], match[0]), text)
-
-    def filled(self, entry: Texts) -> Texts:
-        """Return the entry with all its texts filled in."""
-
-        def fill(part: Any, name: str = "") -> Any:
-            if isinstance(part, dict):
-                return {k: fill(v, k) for k, v in part.items()}
-            if isinstance(part, list):
-                return [fill(v, name) for v in part]
-            return self.fill(part, sentence=name in SENTENCES) if isinstance(part, str) else part
-
-        if not self.values:
-            return entry
-        fields = entry.model_dump(by_alias=True, exclude_defaults=True, exclude={"for_each"})
-        return type(entry).model_validate(fill(fields))
-
-
-def fillings(
-    document: Document, key: KeyPath, for_each: Mapping[str, Mapping[str, Any]], what: str
-) -> Iterator[ForBinding]:
-    """Yield every combination of a `for`; none, and a reported problem, if there are too many."""
-    number = math.prod(map(len, for_each.values()))
-    if number > MOST:
-        document.report(
-            (*key, "for"), f"stands for {number} {what}; at most {MOST} are allowed", "experiment-too-large"
-        )
-        return
-    for combination in itertools.product(*(choices.items() for choices in for_each.values())):
-        words, choices = {}, []
-        for name, (value, chosen) in zip(for_each, combination, strict=True):
-            if isinstance(chosen, ChoiceSpec):
-                choices.append(chosen)
-                chosen = chosen.says or value
-            words[name] = chosen
-        values = dict(zip(for_each, (value for value, _ in combination), strict=True))
-        yield ForBinding(document, key, values, words, choices)
-
-
-def expanded(spec: ExperimentSpec, document: Document) -> ExperimentSpec:
-    """Return the file with every claim, check and derived number expanded over its `for`."""
-    derived: dict[str, DerivedSpec] = {}
-    for name, number in spec.derived.items():
-        key: KeyPath = ("derived", name)
-        for binding in fillings(document, key, number.for_each, "numbers"):
-            made = binding.fill(name) if number.for_each else name
-            if made in derived:
-                document.report(key, f"there is already a derived number {made!r}", "name-duplicate")
-            derived[made] = binding.filled(number)
-    expanded_claims: dict[str, list[Claim]] = {"claims": [], "checks": []}
-    for group, every in expanded_claims.items():
-        for i, claim in enumerate(getattr(spec, group)):
-            for binding in fillings(document, (group, i), claim.for_each, group):
-                every.append(binding.filled(claim))
-                every[-1]._number = i
-    return spec.model_copy(update={"derived": derived, **expanded_claims})
-
-
-def named_runs(document: Document, i: int, entry: RunSpec) -> Iterator[NamedRun]:
-    """Yield the runs of the i-th entry, up to the first with an error, which is reported."""
-    key: KeyPath = ("runs", i)
-    folder, known = document.path.parent, len(document.errors)
-    for binding in fillings(document, key, entry.for_each, "runs"):
-        name = binding.fill(entry.name, "name")
-        _check_folder(name, binding)
-        changes: dict[Target, Override] = {}
-        for part in (entry, *binding.choices):
-            swaps = {instance: binding.fill(fmu, "swap", instance) for instance, fmu in part.swap.items()}
-            settings = {
-                target: yaml_lines.scalar(binding.fill(value, "set", str(target)))
-                if isinstance(value, str)
-                else value
-                for target, value in part.set.items()
-            }
-            filled = part.model_copy(update={"swap": swaps, "set": settings})
-            for change in changes_of_file(filled, folder, "study"):
-                if change.target in changes:
-                    document.report((*key, "for"), f"{change.target} is given twice", "name-duplicate")
-                changes[change.target] = change
-        label = binding.fill(entry.label, "label", sentence=True) or name
-        row = binding.fill(entry.row, "row", sentence=True) or label
-        scenario = folder / binding.fill(entry.scenario, "scenario")
-        if len(document.errors) > known:
-            return
-        yield NamedRun(name, label, row, scenario, tuple(changes.values()))
-
-
-def _check_folder(name: str, binding: ForBinding) -> None:
-    """Report a run name that cannot be a folder name."""
-    parts = name.split("/")
-    if all(_FOLDER.fullmatch(part) and part.strip(".") for part in parts) and parts[0] != FIGURES:
-        return
-    sentence = f"{short(name)} cannot name a run: use letters, digits, . _ + - and / between folders"
-    if any(len(part) > LONGEST for part in parts):
-        sentence = f"{short(name)} is too long: at most {LONGEST} characters between two /"
-    binding.document.report((*binding.key, "name"), sentence, "name-duplicate")
-
-
-RUNS = "runs"
-"""Folder of the results of runs along axes."""
-FEW = 3
-"""Repeats of a quick look. Chosen: fewer give no useful confidence interval."""
 
 
 @dataclass(frozen=True)
@@ -224,8 +95,15 @@ class LoadedExperiment:
 
     @cached_property
     def points(self) -> list[DesignPoint]:
-        """All points of the design; without axes a single one without levels."""
-        return list(dict.fromkeys(point for _, point in self.design)) or points(self.spec)
+        """All points of the design, one without axes; in a grid the last axis varies fastest."""
+        if self.design:
+            return list(dict.fromkeys(point for _, point in self.design))
+        axes = list(self.spec.axes.values())
+        if self.spec.design == "latin_hypercube":
+            assert self.spec.points is not None and self.spec.seed is not None
+            return latin_hypercube(axes, self.spec.points, self.spec.seed)
+        levels = map(levels_of, axes)
+        return list(itertools.product(*levels) if self.spec.design == "grid" else zip(*levels, strict=True))
 
     @cached_property
     def cases(self) -> list[Case]:
@@ -348,64 +226,215 @@ def experiment_of(
     return LoadedExperiment(path, spec, named, (), tuple(changes), tuple(design), origin)
 
 
-SCENARIOS = Path("scenarios")
-"""Folder searched for studies if none is given."""
+@dataclass(frozen=True)
+class PlannedExperiment:
+    """An experiment with a plan for every case."""
+
+    experiment: LoadedExperiment
+    jobs: list[Job]  # of the cases, in their order
+    units: dict[str, str]  # numeric axis -> SI unit in tables; "" if it has none
+    metric_units: dict[str, str]  # key of a metric -> its unit
+    fmus: dict[str, Fmu]  # SHA-256 -> FMU, of all runs
+
+    def number(self, name: str, level: Level) -> float:
+        """Return a level of a numeric axis in the unit of `units`."""
+        return number_of(self.experiment.spec.axes[name], level, self.units[name])
+
+    def axis_unit(self, name: str) -> str:
+        """Return the unit of an axis in the file as a suffix, ` [km/h]`, or ""."""
+        unit = self.experiment.spec.axes[name].unit or self.units.get(name, "")
+        return f" [{unit}]" if unit not in ("", "1") else ""
+
+    def words(self, case: Case) -> str:
+        """Return the label of a case: `friction 0.3, speed 25 m/s, no control`."""
+        parts = [case.run.row] if case.run.row else []
+        for (name, axis), level in zip(self.experiment.spec.axes.items(), case.point, strict=True):
+            unit = self.axis_unit(name).replace("[", "").replace("]", "")
+            parts.append(f"{name} {level.words}{unit}" if axis.numeric else level.words)
+        return ", ".join(parts)
 
 
-def found_studies(folder: Path = SCENARIOS) -> list[Path]:
-    """Return all study files in the subfolders of a folder, sorted by title.
-
-    The studies of one folder stay together, `study.yaml` first.
-
-    Raises:
-        ScenarioError: there are none.
-    """
-    titles: dict[Path, str] = {}
-    for path, _ in loader.files(folder, ["a study file"], depth=2):
-        data = yaml_lines.read(path, what="study file").data
-        titles[path] = str(data.get("title", "")) if isinstance(data, dict) else ""
-    if not titles:
-        raise ScenarioError(
-            f"no study file was named, and there is none in {folder}/*/", code="file-wrong-kind"
-        )
-    first = {path.parent: min(titles[p] for p in titles if p.parent == path.parent) for path in titles}
-    return sorted(titles, key=lambda path: (first[path.parent], path.stem != "study", titles[path]))
+def number_of(axis: AxisSpec, level: Level, unit: str) -> float:
+    """Return a level of a numeric axis in an SI unit."""
+    if axis.unit is None:
+        return float(level.value)
+    return float(quantities.convert(f"{level.value!r} {axis.unit}", unit))
 
 
-@reads("experiment file", ScenarioError)
-def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> LoadedExperiment:
-    """Load an experiment file: a study, a sweep or a tuning.
+def metrics_of(experiment: LoadedExperiment, run: NamedRun | None = None) -> MetricRequests:
+    """Return the metrics of an experiment as requests for jobs; those of a run have its own windows."""
+    windows = run.windows if run else {}
+    return tuple(
+        (key, spec.metric, windows.get(key, spec.window)) for key, spec in experiment.spec.metrics.items()
+    )
+
+
+def plan_experiment(
+    experiment: LoadedExperiment,
+    out: Path,
+    *,
+    planner: Planner | None = None,
+    progress: Callable[[int], None] = lambda done: None,
+    keep: bool = True,
+    **of_jobs: Any,
+) -> PlannedExperiment:
+    """Plan all cases (see `ready`); one without metrics or tests gets the standard metrics it can compute.
 
     Args:
-        path: the file.
-        changes: overrides of all runs; paths of FMUs are relative to the working directory.
+        experiment: as loaded.
+        out: its results folder.
+        planner: makes the plans.
+        progress: called with the number of cases planned so far.
+        keep: whether runs along axes keep their results; named runs always do.
+        of_jobs: other fields of all jobs.
 
     Raises:
-        ScenarioError: the file is invalid; lists all errors.
+        BuildError: stale FMUs cannot be built.
+        ScenarioError: some runs cannot start; lists each error once.
     """
-    path = Path(path)
-    document = yaml_lines.read(path, what="experiment file")
-    overrides.apply_to_all_runs(document, changes)
-    spec = validated(ExperimentSpec, document)
-    spec = expanded(spec, document)
-    runs = {"": NamedRun("", "", "", path.parent / spec.scenario, ())} if spec.scenario else {}
-    for i, entry in enumerate(spec.runs):
-        for run in named_runs(document, i, entry):
-            if len(runs) == MOST:
-                document.report(
-                    ("runs",), f"more than {MOST} runs; at most {MOST} are allowed", "experiment-too-large"
-                )
-                document.raise_errors()
-            if run.name in runs:
-                document.report(("runs", i, "name"), f"there is already a run {run.name!r}", "name-duplicate")
-            runs[run.name] = run
-    overridden = {change.target: change for change in changes}
-    own = changes_of_file(spec, path.parent, "sweep" if spec.axes else "study")
-    for_all = tuple(change for change in own if change.target not in overridden)
-    experiment = LoadedExperiment(path, spec, runs, for_all, tuple(overridden.values()))
-    if not document.errors:
-        check_axes(spec, document)
-        check_names(experiment, document)
-    document.raise_errors()
-    _ = experiment.recordings  # a mistake in a measurement file is told before the runs are made
-    return experiment
+
+    def about(error: Diagnostic) -> tuple[Hashable, Diagnostic]:
+        """Report an error of an axis once instead of once per value, with its key in the file."""
+        axis = experiment.axis_of(error.location.target)
+        if not axis:
+            return error, error
+        where = Location(experiment.path, target=f"axes.{axis[0]}")
+        return axis, Diagnostic(error.code, str(error), location=where)
+
+    axes = bool(experiment.spec.axes)
+    jobs = [
+        Job(
+            case.label, case.run.scenario, out / (RUNS if axes else case.run.name), case.changes,
+            keep=keep or not axes, test=case.run.test, **of_jobs,
+        )
+        for case in experiment.cases
+    ]  # fmt: skip
+    jobs = ready(jobs, planner=planner, progress=progress, group=about)
+    plans = [job.plan for job in jobs if job.plan]
+    made_up = list(map(results_to_be, {tuple(plan.record): plan for plan in plans}.values()))
+    if not experiment.spec.metrics and not any(job.test for job in jobs):
+        standard = {
+            name: MetricSpec.model_validate({"metric": name})
+            for name in STANDARD
+            if any(unit_in(results, metric(name)) for results in made_up)
+        }
+        experiment = replace(experiment, spec=experiment.spec.model_copy(update={"metrics": standard}))
+    units, metric_units = _units(experiment, plans), _metric_units(experiment, made_up)
+    if axes:
+        requests = {name: metrics_of(experiment, run) for name, run in experiment.runs.items()}
+        jobs = [keyed(job, requests[case.run.name]) for job, case in zip(jobs, experiment.cases, strict=True)]
+        jobs = [replace(job, out=job.out / job.key[:12]) for job in jobs]
+    else:
+        jobs = [keyed(job) for job in jobs]
+    used = {instance.fmu.sha256: instance.fmu for plan in plans for instance in plan.instances}
+    return PlannedExperiment(experiment, jobs, units, metric_units, used)
+
+
+def _metric_units(experiment: LoadedExperiment, made_up: list[Results]) -> dict[str, str]:
+    """Return metric key -> unit; `made_up`: results without rows.
+
+    Raises:
+        ScenarioError: no run records a metric's signals, or a bound has a unit that does not fit.
+    """
+    units: dict[str, str] = {}
+    errors = []
+    for key, spec in experiment.spec.metrics.items():
+        units_of_metric = (unit_in(results, metric(spec.metric)) for results in made_up)
+        unit = next((unit for unit in units_of_metric if unit is not None), None)
+        if unit is None:
+            location = f"{experiment.path}: metrics.{key}"
+            errors.append(f"{location}: no run records the signals of {spec.metric}")
+        else:
+            units[key] = unit
+    for location, unit, bound in _bounds(experiment, units):
+        try:
+            si_number(bound, unit)
+        except ValueError as error:  # noqa: PERF203 - all errors are collected
+            errors.append(f"{experiment.path}: {location}: {error}")
+    if errors:
+        raise ScenarioError(errors, code="metric-unavailable")
+    return units
+
+
+def _bounds(experiment: LoadedExperiment, units: dict[str, str]) -> Iterable[tuple[str, str, float | str]]:
+    """Yield (key in the file, unit, bound) of all bounds whose unit is known."""
+    spec = experiment.spec
+    for key, condition in spec.conditions():
+        derived = spec.derived.get(condition.derived)
+        unit = derived.unit if derived else units.get(condition.metric)
+        if unit is not None and not isinstance(condition.bound, MetricReference):
+            yield dotted(key), unit, condition.bound
+    for i, figure in enumerate(spec.figures):
+        for name in ("largest", "mark"):
+            if figure.metric in units and (bound := getattr(figure, name)) is not None:
+                yield f"figures[{i}].{name}", units[figure.metric], bound
+
+
+def _units(experiment: LoadedExperiment, every: list[Plan]) -> dict[str, str]:
+    """Return numeric axis -> unit.
+
+    Raises:
+        ScenarioError: the unit in the file does not fit.
+    """
+    plans = {tuple(instance.fmu.sha256 for instance in plan.instances): plan for plan in every}.values()
+    return {
+        name: next((unit for plan in plans if (unit := _unit(axis, plan))), "")
+        for name, axis in experiment.spec.axes.items()
+        if axis.numeric
+    }
+
+
+def _unit(axis: AxisSpec, plan: Plan) -> str | None:
+    """Return the unit of an axis's target, or None if the plan does not have the target."""
+    target = axis.vary[0]
+    if target.is_time:
+        return "s"
+    if target.kind == "fact":
+        return FACTS[target.variable].unit
+    return next((variable.unit for _, variable in reached(plan, target)), None)
+
+
+def reached(plan: Plan, target: Target) -> Iterator[tuple[Instance, Variable]]:
+    """Yield the parameters, or the constant inputs, that a target sets in a plan."""
+    by_name = {instance.name: instance for instance in plan.instances}
+    if target.kind == "input":
+        pattern = SignalName.parse_input(target.variable, by_name)
+        for instance in plan.instances:
+            for name, variable in instance.fmu.variables.items():
+                if name in instance.constants and pattern.matches(instance.name, name):
+                    yield instance, variable
+    elif target.kind == "fact":
+        fact = FACTS[target.variable]
+        for instance in plan.instances:
+            for name, variable in instance.fmu.variables.items():
+                if fact.counts(instance, name) or (name in fact.inputs and name in instance.constants):
+                    yield instance, variable
+    elif target.kind in ("parameter", "vehicle_parameter"):
+        for instance in plan.instances:
+            own = instance.fmu.variables.get(target.variable)
+            if target.instance in ("", instance.name) and own and own.causality == "parameter":
+                yield instance, own
+
+
+def found_at(plan: Plan, target: Target) -> tuple[Given, str] | None:
+    """Return the value and unit that an override target has in a plan; None if it has no such target."""
+    instance = next((planned for planned in plan.instances if planned.name == target.instance), None)
+    if target.kind == "fmu":
+        return (instance.fmu.name, "") if instance else None
+    if target.kind == "vehicle_file":
+        return (str(plan.scenario["vehicle"]), "") if plan.scenario.get("vehicle") else None
+    if target.kind == "tyres":
+        files = {axle: str(file["file"]) for axle, file in plan.scenario.get("tyre_files", {}).items()}
+        return (files[target.variable or "front"], "") if files else None
+    if target.kind == "run":
+        times = float(plan.start), plan.time(plan.n_steps), float(plan.step)
+        values: dict[str, Given] = dict(zip(OF_RUN, (*times, plan.algorithm), strict=True))
+        return values[target.variable], "s"
+    if target.kind == "setting" and target.is_time and instance:
+        return float(instance.period * plan.step), "s"
+    for instance, variable in reached(plan, target):
+        value = {**instance.parameters, **instance.constants}.get(variable.name, variable.start)
+        of_vehicle = instance.origins.get(variable.name, DEFAULT).kind == "vehicle"
+        if value is not None and (of_vehicle or target.kind != "vehicle_parameter"):
+            return value, variable.unit or ""
+    return None

@@ -19,13 +19,12 @@ from ..metrics.expressions import MetricValue
 from ..metrics.verdict import Status, Verdict, not_judged, worst
 from ..results.reader import Results
 from ..results.run_folder import RUN_FILE
+from .axes import RUN, DesignPoint, Level
 from .claim_schema import Claim, LimitSpec, calculate
 from .claims import ClaimResult, Judgement, MetricTable, Region, judge
 from .confidence import interval, share_bounds
-from .experiment import Case, LoadedExperiment, NamedRun
-from .experiment_design import RUN, DesignPoint, Level
+from .experiment import Case, LoadedExperiment, NamedRun, PlannedExperiment, metrics_of
 from .jobs import NOT_MADE, MeasuredRun, Outcome, measured, read_back
-from .plan_experiment import PlannedExperiment, metrics_of
 from .published_tables import correlation
 from .schema import ExperimentSpec
 from .tables import Cell, Table

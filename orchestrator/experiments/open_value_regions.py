@@ -20,21 +20,20 @@ from ..plan import Override
 from ..plan import Value as Given
 from ..planner import Planner
 from ..signal_names import Target
-from .claim_schema import Claim, MetricReference
-from .claims import ONE_IN, TIMES, ClaimResult, LevelVerdict, OpenValueScan, Region, judge
-from .confidence import Decision, SequentialTest
-from .experiment import RUNS, LoadedExperiment, NamedRun
-from .experiment_design import (
+from .axes import (
     Level,
     OpenValueSpec,
     OpenVariantSpec,
     changes_at,
-    extended_hypercube,
+    latin_hypercube,
     levels_of,
 )
+from .claim_schema import Claim, MetricReference
+from .claims import ONE_IN, TIMES, ClaimResult, LevelVerdict, OpenValueScan, Region, judge
+from .confidence import Decision, SequentialTest
+from .experiment import RUNS, LoadedExperiment, NamedRun, PlannedExperiment, found_at, metrics_of, number_of
 from .experiment_result import ExperimentResult, derive
 from .jobs import Job, MeasuredRun, keyed, ready
-from .plan_experiment import PlannedExperiment, found_at, metrics_of, number_of
 from .published_tables import ranked
 
 ORIGIN: Final = "region"
@@ -250,7 +249,7 @@ def plan_region(planned: PlannedExperiment, folder: Path, *, planner: Planner) -
     region = spec.region
     assert region is not None
     continuous = [open_value.continuous for open_value in runs.open_values.values()]
-    hypercube = extended_hypercube(continuous, region.points, region.most, region.seed)
+    hypercube = latin_hypercube(continuous, region.points, region.seed, most=region.most)
     questions = {
         (group, number): _asked(runs, claim, hypercube)
         for group, claims in (("claims", spec.claims), ("checks", spec.checks))

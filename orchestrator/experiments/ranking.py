@@ -37,20 +37,18 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 from ..cache import warn_of_record, what_changed
 from ..errors import ResultsError, ScenarioError
 from ..evaluation.sine_with_dwell import AMPLITUDE, SIDES, amplitudes
-from ..evaluation.standard_tests import Evaluation, NotJudged
+from ..evaluation.standard_tests import Evaluation
 from ..evaluation.steering_tests import characteristic_angle
 from ..messages import hint
 from ..metrics.expressions import TimeWindow
+from ..metrics.verdict import NotJudged
 from ..plan import Override, Plan
 from ..safe_files import reads
 from ..scenario import overrides, yaml_lines
 from ..scenario.schema import Scalar
 from ..scenario.schema_validation import StrictModel, Time, validated
 from ..signal_names import Target
-from .claim_schema import text_of
-from .executor import Executor
-from .experiment import LoadedExperiment, NamedRun, experiment_of
-from .experiment_design import (
+from .axes import (
     DesignAxisSpec,
     Level,
     OverrideSpec,
@@ -58,6 +56,9 @@ from .experiment_design import (
     axis_of_levels,
     changes_of_file,
 )
+from .claim_schema import text_of
+from .executor import Executor
+from .experiment import LoadedExperiment, NamedRun, experiment_of
 from .experiment_result import ExperimentResult
 from .standard_test_runs import slow_steer_amplitude
 

@@ -148,6 +148,7 @@ from ..messages import listed
 from ..scenario.schema import Scalar
 from ..scenario.schema_validation import OneOf, StrictModel, exactly_one
 from ..scenario.yaml_lines import KeyPath
+from .axes import MOST, AxisSpec, DesignAxisSpec, OverrideSpec, RegionSpec
 from .claim_schema import (
     Alternatives,
     Assertion,
@@ -162,7 +163,6 @@ from .claim_schema import (
     ValidationSpec,
     alternatives,
 )
-from .experiment_design import MOST, AxisSpec, DesignAxisSpec, OverrideSpec, RegionSpec
 
 
 class ChoiceSpec(OverrideSpec):

@@ -19,9 +19,9 @@ from ..safe_files import reads
 from ..scenario.overrides import setting as setting_of
 from ..scenario.quantities import convert
 from ..signal_names import Target
+from .axes import DesignAxisSpec, Level, changes_of_file
 from .executor import Executor, Search, highest_passing, side_by_side
 from .experiment import LoadedExperiment, NamedRun, experiment_of
-from .experiment_design import DesignAxisSpec, Level, changes_of_file
 from .jobs import MeasuredRun
 from .ranking import CONTROLLER, RECORDED, SERIES, angle_experiment, angles_of
 from .ranking_scores import RankedRun, RankedState

@@ -48,7 +48,7 @@ from ..scenario import yaml_lines
 from ..scenario.schema import Scalar
 from ..scenario.schema_validation import StrictModel, validated
 from ..signal_names import Target
-from .experiment_design import OverrideSpec, TargetText
+from .axes import OverrideSpec, TargetText
 from .ranking import EntriesSpec, EntrySpec, LoadedRanking, load_ranking
 
 REFERENCE = "none"

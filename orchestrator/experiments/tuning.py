@@ -23,9 +23,9 @@ from ..cache import checksums_of
 from ..errors import ScenarioError
 from ..metrics.expressions import MetricValue
 from ..signal_names import Target
+from .axes import DesignAxisSpec, OverrideSpec, VariantSpec, level_at
 from .claims import MetricTable
 from .experiment import LoadedExperiment
-from .experiment_design import DesignAxisSpec, OverrideSpec, VariantSpec, level_at
 from .experiment_result import ExperimentResult, derive
 from .tables import Table, column
 

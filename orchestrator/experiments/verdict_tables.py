@@ -16,11 +16,11 @@ from ..figures.style import digits_of, shown
 from ..messages import changed
 from ..metrics.expressions import MetricValue, metric
 from ..metrics.verdict import SYMBOLS, Status, Verdict
+from .axes import levels_of
 from .claim_schema import GridSpec, MetricReference, MetricSpec, si_number
 from .claims import ClaimResult
 from .confidence import Bounds
 from .experiment import NamedRun
-from .experiment_design import levels_of
 from .experiment_result import ExperimentResult, limit_table
 from .jobs import NOT_MADE
 from .published_tables import cells, grid_tables, side_by_side

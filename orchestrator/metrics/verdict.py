@@ -127,6 +127,10 @@ def apart(value: float, *bounds: float, decimals: int) -> str:
     return f"{round(value, decimals) + 0.0:.{decimals}f}"  # never "-0.0"
 
 
+class NotJudged(Exception):
+    """Raised when a run cannot be judged; the message is the reason."""
+
+
 def not_judged(why: str) -> Verdict:
     """Return a verdict that could not be reached, with the reason."""
     return Verdict(Status.NOT_JUDGED, why=why)

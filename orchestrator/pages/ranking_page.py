@@ -11,7 +11,6 @@ from typing import Any
 
 from ..errors import ResultsError, ScenarioError
 from ..evaluation.sine_with_dwell import RATIOS, SPUN, course_of
-from ..evaluation.standard_tests import NotJudged
 from ..evaluation.trace import trace_of
 from ..experiments.experiment import FIGURES
 from ..experiments.experiment_result import Each
@@ -46,6 +45,7 @@ from ..experiments.threat_scores import scored
 from ..experiments.threats import load_threats
 from ..figures.style import LabelledRun
 from ..messages import changed, counted, in_text, listed
+from ..metrics.verdict import NotJudged
 from ..results.reader import Results, load_results
 from .page_parts import FigureImage, anchor, image_of, option_of, render
 from .viewer import DATA, Settings, View, assets, carried, embedded, tidy_sides, write_side

@@ -16,9 +16,9 @@ from ..experiments.claims import ClaimResult
 from ..experiments.confidence import CONFIDENCE
 from ..experiments.experiment import FIGURES
 from ..experiments.experiment_result import Each, ExperimentResult
-from ..experiments.figures import runs_of, title_of
 from ..experiments.jobs import Job
 from ..experiments.open_value_regions import runs_of as runs_of_claim
+from ..experiments.result_files import runs_of, title_of
 from ..experiments.schema import FigureSpec
 from ..experiments.tables import Cell, Table
 from ..experiments.verdict_tables import (

@@ -17,9 +17,9 @@ from typing import Any
 from markupsafe import Markup
 
 from ..errors import ResultsError
+from ..experiments.axes import RUN, Level, changes_at
 from ..experiments.claim_schema import MetricReference, si_number
 from ..experiments.experiment import Case
-from ..experiments.experiment_design import RUN, Level, changes_at
 from ..experiments.experiment_result import Each, ExperimentResult, limits_of
 from ..experiments.jobs import Job
 from ..figures.style import LabelledRun, digits_of, shown, shown_unit

@@ -8,9 +8,9 @@ import pytest
 
 from orchestrator import workers
 from orchestrator.errors import ScenarioError
+from orchestrator.experiments.axes import DesignAxisSpec, Level, axis_of_levels
 from orchestrator.experiments.executor import Executor, highest_passing, runner_of, side_by_side
 from orchestrator.experiments.experiment import NamedRun, experiment_of
-from orchestrator.experiments.experiment_design import DesignAxisSpec, Level, axis_of_levels
 from orchestrator.experiments.jobs import Outcome, run_job
 from orchestrator.plan import Override
 

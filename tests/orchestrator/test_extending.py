@@ -17,11 +17,11 @@ from orchestrator.errors import ScenarioError
 from orchestrator.evaluation import standard_tests
 from orchestrator.evaluation.standard_tests import DRIVEN, TESTS, SeriesRun, StandardTest, evaluation
 from orchestrator.experiments.axis_figures import MetricDrawing
-from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.experiment import PlannedExperiment
 from orchestrator.experiments.experiment_result import ExperimentResult
-from orchestrator.experiments.figures import draw_all
 from orchestrator.experiments.jobs import Job, MeasuredRun
-from orchestrator.experiments.plan_experiment import PlannedExperiment
+from orchestrator.experiments.load_experiment import load_experiment
+from orchestrator.experiments.result_files import draw_all
 from orchestrator.experiments.schema import FIGURE_KINDS, FigureKind
 from orchestrator.fault_kinds import KINDS, FaultKind
 from orchestrator.master.simulate import simulate_in_memory

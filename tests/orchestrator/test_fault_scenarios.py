@@ -12,7 +12,7 @@ import yawbench as yb
 from orchestrator.cli import main
 from orchestrator.commands.experiments import command_of
 from orchestrator.errors import ScenarioError, YawbenchError
-from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.load_experiment import load_experiment
 from orchestrator.fault_kinds import Fault, FaultLocation, FaultySignal
 from orchestrator.figures.panels import FAULTY, LabelledRun
 from orchestrator.figures.plots import draw

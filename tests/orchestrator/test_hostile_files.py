@@ -15,8 +15,9 @@ from orchestrator.commands.check import show
 from orchestrator.commands.progress import print_tables, say
 from orchestrator.errors import Diagnostic, ScenarioError, YawbenchError
 from orchestrator.experiments.claim_schema import parse
-from orchestrator.experiments.experiment import LoadedExperiment, load_experiment
+from orchestrator.experiments.experiment import LoadedExperiment
 from orchestrator.experiments.experiment_result import judge_results
+from orchestrator.experiments.load_experiment import load_experiment
 from orchestrator.experiments.schema import ExperimentSpec
 from orchestrator.experiments.tables import Table
 from orchestrator.pages.study_page import chapter, study_page

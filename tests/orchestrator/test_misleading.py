@@ -9,7 +9,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.errors import ScenarioError, WiringError
-from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.load_experiment import load_experiment
 from orchestrator.scenario.loader import load_scenario
 from orchestrator.scenario.quantities import exact_text, seconds
 from orchestrator.wiring.make_plan import make_plan

@@ -15,11 +15,11 @@ from orchestrator.errors import Diagnostic, ScenarioError
 from orchestrator.experiments.claim_schema import Claim
 from orchestrator.experiments.claims import Judgement, Region, judge
 from orchestrator.experiments.confidence import SequentialTest
-from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.experiment import plan_experiment
 from orchestrator.experiments.experiment_result import ExperimentResult
 from orchestrator.experiments.jobs import MeasuredRun
+from orchestrator.experiments.load_experiment import load_experiment
 from orchestrator.experiments.open_value_regions import judge_region, next_jobs, plan_region, runs_of
-from orchestrator.experiments.plan_experiment import plan_experiment
 from orchestrator.experiments.verdict_tables import region_words, verdict
 from orchestrator.metrics.expressions import MetricValue
 from orchestrator.metrics.verdict import Status, Verdict, compare, not_judged, worst

@@ -11,11 +11,11 @@ from components.sensing.noise import key, normal
 from orchestrator.commands.experiments import chapter_of
 from orchestrator.errors import ScenarioError
 from orchestrator.experiments.confidence import interval, share_bounds
-from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.experiment import plan_experiment
 from orchestrator.experiments.experiment_result import judge_records
-from orchestrator.experiments.figures import draw_over_axes
 from orchestrator.experiments.jobs import run_job
-from orchestrator.experiments.plan_experiment import plan_experiment
+from orchestrator.experiments.load_experiment import load_experiment
+from orchestrator.experiments.result_files import draw_over_axes
 from orchestrator.experiments.verdict_tables import limit_tables, run_tables, verdict
 from orchestrator.figures.style import shown
 from orchestrator.metrics.expressions import MetricValue

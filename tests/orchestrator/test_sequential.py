@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from orchestrator.experiments.axes import RegionSpec, hypercube
 from orchestrator.experiments.claims import ONE_IN
 from orchestrator.experiments.confidence import Decision, SequentialTest, share_bounds
-from orchestrator.experiments.experiment_design import RegionSpec, hypercube
 from tests.checkout import ROOT
 from tests.verdicts import table_in
 

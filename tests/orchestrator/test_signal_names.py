@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.experiment import plan_experiment
+from orchestrator.experiments.load_experiment import load_experiment
 from orchestrator.experiments.open_value_regions import RegionRuns
-from orchestrator.experiments.plan_experiment import plan_experiment
 from orchestrator.figures.panels import panels_of
 from orchestrator.figures.style import LabelledRun
 from orchestrator.metrics.expressions import evaluate, metric

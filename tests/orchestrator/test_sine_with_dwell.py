@@ -12,11 +12,11 @@ import pytest
 
 from components.drivers.sine_with_dwell import SineWithDwellParameters, sine_with_dwell
 from orchestrator.evaluation.sine_with_dwell import amplitudes, evaluate_dwell, is_series, judge_series
-from orchestrator.evaluation.standard_tests import TESTS, Evaluation, NotJudged
+from orchestrator.evaluation.standard_tests import TESTS, Evaluation
 from orchestrator.evaluation.steering_tests import G, characteristic_angle, evaluate_slow_steer
 from orchestrator.evaluation.trace import Trace, trace_of
 from orchestrator.figures.style import save
-from orchestrator.metrics.verdict import Status, Verdict, apart, not_judged
+from orchestrator.metrics.verdict import NotJudged, Status, Verdict, apart, not_judged
 from orchestrator.results.measurement_results import load_run
 from tests.commands import status_of
 from tests.sentences import golden, golden_in

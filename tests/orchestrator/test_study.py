@@ -17,13 +17,11 @@ from rich.console import Console
 from orchestrator.errors import Diagnostic, ScenarioError
 from orchestrator.experiments.claim_schema import Claim, GridSpec, calculate, rank_correlation
 from orchestrator.experiments.claims import judge
-from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.experiment_result import judge_results
-from orchestrator.experiments.figures import draw_all, draw_over_axes
 from orchestrator.experiments.jobs import Job, Outcome
-from orchestrator.experiments.plan_experiment import jobs_of
+from orchestrator.experiments.load_experiment import load_experiment
 from orchestrator.experiments.published_tables import correlation
-from orchestrator.experiments.result_files import write_findings
+from orchestrator.experiments.result_files import draw_all, draw_over_axes, write_findings
 from orchestrator.experiments.tables import Table, for_terminal
 from orchestrator.experiments.verdict_tables import claim_tables, derived_tables, run_tables, share
 from orchestrator.figures.style import shown
@@ -221,10 +219,10 @@ def test_for_stands_for_one_run_per_combination(study, tmp_path):
     assert (runs["slow"].label, runs["slow"].row) == ("slow", "slow")
 
 
-def test_a_run_becomes_a_job_with_a_folder_of_its_own(study, tmp_path):
-    *_, job = jobs_of(study(), tmp_path / "out")
-    assert job.out == tmp_path / "out" / "slow"
-    assert job.changes == (
+def test_a_run_becomes_a_case_with_its_overrides(study):
+    *_, case = study().cases
+    assert case.run.name == "slow"
+    assert case.changes == (
         Override.of("stop_time", 2.0, "study"),
         Override.of("algorithm", "jacobi", "study"),
     )

@@ -15,9 +15,9 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.experiments.executor import left_to_do
-from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.experiment import plan_experiment
 from orchestrator.experiments.jobs import Job, Outcome
-from orchestrator.experiments.plan_experiment import plan_experiment
+from orchestrator.experiments.load_experiment import load_experiment
 
 from .test_sweep import UNITS, moods, rows, yawbench  # noqa: F401
 

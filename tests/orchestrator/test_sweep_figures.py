@@ -10,12 +10,11 @@ import pytest
 
 from orchestrator.errors import Diagnostic, ResultsError
 from orchestrator.experiments.axis_figures import boundary, edges
-from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.experiment import PlannedExperiment
 from orchestrator.experiments.experiment_result import ExperimentResult, limit_table, limits_of
-from orchestrator.experiments.figures import draw_over_axes
 from orchestrator.experiments.jobs import Job, MeasuredRun, measured
-from orchestrator.experiments.plan_experiment import PlannedExperiment
-from orchestrator.experiments.result_files import columns_of, write_table
+from orchestrator.experiments.load_experiment import load_experiment
+from orchestrator.experiments.result_files import columns_of, draw_over_axes, write_table
 from orchestrator.experiments.tables import to_pandas
 from tests.sentences import golden, refused
 

@@ -9,9 +9,9 @@ import pytest
 from scipy.stats import qmc
 
 from orchestrator.errors import ScenarioError
-from orchestrator.experiments.experiment import load_experiment
-from orchestrator.experiments.experiment_design import AxisSpec, level_at
-from orchestrator.experiments.plan_experiment import plan_experiment
+from orchestrator.experiments.axes import AxisSpec, level_at
+from orchestrator.experiments.experiment import plan_experiment
+from orchestrator.experiments.load_experiment import load_experiment
 from tests.changed import changed
 from tests.sentences import refused, texts_of
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.experiments import figures as sweep_figures
+from orchestrator.experiments import result_files
 from orchestrator.figures import plots
 from orchestrator.figures.panels import LabelledRun
 from orchestrator.figures.plots import draw
@@ -77,7 +77,7 @@ def test_everything_made_of_a_run_names_all_that_was_changed(yawbench, tmp_path,
     shown = {"metrics": flat(out), "messages": flat(said)}
 
     drawn = {}
-    for module in (plots, sweep_figures):
+    for module in (plots, result_files):
 
         def kept(figure, *arguments, name=module.__name__, frame=module.frame):
             frame(figure, *arguments)
@@ -110,17 +110,17 @@ def test_everything_made_of_a_run_names_all_that_was_changed(yawbench, tmp_path,
 @pytest.mark.exhaustive
 def test_the_figure_of_a_sweep_names_what_options_changed(yawbench, fmus, tmp_path):
 
-    from orchestrator.experiments.experiment import load_experiment
+    from orchestrator.experiments.experiment import plan_experiment
     from orchestrator.experiments.experiment_result import judge_records
     from orchestrator.experiments.jobs import MeasuredRun
-    from orchestrator.experiments.plan_experiment import plan_experiment
+    from orchestrator.experiments.load_experiment import load_experiment
     from tests.changed import changed as given
 
     (tmp_path / "sweep.yaml").write_text(SWEEP)
     sweep = load_experiment(tmp_path / "sweep.yaml", changes=given(settings=["inputs.friction*=0.3"]))
     planned = plan_experiment(sweep, tmp_path, fmus=fmus)
     records = {job.key: MeasuredRun({"sideslip": (0.1, "rad")}) for job in planned.jobs}
-    figure = sweep_figures.draw_over_axes(judge_records(planned, records), sweep.spec.figures[0])
+    figure = result_files.draw_over_axes(judge_records(planned, records), sweep.spec.figures[0])
     assert golden_in(texts(figure))
 
 

@@ -12,8 +12,8 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.errors import ScenarioError, WiringError, warnings_in
-from orchestrator.experiments.experiment import load_experiment
-from orchestrator.experiments.plan_experiment import plan_experiment
+from orchestrator.experiments.experiment import plan_experiment
+from orchestrator.experiments.load_experiment import load_experiment
 from orchestrator.interop.ssp_write import write_ssp
 from orchestrator.pages.page_parts import groups_of
 from orchestrator.results.freshness import key_of, run_record

@@ -12,8 +12,8 @@ from lxml import html
 
 import yawbench as yb
 from orchestrator.evaluation.validation import CrossPlot
-from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.experiment_result import judge_results
+from orchestrator.experiments.load_experiment import load_experiment
 from orchestrator.metrics.verdict import apart
 from orchestrator.pages.evaluation_page import validation_page, validation_sentence
 from orchestrator.pages.page_parts import save_page

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.cli import main
-from orchestrator.experiments.experiment import found_studies
+from orchestrator.experiments.load_experiment import found_studies
 
 from .flaws import SCREENS, check_budgets, check_first_screen
 

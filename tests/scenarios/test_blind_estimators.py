@@ -12,7 +12,7 @@ import yaml
 
 import yawbench as yb
 from docs.generate import blind_tables
-from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.load_experiment import load_experiment
 from tests.commands import status_of
 
 SWEEP = blind_tables.RUNS.parent / "blind_estimators.yaml"

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.experiment_result import derive
 from orchestrator.experiments.jobs import Job, execute
+from orchestrator.experiments.load_experiment import load_experiment
 from orchestrator.figures.style import shown
 from orchestrator.metrics.expressions import MetricValue
 from orchestrator.results.reader import load_results

@@ -15,7 +15,7 @@ import yawbench as yb
 from docs.generate import monitor_tables
 from docs.generate.monitor_tables import GYRO, WHEEL, Outcome
 from orchestrator.experiments.confidence import share_bounds
-from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.load_experiment import load_experiment
 from orchestrator.scenario import yaml_lines
 from tests.commands import status_of
 

@@ -11,7 +11,7 @@ import pytest
 
 import yawbench as yb
 from orchestrator.cli import main
-from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.load_experiment import load_experiment
 from tests.verdicts import table_in
 
 from .open_loop import MANOEUVRES, SPEED, missed, row

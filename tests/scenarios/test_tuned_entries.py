@@ -10,8 +10,8 @@ from ruamel.yaml import YAML
 
 import yawbench as yb
 from orchestrator.cli import main
-from orchestrator.experiments.experiment import load_experiment
-from orchestrator.experiments.experiment_design import level_at
+from orchestrator.experiments.axes import level_at
+from orchestrator.experiments.load_experiment import load_experiment
 from orchestrator.experiments.tuning import DIGITS, tuning_of
 from orchestrator.scenario.loader import SHIPPED
 from tests.checkout import ROOT

@@ -134,7 +134,7 @@ def case_of(group: str, number: int, seed: int, box: Sandbox) -> tuple[Path, str
 
 def load(file: Path, kind: str, planner: Any) -> None:
     """Read a file as the commands do, up to where runs would begin."""
-    from orchestrator.experiments.experiment import load_experiment
+    from orchestrator.experiments.load_experiment import load_experiment
     from orchestrator.metrics.expressions import evaluate_all
     from orchestrator.plan import Override
     from orchestrator.results.reader import load_results
@@ -271,7 +271,7 @@ def through_loaders(
 
 def command_of(number: int, seed: int, box: Sandbox) -> tuple[list[str], Path]:
     """Return a command line for a case, and its file."""
-    from orchestrator.experiments.experiment import load_experiment
+    from orchestrator.experiments.load_experiment import load_experiment
     from orchestrator.scenario.loader import load_scenario
 
     r = random.Random(f"{seed}/command/{number}")

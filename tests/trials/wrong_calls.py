@@ -443,7 +443,7 @@ def b_fault(kind: str, name: str, **more: Any) -> Callable[[Any], Any]:
 
 def plan_all(axes: Mapping[Any, Any]) -> None:
     """Make an experiment, and plan its runs as `run` does before it makes them."""
-    from orchestrator.experiments.plan_experiment import plan_experiment
+    from orchestrator.experiments.experiment import plan_experiment
     from yawbench._run_many import planner_of
 
     made = yb.experiment(BENCH.base, axes, metrics="peak(sideslip)")

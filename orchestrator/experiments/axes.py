@@ -6,13 +6,12 @@ leaves open, with the range over which claims are judged again.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, WithJsonSchema, model_validator
@@ -27,10 +26,6 @@ from ..scenario.schema_validation import StrictModel, Time, exactly_one
 from ..signal_names import INPUTS, OF_RUN, VEHICLE, Target
 from .claim_schema import LEVELS as VALUES
 from .claim_schema import Number, Patterns, is_finite, text_of
-
-if TYPE_CHECKING:
-    from .schema import ExperimentSpec
-
 
 MOST = 100_000
 """Largest number of runs in an experiment; chosen: more is a typo, and its plans take more than 0.5 GB."""
@@ -338,29 +333,13 @@ def _level(number: float) -> Level:
     return Level(number, f"{number:.6g}")
 
 
-def points(spec: ExperimentSpec) -> list[DesignPoint]:
-    """Return the points of a design in a fixed order; in a grid the last axis varies fastest."""
-    axes = list(spec.axes.values())
-    if spec.design == "latin_hypercube":
-        assert spec.points is not None
-        assert spec.seed is not None
-        return latin_hypercube(axes, spec.points, spec.seed)
-    levels = [levels_of(axis) for axis in axes]
-    return list(itertools.product(*levels) if spec.design == "grid" else zip(*levels, strict=True))
-
-
-def latin_hypercube(axes: Sequence[AxisSpec], runs: int, seed: int) -> list[DesignPoint]:
+def latin_hypercube(axes: Sequence[AxisSpec], runs: int, seed: int, *, most: int = 0) -> list[DesignPoint]:
     """Return a Latin hypercube: on every axis, each of `runs` equal parts of the range holds one point.
 
-    An axis of listed values takes each of them equally often, up to the remainder of the division.
-    Source: McKay, Beckman, Conover, Technometrics 21 (1979) 239-245.
+    It is extended to `most` points, if these are more. An axis of listed values takes each of them equally
+    often, up to the remainder of the division.
     """
-    return extended_hypercube(axes, runs, runs, seed)
-
-
-def extended_hypercube(axes: Sequence[AxisSpec], runs: int, most: int, seed: int) -> list[DesignPoint]:
-    """Return a Latin hypercube of `runs` points followed by more, see `hypercube`."""
-    positions = hypercube(len(axes), runs, most, seed)
+    positions = hypercube(len(axes), runs, max(runs, most), seed)
     return [
         tuple(level_at(axis, float(position)) for axis, position in zip(axes, row, strict=True))
         for row in positions

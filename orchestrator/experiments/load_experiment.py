@@ -1,21 +1,219 @@
-"""Checks that the runs, metrics, axes, numbers and grids an experiment file refers to exist."""
+"""Loading of experiment files: entries with `for` expanded, and every name in them looked up.
+
+All errors of a file are reported at once.
+"""
 
 from __future__ import annotations
 
 import itertools
+import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
 
-from ..messages import hint
+from ..errors import ScenarioError
+from ..messages import hint, short
+from ..plan import Override
+from ..safe_files import reads
+from ..scenario import loader, overrides, yaml_lines
+from ..scenario.schema_validation import validated
 from ..scenario.yaml_lines import Document, KeyPath
 from ..signal_names import Target
-from .claim_schema import MetricReference, text_of
-from .experiment_design import RUN, levels_of, names_of
+from .axes import RUN, changes_of_file, levels_of, names_of
+from .claim_schema import Claim, DerivedSpec, MetricReference, text_of
+from .experiment import FIGURES, LoadedExperiment, NamedRun
 from .published_tables import cells
-from .schema import ExperimentSpec, FigureSpec
+from .schema import ChoiceSpec, ExperimentSpec, FigureSpec, RunSpec
 
-if TYPE_CHECKING:
-    from .experiment import LoadedExperiment
+SENTENCES = ("says", "short", "source", "note")
+"""Fields of claims and derived numbers that are prose, where `{name}` becomes the label of a value."""
+MOST = 10_000
+"""Largest number of named runs. Chosen: a hundred times our largest study; one report shows them all."""
+LONGEST = 100
+"""Characters of a folder name. Chosen: more do not fit into file names where a letter takes two bytes."""
+_FOLDER = re.compile(rf"[\w.+-]{{1,{LONGEST}}}")
+Texts = TypeVar("Texts", Claim, DerivedSpec)
+
+
+SCENARIOS = Path("scenarios")
+"""Folder searched for studies if none is given."""
+
+
+def found_studies(folder: Path = SCENARIOS) -> list[Path]:
+    """Return all study files in the subfolders of a folder, sorted by title.
+
+    The studies of one folder stay together, `study.yaml` first.
+
+    Raises:
+        ScenarioError: there are none.
+    """
+    titles: dict[Path, str] = {}
+    for path, _ in loader.files(folder, ["a study file"], depth=2):
+        data = yaml_lines.read(path, what="study file").data
+        titles[path] = str(data.get("title", "")) if isinstance(data, dict) else ""
+    if not titles:
+        raise ScenarioError(
+            f"no study file was named, and there is none in {folder}/*/", code="file-wrong-kind"
+        )
+    first = {path.parent: min(titles[p] for p in titles if p.parent == path.parent) for path in titles}
+    return sorted(titles, key=lambda path: (first[path.parent], path.stem != "study", titles[path]))
+
+
+@reads("experiment file", ScenarioError)
+def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> LoadedExperiment:
+    """Load an experiment file: a study, a sweep or a tuning.
+
+    Args:
+        path: the file.
+        changes: overrides of all runs; paths of FMUs are relative to the working directory.
+
+    Raises:
+        ScenarioError: the file is invalid; lists all errors.
+    """
+    path = Path(path)
+    document = yaml_lines.read(path, what="experiment file")
+    overrides.apply_to_all_runs(document, changes)
+    spec = validated(ExperimentSpec, document)
+    spec = expanded(spec, document)
+    runs = {"": NamedRun("", "", "", path.parent / spec.scenario, ())} if spec.scenario else {}
+    for i, entry in enumerate(spec.runs):
+        for run in named_runs(document, i, entry):
+            if len(runs) == MOST:
+                document.report(
+                    ("runs",), f"more than {MOST} runs; at most {MOST} are allowed", "experiment-too-large"
+                )
+                document.raise_errors()
+            if run.name in runs:
+                document.report(("runs", i, "name"), f"there is already a run {run.name!r}", "name-duplicate")
+            runs[run.name] = run
+    overridden = {change.target: change for change in changes}
+    own = changes_of_file(spec, path.parent, "sweep" if spec.axes else "study")
+    for_all = tuple(change for change in own if change.target not in overridden)
+    experiment = LoadedExperiment(path, spec, runs, for_all, tuple(overridden.values()))
+    if not document.errors:
+        check_axes(spec, document)
+        check_names(experiment, document)
+    document.raise_errors()
+    _ = experiment.recordings  # a mistake in a measurement file is told before the runs are made
+    return experiment
+
+
+@dataclass(frozen=True)
+class ForBinding:
+    """One combination of the values of an entry's `for`: what `{name}` becomes in its texts."""
+
+    document: Document
+    key: KeyPath  # of the entry
+    values: dict[str, str]  # in names
+    words: dict[str, str]  # in sentences
+    choices: list[ChoiceSpec]  # values that come with overrides
+
+    def fill(self, text: str, *where: str, sentence: bool = False) -> str:
+        """Return a text of the entry with its placeholders filled in; `where`: its key within the entry."""
+        use = self.words if sentence else self.values
+        for word in re.findall(r"\{([^{}]*)\}", text):
+            if word not in use:
+                guess = hint(word, use, lead="'for' has")
+                self.document.report((*self.key, *where), f"{{{word}}} is undefined{guess}", "axis-unknown")
+        return re.sub(r"\{(\w+)\}", lambda match: use.get(match[1], match[0]), text)
+
+    def filled(self, entry: Texts) -> Texts:
+        """Return the entry with all its texts filled in."""
+
+        def fill(part: Any, name: str = "") -> Any:
+            if isinstance(part, dict):
+                return {k: fill(v, k) for k, v in part.items()}
+            if isinstance(part, list):
+                return [fill(v, name) for v in part]
+            return self.fill(part, sentence=name in SENTENCES) if isinstance(part, str) else part
+
+        if not self.values:
+            return entry
+        fields = entry.model_dump(by_alias=True, exclude_defaults=True, exclude={"for_each"})
+        return type(entry).model_validate(fill(fields))
+
+
+def fillings(
+    document: Document, key: KeyPath, for_each: Mapping[str, Mapping[str, Any]], what: str
+) -> Iterator[ForBinding]:
+    """Yield every combination of a `for`; none, and a reported problem, if there are too many."""
+    number = math.prod(map(len, for_each.values()))
+    if number > MOST:
+        document.report(
+            (*key, "for"), f"stands for {number} {what}; at most {MOST} are allowed", "experiment-too-large"
+        )
+        return
+    for combination in itertools.product(*(choices.items() for choices in for_each.values())):
+        words, choices = {}, []
+        for name, (value, chosen) in zip(for_each, combination, strict=True):
+            if isinstance(chosen, ChoiceSpec):
+                choices.append(chosen)
+                chosen = chosen.says or value
+            words[name] = chosen
+        values = dict(zip(for_each, (value for value, _ in combination), strict=True))
+        yield ForBinding(document, key, values, words, choices)
+
+
+def expanded(spec: ExperimentSpec, document: Document) -> ExperimentSpec:
+    """Return the file with every claim, check and derived number expanded over its `for`."""
+    derived: dict[str, DerivedSpec] = {}
+    for name, number in spec.derived.items():
+        key: KeyPath = ("derived", name)
+        for binding in fillings(document, key, number.for_each, "numbers"):
+            made = binding.fill(name) if number.for_each else name
+            if made in derived:
+                document.report(key, f"there is already a derived number {made!r}", "name-duplicate")
+            derived[made] = binding.filled(number)
+    expanded_claims: dict[str, list[Claim]] = {"claims": [], "checks": []}
+    for group, every in expanded_claims.items():
+        for i, claim in enumerate(getattr(spec, group)):
+            for binding in fillings(document, (group, i), claim.for_each, group):
+                every.append(binding.filled(claim))
+                every[-1]._number = i
+    return spec.model_copy(update={"derived": derived, **expanded_claims})
+
+
+def named_runs(document: Document, i: int, entry: RunSpec) -> Iterator[NamedRun]:
+    """Yield the runs of the i-th entry, up to the first with an error, which is reported."""
+    key: KeyPath = ("runs", i)
+    folder, known = document.path.parent, len(document.errors)
+    for binding in fillings(document, key, entry.for_each, "runs"):
+        name = binding.fill(entry.name, "name")
+        _check_folder(name, binding)
+        changes: dict[Target, Override] = {}
+        for part in (entry, *binding.choices):
+            swaps = {instance: binding.fill(fmu, "swap", instance) for instance, fmu in part.swap.items()}
+            settings = {
+                target: yaml_lines.scalar(binding.fill(value, "set", str(target)))
+                if isinstance(value, str)
+                else value
+                for target, value in part.set.items()
+            }
+            filled = part.model_copy(update={"swap": swaps, "set": settings})
+            for change in changes_of_file(filled, folder, "study"):
+                if change.target in changes:
+                    document.report((*key, "for"), f"{change.target} is given twice", "name-duplicate")
+                changes[change.target] = change
+        label = binding.fill(entry.label, "label", sentence=True) or name
+        row = binding.fill(entry.row, "row", sentence=True) or label
+        scenario = folder / binding.fill(entry.scenario, "scenario")
+        if len(document.errors) > known:
+            return
+        yield NamedRun(name, label, row, scenario, tuple(changes.values()))
+
+
+def _check_folder(name: str, binding: ForBinding) -> None:
+    """Report a run name that cannot be a folder name."""
+    parts = name.split("/")
+    if all(_FOLDER.fullmatch(part) and part.strip(".") for part in parts) and parts[0] != FIGURES:
+        return
+    sentence = f"{short(name)} cannot name a run: use letters, digits, . _ + - and / between folders"
+    if any(len(part) > LONGEST for part in parts):
+        sentence = f"{short(name)} is too long: at most {LONGEST} characters between two /"
+    binding.document.report((*binding.key, "name"), sentence, "name-duplicate")
+
 
 COLUMNS = (RUN, "status", "reason", "warnings", "key")
 """Columns of the table besides axes and metrics."""
