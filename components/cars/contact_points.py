@@ -13,29 +13,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import cos, sin
-from typing import TYPE_CHECKING, NamedTuple
 
 from .plane_body import NO_MOMENTS, Geometry, sum_of
+from .ride import Contact, Ride
 from .wheel_kinematics import Eight
-
-if TYPE_CHECKING:
-    from .ride import Ride
-
-
-class Contact(NamedTuple):
-    """Horizontal forces [N] of the tyres in vehicle axes, f_x then f_y, with their plain resultants."""
-
-    x_fl: float
-    x_fr: float
-    x_rl: float
-    x_rr: float
-    y_fl: float
-    y_fr: float
-    y_rl: float
-    y_rr: float
-    x: float  # sum of f_x
-    y: float
-    moment: float  # about the vertical axis at rest [N.m]
 
 
 def contact(

@@ -43,7 +43,6 @@ from typing import NamedTuple
 from vocabulary.gravity import G
 
 from ..mathematics.integrators import rk4
-from .contact_points import Contact
 
 RESOLVED = 0.5
 """Largest substep times the fastest rate: an error of 3e-4 of the wheels' hop in each of its radians."""
@@ -89,6 +88,22 @@ class Ride(NamedTuple):
         body = 4.0 * (1.0 / self.m_s + self.half_track**2 / self.roll + arm * arm / self.pitch)
         wheel = 1.0 / min(self.m_f, self.m_r)
         return max(sqrt((k + self.k_t) * wheel + k * body), d * (wheel + body))
+
+
+class Contact(NamedTuple):
+    """Horizontal forces [N] of the tyres in vehicle axes, f_x then f_y, with their plain resultants."""
+
+    x_fl: float
+    x_fr: float
+    x_rl: float
+    x_rr: float
+    y_fl: float
+    y_fr: float
+    y_rl: float
+    y_rr: float
+    x: float  # sum of f_x
+    y: float
+    moment: float  # about the vertical axis at rest [N.m]
 
 
 def rates(y: Sequence[float], held: Contact, ride: Ride, lighter: float = -0.0) -> tuple[float, ...]:
