@@ -94,7 +94,7 @@ def show(plan: Plan, scenario: Path, *, defaults: bool = False) -> None:
 
 
 def _print(plan: Plan, scenario: Path, console: Console, defaults: bool) -> None:
-    from ..messages import changed
+    from ..scenario.overrides import changed
     from ..wiring.order import evaluate
 
     console.print(printable(f"{scenario}: {plan.title}" if plan.title else f"{scenario}"))

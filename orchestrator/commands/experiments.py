@@ -49,7 +49,7 @@ def concluded(experiment: LoadedExperiment, execute: Executor, options: RunOptio
     from ..errors import YawbenchError
     from ..experiments.experiment_result import judge_results, kept_cases
     from ..experiments.result_files import draw_all, write_findings
-    from ..messages import changed
+    from ..scenario.overrides import changed
 
     if options.quick and experiment.spec.repeats:
         experiment = experiment.short

@@ -13,6 +13,7 @@ from .progress import print_tables, say
 
 if TYPE_CHECKING:
     from ..interop.second_opinion import SecondOpinion
+    from ..plan import Plan
 
 
 Masters = Annotated[
@@ -36,7 +37,8 @@ def second_opinion(
     """
     from ..errors import ScenarioError, SimulationError
     from ..interop.second_opinion import MASTERS, second_opinion
-    from ..messages import changed, faults_of, hint
+    from ..messages import hint
+    from ..scenario.overrides import changed
 
     known = {program.title.lower(): program for program in MASTERS}
     for name in master or ():
@@ -49,7 +51,7 @@ def second_opinion(
     plan = plan_of_scenario(scenario, options)
     if plan.faults:
         raise ScenarioError(
-            f"{scenario}: faults are not supported by other masters; omit {faults_of(plan)}",
+            f"{scenario}: faults are not supported by other masters; omit {_faults_of(plan)}",
             code="faults-unsupported",
         )
     if plan.changes:
@@ -75,6 +77,11 @@ def second_opinion(
             time=0.0,
             code="masters-disagree",
         )
+
+
+def _faults_of(plan: Plan) -> str:
+    """Return the faults of a plan in words."""
+    return "; ".join(dict.fromkeys(f"{signal.fault.on}: {signal.fault}" for signal in plan.faults))
 
 
 def show(opinions: list[SecondOpinion]) -> None:
@@ -144,12 +151,11 @@ def export_ssp(
     SSP: System Structure and Parameterization. `yawbench run` accepts the archive and gives the same numbers.
     """
     from ..interop.ssp_write import for_omsimulator, write_ssp
-    from ..messages import faults_of
 
     plan = plan_of_scenario(scenario, options)
     notes = list(map(str, plan.diagnostics))
     if plan.faults:
-        notes.append(f"faults are not part of the archive: {faults_of(plan)}")
+        notes.append(f"faults are not part of the archive: {_faults_of(plan)}")
     if for_ == "omsimulator":
         plan, more = for_omsimulator(plan)
         notes += more

@@ -365,8 +365,8 @@ def write_view(
         ResultsError: a run cannot be read, or the page cannot be written.
     """
     from ..errors import ResultsError
+    from ..figures.plots import changes_of
     from ..figures.style import LabelledRun
-    from ..messages import changed_each
     from ..pages.page_parts import save_page
     from ..pages.viewer import SETTINGS, Settings, View, page
     from .progress import say
@@ -374,7 +374,7 @@ def write_view(
     read = read_runs(folders, start)
     runs = [LabelledRun(name, results) for name, results in zip(labels, read, strict=True)]
     titles = [run.results.record.title or run.label for run in runs]
-    changed = changed_each([(run.label, run.results.record.overrides) for run in runs])
+    changed = changes_of(runs)
     settings = Settings((View(panels=panels),)) if panels else SETTINGS
     if len(runs) == 1:
         text = page(runs, settings, title=titles[0], changed=changed)
@@ -437,7 +437,7 @@ def salvage(folders: Folders) -> None:
     instead. Incomplete Parquet and MDF files cannot be recovered.
     """
     from ..messages import counted
-    from ..results.salvage import lost_format, salvage
+    from ..results.reader import lost_format, salvage
     from .progress import say
 
     for folder in folders:

@@ -59,9 +59,9 @@ def run(
     from ..master.isolation import opener_of
     from ..master.process_state import STATUS, WARNING
     from ..master.simulate import simulate
-    from ..messages import changed, with_changes
     from ..results.file_formats import size_note
     from ..results.run_folder import default_folder, refuse_below_others
+    from ..scenario.overrides import changed, with_changes
 
     if options.out and name:
         raise ScenarioError("--out and --name are mutually exclusive", code="option-invalid")

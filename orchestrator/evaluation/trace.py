@@ -28,12 +28,12 @@ from vocabulary.signals import SIGNALS
 
 from ..errors import ResultsError
 from ..measured.segment import LowPass, even_grid, resample
-from ..messages import with_changes
 from ..metrics.expressions import columns_of
 from ..metrics.measures import si_of
 from ..metrics.verdict import NotJudged
 from ..results.reader import Results
 from ..results.run_record import FmuRecord
+from ..scenario.overrides import with_changes
 
 CUT_OFF = {"steering_wheel_angle": 10.0, "yaw_rate": 6.0, "acceleration_y": 6.0}
 """Cut-off frequencies of the low pass [Hz]: GTR 8."""

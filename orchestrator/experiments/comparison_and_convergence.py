@@ -24,14 +24,13 @@ import numpy as np
 
 from ..errors import ResultsError, ScenarioError
 from ..figures.style import QUIET, frame, line_style, new_figure
-from ..messages import changed, with_changes
 from ..metrics.expressions import MetricValue, metric
 from ..metrics.measures import variable_of, words
 from ..plan import Override
 from ..plan import Value as Plain
 from ..results.reader import Results
 from ..scenario.loader import load_scenario
-from ..scenario.overrides import is_path, swap_of
+from ..scenario.overrides import changed, is_path, swap_of, with_changes
 from ..signal_names import SignalName
 from .claim_schema import text_of
 from .experiment import LoadedExperiment, NamedRun, experiment_of

@@ -19,12 +19,13 @@ from ..cache import changed_since, warn_of_record, with_checksums
 from ..errors import ResultsError
 from ..figures.plots import draw
 from ..figures.style import ROW, LabelledRun, frame, literal, new_figure, save
-from ..messages import changed, counted
+from ..messages import counted
 from ..metrics.expressions import MetricValue, metric
 from ..metrics.measures import si
 from ..results.reader import Results
 from ..results.run_folder import LARGEST
 from ..safe_files import read_bytes, reason, write_whole
+from ..scenario.overrides import changed
 from .axis_figures import FAILED, Drawing
 from .claim_schema import si_number, text_of
 from .claims import ClaimResult, Region

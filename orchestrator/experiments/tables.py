@@ -20,7 +20,7 @@ from ..errors import Diagnostic, ModelDescriptionError, ScenarioError, text_of
 from ..figures.style import shown
 from ..fmu.archive import open_fmu
 from ..fmu.binary import runs_as
-from ..messages import changed, printable, star, with_changes
+from ..messages import printable, star
 from ..metrics.expressions import STANDARD, MetricValue, columns_of, evaluate_all, metric
 from ..metrics.measures import catalogue as measures
 from ..metrics.measures import si, symbol
@@ -28,6 +28,7 @@ from ..plan import Fmu, Plan
 from ..results.reader import FoundRun, Results
 from ..results.run_record import RunRecord
 from ..scenario import loader, yaml_lines
+from ..scenario.overrides import changed, with_changes
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -13,9 +13,9 @@ from ..errors import text_of
 from ..evaluation.standard_tests import Evaluation, StandardTest, TestQuantity, TestSeries
 from ..evaluation.validation import Validation
 from ..figures.style import digits_of, shown
-from ..messages import changed
 from ..metrics.expressions import MetricValue, metric
 from ..metrics.verdict import SYMBOLS, Status, Verdict
+from ..scenario.overrides import changed
 from .axes import levels_of
 from .claim_schema import GridSpec, MetricReference, MetricSpec, si_number
 from .claims import ClaimResult

@@ -11,8 +11,9 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ResultsError
-from ..messages import changed_each
+from ..plan import Override
 from ..results.run_folder import RunStatus
+from ..scenario.overrides import changed, fmu_of
 from .panels import SPAN, Panel, in_legend, shown_by, spans_of
 from .style import (
     NARROW,
@@ -152,6 +153,28 @@ def title_of(runs: Sequence[LabelledRun]) -> str:
 def changes_of(runs: Sequence[LabelledRun]) -> str:
     """Return the overrides of the runs' scenarios, in words."""
     return changed_each([(run.label, run.results.record.overrides) for run in runs])
+
+
+def changed_each(labelled: Sequence[tuple[str, Sequence[Override]]]) -> str:
+    """Return the overrides of several runs (label, overrides) in words: common ones first, then by label.
+
+    A swap is left out where the label of the run names the FMU already.
+    """
+    (_, first), *others = labelled or [("", ())]
+    common = [change for change in first if all(_among(change, changes) for _, changes in others)]
+    parts = [changed(common)]
+    for label, changes in labelled:
+        own = [change for change in changes if not _among(change, common) and not _in_label(change, label)]
+        parts += [f"{label}: {changed(own)}"] if own else []
+    return "; ".join(filter(None, parts))
+
+
+def _in_label(change: Override, label: str) -> bool:
+    return change.swaps and fmu_of(change) == label.rpartition("/")[2]
+
+
+def _among(change: Override, changes: Iterable[Override]) -> bool:
+    return any((other.target, other.value) == (change.target, change.value) for other in changes)
 
 
 def provenance(runs: Sequence[LabelledRun]) -> str:

@@ -32,9 +32,10 @@ from lxml.etree import SubElement, _Element
 
 from ..errors import ResultsError, WiringError
 from ..fmu.archive import read_archive
-from ..messages import fold, listed, with_changes
+from ..messages import fold, listed
 from ..plan import Fmu, Instance, Plan, Value, Variable, Wire
 from ..safe_files import write_whole
+from ..scenario.overrides import with_changes
 from ..scenario.quantities import BASE_UNITS, Unit, measure_of
 from ..scenario.ssp_archive import (
     DESCRIPTION_FILE,

@@ -18,11 +18,12 @@ from vocabulary.wheels import WHEELS
 from ..experiments.experiment_result import ExperimentResult
 from ..experiments.tables import Table, marked, remarks
 from ..figures.style import LabelledRun, digits_of, shown, shown_unit
-from ..messages import changed, counted, star
+from ..messages import counted, star
 from ..metrics.expressions import MetricValue, metric
 from ..metrics.measures import variable_of
 from ..results.reader import Results
 from ..results.run_record import RunRecord
+from ..scenario.overrides import changed
 from ..signal_names import SignalName
 from .viewer import View
 

@@ -44,9 +44,10 @@ from ..experiments.threat_runs import published_result
 from ..experiments.threat_scores import scored
 from ..experiments.threats import load_threats
 from ..figures.style import LabelledRun
-from ..messages import changed, counted, in_text, listed
+from ..messages import counted, in_text, listed
 from ..metrics.verdict import NotJudged
 from ..results.reader import Results, load_results
+from ..scenario.overrides import changed
 from .page_parts import FigureImage, anchor, image_of, option_of, render
 from .viewer import DATA, Settings, View, assets, carried, embedded, tidy_sides, write_side
 

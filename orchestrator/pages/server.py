@@ -30,8 +30,9 @@ from pathlib import Path
 from urllib.parse import parse_qs, quote, unquote, urlsplit
 
 from ..errors import ResultsError, YawbenchError
+from ..figures.plots import changes_of
 from ..figures.style import LabelledRun
-from ..messages import changed_each, printable
+from ..messages import printable
 from ..results.file_formats import FILES
 from ..results.reader import FoundRun, found_runs, load_results
 from ..results.run_folder import RUN_FILE
@@ -222,11 +223,8 @@ class Request(BaseHTTPRequestHandler):
         titles = dict.fromkeys(
             results.record.title or path for path, results in zip(paths, loaded, strict=True)
         )
-        changed = changed_each(
-            [(path, results.record.overrides) for path, results in zip(paths, loaded, strict=True)]
-        )
         runs = [LabelledRun(path, results) for path, results in zip(paths, loaded, strict=True)]
-        self._send_own(page(runs, title="; ".join(titles), below=", ".join(paths), changed=changed))
+        self._send_own(page(runs, title="; ".join(titles), below=", ".join(paths), changed=changes_of(runs)))
 
     def _bench(self, rest: str, query: Query) -> None:
         """Send the bench of a scenario."""

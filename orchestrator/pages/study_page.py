@@ -41,7 +41,7 @@ from ..experiments.verdict_tables import (
 )
 from ..figures.phase_portrait import signals_of
 from ..figures.style import LabelledRun
-from ..messages import changed, counted, listed
+from ..messages import counted, listed
 from ..metrics.expressions import evaluate, metric
 from ..plan import Plan
 from ..planner import Planner
@@ -51,6 +51,7 @@ from ..results.reader import Results
 from ..results.run_folder import RunStatus
 from ..results.run_record import RunRecord, load_record
 from ..scenario.loader import LoadedScenario
+from ..scenario.overrides import changed
 from .diagram import diagram, systems_of
 from .evaluation_page import validation_facts
 from .page_parts import FigureImage, anchor, count_kinds, fmus_of, groups_of, image_of, programs_of, render

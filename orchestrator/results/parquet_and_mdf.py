@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ResultsError
-from ..messages import with_changes
+from ..scenario.overrides import with_changes
 from .file_formats import FILES, FORMATS, column_of, plain, values_of
 from .recorder import ColumnRecorder
 from .run_record import RunRecord

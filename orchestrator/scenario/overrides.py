@@ -13,7 +13,7 @@
 
 Studies and sweeps have the same targets, `faults.sensor.yaw_rate` for faults, and also `vehicle`, the vehicle
 file itself. Documents store which override set a value, so that later messages name the override instead of
-a line.
+a line. `changed` has them in words.
 """
 
 from __future__ import annotations
@@ -309,3 +309,37 @@ def _mapping(data: Any, name: str) -> dict[str, Any]:
     """Return data[name] if both are mappings, else an empty mapping: the schema reports the error."""
     inner = data.get(name) if isinstance(data, dict) else None
     return inner if isinstance(inner, dict) else {}
+
+
+def changed(changes: Iterable[Override]) -> str:
+    """Return overrides in words, `controller_off for controller, inputs.friction* = 0.3`; "" for none."""
+    return ", ".join(map(_in_words, changes))
+
+
+def _in_words(change: Override) -> str:
+    value, target = change.value, change.target
+    if change.faulty:
+        return f"{change.faulty}: {value}"
+    if change.swaps:
+        return f"{fmu_of(change)} for {target}"
+    if target.kind == "vehicle_file":
+        return f"vehicle file {Path(str(value)).name}"
+    if target.names_file:
+        return f"{target} = {Path(str(value)).name}"
+    text = str(value).lower() if isinstance(value, bool) else str(value)
+    if isinstance(value, float):
+        text = f"{value:.10g}"
+    seconds = " s" if target.is_time and not isinstance(value, str) else ""
+    return f"{target} = {text}{seconds}"
+
+
+def fmu_of(swap: Override) -> str:
+    """Return the name of the FMU that a swap inserts."""
+    name = str(swap.value)
+    return Path(name).stem if name.lower().endswith(".fmu") else name
+
+
+def with_changes(title: str, changes: Iterable[Override]) -> str:
+    """Return a title in one line, followed by the overrides."""
+    words = changed(changes)
+    return f"{title} (changed: {words})" if words and title else f"changed: {words}" if words else title

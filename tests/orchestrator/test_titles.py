@@ -11,11 +11,11 @@ import pytest
 from orchestrator.experiments import result_files
 from orchestrator.figures import plots
 from orchestrator.figures.panels import LabelledRun
-from orchestrator.figures.plots import draw
+from orchestrator.figures.plots import changed_each, draw
 from orchestrator.figures.style import save
-from orchestrator.messages import changed, changed_each, with_changes
 from orchestrator.plan import Override
 from orchestrator.results.reader import load_results
+from orchestrator.scenario.overrides import changed, with_changes
 from tests.sentences import golden, golden_in
 
 from .recorded import car, noted
