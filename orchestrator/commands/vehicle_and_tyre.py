@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from ..experiments.tables import Cell, Table
-    from ..vehicles.handling import Handling
+    from ..handling import Handling
 
 
 VehicleAction = Annotated[Literal["show"], typer.Argument(help="show: drive the car and show its handling.")]
@@ -59,12 +59,12 @@ def vehicle(
     gradient, body modes, stopping distance; understeer over lateral acceleration; yaw gain, natural
     frequency and damping over speed.
     """
+    from ..handling import TestTrack, draw_cars, fitting_plant, handling_of
     from ..planner import Planner
     from ..results.run_folder import below_results
     from ..scenario import loader, yaml_lines
     from ..scenario.schema import Vehicle
     from ..scenario.schema_validation import validated
-    from ..vehicles.handling import TestTrack, draw_cars, fitting_plant, handling_of
     from ..wiring.suspicious_values import suspicious_vehicle
     from .progress import print_tables, save_figure, say
 
@@ -93,7 +93,7 @@ def _tables(cars: list[Handling]) -> list[Table]:
 
     from ..evaluation.steering_tests import ACCELERATIONS, G
     from ..experiments.tables import Table
-    from ..vehicles.handling import SPEEDS
+    from ..handling import SPEEDS
 
     names = [without_role(car.plant) for car in cars]
     numbers = set(range(1, len(names) + 1))

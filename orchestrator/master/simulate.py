@@ -16,10 +16,9 @@ from ..interrupts import StopFlag, interrupts
 from ..messages import printable
 from ..metrics.plausibility import PlausibilityWatch
 from ..plan import Plan
-from ..results.file_formats import recorder_of
 from ..results.freshness import key_of, run_record
 from ..results.reader import Results
-from ..results.recorder import MemoryRecorder, Recorder
+from ..results.recorder import MemoryRecorder, Recorder, recorder_of
 from ..results.run_folder import RunStatus
 from ..results.run_record import DiagnosticRecord, EndRecord, ErrorRecord, WarningRecord
 from .child_run import ChildRun, can_be_apart

@@ -30,11 +30,9 @@ from ..messages import hint, short
 from ..safe_files import open_regular
 
 if TYPE_CHECKING:
-    import numpy as np
     import pyarrow as pa
 
     from ..plan import Plan
-    from .recorder import Recorder
 
 
 RESULTS_FILE = "results.csv"
@@ -46,8 +44,8 @@ class Format:
 
     file: str
     says: str
-    recorder: str  # "module:class" in this package that writes it, a subclass of `Recorder`
-    source: str  # "module:class" that reads it, called with its path and the columns that hold text
+    recorder: str  # "module:class" in this package that writes it, see `recorder.recorder_of`
+    source: str  # "module:class" that reads it, see `reader.source_of`
     bytes: int  # per value; measured on one run of each of the papers A to D, rounded
     package: str = ""  # Python package that it needs besides those of yawbench
     extra: str = ""  # of yawbench, with which that package is installed
@@ -90,7 +88,8 @@ def check_format(name: str) -> str:
     """Return the name of a format if it can be used.
 
     Raises:
-        ScenarioError: the format does not exist, or a package that it needs is missing.
+        ScenarioError: the format does not exist.
+        ResultsError: a package that it needs is missing.
     """
     if name not in FORMATS:
         raise ScenarioError(
@@ -100,29 +99,8 @@ def check_format(name: str) -> str:
     return name
 
 
-def recorder_of(name: str) -> type[Recorder]:
-    """Return the recorder class of a format, a subclass of `Recorder`."""
-    recorder: type[Recorder] = _class(FORMATS[check_format(name)].recorder)
-    return recorder
-
-
-def source_of(path: Path, texts: Sequence[str] | None = None) -> ResultsSource:
-    """Open a results file for reading.
-
-    Args:
-        path: path of the file; its name determines the format.
-        texts: columns that hold text, for formats that do not record it; None: guess from the first row.
-
-    Raises:
-        OSError, ValueError: it is not a file that a run writes.
-        ResultsError: a package that the format needs is missing.
-    """
-    (source,) = (format.source for format in FORMATS.values() if format.file == path.name)
-    opened: ResultsSource = _class(source)(path, texts)
-    return opened
-
-
-def _class(path: str) -> Any:
+def load_class(path: str) -> Any:
+    """Import and return a class that a format names."""
     return pkgutil.resolve_name(f"{__package__}.{path}")
 
 

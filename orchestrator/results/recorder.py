@@ -24,7 +24,7 @@ from ..cache import checksum, shown
 from ..errors import ResultsError
 from ..plan import Value
 from ..safe_files import reason, write_whole
-from .file_formats import RESULTS_FILE, plain, recorder_of, rows_text
+from .file_formats import FORMATS, RESULTS_FILE, check_format, load_class, plain, rows_text
 from .reader import Results
 from .run_folder import PART, RUN_FILE, FolderLock, put_in_place, tidy
 from .run_record import RunRecord
@@ -365,6 +365,17 @@ class ColumnRecorder(Recorder):
 
     def _make_room(self, needed: int) -> bool:
         return False  # part of a columnar file cannot be read
+
+
+def recorder_of(format: str) -> type[Recorder]:
+    """Return the recorder class of a format, a subclass of `Recorder`.
+
+    Raises:
+        ScenarioError: the format does not exist.
+        ResultsError: a package that it needs is missing.
+    """
+    recorder: type[Recorder] = load_class(FORMATS[check_format(format)].recorder)
+    return recorder
 
 
 def write_results(results: Results, folder: Path, *, format: str = "csv") -> None:

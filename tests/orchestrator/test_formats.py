@@ -14,9 +14,9 @@ from orchestrator.cli import main
 from orchestrator.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
 from orchestrator.master.simulate import simulate, simulate_in_memory
 from orchestrator.results import parquet_and_mdf
-from orchestrator.results.file_formats import FILES, recorder_of
+from orchestrator.results.file_formats import FILES
 from orchestrator.results.reader import load_results
-from orchestrator.results.recorder import BLOCK, MemoryRecorder
+from orchestrator.results.recorder import BLOCK, MemoryRecorder, recorder_of
 from orchestrator.results.run_record import RunRecord
 from tests.fmu_copies import put_fmus
 from tests.sentences import golden, golden_in, refused

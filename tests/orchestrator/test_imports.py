@@ -34,7 +34,7 @@ STAGES = (
     {"planner"},
     {"evaluation"},
     {"experiments"},
-    {"interop", "vehicles"},
+    {"interop", "handling"},
     {"pages"},
     {"commands"},
     {"cli"},

@@ -11,15 +11,11 @@ import pytest
 from ruamel.yaml import YAML
 
 from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
+from orchestrator import handling
 from orchestrator.cli import main
 from orchestrator.commands.check import show
 from orchestrator.errors import WiringError, warnings_in
-from orchestrator.master.simulate import simulate_in_memory
-from orchestrator.planner import Planner
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.tyre_stand import cornering_stiffness
-from orchestrator.vehicles import handling as handling
-from orchestrator.vehicles.handling import (
+from orchestrator.handling import (
     SAMPLE,
     STEP,
     TURN_SPEED,
@@ -31,6 +27,10 @@ from orchestrator.vehicles.handling import (
     modes_of,
     plants_in,
 )
+from orchestrator.master.simulate import simulate_in_memory
+from orchestrator.planner import Planner
+from orchestrator.scenario.loader import load_scenario
+from orchestrator.tyre_stand import cornering_stiffness
 from orchestrator.wiring.derivations import car_of
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed

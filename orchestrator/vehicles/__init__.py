@@ -1,1 +1,0 @@
-"""Cars on a test track: handling figures of a vehicle file with its plant and tyres."""
