@@ -284,7 +284,7 @@ def plot(
     """
     import matplotlib
 
-    from ..experiments.comparison_and_convergence import FIGURES
+    from ..experiments.scenario_experiments import FIGURES
     from ..figures.panels import check_panels, shown_by
     from ..figures.plots import OVERVIEW, draw, size_of_style
     from ..figures.style import KINDS, LabelledRun, save

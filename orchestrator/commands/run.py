@@ -190,7 +190,7 @@ def compare(
     Without --out, results go to results/<folder of the scenario>/<its name>-compare. A run that
     fails is reported; the other runs continue.
     """
-    from ..experiments.comparison_and_convergence import comparison, comparison_table
+    from ..experiments.scenario_experiments import comparison, comparison_table
     from ..pages.comparison import comparison_facts
     from ..results.run_folder import default_folder
 
@@ -257,7 +257,7 @@ def converge(
     from dataclasses import replace
 
     from ..errors import ScenarioError
-    from ..experiments.comparison_and_convergence import (
+    from ..experiments.scenario_experiments import (
         columns_of,
         convergence_figure,
         convergence_table,

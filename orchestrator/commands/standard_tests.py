@@ -21,8 +21,6 @@ from .progress import executor_of, hold, say, stoppable
 if TYPE_CHECKING:
     from ..evaluation.trace import Trace
     from ..experiments.executor import Executor
-    from ..experiments.experiment import NamedRun
-    from ..experiments.jobs import Job
     from ..plan import Override
 
 
@@ -87,7 +85,7 @@ def drive(
     is resumed; finished runs are not repeated.
     """
     from ..errors import ScenarioError
-    from ..experiments.standard_test_runs import TestDriver
+    from ..experiments.scenario_experiments import TestDriver
     from ..results.run_folder import default_folder
     from ..scenario import loader
 
@@ -109,10 +107,9 @@ def drive(
     if slow:
         known = angle_of(angle) or _angle_driven(slow, changes, execute)
         say(f"A = {math.degrees(known):.1f} degrees")
-    driver = TestDriver(
-        chosen, one_run, changes, execute, lambda title, runs: _run_all(title, runs, execute), known
-    )
-    series = chosen.drive(driver)
+    driver = TestDriver(chosen, one_run, changes, execute, known)
+    with stoppable(folder):
+        series = chosen.drive(driver)
     EvaluatedRuns(chosen, driver.traces, driver.judged, series, known, folder).conclude(each=figures)
     if driver.status:
         raise typer.Exit(driver.status)
@@ -126,30 +123,18 @@ def _angle_driven(scenario: Path, changes: Sequence[Override], execute: Executor
         typer.Exit: a run failed.
     """
     from ..errors import ResultsError
-    from ..evaluation.steering_tests import characteristic_angle, evaluate_slow_steer
-    from ..experiments.standard_test_runs import slow_steer_runs, traces
+    from ..evaluation.steering_tests import characteristic_angle
+    from ..experiments.scenario_experiments import TestDriver, slow_steer_runs
 
-    jobs, status = _run_all("slowly increasing steer", slow_steer_runs(scenario, changes, execute), execute)
-    if status:
-        raise typer.Exit(status)
+    driver = TestDriver(TESTS["slowly-increasing-steer"], scenario, changes, execute)
+    with stoppable(execute.folder):
+        judged = driver.make(slow_steer_runs(scenario, changes, execute))
+    if driver.status:
+        raise typer.Exit(driver.status)
     try:
-        return characteristic_angle([evaluate_slow_steer(trace) for trace in traces(jobs)])
+        return characteristic_angle(judged)
     except NotJudged as why:
         raise ResultsError(str(why), code="test-not-applicable") from None
-
-
-def _run_all(title: str, runs: Sequence[NamedRun], execute: Executor) -> tuple[list[Job], int]:
-    """Make unfinished runs; return all jobs and the exit status, not 0 if a run failed.
-
-    Raises:
-        typer.Exit: Ctrl-C.
-    """
-    from ..experiments.experiment import experiment_of
-
-    jobs = execute.planned(experiment_of(runs[0].scenario, runs, title=title)).jobs
-    with stoppable(execute.folder):
-        outcomes = execute.run(title, jobs, journaled=False)
-    return jobs, max((outcome.exit_status for outcome in outcomes if not outcome.ok), default=0)
 
 
 def _vehicle(name: str | None) -> tuple[Override, ...]:

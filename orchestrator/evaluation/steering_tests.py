@@ -54,11 +54,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
-from ..errors import text_of
+from ..errors import ScenarioError, text_of
 from ..metrics.verdict import NotJudged
+from ..plan import Plan
+from ..signal_names import Target
+from .sine_with_dwell import AMPLITUDE
 from .standard_tests import Evaluation, evaluation
 from .trace import SLOWEST, Trace, at, first_crossing, opposed, prepared, refuse_opposed
 
@@ -185,6 +189,22 @@ def characteristic_angle(judged: Sequence[Evaluation]) -> float:
         raise NotJudged(f"slowly increasing steer{f', {without.label}' if without else ''}: {why}")
     mean = float(np.mean([abs(run["angle"] or 0.0) for run in judged]))
     return math.radians(round(math.degrees(mean), 1))
+
+
+def slow_steer_amplitude(plan: Plan, scenario: Path) -> float:
+    """Return the absolute amplitude of the driver in a plan of slowly increasing steer [rad].
+
+    Raises:
+        ScenarioError: the driver has none; names the scenario.
+    """
+    target = Target.parse(AMPLITUDE)
+    for instance in plan.instances:
+        value = instance.parameter(target.variable) if instance.name == target.instance else None
+        if isinstance(value, (int, float)) and value != 0:
+            return abs(float(value))
+    raise ScenarioError(
+        f"{scenario}: {AMPLITUDE} must be a non-zero hand-wheel amplitude", code="fmu-wrong-kind"
+    )
 
 
 STEADY = 1.0

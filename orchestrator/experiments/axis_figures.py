@@ -23,9 +23,9 @@ from ..metrics.measures import variable_of, words
 from ..signal_names import Target
 from .axes import RUN, Level, names_of
 from .claim_schema import si_number, text_of
+from .claims import cells
 from .experiment import Case
 from .experiment_result import ExperimentResult, limits_of
-from .published_tables import cells
 from .schema import FigureSpec
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Claims, checks and limits judged by the metrics of runs; how robust a verdict is over open values.
+"""Claims, checks and limits judged by the metrics of runs, grids beside a paper's; verdicts over a region.
 
 The verdict on a claim is that of the condition that decides it: all conditions must be true, so its margin is
 the smallest of theirs. Where the bound is another run's metric, it is the value of that metric at the same
@@ -7,17 +7,17 @@ point; where a bound is 0, the margin is relative to the number at the chosen po
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from itertools import pairwise
 
 from ..errors import ScenarioError
 from ..figures.style import DIGITS, digits_apart, digits_of, shown
 from ..metrics.expressions import MetricValue
 from ..metrics.verdict import Status, Verdict, compare, worst
-from .claim_schema import Assertion, Claim, Condition, MetricReference, si_number
+from .claim_schema import Assertion, Claim, Condition, GridSpec, MetricReference, rank_correlation, si_number
 from .confidence import Bounds, Decision, SequentialTest
 
 ONE_IN = 10
@@ -79,7 +79,7 @@ class OpenValueScan:
         start = self.chosen.number
         ascending = sorted((self.chosen, *known), key=lambda level: level.number or 0.0)
         flips = []
-        for pair in pairwise(ascending):
+        for pair in itertools.pairwise(ascending):
             near, far = sorted(pair, key=lambda level: abs((level.number or 0.0) - start))
             if near.verdict.holds != far.verdict.holds:
                 flips.append(_between(near, far))
@@ -172,6 +172,75 @@ class Region:
 
 MetricTable = Mapping[tuple[str, str], MetricValue]
 """(run, metric key) -> value, where there is one."""
+
+
+@dataclass(frozen=True)
+class GridCell:
+    """A cell of a grid: its run and metric, row and column, and the published number, if any."""
+
+    run: str  # "" for a derived number
+    metric: str  # or the key of a derived number
+    row: str
+    column: str
+    published: float | None
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Key of the cell's value in a `MetricTable`."""
+        return self.run, self.metric
+
+
+def cells(spec: GridSpec) -> list[GridCell]:
+    """Return the cells row by row, then the runs outside the grid, whose column is empty."""
+    ((row_key, rows),) = spec.rows.items()
+    ((column_key, columns),) = spec.columns.items()
+    in_grid = []
+    for (i, row), (k, column) in itertools.product(enumerate(rows), enumerate(columns)):
+        run, derived = (
+            text.replace(f"{{{row_key}}}", row).replace(f"{{{column_key}}}", column)
+            for text in (spec.run, spec.derived)
+        )
+        published = spec.published[i][k] if spec.published else None
+        in_grid.append(GridCell(run, spec.metric or derived, rows[row], columns[column], published))
+    return in_grid + [GridCell(cell.run, spec.metric, cell.says, "", cell.published) for cell in spec.beside]
+
+
+def ranked(spec: GridSpec, only: Mapping[str, Collection[str]] | None = None) -> list[GridCell]:
+    """Return the cells whose order is compared with the paper's: those with a published number.
+
+    Args:
+        spec: the grid.
+        only: name of rows or columns -> values to include; excludes runs outside the grid.
+    """
+    among = [cell for cell in cells(spec) if cell.published is not None]
+    if not only:
+        return among
+    ((row_key, rows),), ((column_key, columns),) = spec.rows.items(), spec.columns.items()
+    kept = {words for value, words in rows.items() if value in only.get(row_key, rows)}
+    in_columns = {words for value, words in columns.items() if value in only.get(column_key, columns)}
+    return [cell for cell in among if cell.row in kept and cell.column in in_columns]
+
+
+def correlation(
+    spec: GridSpec, values: MetricTable, only: Mapping[str, Collection[str]] | None = None
+) -> float | None:
+    """Return Spearman's rank correlation with the published values; None if a run is missing.
+
+    Args:
+        spec: the grid.
+        values: metrics of the runs.
+        only: see `ranked`.
+    """
+    among = ranked(spec, only)
+    pairs = [
+        (value.number, cell.published)
+        for cell in among
+        if cell.published is not None and (value := values.get(cell.key)) is not None
+    ]
+    if len(pairs) < max(len(among), 2):
+        return None
+    measured, published = zip(*pairs, strict=True)
+    return rank_correlation(measured, published)
 
 
 @dataclass(frozen=True)

@@ -21,11 +21,10 @@ from ..results.reader import Results
 from ..results.run_folder import RUN_FILE
 from .axes import RUN, DesignPoint, Level
 from .claim_schema import Claim, LimitSpec, calculate
-from .claims import ClaimResult, Judgement, MetricTable, Region, judge
+from .claims import ClaimResult, Judgement, MetricTable, Region, correlation, judge
 from .confidence import interval, share_bounds
 from .experiment import Case, LoadedExperiment, NamedRun, PlannedExperiment, metrics_of
 from .jobs import NOT_MADE, MeasuredRun, Outcome, measured, read_back
-from .published_tables import correlation
 from .schema import ExperimentSpec
 from .tables import Cell, Table
 

@@ -23,8 +23,8 @@ from ..scenario.yaml_lines import Document, KeyPath
 from ..signal_names import Target
 from .axes import RUN, changes_of_file, levels_of, names_of
 from .claim_schema import Claim, DerivedSpec, MetricReference, text_of
+from .claims import cells
 from .experiment import FIGURES, LoadedExperiment, NamedRun
-from .published_tables import cells
 from .schema import ChoiceSpec, ExperimentSpec, FigureSpec, RunSpec
 
 SENTENCES = ("says", "short", "source", "note")

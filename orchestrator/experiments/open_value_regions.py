@@ -29,12 +29,11 @@ from .axes import (
     levels_of,
 )
 from .claim_schema import Claim, MetricReference
-from .claims import ONE_IN, TIMES, ClaimResult, LevelVerdict, OpenValueScan, Region, judge
+from .claims import ONE_IN, TIMES, ClaimResult, LevelVerdict, OpenValueScan, Region, judge, ranked
 from .confidence import Decision, SequentialTest
 from .experiment import RUNS, LoadedExperiment, NamedRun, PlannedExperiment, found_at, metrics_of, number_of
 from .experiment_result import ExperimentResult, derive
 from .jobs import Job, MeasuredRun, keyed, ready
-from .published_tables import ranked
 
 ORIGIN: Final = "region"
 """Origin of overrides that open values make."""

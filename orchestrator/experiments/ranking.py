@@ -38,7 +38,7 @@ from ..cache import warn_of_record, what_changed
 from ..errors import ResultsError, ScenarioError
 from ..evaluation.sine_with_dwell import AMPLITUDE, SIDES, amplitudes
 from ..evaluation.standard_tests import Evaluation
-from ..evaluation.steering_tests import characteristic_angle
+from ..evaluation.steering_tests import characteristic_angle, slow_steer_amplitude
 from ..messages import hint
 from ..metrics.expressions import TimeWindow
 from ..metrics.verdict import NotJudged
@@ -60,7 +60,6 @@ from .claim_schema import text_of
 from .executor import Executor
 from .experiment import LoadedExperiment, NamedRun, experiment_of
 from .experiment_result import ExperimentResult
-from .standard_test_runs import slow_steer_amplitude
 
 CONTROLLER = "controller"
 """The instance that all entries swap."""

@@ -18,12 +18,11 @@ from ..metrics.verdict import SYMBOLS, Status, Verdict
 from ..scenario.overrides import changed
 from .axes import levels_of
 from .claim_schema import GridSpec, MetricReference, MetricSpec, si_number
-from .claims import ClaimResult
+from .claims import ClaimResult, GridCell, cells, correlation, ranked
 from .confidence import Bounds
 from .experiment import NamedRun
 from .experiment_result import ExperimentResult, limit_table
 from .jobs import NOT_MADE
-from .published_tables import cells, grid_tables, side_by_side
 from .schema import TableSpec
 from .tables import Cell, Column, Table, marked, remarks
 
@@ -61,16 +60,89 @@ def limit_tables(findings: ExperimentResult) -> list[Table]:
     return tables
 
 
-def _grid_tables(findings: ExperimentResult, grid: GridSpec) -> list[Table]:
-    """Return the tables of a grid: measured numbers with signs of verdicts, and published numbers."""
-    signs: dict[tuple[str, str], str] = {}
-    for result in findings.judgements if grid.holds else ():
+def _grid_tables(findings: ExperimentResult, spec: GridSpec) -> list[Table]:
+    """Return the table of a grid's measured numbers and that of published ones, in SI units, three digits.
+
+    A grid with `holds`, of derived numbers or of means over repeats has its numbers in display units.
+    """
+    ((_, rows),), ((_, columns),) = spec.rows.items(), spec.columns.items()
+    every, width, values = cells(spec), len(columns), findings.values_of_grids
+    lines = [(row, every[i * width : (i + 1) * width]) for i, row in enumerate(rows.values())]
+    beside = every[len(rows) * width :]
+    headings, numbers = [spec.corner, *columns.values()], set(range(1, width + 1))
+    measured = [values.get(cell.key) for cell in every]
+    if spec.holds or spec.derived or any(value and (value.half or value.between) for value in measured):
+        return [_display_table(findings, spec, Table(spec.title, headings, numbers=numbers), lines, beside)]
+
+    def digits(cell: GridCell) -> Cell:
+        value = values.get(cell.key)
+        return None if value is None else digits_of(value.number)
+
+    def published(cell: GridCell) -> Cell:
+        return None if cell.published is None else digits_of(cell.published)
+
+    units = {value.unit for (_, key), value in values.items() if key == spec.metric}
+    title = spec.title if units <= {"1", "%"} else f"{spec.title} [{units.pop()}]"
+    tables = [Table(title, headings, [[row, *map(digits, line)] for row, line in lines], [], numbers)]
+    if spec.published:
+        printed = [[row, *map(published, line)] for row, line in lines]
+        tables.append(Table(f"{title}: published values", headings, printed, [], numbers))
+    notes = tables[-1].notes
+    for cell in beside:
+        theirs = "" if cell.published is None else f", the paper: {published(cell)}"
+        notes.append(f"{cell.row}: {digits(cell)}{theirs}")
+    if spec.published:
+        coefficient, count = correlation(spec, values), len(ranked(spec))
+        notes.append(
+            f"rank correlation (Spearman) with the paper over {count} runs: "
+            f"{'not all runs have results' if coefficient is None else digits_of(coefficient)}"
+        )
+    return tables
+
+
+def _display_table(
+    findings: ExperimentResult,
+    spec: GridSpec,
+    table: Table,
+    lines: Sequence[tuple[str, Sequence[GridCell]]],
+    beside: Sequence[GridCell],
+) -> Table:
+    """Fill the table of a grid in display units, with confidence and, if it has `holds`, its last row."""
+    signs: dict[tuple[str, str], str] = {}  # of the verdicts on claims about a cell: "" if they hold
+    for result in findings.judgements if spec.holds else ():
         about = {(c.run, c.derived or c.metric) for c in result.claim.holds_if}
         if len(about) == 1:
             word = verdict(result)
             (key,) = about
             signs[key] = signs.get(key) or ("" if word == HOLDS else "✗" if word in FAILS.values() else "?")
-    return grid_tables(grid, findings.values_of_grids, signs)
+
+    def number(cell: GridCell) -> str:
+        value = findings.values_of_grids.get(cell.key)
+        return shown(value.number, value.unit, half=value.half, between=value.between) if value else "-"
+
+    def signed(cell: GridCell) -> str:
+        return f"{number(cell)} {signs.get(cell.key, '')}".rstrip()
+
+    def down_to(column: Sequence[GridCell]) -> str:
+        """Return the last row down to which all claims about a column's cells hold."""
+        good = [*itertools.takewhile(lambda cell: not signs.get(cell.key), column)]
+        return "all" if len(good) == len(column) else good[-1].row if good else "-"
+
+    table.rows += [[row, *map(signed, line)] for row, line in lines]
+    table.rows += [[cell.row, *[number(cell)] * (len(table.columns) - 1)] for cell in beside]
+    if spec.holds:
+        table.rows.append([spec.holds, *map(down_to, zip(*(line for _, line in lines), strict=True))])
+    return table
+
+
+def _side_by_side(tables: Sequence[Table]) -> Table:
+    """Join the tables of measured and published numbers into one."""
+    if len(tables) == 1:
+        return tables[0]
+    ours, theirs = tables
+    rows = [[*left, *right] for left, right in zip(ours.rows, theirs.rows, strict=True)]
+    columns = [*ours.columns, Column("the paper:"), *theirs.columns[1:]]
+    return Table(ours.title, columns, rows, theirs.notes)
 
 
 def derived_tables(findings: ExperimentResult, *, apart: bool = False) -> list[Table]:
@@ -82,7 +154,7 @@ def derived_tables(findings: ExperimentResult, *, apart: bool = False) -> list[T
     for grid in spec.grids.values():
         if not grid.holds:
             of_grid = _grid_tables(findings, grid)
-            tables += of_grid if apart else [side_by_side(of_grid)]
+            tables += of_grid if apart else [_side_by_side(of_grid)]
     in_grids = {cell.metric for grid in spec.grids.values() if grid.derived for cell in cells(grid)}
     if alone := {key: entry for key, entry in spec.derived.items() if key not in in_grids}:
         rows: list[list[Cell]] = [[entry.says, findings.derived.get(key)] for key, entry in alone.items()]
@@ -271,14 +343,9 @@ def region_table(findings: ExperimentResult) -> Table:
     lines = {line.open_value: line for result in findings.regions.values() for line in result.lines}
     rows: list[list[Cell]] = []
     for name, open_value in region.open_values.items():
-        line, levels = lines.get(name), levels_of(open_value.stepped)
+        line, levels = lines.get(name), [level.words for level in levels_of(open_value.stepped)]
         unit = open_value.unit or (line.unit if line and line.unit != "1" and not open_value.times else "")
-        ends = (
-            [levels[0].words, levels[-1].words]
-            if open_value.start is not None
-            else [level.words for level in levels]
-        )
-        words = " to ".join(ends) if open_value.start is not None else ", ".join(ends)
+        words = ", ".join(levels) if open_value.start is None else f"{levels[0]} to {levels[-1]}"
         chosen = line.words(line.chosen.number) if line and line.chosen.number is not None else None
         rows.append([
             open_value.says or name, None if open_value.times else chosen,

@@ -13,11 +13,11 @@ from matplotlib.figure import Figure
 from orchestrator.commands.results import distinct
 from orchestrator.errors import Diagnostic, ScenarioError
 from orchestrator.experiments.claim_schema import MetricSpec
-from orchestrator.experiments.comparison_and_convergence import FIGURE_SPECS, comparison_table, variants
 from orchestrator.experiments.experiment import NamedRun, experiment_of
 from orchestrator.experiments.experiment_result import judge_results
 from orchestrator.experiments.jobs import Job, Outcome
 from orchestrator.experiments.result_files import draw_all, write_findings
+from orchestrator.experiments.scenario_experiments import FIGURE_SPECS, comparison_table, variants
 from orchestrator.experiments.schema import ExperimentSpec
 from orchestrator.figures.panels import LabelledRun, shown_by
 from orchestrator.metrics.expressions import MetricValue

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import Diagnostic, ResultsError, ScenarioError
-from orchestrator.experiments.comparison_and_convergence import (
+from orchestrator.experiments.experiment import NamedRun, experiment_of
+from orchestrator.experiments.experiment_result import judge_results
+from orchestrator.experiments.jobs import Job, Outcome
+from orchestrator.experiments.scenario_experiments import (
     columns_of,
     convergence_figure,
     convergence_table,
     measure,
     refinements,
 )
-from orchestrator.experiments.experiment import NamedRun, experiment_of
-from orchestrator.experiments.experiment_result import judge_results
-from orchestrator.experiments.jobs import Job, Outcome
 from orchestrator.experiments.tables import to_csv
 from tests.changed import changed
 from tests.sentences import golden, refused

@@ -16,11 +16,10 @@ from rich.console import Console
 
 from orchestrator.errors import Diagnostic, ScenarioError
 from orchestrator.experiments.claim_schema import Claim, GridSpec, calculate, rank_correlation
-from orchestrator.experiments.claims import judge
+from orchestrator.experiments.claims import correlation, judge
 from orchestrator.experiments.experiment_result import judge_results
 from orchestrator.experiments.jobs import Job, Outcome
 from orchestrator.experiments.load_experiment import load_experiment
-from orchestrator.experiments.published_tables import correlation
 from orchestrator.experiments.result_files import draw_all, draw_over_axes, write_findings
 from orchestrator.experiments.tables import Table, for_terminal
 from orchestrator.experiments.verdict_tables import claim_tables, derived_tables, run_tables, share

@@ -1,4 +1,4 @@
-"""Experiments made of one scenario: comparisons of FMUs, and convergence over the communication step.
+"""Experiments made of one scenario: comparisons of FMUs, convergence over the step, series of standard tests.
 
 A comparison has one named run for every combination of the swapped FMUs.
 
@@ -7,6 +7,8 @@ keep it. The error of a run is the largest difference from the finest run of the
 the communication points of the coarsest run, relative to the signal's peak. The observed order at h is
 log2(|x_h - x_h/2| / |x_h/2 - x_h/4|) with the same norm: it needs no exact solution, and compares an
 algorithm only with itself.
+
+A standard test decides from run to run what its series needs; a `TestDriver` makes the runs.
 """
 
 from __future__ import annotations
@@ -14,44 +16,45 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
-from fractions import Fraction
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from ..errors import ResultsError, ScenarioError
+from ..evaluation.sine_with_dwell import AMPLITUDE, SIDES
+from ..evaluation.standard_tests import Evaluation, SeriesRun, StandardTest
+from ..evaluation.steering_tests import slow_steer_amplitude
+from ..evaluation.trace import Trace, trace_of
 from ..figures.style import QUIET, frame, line_style, new_figure
 from ..metrics.expressions import MetricValue, metric
 from ..metrics.measures import variable_of, words
-from ..plan import Override
+from ..plan import Override, Plan
 from ..plan import Value as Plain
-from ..results.reader import Results
-from ..scenario.loader import load_scenario
+from ..results.reader import load_results
+from ..scenario.loader import LoadedScenario, load_scenario
 from ..scenario.overrides import changed, is_path, swap_of, with_changes
+from ..scenario.quantities import convert
 from ..signal_names import SignalName
 from .claim_schema import text_of
+from .executor import Executor, highest_passing, side_by_side
 from .experiment import LoadedExperiment, NamedRun, experiment_of
 from .experiment_result import ExperimentResult
+from .jobs import Job, planned
 from .tables import Cell, Table, column, marked, remarks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-
-PANELS = (
-    "steer_angle",
-    "sideslip",
-    "sideslip_error",
-    "yaw_rate",
-    "acceleration_y",
-    "yaw_moment",
-    "path",
-)
-FIGURES = {"overview": PANELS, "wheel_torques": ("wheel_torque_*",)}
+FIGURES = {
+    "overview":
+        ("steer_angle", "sideslip", "sideslip_error", "yaw_rate", "acceleration_y", "yaw_moment", "path"),
+    "wheel_torques": ("wheel_torque_*",),
+}  # fmt: skip
 """Figure name -> panels."""
 FIGURE_SPECS = [
     {"name": name, "title": name.replace("_", " ").capitalize(), "runs": ["*"], "panels": [*panels]}
@@ -193,13 +196,11 @@ def refinements(
     runs = []
     for algorithm in algorithms or [loaded.algorithm]:
         for k in range(halvings + 1):
-            step: Fraction = loaded.step_size / 2**k
-            refined = (
-                Override.of("algorithm", algorithm, "converge"),
-                Override.of("step_size", float(step), "converge"),
-            )
-            name = f"{algorithm}/{_milliseconds(float(step)).replace(' ', '')}"
-            label = f"{algorithm}, {_milliseconds(float(step))}"
+            step = float(loaded.step_size / 2**k)
+            values: dict[str, Plain] = {"algorithm": algorithm, "step_size": step}
+            refined = tuple(Override.of(target, value, "converge") for target, value in values.items())
+            name = f"{algorithm}/{_milliseconds(step).replace(' ', '')}"
+            label = f"{algorithm}, {_milliseconds(step)}"
             runs.append(NamedRun(name, label, label, scenario, refined))
     title = with_changes(f"Convergence of {signal}, {scenario.stem}", changes)
     return experiment_of(scenario, runs, changes=changes, title=title)
@@ -220,42 +221,34 @@ def measure(findings: ExperimentResult, signal: str) -> list[ConvergenceRow]:
         by_algorithm.setdefault(str(_given(run, "algorithm")), []).append(run)
     finest = next(iter(by_algorithm.values()))[-1]
     failed = {case.run.name: findings.record(case).reason or "" for case in findings.experiment.cases}
-    samples = {
-        run.name: _samples(findings.results.get(run.name), signal, failed[run.name])
-        for run in findings.experiment.runs.values()
-    }
-    reference = samples[finest.name][0]
+    samples: dict[str, np.ndarray] = {}
+    for name, results in findings.results.items():
+        number = np.issubdtype(results[signal].dtype, np.number)
+        failed[name] = "" if number else f"{signal} is not a number"
+        if number:
+            samples[name] = results[signal]
+    reference = samples.get(finest.name)
     peak = math.nan if reference is None else float(np.max(np.abs(reference)))
     if peak == 0:
         raise ResultsError(f"{signal} is zero throughout: choose another --signal.", code="signal-zero")
     rows = []
     for algorithm, runs in by_algorithm.items():
-        coarse = [_common(samples[run.name][0], k) for k, run in enumerate(runs)]
+        coarse = [_common(samples.get(run.name), k) for k, run in enumerate(runs)]
         target = _common(reference, len(runs) - 1)
         steps = [_distance(a, b) for a, b in zip(coarse, [*coarse[1:], None], strict=True)]
-        for k, run in enumerate(runs):
-            after = steps[k + 1] if k + 1 < len(steps) else None
-            order = math.log2(first / after) if (first := steps[k]) and after else None
+        for k, (run, first, after) in enumerate(zip(runs, steps, [*steps[1:], None], strict=True)):
+            order = math.log2(first / after) if first and after else None
             distance = None if run is finest else _distance(coarse[k], target)
-            _, wall_time, why = samples[run.name]
             error = None if distance is None else distance / peak
             step = float(_given(run, "step_size"))
-            rows.append(ConvergenceRow(algorithm, step, error, order, wall_time, why, run is finest))
+            cost = findings.results[run.name].record.wall_time if run.name in samples else None
+            rows.append(ConvergenceRow(algorithm, step, error, order, cost, failed[run.name], run is finest))
     return rows
 
 
 def _given(run: NamedRun, setting: str) -> Plain:
     """Return the value that a run's last override of `algorithm` or `step_size` sets."""
     return next(change.plain for change in reversed(run.changes) if str(change.target) == setting)
-
-
-def _samples(results: Results | None, signal: str, why: str) -> tuple[np.ndarray | None, float | None, str]:
-    """Return the signal and the wall time [s], or None for both and the reason."""
-    if results is None:
-        return None, None, why
-    if not np.issubdtype(results[signal].dtype, np.number):
-        return None, None, f"{signal} is not a number"
-    return results[signal], results.record.wall_time, ""
 
 
 def _common(x: np.ndarray | None, k: int) -> np.ndarray | None:
@@ -286,15 +279,13 @@ def convergence_table(rows: Sequence[ConvergenceRow], title: str) -> Table:
 
 def columns_of(rows: Sequence[ConvergenceRow]) -> Table:
     """Return the rows as columns, in SI units."""
-    numbers = (("step_size", "s", "step"), ("error", "1", "error"), ("order", "1", "order"),
-               ("wall_time", "s", "wall_time"))  # fmt: skip
     return Table.of_columns(
         [
             column("algorithm", "string", [row.algorithm for row in rows]),
-            *(
-                column(n, "float64", [getattr(row, part) for row in rows], {"unit": u})
-                for n, u, part in numbers
-            ),
+            column("step_size", "float64", [row.step for row in rows], {"unit": "s"}),
+            column("error", "float64", [row.error for row in rows], {"unit": "1"}),
+            column("order", "float64", [row.order for row in rows], {"unit": "1"}),
+            column("wall_time", "float64", [row.wall_time for row in rows], {"unit": "s"}),
             column("failed", "string", [row.failed for row in rows]),
         ]
     )
@@ -354,3 +345,105 @@ def _slopes(axes: Axes, rows: Sequence[ConvergenceRow]) -> None:
             f"order {order}", (math.sqrt(coarse * fine), middle), (-4, 3), ha="right",
             textcoords="offset points", fontsize=7.5, color=QUIET,
         )  # fmt: skip
+
+
+ORIGIN: Final = "standard test"
+"""Origin of the overrides by which a test varies its scenario."""
+
+
+@dataclass
+class TestDriver:
+    """Drives the series of a standard test as named runs (see `evaluation.standard_tests.SeriesDriver`).
+
+    Args:
+        test: evaluates the runs.
+        scenario: of all runs.
+        changes: overrides of all runs.
+        execute: makes the runs.
+        angle: A [rad], of tests that need it.
+
+    Attributes:
+        traces, judged: of all runs so far that can be judged.
+        status: the largest exit status so far, 0 unless a run failed.
+    """
+
+    __test__ = False  # not a pytest class
+
+    test: StandardTest
+    scenario: Path
+    changes: Sequence[Override]
+    execute: Executor
+    angle: float | None = None
+    traces: list[Trace] = field(default_factory=list)
+    judged: list[Evaluation] = field(default_factory=list)
+    status: int = 0
+
+    @cached_property
+    def _planned(self) -> tuple[LoadedScenario, Plan]:
+        base = Job("", self.scenario, self.execute.folder, (*self.changes,), **self.execute.of_jobs)
+        return planned(base, self.execute.planner)
+
+    @cached_property
+    def speed(self) -> float:
+        """Speed of the scenario [m/s].
+
+        Raises:
+            ScenarioError: it has none above 0.
+        """
+        initial = self._planned[0].speed
+        speed = 0.0 if initial is None else float(convert(str(initial), "m/s"))
+        if speed <= 0.0:
+            raise ScenarioError(
+                f"{self.scenario}: has no speed above 0, from which the series could start",
+                code="fmu-wrong-kind",
+            )
+        return speed
+
+    @property
+    def duration(self) -> float:
+        """Duration of the scenario [s]."""
+        plan = self._planned[1]
+        return float(plan.step * plan.n_steps)
+
+    def make(self, runs: Sequence[SeriesRun]) -> list[Evaluation]:
+        """Make runs that have no results yet; return the evaluations of those that can be judged.
+
+        Raises:
+            ScenarioError: a run cannot start.
+            ResultsError: a run did not record a signal that the test needs.
+        """
+        named = []
+        for run in runs:
+            own = (Override.of(target, value, ORIGIN) for target, value in run.values.items())
+            named.append(NamedRun(run.folder, run.folder, run.folder, self.scenario, (*self.changes, *own)))
+        title = runs[0].label if len(runs) == 1 else self.test.name.replace("-", " ")
+        jobs = self.execute.planned(experiment_of(self.scenario, named, title=title)).jobs
+        outcomes = self.execute.run(title, jobs, journaled=False)
+        failed = [outcome.exit_status for outcome in outcomes if not outcome.ok]
+        self.status = max([self.status, *failed])
+        made = [(run, job) for run, job in zip(runs, jobs, strict=True) if run.partly or not failed]
+        traces = [trace_of(load_results(job.out), run.label) for run, job in made]
+        judged = [self.test.evaluate(trace, self.angle) for trace in traces]
+        self.traces += traces
+        self.judged += judged
+        return judged
+
+    def search_highest(self, passes: Callable[[float], bool], **bounds: float) -> None:
+        """Search the highest value that passes; `bounds`: see `highest_passing`."""
+        search = highest_passing(**bounds)
+        side_by_side({"": search}, lambda values: {name: passes(value) for name, value in values.items()})
+
+
+def slow_steer_runs(scenario: Path, changes: Sequence[Override], execute: Executor) -> list[SeriesRun]:
+    """Return runs of slowly increasing steer to both sides, with the scenario's amplitude.
+
+    Raises:
+        ScenarioError: the scenario is wrong, or its driver has no amplitude.
+    """
+    (plan,) = execute.plans([NamedRun("", "", "", scenario, (*changes,))])
+    amplitude = slow_steer_amplitude(plan, scenario)
+    folders = {f"slowly_increasing_steer/{name}": side for name, side in SIDES}
+    return [
+        SeriesRun(folder, folder, {AMPLITUDE: side * amplitude}, partly=False)
+        for folder, side in folders.items()
+    ]
