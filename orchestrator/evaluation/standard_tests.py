@@ -194,7 +194,7 @@ class StandardTest:
     function: str  # "module:function" in this package that evaluates a run
     columns: tuple[str, ...]  # keys of the quantities in tables of several runs
     needs_angle: bool = False  # whether the function takes A
-    drawing: str = ""  # module in this package with `draw_run` and `draw_series`
+    drawing: str = ""  # "module:name" of functions name_run and name_series, which draw them
     marking: str = ""  # "module:function" that returns the instants and limits of a run
     together: str = ""  # "module:function" that judges several recorded runs as a series
     driving: str = ""  # "module:function" that makes and judges a series of runs
@@ -218,7 +218,7 @@ class StandardTest:
 
     def draw(self, trace: Trace, judged: Evaluation) -> Figure | None:
         """Return the figure of a run, None if there is nothing to draw."""
-        figure: Figure | None = _named(f"{self.drawing}:draw_run")(trace, judged) if self.drawing else None
+        figure: Figure | None = _named(f"{self.drawing}_run")(trace, judged) if self.drawing else None
         return figure
 
     def marks(self, judged: Evaluation) -> tuple[list[Mark], list[Limit]]:
@@ -227,8 +227,8 @@ class StandardTest:
         return drawn
 
     def draw_series(self, series: TestSeries, note: str) -> Figure:
-        """Return the figure of a series; only for tests with a drawing module."""
-        figure: Figure = _named(f"{self.drawing}:draw_series")(series, note)
+        """Return the figure of a series; only for tests with a drawing."""
+        figure: Figure = _named(f"{self.drawing}_series")(series, note)
         return figure
 
 
@@ -264,7 +264,7 @@ TESTS: dict[str, StandardTest] = {
             "sine_with_dwell:evaluate_dwell",
             ("amplitude", "ratio_1000", "ratio_1750", "displacement", "sideslip", "speed_end"),
             needs_angle=True,
-            drawing="sine_with_dwell_figures",
+            drawing="figures:draw_dwell",
             marking="sine_with_dwell:marks_of",
             together="sine_with_dwell:judge_together",
             driving="sine_with_dwell:drive_series",
@@ -316,10 +316,10 @@ TESTS: dict[str, StandardTest] = {
         StandardTest(
             "lane-change",
             "a double lane change between cones, clean or not (ISO 3888)",
-            "lane_change:evaluate_lane_change",
+            "steering_tests:evaluate_lane_change",
             ("entry", "exit", "overrun", "sideslip", "acceleration", "hand"),
-            drawing="lane_change",
-            driving="lane_change:drive_series",
+            drawing="figures:draw_lane_change",
+            driving="steering_tests:drive_lane_changes",
             driven_as=("iso-3888-1", "iso-3888-2"),
             varies=("speed", "stop_time"),
         ),

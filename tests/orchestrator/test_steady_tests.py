@@ -13,9 +13,14 @@ from scipy.signal import lsim
 import yawbench as yb
 from components.drivers.sine_sweep import SineSweepParameters, sweep
 from orchestrator.evaluation.braking_and_wind import evaluate_turn
-from orchestrator.evaluation.lane_change import evaluate_lane_change, judge_entry_speeds
 from orchestrator.evaluation.standard_tests import Evaluation
-from orchestrator.evaluation.steering_tests import evaluate_step, evaluate_sweep, evaluate_understeer
+from orchestrator.evaluation.steering_tests import (
+    evaluate_lane_change,
+    evaluate_step,
+    evaluate_sweep,
+    evaluate_understeer,
+    judge_entry_speeds,
+)
 from orchestrator.evaluation.trace import Trace, trace_of
 from orchestrator.metrics.verdict import Status, Verdict
 from orchestrator.results.reader import Results

@@ -7,10 +7,9 @@ from math import degrees, radians
 import pytest
 
 import yawbench as yb
-from orchestrator.evaluation.lane_change import evaluate_lane_change
 from orchestrator.evaluation.sine_with_dwell import evaluate_dwell
 from orchestrator.evaluation.standard_tests import Evaluation
-from orchestrator.evaluation.steering_tests import evaluate_slow_steer
+from orchestrator.evaluation.steering_tests import evaluate_lane_change, evaluate_slow_steer
 from orchestrator.evaluation.trace import trace_of
 from orchestrator.metrics.verdict import Status
 from orchestrator.plan import Override

@@ -1,4 +1,4 @@
-"""Figures of sine with dwell: one run with its instants and ratios; a series over amplitude."""
+"""Figures of standard tests: a run of sine with dwell or a lane change, and the series of its runs."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vocabulary.lane_change import Lane, lanes_of
+
 from ..figures.style import CHANGED, QUIET, frame, line_style, new_figure
 from ..metrics.verdict import NotJudged, Status
 from .sine_with_dwell import AT, FAR, RATIOS, DwellCourse, course_of, percent
 from .standard_tests import Evaluation, TestSeries
+from .steering_tests import CLEAN
 from .trace import Trace, at
 
 if TYPE_CHECKING:
@@ -22,7 +25,7 @@ MARKS = {Status.PASSED: "#009E73", Status.FAILED: "#D55E00", Status.NOT_JUDGED: 
 RESPONSE = "responsiveness"
 
 
-def draw_run(trace: Trace, judged: Evaluation) -> Figure | None:
+def draw_dwell_run(trace: Trace, judged: Evaluation) -> Figure | None:
     """Return the figure of a run: hand wheel, yaw rate with its ratios, displacement, sideslip.
 
     None if the run cannot be judged.
@@ -131,7 +134,7 @@ def _displaced(axes: Axes, course: DwellCourse, judged: Evaluation, trace: Trace
         _label(axes, instant + 0.35, least, f"at least {least:g} m", (4, -3), color=CHANGED)
 
 
-def draw_series(series: TestSeries, note: str) -> Figure:
+def draw_dwell_series(series: TestSeries, note: str) -> Figure:
     """Return the figure of a series: ratios and displacement over amplitude, in both directions."""
     from matplotlib.lines import Line2D
 
@@ -182,4 +185,108 @@ def draw_series(series: TestSeries, note: str) -> Figure:
         angle, verdict = math.degrees(series.data["A"]), series.data["verdict"].value
         title = f"Sine with dwell, A = {angle:.1f}°: the series has {verdict}"
         frame(figure, 5.0, handles, title, f"{verdicts} · {note}")
+    return figure
+
+
+EVERY = 5.0
+"""Distance between the drawn outlines of the car [m]."""
+AROUND = 12.0
+"""Length of road drawn before the first and behind the last cones [m]."""
+
+
+def draw_lane_change_run(trace: Trace, judged: Evaluation) -> Figure:
+    """Return the figure of a run: the car between the cones, hand wheel, lateral acceleration, sideslip."""
+    track = lanes_of(trace.facts)
+    x = trace["position_x"]
+    start = track[0].start if track else 0.0
+    panels = [
+        (name, says, factor)
+        for name, says, factor in (
+            ("steering_wheel_angle", "Hand-wheel angle [°]", 180.0 / np.pi),
+            ("acceleration_y", "Lateral acceleration [m/s²]", 1.0),
+            ("sideslip", "Sideslip angle [°]", 180.0 / np.pi),
+            ("velocity_x", "Speed [km/h]", 3.6),
+        )
+        if name in trace
+    ]
+    heights = [1.5, *([0.8] * len(panels))]
+    with new_figure() as figure:
+        axes = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
+        _from_above(axes[0], trace, track, start)
+        for panel, (name, says, factor) in zip(axes[1:], panels, strict=True):
+            panel.plot(x - start, factor * trace[name], **line_style(0))
+            panel.set_title(says)
+            if name != "velocity_x":
+                panel.axhline(0.0, color="#444444", linewidth=0.7, zorder=1)
+        for panel in axes:
+            for lane in track:
+                panel.axvspan(lane.start - start, lane.end - start, color="#F1F1F1", zorder=0)
+        end = track[-1].end - start if track else float(x[-1]) - start
+        axes[0].set_xlim(-AROUND, min(end + AROUND, float(x.max()) - start))
+        axes[-1].set_xlabel("Distance from the first cones [m]")
+        entry = judged["entry"]
+        clean = judged.criteria[CLEAN]
+        speed = "" if entry is None else f", {3.6 * entry:.1f} km/h at the first cones"
+        note = " · ".join([*filter(None, [trace.title, trace.name]), *map(str, judged.diagnostics)])
+        title = f"Lane change{speed}: {clean.status.value}, {clean.why}"
+        frame(figure, 1.45 * sum(heights), [], title, note)
+    return figure
+
+
+def _from_above(axes: Axes, trace: Trace, track: list[Lane], start: float) -> None:
+    """Draw the cones, the path of the centre of mass and outlines of the car."""
+    x, y = trace["position_x"] - start, trace["position_y"]
+    axes.plot(x, y, **line_style(0))
+    axes.set_title("From above [m]; the scale across is larger")
+    for lane in track:
+        distances = np.linspace(lane.start, lane.end, 2 + round((lane.end - lane.start) / 4.0)) - start
+        for border in (lane.right, lane.left):
+            axes.plot(
+                distances, np.full_like(distances, border), "^", color=CHANGED, markersize=3.5, zorder=4
+            )
+    known = [trace.facts.get(name) for name in ("cg_to_front_end", "cg_to_rear_end", "vehicle_width")]
+    if "yaw_angle" not in trace or not all(isinstance(value, (int, float)) for value in known):
+        return
+    front, rear, width = (float(value) for value in known)  # type: ignore[arg-type]
+    body = np.array([[front, front, -rear, -rear, front], [0.5, -0.5, -0.5, 0.5, 0.5]])
+    body[1] *= width
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
+    for k in np.searchsorted(way, np.arange(0.0, way[-1], EVERY)):
+        c, s = np.cos(trace["yaw_angle"][k]), np.sin(trace["yaw_angle"][k])
+        axes.plot(
+            x[k] + c * body[0] - s * body[1], y[k] + s * body[0] + c * body[1],
+            color=QUIET, linewidth=0.7, zorder=2,
+        )  # fmt: skip
+    highest = max([lane.left for lane in track] + [float(y.max())])
+    lowest = min([lane.right for lane in track] + [float(y.min())])
+    axes.set_ylim(max(lowest, -12.0) - 0.8, min(highest, 12.0) + 0.8)
+
+
+def draw_lane_change_series(series: TestSeries, note: str) -> Figure:
+    """Return the figure of a series over entry speed: overrun, and how hard the car is driven."""
+    panels: list[tuple[str, str, float]] = [
+        ("overrun", "Largest distance beyond the cones [m]", 1.0),
+        ("acceleration", "Largest lateral acceleration [m/s²]", 1.0),
+        ("sideslip", "Peak sideslip [°]", 180.0 / np.pi),
+        ("exit", "Speed behind the last cones [km/h]", 3.6),
+    ]
+    with new_figure() as figure:
+        grid = figure.subplots(2, 2, sharex=True, squeeze=False)
+        for axes, (key, says, factor) in zip(grid.flat, panels, strict=True):
+            for status, marker in ((Status.PASSED, "o"), (Status.FAILED, "X"), (Status.NOT_JUDGED, "s")):
+                runs = [run for run in series.runs if run.criteria[CLEAN].status is status]
+                points = [(3.6 * (run["entry"] or 0.0), run[key]) for run in runs]
+                shown = [(v, factor * value) for v, value in points if value is not None]
+                style: dict[str, Any] = {"color": MARKS[status], "markersize": 6.0, "linestyle": ""}
+                axes.plot([v for v, _ in shown], [value for _, value in shown], marker=marker, **style)
+            axes.set_title(says)
+            if (highest := series.data["highest_clean_entry_speed"]) is not None:
+                axes.axvline(3.6 * highest, color=CHANGED, linewidth=1.2)
+        grid[0, 0].set_yscale("symlog", linthresh=0.1, linscale=0.5)
+        grid[0, 0].set_ylim(-0.02, 2.0 * max([0.1, *(run["overrun"] or 0.0 for run in series.runs)]))
+        grid[0, 0].set_yticks([0.0, 0.1, 1.0, 10.0][: 3 if grid[0, 0].get_ylim()[1] < 10.0 else 4])
+        grid[0, 0].yaxis.set_major_formatter("{x:g}")
+        for axes in grid[1]:
+            axes.set_xlabel("Speed at the first cones [km/h]")
+        frame(figure, 4.6, [], series.summary, f"round: clean; cross: cones touched · {note}")
     return figure
