@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import BuildError, Diagnostic
-from orchestrator.fmu.binary import REASON, runs_as
+from orchestrator.fmu.archive import REASON, runs_as
 from orchestrator.safe_files import draft_of, remove_draft
 from orchestrator.workers import Pool
 from vocabulary.roles import ROLES

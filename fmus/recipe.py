@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import BuildError
-from orchestrator.fmu.binary import REASON
+from orchestrator.fmu.archive import REASON
 from vocabulary.roles import ROLES
 
 from .compiler import compile_launcher, compiler_tools

@@ -10,8 +10,10 @@ from __future__ import annotations
 import re
 from collections.abc import Collection
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Literal, NamedTuple
+
+from vocabulary.signals import SYMBOLS
 
 from .messages import short
 
@@ -80,6 +82,26 @@ class SignalName(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.instance}.{self.variable}" if self.instance else self.variable
+
+
+def alike(output: str, name: str) -> int:
+    """Return how many words the names of an output and of an input share: 0 if it should not be suggested.
+
+    A reference value does not match an actual value.
+    """
+    words = words_of(output), words_of(name)
+    return len(words[0] & words[1]) if ("ref" in words[0]) == ("ref" in words[1]) else 0
+
+
+@cache
+def words_of(name: str) -> frozenset[str]:
+    """Return the words of a signal's name, symbols translated: of `PsiDot` and `yaw_rate` yaw and rate.
+
+    Words of up to two letters do not count.
+    """
+    words = [name, *re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)]
+    translated = "_".join(SYMBOLS.get(word.lower(), word.lower()) for word in words)
+    return frozenset(word for word in translated.split("_") if len(word) > 2)
 
 
 TargetKind = Literal[

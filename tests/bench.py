@@ -24,7 +24,7 @@ from time import perf_counter, perf_counter_ns
 import numpy as np
 
 from fmus.build import HERE as FMUS
-from orchestrator.fmu.binary import runs_as
+from orchestrator.fmu.archive import runs_as
 from orchestrator.interop.second_opinion import MASTERS, installed, second_opinion
 from orchestrator.interrupts import StopFlag
 from orchestrator.master.compiled_loop import WANTED as LOOP

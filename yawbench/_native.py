@@ -21,8 +21,8 @@ import components
 import vocabulary
 from components.fmi.component import Component
 from orchestrator.errors import YawbenchError
-from orchestrator.fmu.archive import open_fmu
-from orchestrator.fmu.binary import PYTHON_WANTED, REASON, binary_of, python_wanted
+from orchestrator.fmu.archive import PYTHON_WANTED, REASON, open_fmu, python_wanted
+from orchestrator.fmu.description import binary_of
 from orchestrator.plan import Fmu, RunsAs
 
 from ._parameters import ProgramParameters, functions_of, has_constructor

@@ -16,7 +16,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from orchestrator.errors import BuildError
-from orchestrator.fmu.binary import platform
+from orchestrator.fmu.description import platform
 from vocabulary.roles import ROLES
 
 from ..compiler import compile_library, compiler_command, compiler_tools, compiler_version

@@ -18,8 +18,7 @@ from vocabulary.wheels import WHEELS
 
 from ..errors import Diagnostic, ModelDescriptionError, ScenarioError, text_of
 from ..figures.style import shown
-from ..fmu.archive import open_fmu
-from ..fmu.binary import runs_as
+from ..fmu.archive import open_fmu, runs_as
 from ..messages import printable, star
 from ..metrics.expressions import STANDARD, MetricValue, columns_of, evaluate_all, metric
 from ..metrics.measures import catalogue as measures

@@ -6,6 +6,9 @@ complete, in one rename, so processes that unpack the same archive at the same t
 A file that was changed, truncated or deleted since is detected by its hash, which costs a millisecond per
 FMU, and restored.
 
+`binary_problem` says why an FMU cannot be loaded on this platform, `runs_as` whether one that was built from
+Python runs as native code.
+
 `kept_in` lists the entries of a cache folder: their kinds, sizes, and whether they are intact.
 """
 
@@ -21,26 +24,28 @@ import os
 import re
 import shutil
 import struct
+import sys
 import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 from ..cache import STORES, cache_folders, content_of, delete_unused, hold
 from ..errors import ModelDescriptionError
-from ..messages import closest, listed
-from ..plan import Fmu
+from ..messages import closest, listed, short
+from ..plan import Fmu, RunsAs
 from ..safe_files import PACKED, TooLargeError, check_archive, read_bytes, reason
 from . import description as fmu_description
-from .binary import binary_problem
+from .description import binary_of, platform
 
 FORMAT = 9
 """Format version of cache entries; part of their names, so versions of this program can share a cache."""
 
+_FILE_NAME = re.compile(r"[^/\\:\x00-\x1f\x7f]{1,200}")
 _FILE_TIME = 946_684_800
 """Time stamp of unpacked files, 2000-01-01 [s]: keeps Python's bytecode valid after a restore."""
 _DAMAGE = (
@@ -78,6 +83,29 @@ def open_fmu(path: Path | str, *, validate: bool = True) -> Fmu:
         return fmu
     assert problem is not None
     raise problem
+
+
+def binary_problem(fmu: Fmu) -> str | None:
+    """Return why an FMU cannot be loaded on this platform, None if it has a binary for it."""
+    identifier = fmu.model_identifier
+    if not _FILE_NAME.fullmatch(identifier) or identifier in (".", ".."):
+        return (
+            f"modelIdentifier {short(identifier)} cannot name the library of an FMU: "
+            "it may contain letters, digits and _, at most 200"
+        )
+    missing = binary_of(fmu.fmi, identifier)
+    if (fmu.directory / missing).is_file():
+        return None
+    name, _ = platform(fmu.fmi)
+    present = sorted(p.name for p in fmu.directory.glob("binaries/*") if p.is_dir() and any(p.iterdir()))
+    if name in present:
+        files = sorted(p.name for p in (fmu.directory / "binaries" / name).iterdir())
+        return (
+            f"no binary of the name that the model identifier asks for ({missing}); binaries/{name} contains "
+            f"{listed(files)}"
+        )
+    others = f"it has binaries for {listed(present)}" if present else "it has no binaries"
+    return f"no binary for this platform ({missing}); {others}"
 
 
 def _no_room(path: Path, folder: Path, error: OSError) -> str:
@@ -278,3 +306,51 @@ def _zip_is_whole(file: Path) -> bool:
     with contextlib.suppress(zipfile.BadZipFile, OSError), zipfile.ZipFile(file) as archive:
         return archive.testzip() is None
     return False
+
+
+REASON = "extra/org.yawbench.native/native.txt"
+"""Path in an archive of why it has no native library; empty if it has one."""
+WANTED = "YAWBENCH_UNITS"
+"""Environment variable: `python` asks for Python in place of native code."""
+
+
+PYTHON_WANTED = RunsAs(f"{WANTED} asks for it")
+
+
+def python_wanted() -> bool:
+    """Return whether the environment asks for Python in place of native code."""
+    return os.environ.get(WANTED) == "python"
+
+
+def runs_as(archive: Path) -> RunsAs | None:
+    """Return how an FMU that was built from Python here runs, None for any other."""
+    try:
+        why = _why_python(str(archive), os.stat(archive).st_mtime_ns)
+    except OSError:
+        return None
+    if why is None:
+        return None
+    if why:
+        return RunsAs(why)
+    if python_wanted():
+        return PYTHON_WANTED
+    return RunsAs() if sys.platform == "linux" else RunsAs("the native library is for Linux")
+
+
+def is_native(directory: Path) -> bool:
+    """Return whether the FMU unpacked in a folder was built here and runs natively in this process."""
+    if sys.platform != "linux" or python_wanted():
+        return False
+    try:
+        return (directory / REASON).stat().st_size == 0
+    except OSError:
+        return False
+
+
+@lru_cache(maxsize=1024)
+def _why_python(archive: str, changed: int) -> str | None:
+    try:
+        with zipfile.ZipFile(archive) as opened:
+            return opened.read(REASON).decode("utf-8", "replace")
+    except (KeyError, zipfile.BadZipFile):
+        return None

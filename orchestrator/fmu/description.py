@@ -1,10 +1,6 @@
 """Model descriptions: read by fmpy into `plan.Fmu`, and checked for what this master supports.
 
 `scalars` gives the variables as scalars whichever version of FMI describes them, arrays element by element.
-
-`shadowed_modules` detects PythonFMU instances that would silently run each other's code: all of them in a
-process share one interpreter, and of two modules with the same name the second is never loaded. FMUs built by
-`yawbench build` have module names that are unique to their content; FMUs from other sources may not.
 """
 
 from __future__ import annotations
@@ -13,6 +9,7 @@ import hashlib
 import io
 import itertools
 import math
+import platform as machine
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
@@ -23,7 +20,20 @@ from xml.etree import ElementTree
 from ..errors import Diagnostic, ModelDescriptionError
 from ..messages import short
 from ..plan import Fmu, UnitDefinition, Value, Variable
-from .binary import INTEGERS, binary_of, lacking
+
+_ALWAYS = ("EnterInitializationMode", "ExitInitializationMode", "DoStep", "FreeInstance")
+CORE = {
+    2: ("Instantiate", "SetupExperiment", *_ALWAYS),
+    3: ("InstantiateCoSimulation", *_ALWAYS),
+}
+"""Major version of FMI -> functions that every run calls."""
+INTEGERS = tuple(f"{sign}Int{bits}" for bits in (8, 16, 32, 64) for sign in ("", "U"))
+TYPES = {
+    2: ("Real", "Integer", "Boolean", "String"),
+    3: ("Float32", "Float64", *INTEGERS, "Boolean", "String"),
+}
+"""Major version of FMI -> types as in the names of setters and getters."""
+_ARCHITECTURES = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}
 
 _KINDS = {"Float32": "Real", "Float64": "Real"} | dict.fromkeys(INTEGERS, "Integer")
 """Type of FMI 3.0 -> type in a scenario, where the names differ."""
@@ -33,6 +43,12 @@ _REFUSED = {
 }
 MOST = 100_000
 """Largest number of elements of an array; chosen: more than any interface has."""
+
+
+def integer_limits(kind: str) -> tuple[int, int]:
+    """Return the smallest and the largest number of an integer type of FMI 3.0, such as "UInt8"."""
+    bits = int(kind.partition("Int")[2])
+    return (0, 2**bits - 1) if kind.startswith("U") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
 
 
 def scalars(description: Any, root: ElementTree.Element) -> tuple[dict[str, Variable], dict[str, str]]:
@@ -174,62 +190,6 @@ def _limit(v: Mapping[str, str] | Any, declared: Any, which: str) -> float | Non
     return None if text is None else float(text)
 
 
-def shadowed_modules(fmus: Mapping[str, Fmu], *, isolated: bool = False) -> list[str]:
-    """Return an error message for every instance that would run another instance's or this program's module.
-
-    Args:
-        fmus: instance -> FMU.
-        isolated: each instance has a process of its own, and so its own modules.
-    """
-    problems = []
-    first_in: dict[str, tuple[str, str]] = {}
-    for instance, fmu in fmus.items():
-        for module, content in fmu.python_modules.items():
-            other, its_content = first_in.setdefault(module, (instance, content))
-            if its_content != content and not isolated:
-                problems.append(
-                    f"{instance} ({fmu.name}) would run code of {other} ({fmus[other].name}): both FMUs "
-                    f"bring a Python module {module!r}, and a process has room for one; rebuild one of them "
-                    "with another module name, or run with --isolate"
-                )
-            elif module in sys.stdlib_module_names:
-                problems.append(
-                    f"{instance} ({fmu.name}) would run other code: its Python module {module!r} has the "
-                    "name of one of Python's own; rebuild it with another module name"
-                )
-            elif _loaded_from_elsewhere(module, content, fmu.directory):
-                problems.append(
-                    f"{instance} ({fmu.name}) would run other code: another Python module {module!r} is "
-                    "loaded in this process already; rebuild it with another module name"
-                )
-    return problems
-
-
-def _loaded_from_elsewhere(module: str, content: str, directory: Path) -> bool:
-    """Return whether a different module with this name is already loaded in this process."""
-    homes = [home for home in _homes(module) if not home.is_relative_to(directory)]
-    return any(_content(home, module) != content for home in homes)
-
-
-def _homes(module: str) -> list[Path]:
-    """Return the folders that a loaded module comes from: several if it is a folder without __init__.py."""
-    loaded = sys.modules.get(module)
-    file = getattr(loaded, "__file__", None)
-    if file is not None:
-        return [Path(file).parents[1 if Path(file).name == "__init__.py" else 0]]
-    return [Path(folder).parent for folder in getattr(loaded, "__path__", ())]
-
-
-def _content(home: Path, module: str) -> str | None:
-    """Return the hash of a module's files in a folder; None if they cannot be read."""
-    package = home / module
-    files = package.rglob("*.py") if package.is_dir() else [home / f"{module}.py"]
-    try:
-        return hashes_of_modules({f.relative_to(home).as_posix(): f.read_bytes() for f in files}).get(module)
-    except OSError:
-        return None
-
-
 def hashes_of_modules(files: Mapping[str, bytes]) -> dict[str, str]:
     """Return the top-level Python modules among files, by their paths, each with a hash of its content."""
     hashes: dict[str, Any] = {}
@@ -305,6 +265,35 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
         needs_tool=kind.needsExecutionTool,
         host_packages=tuple(_annotated(root, "hostPackages", "names").split()),
     )
+
+
+def platform(fmi: int = 2) -> tuple[str, str]:
+    """Return the name of this platform in a version of FMI, and the suffix of its binaries."""
+    names = {"win32": ("win", ".dll"), "cygwin": ("win", ".dll"), "darwin": ("darwin", ".dylib")}
+    system, suffix = names.get(sys.platform, ("linux", ".so"))  # as in fmpy, which is slow to import
+    wide = sys.maxsize > 2**32
+    if fmi == 2:
+        return f"{system}{64 if wide else 32}", suffix
+    architecture = _ARCHITECTURES.get(machine.machine().lower(), "x86_64") if wide else "x86"
+    return f"{architecture}-{'windows' if system == 'win' else system}", suffix
+
+
+def binary_of(fmi: int, identifier: str) -> str:
+    """Return the path, within the archive, of the library for this platform."""
+    name, suffix = platform(fmi)
+    return f"binaries/{name}/{identifier}{suffix}"
+
+
+def lacking(library: bytes | None, fmi: int) -> tuple[str, ...]:
+    """Return the functions that this program may call and the library does not export.
+
+    The library is not loaded: a function whose name is not in the file cannot be found after loading. A file
+    with none of the names gets its functions from another library; it is checked when it is loaded.
+    """
+    access = [f"{verb}{kind}" for verb in ("Set", "Get") for kind in TYPES[fmi]]
+    named = {name: f"fmi{fmi}{name}" for name in (*CORE[fmi], *access)}
+    missing = [name for name, full in named.items() if f"{full}\0".encode() not in (library or b"")]
+    return () if len(missing) == len(named) else tuple(named[name] for name in missing)
 
 
 def _dangling(root: ElementTree.Element, fmi: int) -> str | None:

@@ -9,6 +9,10 @@ point of the group `yawbench.components`, whose value is a package with folders 
 
 They are built into the cache when they are first used, and again when they have changed. The first place
 that has a name counts.
+
+`shadowed_modules` detects PythonFMU instances that would silently run each other's code: all of them in a
+process share one interpreter, and of two modules with the same name the second is never loaded. FMUs built by
+`yawbench build` have module names that are unique to their content; FMUs from other sources may not.
 """
 
 from __future__ import annotations
@@ -33,6 +37,7 @@ from ..messages import closest, listed, printable, short
 from ..plan import BuildInfo, Fmu
 from ..scenario.overrides import is_path
 from .archive import open_fmu
+from .description import hashes_of_modules
 
 if TYPE_CHECKING:
     from fmus.rebuild_stale import FmuUpdater
@@ -351,3 +356,59 @@ def hidden(names: Iterable[str], folder: Path, *, packages: bool) -> list[Diagno
             sentence = f"{name} is in {listed(places)}; that in {places[0]} is used"
             warnings.append(Diagnostic("fmu-ambiguous", sentence, "warning"))
     return warnings
+
+
+def shadowed_modules(fmus: Mapping[str, Fmu], *, isolated: bool = False) -> list[str]:
+    """Return an error message for every instance that would run another instance's or this program's module.
+
+    Args:
+        fmus: instance -> FMU.
+        isolated: each instance has a process of its own, and so its own modules.
+    """
+    problems = []
+    first_in: dict[str, tuple[str, str]] = {}
+    for instance, fmu in fmus.items():
+        for module, content in fmu.python_modules.items():
+            other, its_content = first_in.setdefault(module, (instance, content))
+            if its_content != content and not isolated:
+                problems.append(
+                    f"{instance} ({fmu.name}) would run code of {other} ({fmus[other].name}): both FMUs "
+                    f"bring a Python module {module!r}, and a process has room for one; rebuild one of them "
+                    "with another module name, or run with --isolate"
+                )
+            elif module in sys.stdlib_module_names:
+                problems.append(
+                    f"{instance} ({fmu.name}) would run other code: its Python module {module!r} has the "
+                    "name of one of Python's own; rebuild it with another module name"
+                )
+            elif _loaded_from_elsewhere(module, content, fmu.directory):
+                problems.append(
+                    f"{instance} ({fmu.name}) would run other code: another Python module {module!r} is "
+                    "loaded in this process already; rebuild it with another module name"
+                )
+    return problems
+
+
+def _loaded_from_elsewhere(module: str, content: str, directory: Path) -> bool:
+    """Return whether a different module with this name is already loaded in this process."""
+    homes = [home for home in _homes(module) if not home.is_relative_to(directory)]
+    return any(_content(home, module) != content for home in homes)
+
+
+def _homes(module: str) -> list[Path]:
+    """Return the folders that a loaded module comes from: several if it is a folder without __init__.py."""
+    loaded = sys.modules.get(module)
+    file = getattr(loaded, "__file__", None)
+    if file is not None:
+        return [Path(file).parents[1 if Path(file).name == "__init__.py" else 0]]
+    return [Path(folder).parent for folder in getattr(loaded, "__path__", ())]
+
+
+def _content(home: Path, module: str) -> str | None:
+    """Return the hash of a module's files in a folder; None if they cannot be read."""
+    package = home / module
+    files = package.rglob("*.py") if package.is_dir() else [home / f"{module}.py"]
+    try:
+        return hashes_of_modules({f.relative_to(home).as_posix(): f.read_bytes() for f in files}).get(module)
+    except OSError:
+        return None

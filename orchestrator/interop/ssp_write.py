@@ -52,7 +52,7 @@ from ..scenario.ssp_archive import (
     SSD,
     SSV,
 )
-from ..wiring.compatibility import conversion_between
+from ..wiring.connections import conversion_between
 
 _FILE_TIME = (1980, 1, 1, 0, 0, 0)
 

@@ -24,7 +24,8 @@ from fmpy.fmi2 import (
 )
 from fmpy.fmi3 import fmi3IntermediateUpdateCallback, fmi3LogMessageCallback
 
-from ..fmu.binary import INTEGERS, is_native
+from ..fmu.archive import is_native
+from ..fmu.description import INTEGERS
 from ..plan import Instance, Plan
 from .compiled_loop import Kind, OperationData
 from .instance import BoundCall, CtypesInstance, ExperimentSetup, PlainCall, Status

@@ -23,7 +23,8 @@ import fmpy
 import numpy as np
 
 from ..errors import ModelDescriptionError, SimulationError
-from ..fmu.binary import CORE, INTEGERS, binary_of, binary_problem
+from ..fmu.archive import binary_problem
+from ..fmu.description import CORE, INTEGERS, binary_of
 from ..messages import listed
 from ..plan import Instance, Value, ValueRef
 from .compiled_loop import Kind, OperationData

@@ -31,7 +31,7 @@ import numpy as np
 from ..coupling_algorithms import ALGORITHMS, WireTiming
 from ..errors import SimulationError
 from ..fault_kinds import KINDS, Disturbance
-from ..fmu.binary import integer_limits
+from ..fmu.description import integer_limits
 from ..messages import listed
 from ..plan import Instance, Plan, Value, Variable, Wire
 from .instance import FmuInstance, Status, StepCalls

@@ -21,7 +21,7 @@ from typing import Any
 
 from ..cache import OF_RESULTS, checksum, sources_hash
 from ..errors import ResultsError
-from ..fmu.binary import runs_as
+from ..fmu.archive import runs_as
 from ..plan import DEFAULT, Fmu, InputSeries, Instance, Plan, ValueSource, Wire
 from ..signal_names import SignalName
 from .reader import load_results

@@ -73,7 +73,7 @@ class FmuRecord(_Part):
     generation_tool: str | None = None
     fmi_version: str = ""
     built: dict[str, Any] | None = None
-    runs_as: str | None = None  # see `fmu.binary.runs_as`
+    runs_as: str | None = None  # see `fmu.archive.runs_as`
     step_size: float | None = None
     tolerance: float | None = None
     parameters: dict[str, Any] = {}

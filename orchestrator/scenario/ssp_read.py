@@ -10,6 +10,10 @@ On every connection a number is first converted from the unit of its start to th
 connection suppresses that, and then linearly transformed. A connector of an FMU without a unit has that of
 its variable, a connector of a system that of the connector it is connected to.
 
+Parameter values are bound to variables by name, first those of inner systems, then those of outer ones. Of
+several values for a variable, that of the outermost system wins, on the same level the last. Unknown names
+are ignored, as the standard requires, but with a note.
+
 Unsupported features are refused by name: signal dictionaries, mappings in connections, components that are
 not FMUs.
 """
@@ -18,27 +22,40 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from lxml import etree
 from lxml.etree import _Element
 
 from ..errors import Diagnostic, Location
 from ..messages import fold, listed
+from ..plan import UnitDefinition
 from ..signal_names import RESERVED
-from .quantities import Unit, conversion
-from .ssp_archive import DESCRIPTION_FILE, OMS, OSP, OWN, SSD, SspArchive, SspError
-from .ssp_structure import (
+from .quantities import Unit, conversion, converted, measure_of
+from .ssp_archive import (
+    DESCRIPTION_FILE,
+    MAPPING_TYPE,
+    OMS,
+    OSP,
+    OWN,
+    SSD,
+    SSM,
+    SSV,
+    VALUES_TYPE,
     ElementPath,
+    SspArchive,
     SspEnd,
+    SspError,
     SspStructure,
-    SspValue,
+    SspVariable,
     linear,
     number,
     read_structure,
-    read_values,
+    unit_definitions,
 )
 from .yaml_lines import Document
 
@@ -264,3 +281,154 @@ def _experiment(root: _Element) -> dict[str, Any]:
         record = [str(element.get("variable")) for element in own.iterfind(f"{{{OWN}}}Record")]
         settings |= {"record": record} if record else {}
     return settings
+
+
+@dataclass(frozen=True)
+class SspValue:
+    """A parameter value as in the archive."""
+
+    value: Any
+    unit: str | None
+    parameter: _Element
+    definition: UnitDefinition | None = None  # of the unit, if the archive gives one
+    factor: float = 1.0
+    offset: float = 0.0
+
+    def for_variable(self, declared: SspVariable | None) -> Any:
+        """Return the value for a variable as in a scenario file: a plain value, or one with its unit.
+
+        Raises:
+            SspError: a transformation of something other than a number, or with an incompatible unit.
+        """
+        value = self._in_unit_of(declared)
+        if (self.factor, self.offset) == (1.0, 0.0):
+            return value
+        if isinstance(value, (bool, str)):
+            raise SspError(
+                f"{self._name}: a LinearTransformation is for numbers (got {value})", self.parameter
+            )
+        result = self.factor * value + self.offset
+        if isinstance(value, float):
+            return result
+        if not result.is_integer():
+            raise SspError(f"{self._name}: {result:g} is not a whole number", self.parameter)
+        return int(result)
+
+    def _in_unit_of(self, declared: SspVariable | None) -> Any:
+        """Return the converted value; if units are incompatible, with its unit, so that wiring refuses it."""
+        unit = declared.unit if declared else None
+        if not isinstance(self.value, float) or self.unit is None or unit is None or self.unit == unit:
+            return self.value
+        source, target = measure_of(self.unit, self.definition), declared.measure if declared else None
+        if source is None or target is None or source.powers != target.powers:
+            return f"{self.value!r} {self.unit}"
+        return float(converted(Fraction(repr(self.value)), source, target))
+
+    @property
+    def _name(self) -> str:
+        return f"parameter {self.parameter.get('name')!r}"
+
+
+@dataclass
+class SspValues:
+    """The values of variables and connectors, and the unknown names."""
+
+    known: dict[SspEnd, SspValue] = field(default_factory=dict)
+    unknown: list[str] = field(default_factory=list)
+
+
+def read_values(archive: SspArchive, structure: SspStructure) -> SspValues:
+    """Read all parameter bindings of a structure.
+
+    Raises:
+        SspError: values cannot be read.
+    """
+    values = SspValues()
+    elements = {path: component.element for path, component in structure.components.items()}
+    for path, element in (elements | structure.systems).items():  # outer ones last
+        for name, value in _bound(archive, element):
+            end = structure.find(path, name)
+            if end is not None:
+                values.known[end] = value
+            else:
+                values.unknown.append(str(SspEnd(path, name)))
+    return values
+
+
+def _bound(archive: SspArchive, element: _Element) -> Iterator[tuple[str, SspValue]]:
+    """Yield (name, value) of an element's parameter bindings."""
+    for binding in element.iterfind(f"{{{SSD}}}ParameterBindings/{{{SSD}}}ParameterBinding"):
+        _check_type(binding, VALUES_TYPE)
+        values = binding.find(f"{{{SSD}}}ParameterValues/{{{SSV}}}ParameterSet")
+        if values is None:
+            if not binding.get("source"):
+                raise SspError("parameters are bound that are nowhere", binding)
+            values = archive.xml(archive.member(binding), f"{{{SSV}}}ParameterSet")
+        mapping = _mapping(archive, binding)
+        definitions = unit_definitions(values.iterfind(f"{{{SSV}}}Units/*"))
+        for parameter in values.iterfind(f"{{{SSV}}}Parameters/{{{SSV}}}Parameter"):
+            name, value = binding.get("prefix", "") + parameter.get("name", ""), _value(parameter)
+            value = replace(value, definition=definitions.get(str(value.unit)))
+            if mapping is None:
+                yield name, value
+            for entry in (mapping or {}).get(name, ()):
+                yield entry.get("target", ""), _transformed(value, entry)
+
+
+def _mapping(archive: SspArchive, binding: _Element) -> dict[str, list[_Element]] | None:
+    """Return the entries of a binding's mapping by source name, None if it has no mapping."""
+    mapping = binding.find(f"{{{SSD}}}ParameterMapping")
+    if mapping is None:
+        return None
+    _check_type(mapping, MAPPING_TYPE)
+    content = mapping.find(f"{{{SSM}}}ParameterMapping")
+    if content is None:
+        content = archive.xml(archive.member(mapping), f"{{{SSM}}}ParameterMapping")
+    entries: dict[str, list[_Element]] = {}
+    for entry in content.iterfind(f"{{{SSM}}}MappingEntry"):
+        entries.setdefault(entry.get("source", ""), []).append(entry)
+    return entries
+
+
+def _check_type(element: _Element, allowed: str) -> None:
+    if element.get("type", allowed) != allowed:
+        raise SspError(
+            f"{element.get('type')} is not supported: only {allowed} is", element, code="ssp-unsupported"
+        )
+
+
+def _transformed(value: SspValue, entry: _Element) -> SspValue:
+    """Return a value with the transformation of a mapping entry."""
+    if entry.get("suppressUnitConversion") in ("true", "1"):
+        value = replace(value, unit=None)
+    factor, offset = linear(entry)
+    return replace(value, factor=factor, offset=offset)
+
+
+def _value(parameter: _Element) -> SspValue:
+    for kind in parameter.iterchildren("{*}*"):
+        name, text = etree.QName(kind).localname, kind.get("value", "")
+        try:
+            if name == "Real":
+                unit = kind.get("unit")
+                if unit and (bare := re.fullmatch(r"\[(.+)\]", unit.strip())):
+                    unit = bare[1]  # as tools write units behind names
+                return SspValue(float(text), unit, parameter)
+            if name == "Integer":
+                return SspValue(int(text), None, parameter)
+            if name == "Boolean":
+                meant = {"true": True, "1": True, "false": False, "0": False}[text.strip()]
+                return SspValue(meant, None, parameter)
+        except (ValueError, KeyError):
+            raise SspError(
+                f"parameter {parameter.get('name')!r}: {text!r} is not of type {name}", parameter
+            ) from None
+        if name in ("String", "Enumeration"):
+            return SspValue(text, None, parameter)
+        if name == "Binary":
+            raise SspError(
+                f"parameter {parameter.get('name')!r} is Binary: not supported",
+                parameter,
+                code="ssp-unsupported",
+            )
+    raise SspError(f"parameter {parameter.get('name')!r} has no value", parameter)

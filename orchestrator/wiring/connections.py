@@ -18,9 +18,9 @@ from itertools import pairwise
 from ..messages import fold, hint, listed
 from ..plan import Variable, Wire
 from ..scenario.loader import Connection
+from ..scenario.quantities import conversion, measure_of
 from ..scenario.yaml_lines import KeyPath, dotted
-from ..signal_names import SignalName, matching
-from .compatibility import DIFFERENCES, alike, contradicts_its_name, conversion_between, difference, fits
+from ..signal_names import SignalName, alike, matching
 from .constants import Constant, Input
 from .context import WiringContext
 from .order import in_order
@@ -372,3 +372,68 @@ class Connector:
             self._system.note(
                 "unit-unusual", f"{who} defines {measure} otherwise than usual: taken as it defines it"
             )
+
+
+def conversion_between(source: Variable, target: Variable) -> tuple[float, float] | None:
+    """Return gain and offset between the units of two variables, None if the units are incompatible.
+
+    A variable without a unit is taken to have that of the other.
+    """
+    ends = (source.unit, source.definition), (target.unit, target.definition)
+    if source.unit is None or target.unit is None or ends[0] == ends[1]:
+        return 1.0, 0.0
+    of, to = (measure_of(*end) for end in ends)
+    if of is None or to is None:
+        return (1.0, 0.0) if source.unit == target.unit else None
+    return conversion(of, to)
+
+
+DIFFERENCES = {
+    "types": "wiring-type-mismatch",
+    "units": "wiring-unit-mismatch",
+    "enumerations": "wiring-enumeration-mismatch",
+}
+"""Property in which the ends of a wire differ -> code."""
+
+
+def contradicts_its_name(variable: Variable) -> bool:
+    usual, defined = measure_of(variable.unit), measure_of(variable.unit, variable.definition)
+    return usual is not None and usual != defined
+
+
+LOSSLESS = {("Integer", "Real"), ("Boolean", "Real"), ("Integer", "Enumeration"), ("Enumeration", "Integer")}
+"""Types of output and input that differ, and whose wires convert without loss: false and true are 0 and 1, an
+Integer that is the number of an item is that item."""
+
+
+def compatible(source: Variable, target: Variable) -> bool:
+    """Return whether the type of an output can feed that of an input."""
+    return source.type == target.type or (source.type, target.type) in LOSSLESS
+
+
+def difference(
+    source: Variable, target: Variable, scale: tuple[float, float] | None
+) -> tuple[str, str | None, str | None] | None:
+    """Return why two variables cannot be connected (what differs, the source's, the target's), else None."""
+    if not compatible(source, target):
+        return "types", source.type, target.type
+    if scale is None:
+        return "units", source.unit, target.unit
+    if target.type != "Enumeration":
+        return None
+    known = target.items or {}
+    if source.type == "Enumeration":
+        sent = source.items or {}
+        return None if sent.items() <= known.items() else ("enumerations", _listed(sent), _listed(known))
+    if source.variability == "constant" and source.start is not None and source.start not in known.values():
+        return "enumerations", str(source.start), _listed(known)
+    return None
+
+
+def _listed(items: Mapping[str, int]) -> str:
+    return listed(f"{name} {value}" for name, value in items.items())
+
+
+def fits(source: Variable, target: Variable) -> bool:
+    alike_in_units = (source.unit is None) == (target.unit is None)
+    return alike_in_units and compatible(source, target) and conversion_between(source, target) is not None

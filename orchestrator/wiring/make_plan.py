@@ -22,9 +22,8 @@ from vocabulary.roles import role_in, role_of
 from vocabulary.wheels import WHEELS
 
 from ..errors import BuildError, Diagnostic, Location, ModelDescriptionError, WiringError, YawbenchError
-from ..fmu.binary import CORE
-from ..fmu.description import shadowed_modules
-from ..fmu.opener import Opener, find_fmu, find_folder, hidden, host_needs, stale_fmus
+from ..fmu.description import CORE
+from ..fmu.opener import Opener, find_fmu, find_folder, hidden, host_needs, shadowed_modules, stale_fmus
 from ..messages import closest, fold, hint, listed
 from ..plan import DEFAULT, Fmu, InputSeries, Instance, Plan, Value, ValueOrigin, Variable, Wire
 from ..scenario.loader import LoadedScenario

@@ -19,7 +19,7 @@ from vocabulary.patches import patches_of
 from vocabulary.vehicle import CAR
 
 from ..errors import code_of
-from ..fmu.binary import integer_limits
+from ..fmu.description import integer_limits
 from ..messages import closest, fold, hint, listed, short
 from ..plan import DEFAULT, LITERATURE, VARIED, Fmu, OriginKind, Value, ValueOrigin, ValueSource, Variable
 from ..safe_files import TEXT, read_bytes

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from orchestrator.fmu.binary import platform
+from orchestrator.fmu.description import platform
 from vocabulary.wheels import WHEELS
 
 

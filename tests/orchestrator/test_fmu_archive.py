@@ -19,7 +19,7 @@ from orchestrator.cache import KEEP_DAYS, cache_folder, delete_unused
 from orchestrator.errors import ModelDescriptionError
 from orchestrator.fmu import archive as fmu_archive
 from orchestrator.fmu.archive import open_fmu
-from orchestrator.fmu.binary import platform
+from orchestrator.fmu.description import platform
 from tests.sentences import golden, refused
 
 from .fake_fmus import Var, make_fmu, model_description, out

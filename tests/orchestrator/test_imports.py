@@ -150,22 +150,18 @@ def modules() -> dict[str, Path]:
 
 
 def needs(name: str, files: dict[str, Path]) -> set[str]:
-    """Return the modules that a module imports, also inside functions, but not for its types alone."""
+    """Return the modules that a module imports, also inside functions and for its types alone."""
     path = files[name]
     package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
     found = set()
-    waiting: list[ast.AST] = [tree_of(path)]
-    while waiting:
-        for node in ast.iter_child_nodes(waiting.pop()):
-            if isinstance(node, ast.ImportFrom):
-                base = package[: len(package) - node.level + 1] if node.level else []
-                module = ".".join([*base, *([node.module] if node.module else [])])
-                names = [f"{module}.{alias.name}" for alias in node.names]
-                found |= {one if one in files else module for one in names}
-            elif isinstance(node, ast.Import):
-                found |= {alias.name for alias in node.names}
-            elif not (isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")):
-                waiting.append(node)
+    for node in nodes_of(path):
+        if isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            module = ".".join([*base, *([node.module] if node.module else [])])
+            names = [f"{module}.{alias.name}" for alias in node.names]
+            found |= {one if one in files else module for one in names}
+        elif isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
     return (found & files.keys()) - {name}
 
 

@@ -17,7 +17,7 @@ from fmus.build import build_component
 from orchestrator.commands.new import begin
 from orchestrator.experiments import jobs as jobs_module
 from orchestrator.experiments.jobs import Job, execute, keyed, ready, run_job
-from orchestrator.fmu.binary import WANTED, is_native
+from orchestrator.fmu.archive import WANTED, is_native
 from orchestrator.master import fmi
 from orchestrator.master.process_state import Log
 from orchestrator.results.run_folder import RUN_FILE

@@ -12,7 +12,7 @@ import pytest
 
 from fmus.build import HERE as FMUS
 from fmus.build import build_all, find_components
-from orchestrator.fmu.binary import runs_as
+from orchestrator.fmu.archive import runs_as
 from orchestrator.plan import RunsAs
 from orchestrator.scenario.loader import names
 

@@ -13,7 +13,7 @@ import pytest
 from fmus.build import build_component
 from fmus.compiler import compiler_command
 from orchestrator.commands.new import begin
-from orchestrator.fmu.binary import REASON, runs_as
+from orchestrator.fmu.archive import REASON, runs_as
 from orchestrator.plan import RunsAs
 from tests.sentences import golden
 

@@ -12,7 +12,7 @@ import pytest
 
 from fmus.build import HERE as FMUS
 from fmus.build import find_components
-from orchestrator.fmu.binary import runs_as
+from orchestrator.fmu.archive import runs_as
 from orchestrator.plan import RunsAs
 from tests.fmus.bare import Fmu
 from tests.fmus.programs import (
