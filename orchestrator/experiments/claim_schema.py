@@ -153,7 +153,7 @@ def calculate(text: str, values: Mapping[str, float]) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def ranks(x: Sequence[float]) -> np.ndarray:
+def ranks(x: Sequence[float] | np.ndarray) -> np.ndarray:
     """Return the ranks of values, from 1; ties get the mean of their ranks."""
     array = np.asarray(x, dtype=float)
     below = (array[:, None] > array[None, :]).sum(axis=1)

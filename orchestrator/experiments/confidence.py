@@ -37,6 +37,8 @@ import numpy as np
 
 CONFIDENCE = 0.95
 """Share of intervals that contain the true mean; chosen: the usual one."""
+TAIL = 0.5 * (1.0 - CONFIDENCE)
+"""Probability of each side of an interval, and of a wrong decision on one side."""
 DRAWS = 2000
 """Resamples of a bootstrap. Chosen: bounds of 95 % then repeat within a few per cent of their distance."""
 
@@ -55,7 +57,7 @@ class Bounds(NamedTuple):
     high: float
 
 
-def interval(numbers: Sequence[float], confidence: float = CONFIDENCE) -> ConfidenceInterval | None:
+def interval(numbers: Sequence[float]) -> ConfidenceInterval | None:
     """Return the mean over repeats with its confidence interval; None without numbers, or if one is NaN.
 
     The interval has no width for a single number, for equal numbers, and where the mean is infinite.
@@ -69,15 +71,15 @@ def interval(numbers: Sequence[float], confidence: float = CONFIDENCE) -> Confid
     if not math.isfinite(mean):
         return None if math.isnan(mean) else ConfidenceInterval(mean, 0.0)
     spread = math.sqrt(math.fsum((x - mean) ** 2 for x in numbers) / (n - 1))
-    return ConfidenceInterval(mean, _quantile(n - 1, confidence) * spread / math.sqrt(n))
+    return ConfidenceInterval(mean, _quantile(n - 1) * spread / math.sqrt(n))
 
 
 @cache
-def _quantile(degrees: int, confidence: float) -> float:
-    """Return the quantile of Student's distribution that leaves (1 - confidence) / 2 in each tail."""
+def _quantile(degrees: int) -> float:
+    """Return the quantile of Student's distribution that leaves (1 - CONFIDENCE) / 2 in each tail."""
     from scipy.special import stdtrit  # what scipy.stats.t uses, without its slow import
 
-    return float(stdtrit(degrees, 0.5 + confidence / 2))
+    return float(stdtrit(degrees, 0.5 + CONFIDENCE / 2))
 
 
 def share_bounds(count: int, number: int, confidence: float = CONFIDENCE) -> Bounds:
@@ -101,24 +103,21 @@ def share_bounds(count: int, number: int, confidence: float = CONFIDENCE) -> Bou
     return Bounds(low, high)
 
 
-def bootstrap(
-    statistic: Callable[..., Any], sizes: Sequence[int], *, draws: int = DRAWS, seed: int = 1
-) -> np.ndarray:
-    """Return a statistic of resamples, an array of `draws` rows.
+def bootstrap(statistic: Callable[..., Any], sizes: Sequence[int], *, draws: int = DRAWS) -> np.ndarray:
+    """Return a statistic of resamples, an array of `draws` rows; the same data give the same resamples.
 
     Args:
         statistic: called with an array of indices for each factor, drawn with replacement.
         sizes: the number of levels of each factor; a single one for independent numbers.
         draws: resamples.
-        seed: of the random numbers, so that the same data give the same intervals.
     """
-    chance = np.random.default_rng(seed)
+    chance = np.random.default_rng(1)
     return np.array([statistic(*(chance.integers(n, size=n) for n in sizes)) for _ in range(draws)])
 
 
-def percentile_bounds(samples: np.ndarray, confidence: float = CONFIDENCE) -> np.ndarray:
-    """Return the quantiles that leave (1 - confidence) / 2 of resamples in each tail: low and high rows."""
-    bounds: np.ndarray = np.quantile(samples, [0.5 - 0.5 * confidence, 0.5 + 0.5 * confidence], axis=0)
+def percentile_bounds(samples: np.ndarray) -> np.ndarray:
+    """Return the quantiles that leave (1 - CONFIDENCE) / 2 of resamples in each tail: low and high rows."""
+    bounds: np.ndarray = np.quantile(samples, [0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE], axis=0)
     return bounds
 
 
@@ -170,17 +169,10 @@ class SequentialTest:
     Args:
         looks: ascending numbers of points at which the count is compared with the boundaries.
         limit: of the share.
-        confidence: of both sides together.
     """
 
     looks: tuple[int, ...]
     limit: float
-    confidence: float = CONFIDENCE
-
-    @property
-    def tail(self) -> float:
-        """Probability of a wrong decision on one side, at the limit."""
-        return 0.5 * (1.0 - self.confidence)
 
     @cached_property
     def boundaries(self) -> tuple[tuple[int, int], ...]:
@@ -189,7 +181,7 @@ class SequentialTest:
         spent_low = spent_high = 0.0
         for look in self.looks:
             alive = _with_more(alive, look - before, self.limit)
-            before, spendable = look, self.tail * look / self.looks[-1]
+            before, spendable = look, TAIL * look / self.looks[-1]
             low = int(np.count_nonzero(spent_low + np.cumsum(alive) <= spendable)) - 1
             high = look + 1 - int(np.count_nonzero(spent_high + np.cumsum(alive[::-1]) <= spendable))
             spent_low += float(alive[: low + 1].sum())
@@ -241,7 +233,7 @@ def _bounds(test: SequentialTest, count: int, number: int) -> Bounds:
     from scipy.optimize import brentq
 
     def bound(side: int) -> float:
-        return float(brentq(lambda share: test._tails(share, count, number)[side] - test.tail, 0.0, 1.0))
+        return float(brentq(lambda share: test._tails(share, count, number)[side] - TAIL, 0.0, 1.0))
 
     return Bounds(bound(1) if count else 0.0, bound(0) if count < number else 1.0)
 

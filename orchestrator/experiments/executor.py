@@ -27,7 +27,7 @@ from ..results.run_folder import RUN_FILE
 from ..workers import Pool
 from .experiment import Case, LoadedExperiment, NamedRun, PlannedExperiment, plan_experiment
 from .experiment_result import Each, ExperimentResult, judge_records, judge_results
-from .jobs import Job, MeasuredRun, MetricRequests, OnOutcome, Outcome, execute, pool_for, read_back, ready
+from .jobs import Job, MeasuredRun, OnOutcome, Outcome, execute, pool_for, read_back, ready
 from .journal import Journal
 
 T = TypeVar("T")
@@ -283,17 +283,12 @@ def left_to_do(jobs: Sequence[Job], records: Mapping[str, MeasuredRun]) -> list[
 def _other_unit(job: Job, record: MeasuredRun) -> str:
     """Describe a metric that was recorded in another unit than the plan's; "" if there is none."""
     assert job.plan is not None
-    units = _units(job.plan, job.metrics)
-    for key, value in record.values.items():
-        if value is not None and units.get(key, value[1]) != value[1]:
-            return f"{key} is stored in {value[1]}, but measured in {units[key]}"
+    results = results_to_be(job.plan)
+    for key, name, _ in job.metrics:
+        value, unit = record.values.get(key), unit_in(results, metric(name))
+        if value is not None and unit not in (None, value[1]):
+            return f"{key} is stored in {value[1]}, but measured in {unit}"
     return ""
-
-
-def _units(plan: Plan, metrics: MetricRequests) -> dict[str, str]:
-    """Return metric key -> unit."""
-    results = results_to_be(plan)
-    return {key: unit for key, name, _ in metrics if (unit := unit_in(results, metric(name))) is not None}
 
 
 def finish(

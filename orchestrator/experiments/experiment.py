@@ -68,10 +68,21 @@ class Case:
 
 
 @dataclass(frozen=True)
-class LoadedExperiment:
-    """A validated experiment file, expanded; its scenarios have not been read yet."""
+class LoadedFile:
+    """A loaded file of many runs."""
 
     path: Path
+
+    @property
+    def identity(self) -> str:
+        """Identifies the file in its results folder: name of its folder and its own."""
+        return f"{self.path.absolute().parent.name}/{self.path.name}"
+
+
+@dataclass(frozen=True)
+class LoadedExperiment(LoadedFile):
+    """A validated experiment file, expanded; its scenarios have not been read yet."""
+
     spec: ExperimentSpec
     runs: dict[str, NamedRun]
     for_all: tuple[Override, ...] = ()  # by the file's own `swap`, `set`, ...
@@ -87,11 +98,6 @@ class LoadedExperiment:
     def changed(self) -> tuple[Override, ...]:
         """The overrides of all runs."""
         return (*self.for_all, *self.by_options)
-
-    @property
-    def identity(self) -> str:
-        """Identifies the experiment in its results folder: name of its file's folder and of the file."""
-        return f"{self.path.absolute().parent.name}/{self.path.name}"
 
     @cached_property
     def points(self) -> list[DesignPoint]:

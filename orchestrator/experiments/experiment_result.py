@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import statistics
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -46,6 +45,24 @@ def _share(values: Sequence[MetricValue]) -> MetricValue:
     count, number = sum(value.number != 0.0 for value in values), len(values)
     share, bounds = count / number, share_bounds(count, number)
     return MetricValue(share, "%", max(bounds.high - share, share - bounds.low), (bounds.low, bounds.high))
+
+
+def _over_repeats(values: Sequence[MetricValue], number: int, kind: str = "mean") -> MetricValue | None:
+    """Return the mean of repeats, or their share or median; None unless all have a value, of a median some.
+
+    Args:
+        values: of the repeats that have one.
+        number: of all repeats.
+        kind: statistic, as in a metric's `over_repeats`.
+    """
+    if number > 1 and kind == "median" and values:
+        return _median(values)
+    if len(values) < number:
+        return None
+    if number > 1 and kind == "share":
+        return _share(values)
+    over = interval([value.number for value in values])
+    return over and MetricValue(over.mean, values[0].unit, over.half)
 
 
 @dataclass(frozen=True)
@@ -109,23 +126,15 @@ class ExperimentResult:
     @cached_property
     def at(self) -> dict[DesignPoint, dict[tuple[str, str], MetricValue]]:
         """Setting -> (run, metric) -> value, where there is one; over repeats the mean, median or share."""
-        repeated = any(axis.repeats for axis in self.spec.axes.values())
-        kinds = {key: spec.over_repeats for key, spec in self.spec.metrics.items()} if repeated else {}
-        return self._means(
-            self._at_points,
-            lambda key, setting: len(self._cases.get((key[0], setting), ())),
-            lambda key: kinds.get(key[1], "mean"),
-        )
-
-    @cached_property
-    def _at_points(self) -> dict[DesignPoint, dict[tuple[str, str], MetricValue]]:
-        at_points: dict[DesignPoint, dict[tuple[str, str], MetricValue]] = {}
-        for case in self.experiment.cases:
-            here = at_points.setdefault(case.point, {})
-            for key in self.spec.metrics:
-                if (value := self.value(case, key)) is not None:
-                    here[case.run.name, key] = value
-        return at_points
+        at: dict[DesignPoint, dict[tuple[str, str], MetricValue]] = {}
+        for (run, setting), cases in self._cases.items():
+            here = at.setdefault(setting, {})
+            for key, spec in self.spec.metrics.items():
+                every = [value for case in cases if (value := self.value(case, key)) is not None]
+                kind = spec.over_repeats if self.spec.repeats else "mean"
+                if (value := _over_repeats(every, len(cases), kind)) is not None:
+                    here[run, key] = value
+        return at
 
     @property
     def values(self) -> MetricTable:
@@ -135,40 +144,25 @@ class ExperimentResult:
     @cached_property
     def derived_at(self) -> dict[DesignPoint, dict[str, MetricValue]]:
         """Setting -> key -> derived number, where there is one; over repeats the mean."""
-        return self._means({point: derive(self.spec, values) for point, values in self._at_points.items()})
+        at_points: dict[DesignPoint, dict[DesignPoint, dict[tuple[str, str], MetricValue]]] = {}
+        for case in self.experiment.cases:
+            here = at_points.setdefault(self.experiment.setting(case.point), {}).setdefault(case.point, {})
+            for key in self.spec.metrics:
+                if (value := self.value(case, key)) is not None:
+                    here[case.run.name, key] = value
+        means = {}
+        for setting, values_at in at_points.items():
+            several = [derive(self.spec, values) for values in values_at.values()]
+            every = {
+                key: [numbers[key] for numbers in several if key in numbers] for key in self.spec.derived
+            }
+            over = {key: _over_repeats(values, len(several)) for key, values in every.items()}
+            means[setting] = {key: mean for key, mean in over.items() if mean is not None}
+        return means
 
     def mean(self, case: Case, key: str) -> MetricValue | None:
         """Return a metric of a case, averaged over its repeats; None if one of them failed or yields none."""
         return self.at[self.experiment.setting(case.point)].get((case.run.name, key))
-
-    def _means(
-        self,
-        at_points: Mapping[DesignPoint, Mapping[K, MetricValue]],
-        repeats_of: Callable[[K, DesignPoint], int] | None = None,
-        kind_of: Callable[[K], str] = lambda key: "mean",
-    ) -> dict[DesignPoint, dict[K, MetricValue]]:
-        """Return setting -> key -> mean over repeats, of the keys that all repeats have.
-
-        `repeats_of`: number of repeats of a key at a setting; default: all points of the setting.
-        `kind_of`: which statistic of a key, as in a metric's `over_repeats`.
-        """
-        repeats: dict[DesignPoint, list[Mapping[K, MetricValue]]] = {}
-        for point, values in at_points.items():
-            repeats.setdefault(self.experiment.setting(point), []).append(values)
-        means: dict[DesignPoint, dict[K, MetricValue]] = {}
-        for setting, several in repeats.items():
-            here = means[setting] = {}
-            for key in dict.fromkeys(itertools.chain(*several)):
-                every = [values[key] for values in several if key in values]
-                number = repeats_of(key, setting) if repeats_of else len(several)
-                if number > 1 and (kind := kind_of(key)) != "mean":
-                    if kind == "median" or len(every) == number:
-                        here[key] = _median(every) if kind == "median" else _share(every)
-                    continue
-                over = interval([value.number for value in every]) if len(every) == number else None
-                if over is not None:
-                    here[key] = MetricValue(over.mean, every[0].unit, over.half)
-        return means
 
     def cases_of(self, run: NamedRun, setting: DesignPoint) -> list[Case]:
         """Return the cases of a run at a setting: a single one, or its repeats."""

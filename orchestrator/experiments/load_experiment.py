@@ -260,17 +260,7 @@ def check_names(experiment: LoadedExperiment, document: Document) -> None:
     _check_correlations(spec, document)
     _check_limits(spec, document)
     for i, figure in enumerate(spec.figures):
-        if figure.name in [other.name for other in spec.figures[:i]]:
-            document.report(
-                ("figures", i, "name"), f"there is already a figure {figure.name!r}", "name-duplicate"
-            )
-        if figure.what.shows == "runs" and spec.axes:
-            document.report(
-                ("figures", i, "kind"), "runs along axes are drawn as curve, map or limit", "figure-invalid"
-            )
-        _check_levels(spec, document, i, figure)
-        if figure.what.over_axes:
-            _check_places(spec, document, i, figure)
+        _check_figure(spec, document, i, figure)
 
 
 def _names(spec: ExperimentSpec) -> Iterator[tuple[str, str, KeyPath]]:
@@ -378,36 +368,39 @@ def _check_limits(spec: ExperimentSpec, document: Document) -> None:
             document.report(("limits", name), "limits need a grid", "figure-invalid")
 
 
-def _check_levels(spec: ExperimentSpec, document: Document, i: int, figure: FigureSpec) -> None:
-    """Report values in a figure's `only` that the axis does not have."""
-    for axis, chosen in figure.only.items():
-        if axis not in spec.axes or (spec.design == "latin_hypercube" and spec.axes[axis].numeric):
+def _check_figure(spec: ExperimentSpec, document: Document, i: int, figure: FigureSpec) -> None:
+    """Report a name that is taken, unknown values in `only`, and axes that are not shown, or shown twice."""
+
+    def report(sentence: str, *where: str, code: str = "figure-invalid") -> None:
+        document.report(("figures", i, *where), sentence, code)
+
+    if figure.name in [other.name for other in spec.figures[:i]]:
+        report(f"there is already a figure {figure.name!r}", "name", code="name-duplicate")
+    if figure.what.shows == "runs" and spec.axes:
+        report("runs along axes are drawn as curve, map or limit", "kind")
+    for name, chosen in figure.only.items():
+        axis = spec.axes.get(name)
+        if axis is None or (spec.design == "latin_hypercube" and axis.numeric):
             continue
-        known = [text_of(level.value) for level in levels_of(spec.axes[axis])]
-        names = {name for level in levels_of(spec.axes[axis]) for name in names_of(spec.axes[axis], level)}
+        levels = levels_of(axis)
+        names = {text for level in levels for text in names_of(axis, level)}
         for value in (value for value in chosen if text_of(value) not in names):
-            sentence = f"{axis} has no value {value!r}{hint(text_of(value), known, lead='it has')}"
-            document.report(("figures", i, "only", axis), sentence, "figure-invalid")
-
-
-def _check_places(spec: ExperimentSpec, document: Document, i: int, figure: FigureSpec) -> None:
-    """Report axes of a grid that a figure does not show, or shows twice."""
+            guess = hint(text_of(value), [text_of(level.value) for level in levels], lead="it has")
+            report(f"{name} has no value {value!r}{guess}", "only", name)
+    if not figure.what.over_axes:
+        return
     used = {*figure.axes.values()}
-    for name, axis in figure.axes.items():
-        if axis in spec.repeats:
-            document.report(("figures", i, name), f"numbers are means over {axis!r}", "figure-invalid")
-        if name in "xy" and axis in spec.axes and figure.what.upwards and not spec.axes[axis].numeric:
-            document.report(("figures", i), f"the values of {axis!r} must be numbers", "figure-invalid")
+    for key, name in figure.axes.items():
+        if name in spec.repeats:
+            report(f"numbers are means over {name!r}", key)
+        if key in "xy" and name in spec.axes and figure.what.upwards and not spec.axes[name].numeric:
+            report(f"the values of {name!r} must be numbers")
     if figure.limit in spec.limits:
         of = spec.limits[figure.limit].of
         if of in used:
-            document.report(
-                ("figures", i), f"{of!r} is the axis of the limit {figure.limit!r}", "figure-invalid"
-            )
+            report(f"{of!r} is the axis of the limit {figure.limit!r}")
         used.add(of)
-    left = [
-        name for name in (*spec.axes, *([RUN] if spec.runs else [])) if name not in used | {*spec.repeats}
-    ]
+    shown = used | {*spec.repeats}
+    left = [name for name in (*spec.axes, *([RUN] if spec.runs else [])) if name not in shown]
     if spec.design == "grid" and left and not document.errors:
-        sentence = f"the axis {left[0]!r} is not used in this figure: assign it to lines or panels"
-        document.report(("figures", i), sentence, "figure-invalid")
+        report(f"the axis {left[0]!r} is not used in this figure: assign it to lines or panels")

@@ -25,7 +25,7 @@ repeats and amplitude (positive: left first) are axes. `ranking_scores` computes
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -58,7 +58,7 @@ from .axes import (
 )
 from .claim_schema import text_of
 from .executor import Executor
-from .experiment import LoadedExperiment, NamedRun, experiment_of
+from .experiment import LoadedExperiment, LoadedFile, NamedRun, experiment_of
 from .experiment_result import ExperimentResult
 
 CONTROLLER = "controller"
@@ -184,20 +184,14 @@ RECORDED = (
 
 
 @dataclass(frozen=True)
-class LoadedRanking:
+class LoadedRanking(LoadedFile):
     """A loaded ranking file, and the selected part of its conditions."""
 
-    path: Path
     spec: RankingSpec
     entries: dict[str, tuple[EntrySpec, Path]]  # name -> controller, base folder of its path
     quick: bool = False  # only the last amplitude, and only quick conditions
     chosen: tuple[str, ...] = ()  # selected conditions; empty: all
     edited: tuple[str, ...] = ()  # files edited since `yawbench tune` wrote them
-
-    @property
-    def identity(self) -> str:
-        """Identifies the ranking in its results folder: name of its file's folder and of the file."""
-        return f"{self.path.absolute().parent.name}/{self.path.name}"
 
     @cached_property
     def conditions(self) -> dict[str, ConditionSpec]:
@@ -232,6 +226,10 @@ class LoadedRanking:
         fmu = str((folder / spec.fmu).absolute()) if elsewhere else spec.fmu
         settings = {f"{CONTROLLER}.{parameter}": value for parameter, value in spec.parameters.items()}
         return VariantSpec.model_validate({"swap": {CONTROLLER: fmu}, "set": settings})
+
+    def axis_of(self, entries: Iterable[str]) -> DesignAxisSpec:
+        """Return the axis of entries, one level each."""
+        return DesignAxisSpec.model_construct(variants={name: self.variant(name) for name in entries})
 
     def changes_of_entry(self, name: str) -> list[Override]:
         """Return the overrides that put an entry's controller into a scenario."""
@@ -378,9 +376,7 @@ def dwell_experiment(
         for entry in ranking.entries
         for repeat, amplitude in _levels(ranking, run.name, repeated, angles)
     ]
-    axes = {
-        "entry": DesignAxisSpec.model_construct(variants={n: ranking.variant(n) for n in ranking.entries})
-    }
+    axes = {"entry": ranking.axis_of(ranking.entries)}
     for place, levels in repeated.items():
         of = [name for name, condition in ranking.conditions.items() if place in condition.repeats]
         axes[place] = axis_of_levels(

@@ -302,7 +302,9 @@ def columns_of_cells(ranked: RankingResult) -> Table:
             numbers.append(
                 _numbers(f"{key}_half_width", unit, [confidence and confidence.half for confidence in over])
             )
-    least = _numbers("displacement", "m", (None if cell.missing else cell.displacement for cell in cells))
+        if key == "sideslip":
+            least = (None if cell.missing else cell.displacement for cell in cells)
+            numbers.append(_numbers("displacement", "m", least))
     return Table.of_columns(
         [
             _text("entry", (cell.entry for cell in cells)),
@@ -310,9 +312,7 @@ def columns_of_cells(ranked: RankingResult) -> Table:
             _text("state", (cell.state.value for cell in cells)),
             _counts("runs", (cell.counts[1] for cell in cells)),
             _counts("passed", (cell.counts[0] for cell in cells)),
-            *numbers[:4],
-            least,
-            *numbers[4:],
+            *numbers,
         ]
     )
 

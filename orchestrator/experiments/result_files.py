@@ -12,7 +12,6 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from pkgutil import resolve_name
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from ..cache import changed_since, warn_of_record, with_checksums
@@ -158,7 +157,6 @@ def _description(findings: ExperimentResult) -> str:
 
 
 RECORD = "experiment.json"
-NO_FIGURES: Mapping[str, str] = MappingProxyType({})
 
 
 def write_findings(findings: ExperimentResult, drawn: dict[str, str], out: Path) -> None:
@@ -186,7 +184,7 @@ def _warn_if_edited(file: Path) -> None:
         warn_of_record(f"{file}: {words} since it was written; it is written anew from the runs")
 
 
-def record_of(findings: ExperimentResult, drawn: Mapping[str, str] = NO_FIGURES) -> dict[str, Any]:
+def record_of(findings: ExperimentResult, drawn: Mapping[str, str] | None = None) -> dict[str, Any]:
     """Return the record of an experiment as JSON-ready data; `drawn`: name -> title of its figures."""
     spec, settings = findings.spec, findings.experiment.settings
     alone = not spec.axes or (len(settings) == 1 and bool(spec.runs))  # else see the table
@@ -246,7 +244,7 @@ def record_of(findings: ExperimentResult, drawn: Mapping[str, str] = NO_FIGURES)
             ]
             for key, limit in spec.limits.items()
         },
-        "figures": dict(drawn),
+        "figures": dict(drawn or {}),
     }
 
 

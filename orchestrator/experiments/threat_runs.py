@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -19,7 +19,7 @@ from ..safe_files import reads
 from ..scenario.overrides import setting as setting_of
 from ..scenario.quantities import convert
 from ..signal_names import Target
-from .axes import DesignAxisSpec, Level, changes_of_file
+from .axes import Level, changes_of_file
 from .executor import Executor, Search, highest_passing, side_by_side
 from .experiment import LoadedExperiment, NamedRun, experiment_of
 from .jobs import MeasuredRun
@@ -147,8 +147,7 @@ class _RunMaker:
         ranking = self.threats.ranking
         runs = [self._run(place, attempt) for place, attempt in attempts.items()]
         design = [(run.name, (Level(p.entry, p.entry),)) for run, p in zip(runs, attempts, strict=True)]
-        entries = dict.fromkeys(place.entry for place in attempts)
-        axes = {"entry": DesignAxisSpec.model_construct(variants={n: ranking.variant(n) for n in entries})}
+        axes = {"entry": ranking.axis_of(dict.fromkeys(place.entry for place in attempts))}
         title = f"{self.threats.spec.title}, {len({p.setting for p in attempts})} settings"
         return experiment_of(self.threats.path, runs, title=title, axes=axes, design=design, origin="ranking")
 
@@ -157,21 +156,17 @@ class _RunMaker:
         setting = threats.spec.settings[place.setting]
         side, repeat = threats.variants(spec)[attempt.variant]
         scenario = threats.scenario(place.car, spec.scenario)
-        changes = {
-            change.target: change for change in threats.ranking.changes(threats.ranking.spec.cars[place.car])
-        }
+        changes = _by_target(threats.ranking.changes(threats.ranking.spec.cars[place.car]))
         if spec.test == LANE_CHANGE:
             changes.pop(Target.parse("stop_time"), None)
         else:
             amplitude = side * amplitudes(self.angles[place.car])[-1]
             changes[Target.parse(AMPLITUDE)] = Override.of(AMPLITUDE, amplitude, "ranking")
         for part in (setting, spec.filled(attempt.position)):
-            for change in changes_of_file(part, threats.path.parent, "ranking"):
-                changes[change.target] = change
-        for change in self._limited(place, changes):
-            changes[change.target] = change
-        for change in (*self._scaled(place, scenario, spec, spec.level(attempt.position)), *repeat):
-            changes[change.target] = change
+            changes |= _by_target(changes_of_file(part, threats.path.parent, "ranking"))
+        changes |= _by_target(self._limited(place, scenario, changes))
+        changes |= _by_target(self._scaled(place, scenario, spec, spec.level(attempt.position)))
+        changes |= _by_target(repeat)
         if spec.distance is not None:
             speed = float(convert(str(changes[Target.parse("speed")].value), "m/s"))
             seconds = math.ceil(10.0 * spec.distance / speed) / 10.0
@@ -181,7 +176,9 @@ class _RunMaker:
         words = f"{spec.title}, {place.car}"
         return NamedRun(name, words, words, scenario, tuple(changes.values()), test)
 
-    def _limited(self, place: SearchPlace, changes: Mapping[Target, Override]) -> Iterator[Override]:
+    def _limited(
+        self, place: SearchPlace, scenario: Path, changes: Mapping[Target, Override]
+    ) -> Iterator[Override]:
         """Yield the overrides of a moment limit for all, before the faults of the threat."""
         limit = self.threats.spec.settings[place.setting].limit
         if limit is None:
@@ -189,11 +186,7 @@ class _RunMaker:
         own = changes.get(Target.parse(MOMENT))
         text = f"saturation {limit:.10g}" + (f"; {own.value}" if own else "")
         yield setting_of(Target.parse(MOMENT), text, "ranking")
-        spec = self.threats.spec.threats[place.threat]
-        if (
-            self._nominal(place, self.threats.scenario(place.car, spec.scenario), Target.parse(LIMIT))
-            is not None
-        ):
+        if self._nominal(place, scenario, Target.parse(LIMIT)) is not None:
             yield Override.of(LIMIT, limit, "ranking")
 
     def _scaled(
@@ -228,6 +221,11 @@ class _RunMaker:
         return float(value) if isinstance(value, (int, float)) else None
 
 
+def _by_target(changes: Iterable[Override]) -> dict[Target, Override]:
+    """Return target -> its last override."""
+    return {change.target: change for change in changes}
+
+
 Quantities = dict[tuple[str, str, str], dict[str, float | None]]
 """(discipline, car, entry) -> key -> magnitude in SI units; None if the run does not yield it."""
 
@@ -259,10 +257,8 @@ def discipline_experiment(
             design += [(runs[-1].name, (Level(entry, entry),)) for entry in entries]
     if not runs:
         return None
-    axes = {"entry": DesignAxisSpec.model_construct(variants={n: ranking.variant(n) for n in entries})}
-    return experiment_of(
-        threats.path, runs, title="other disciplines", axes=axes, design=design, origin="ranking"
-    )
+    axes, title = {"entry": ranking.axis_of(entries)}, "other disciplines"
+    return experiment_of(threats.path, runs, title=title, axes=axes, design=design, origin="ranking")
 
 
 def table_of_quantities(result: ThreatResult) -> Table:

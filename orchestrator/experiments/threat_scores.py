@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import claim_schema
-from .confidence import CONFIDENCE, DRAWS, Bounds, bootstrap, pairs_apart, percentile_bounds, shared_places
+from .confidence import DRAWS, TAIL, Bounds, bootstrap, pairs_apart, percentile_bounds, shared_places
 from .tables import Table, column
 from .threat_runs import ThreatResult
 from .threats import REFERENCE
@@ -66,11 +66,9 @@ def resampled_scores(positions: np.ndarray, reference: int, draws: int = DRAWS) 
 
 def mean_ranks(positions: np.ndarray) -> np.ndarray:
     """Return the mean rank of every entry, 1 the best; equal levels share the mean of their ranks."""
-    from scipy.stats import rankdata
-
     ranks = np.full(positions.shape, np.nan)
     for threat, car in zip(*np.nonzero(~np.isnan(positions[0])), strict=True):
-        ranks[:, threat, car] = rankdata(-positions[:, threat, car])
+        ranks[:, threat, car] = claim_schema.ranks(-positions[:, threat, car])
     return mean_positions(ranks)
 
 
@@ -308,8 +306,7 @@ def ratio_of_spreads(groups: np.ndarray) -> Spread:
     if within == 0.0:
         return Spread(math.inf, Bounds(math.inf, math.inf))
     observed = n * float(groups.mean(axis=1).var(ddof=1)) / within
-    tail = 0.5 * (1.0 - CONFIDENCE)
-    quantiles = f.ppf([1.0 - tail, tail], number - 1, number * (n - 1))
+    quantiles = f.ppf([1.0 - TAIL, TAIL], number - 1, number * (n - 1))
     value, low, high = (math.sqrt(max(0.0, observed / q - 1.0) / n) for q in (1.0, *map(float, quantiles)))
     return Spread(value, Bounds(low, high))
 

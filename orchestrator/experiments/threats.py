@@ -49,6 +49,7 @@ from ..scenario.schema import Scalar
 from ..scenario.schema_validation import StrictModel, validated
 from ..signal_names import Target
 from .axes import OverrideSpec, TargetText
+from .experiment import LoadedFile
 from .ranking import EntriesSpec, EntrySpec, LoadedRanking, load_ranking
 
 REFERENCE = "none"
@@ -209,19 +210,13 @@ class SearchPlace(NamedTuple):
 
 
 @dataclass(frozen=True)
-class LoadedThreats:
+class LoadedThreats(LoadedFile):
     """A loaded threat file with the ranking whose entries it judges, those of further seeds among them."""
 
-    path: Path
     spec: ThreatsSpec
     ranking: LoadedRanking
     seeds: dict[str, tuple[str, str]]  # entry of a further seed -> entry of the ranking, seed
     quick: bool = False  # only the first setting
-
-    @property
-    def identity(self) -> str:
-        """Identifies it in its results folder: name of its file's folder and of the file."""
-        return f"{self.path.absolute().parent.name}/{self.path.name}"
 
     @property
     def main(self) -> str:

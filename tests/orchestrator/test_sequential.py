@@ -10,7 +10,7 @@ import pytest
 
 from orchestrator.experiments.axes import RegionSpec, hypercube
 from orchestrator.experiments.claims import ONE_IN
-from orchestrator.experiments.confidence import Decision, SequentialTest, share_bounds
+from orchestrator.experiments.confidence import TAIL, Decision, SequentialTest, share_bounds
 from tests.checkout import ROOT
 from tests.verdicts import table_in
 
@@ -82,10 +82,10 @@ def test_claims_far_from_the_limit_are_decided_early():
 
 def test_the_errors_at_the_limit_are_exact_and_nowhere_exceed_what_may_be_spent():
     low, high = TEST._tails(TEST.limit, TEST.boundaries[-1][0], TEST.looks[-1])
-    assert 0.5 * TEST.tail < low <= TEST.tail
+    assert 0.5 * TAIL < low <= TAIL
     assert high <= 1.0
     _, high = TEST._tails(TEST.limit, TEST.boundaries[-1][1], TEST.looks[-1])
-    assert 0.5 * TEST.tail < high <= TEST.tail
+    assert 0.5 * TAIL < high <= TAIL
     chance = np.random.default_rng(4)
     found = Counter(decided(one) for one in chance.random((20_000, TEST.looks[-1])) < TEST.limit)
     assert found[Decision.BELOW] / 20_000 == pytest.approx(low, abs=0.004)  # 4 standard deviations
