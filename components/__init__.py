@@ -1,6 +1,6 @@
 """Components, the sources of FMUs: pure physics and control laws behind thin FMI classes.
 
-The papers that are named A to D:
+Papers cited as A to D:
 
     A  Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on FNN
     B  Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment

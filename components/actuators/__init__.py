@@ -1,1 +1,1 @@
-"""Actuators: from the requested torque to the torque at the wheel."""
+"""Actuators: from requested torque to torque at the wheel."""

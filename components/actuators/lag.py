@@ -1,16 +1,15 @@
-"""Motor and friction brake of each wheel: pure delay, first-order lag, limits; the motor comes first.
+"""Motor and friction brake of each wheel, with dead time, first-order lag and limits.
 
-    motor asked for   T_m* = T* limited to +-motor_torque_limit
-    brake asked for   T_f* = T* - T_m* limited to -friction_brake_torque_limit .. 0
-    either one        tau dT/dt = T*(t - delay) - T,    |dT/dt| <= rate limit              (14), (15)
+    motor request     T_m* = T* limited to +-motor_torque_limit
+    brake request     T_f* = T* - T_m* limited to -friction_brake_torque_limit .. 0
+    both              tau dT/dt = T*(t - delay) - T,    |dT/dt| <= rate limit              (14), (15)
     wheel torque      T_m + T_f
 
-so braking is regenerative up to the motor's limit, and friction does the rest.
-
-How delay and lag are solved exactly, whatever the step: `mathematics.first_order_lag`.
+Braking is regenerative up to the motor's limit; the friction brake supplies the rest. Delay and lag are
+solved exactly for any step size (`mathematics.first_order_lag`).
 
 Source: paper B, equations (14), (15). Erratum: printed with exp(+k s), which would be an advance. The paper
-names no values.
+gives no values.
 """
 
 from dataclasses import dataclass
@@ -22,7 +21,7 @@ from ..mathematics.first_order_lag import Stage
 
 @dataclass(frozen=True)
 class LagParameters:
-    """Parameters of one wheel's motor and brake; all four are equal."""
+    """Parameters of motor and brake, equal for all four wheels."""
 
     motor_time_constant: float = parameter(0.015, "s", "Lag of the motor", "chosen", minimum=0.0)
     motor_delay: float = parameter(0.003, "s", "Pure delay of the motor", "chosen", minimum=0.0)
@@ -43,7 +42,7 @@ class LagParameters:
 
 
 def blend(request: float, motor_limit: float, brake_limit: float) -> tuple[float, float]:
-    """Return the torques [N.m] asked of motor and friction brake, the latter never positive."""
+    """Split a torque request [N.m] between motor and friction brake; the brake's is never positive."""
     motor = min(max(request, -motor_limit), motor_limit)
     return motor, max(min(request - motor, 0.0), -brake_limit)
 

@@ -1,1 +1,1 @@
-"""Allocators: from yaw moment to four longitudinal force requests."""
+"""Allocators: from yaw moment to longitudinal force requests of the four wheels."""

@@ -1,10 +1,10 @@
-"""Share the yaw moment among the wheels in fixed parts, by default equally.
+"""Yaw-moment allocation in fixed shares, by default equal for all wheels.
 
     F_i = s_i M_z / arm_i      s_fl = s_l n_l    s_rl = s_l (1 - n_l)       n front shares per side
                                s_fr = s_r n_r    s_rr = s_r (1 - n_r)       s_l + s_r = 1
 
-so sum(F_i arm_i) = M_z; see `control_laws.moment_sharing` for arms near zero, `control_laws.allocator` for
-the driver's force.
+so sum(F_i arm_i) = M_z. Arms near zero: `control_laws.moment_sharing`; the driver's force:
+`control_laws.allocator`.
 
 Source: paper A, section 3.3: "equal distribution", s_i = 1/4. Ours differs: the shares are parameters.
 """
@@ -39,7 +39,7 @@ class FixedShareParameters:
 
 
 class FixedShare(Allocator):
-    """Yaw moment shared among the wheels in fixed parts, by default a quarter each."""
+    """Yaw-moment allocation in fixed shares, by default a quarter per wheel."""
 
     Parameters = FixedShareParameters
 

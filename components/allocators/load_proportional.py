@@ -1,13 +1,13 @@
-"""Share the yaw moment among the wheels in proportion to their vertical loads.
+"""Yaw-moment allocation in proportion to the vertical loads of the wheels.
 
     F_i = F_zi / sum(F_z) M_z / arm_i      arm_fl = a sin(delta) - d/2 cos(delta)    arm_rl = -d/2
                                            arm_fr = a sin(delta) + d/2 cos(delta)    arm_rr =  d/2
 
-so sum(F_i arm_i) = M_z; see `control_laws.moment_sharing` for arms near zero. The driver's force
-(`control_laws.allocator`) is shared between the axles like their loads. A car without any load on its wheels
-asks for no force; a negative load counts as none.
+so sum(F_i arm_i) = M_z. Arms near zero: `control_laws.moment_sharing`. The driver's force
+(`control_laws.allocator`) is split between the axles in proportion to their loads. Without any wheel load
+all forces are zero; a negative load counts as zero.
 
-`side_forces` offers paper B's two other ways to the same moment: one force per side of the car, split
+`side_forces` selects paper B's two alternatives for the same moment: one force per side of the car, split
 between its front and rear wheel in proportion to their loads (`control_laws.side_forces`; paper B, equation
 (29) without the factor 1/2 that contradicts (25), (26)).
 
@@ -29,7 +29,7 @@ from ..fmi.variables import like, output, parameter
 
 @dataclass(frozen=True)
 class LoadProportionalParameters:
-    """Geometry of the car."""
+    """Geometry of the car, and the split between its sides."""
 
     cg_to_front_axle: float = like(PaperA, "cg_to_front_axle")
     track_width: float = like(PaperA, "track_width")
@@ -43,7 +43,7 @@ class LoadProportionalParameters:
 
 
 class LoadProportional(Allocator):
-    """Yaw moment shared among the wheels in proportion to their vertical loads."""
+    """Yaw-moment allocation in proportion to the vertical loads of the wheels."""
 
     Parameters = LoadProportionalParameters
     inputs = (*Allocator.inputs, "vertical_load_*")

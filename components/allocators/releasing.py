@@ -1,16 +1,16 @@
-"""Make the yaw moment by releasing the driver's brakes first, by braking the other side with the rest.
+"""Yaw-moment allocation that releases the driver's brakes on one side before it brakes the other.
 
-    D_i < 0   the driver's brake force on wheel i, equal left and right, in fixed parts front and rear
-    released  F_i = (1 - s) D_i   on the side that holds the car back from turning as M asks,
+    D_i < 0   the driver's brake force on wheel i, equal left and right, in fixed shares front and rear
+    released  F_i = (1 - s) D_i   on the side whose brake force opposes M,
               s = min(|M| / sum(|D_i arm_i|), release_limit)
-    braked    the rest of M shared among the wheels of the other side, in the parts of the driver's force
+    braked    the rest of M shared among the wheels of the other side, in the shares of the driver's force
 
-so a braking car gets its moment by braking less, where wheels that already slide could give none by
-braking more: on split friction those of the slippery side. What `release_limit` leaves is what the driver
-keeps of the other side's stopping power. A car that its driver does not brake gets all of M from one
-braked side. A wheel whose arm is below an eighth of the track is left alone.
+A braking car thus gets its moment by braking less: wheels that already slide, as those of the slippery side
+on split friction, could not give it by braking more. 1 - `release_limit` is the share of the released side's
+brake force that the driver always keeps. Without driver braking all of M comes from braking one side. Wheels
+whose arm is below an eighth of the track do not take part.
 
-Source: chosen: what delays the build-up of yaw moment in anti-lock brakes on split friction, with a
+Source: chosen: the principle of the yaw-moment delay in anti-lock brakes on split friction, with a
 controller's moment in place of a fixed delay.
 """
 
@@ -27,14 +27,14 @@ from ..fmi.variables import like, parameter
 
 @dataclass(frozen=True)
 class ReleasingParameters:
-    """Geometry of the car, how far the driver's brakes may be released, and his parts front and rear."""
+    """Geometry of the car, limit of the release, and distribution of the driver's force."""
 
     cg_to_front_axle: float = like(PaperC, "cg_to_front_axle")
     track_width: float = like(PaperC, "track_width")
     release_limit: float = parameter(
         0.8,
         "1",
-        "Largest part of the driver's brake force that is taken back on one side",
+        "Largest share of the driver's brake force that is released on one side",
         "chosen: the driver always brakes",
         minimum=0.0,
         maximum=1.0,
@@ -57,8 +57,8 @@ def release_and_brake(
     Args:
         moment, drive: yaw moment [N.m] and sum of the driver's forces [N], negative when braking.
         delta: steer angle [rad].
-        front_share: part of `drive` on the front axle [1].
-        limit: largest part of a wheel's brake force that is released [1].
+        front_share: share of `drive` on the front axle [1].
+        limit: largest share of a wheel's brake force that is released [1].
         a, half_track: distances of front axle and wheels from the centre of mass [m].
     """
     pedal = add_drive_force(NO_FORCE, drive, front_share)
@@ -66,7 +66,7 @@ def release_and_brake(
         return pedal
     arms = lever_arms(delta, a, half_track)
     least_arm = 0.25 * half_track
-    turns = [arm * moment > 0.0 and abs(arm) >= least_arm for arm in arms]  # driving it gives the moment
+    turns = [arm * moment > 0.0 and abs(arm) >= least_arm for arm in arms]  # driving this wheel gives M
     holding = [max(-force * abs(arm), 0.0) * t for force, arm, t in zip(pedal, arms, turns, strict=True)]
     against = (holding[0] + holding[1]) + (holding[2] + holding[3])
     share = min(abs(moment), limit * against) / against if against > 0.0 else 0.0
@@ -85,7 +85,7 @@ def release_and_brake(
 
 
 class Releasing(Allocator):
-    """Yaw moment by releasing the driver's brakes on one side, then by braking the other."""
+    """Yaw-moment allocation by releasing the driver's brakes on one side, then braking the other."""
 
     Parameters = ReleasingParameters
 

@@ -1,6 +1,6 @@
-"""Turn the yaw moment into one force per side, split between front and rear in fixed parts.
+"""Yaw-moment allocation as one longitudinal force per side, split front to rear in fixed shares.
 
-The law is in `control_laws.side_forces`; the driver's force: `control_laws.allocator`.
+Law: `control_laws.side_forces`. The driver's force: `control_laws.allocator`.
 
 Source: paper B, equations (25)-(28).
 """
@@ -49,7 +49,7 @@ class SideShareParameters:
 
 
 class SideShare(Allocator):
-    """Yaw moment as one longitudinal force per side, split front to rear in fixed parts."""
+    """Yaw-moment allocation as one longitudinal force per side, split front to rear in fixed shares."""
 
     Parameters = SideShareParameters
 

@@ -1,24 +1,25 @@
-"""Brake one wheel for the yaw moment, chosen by the driving state; the driver's force is kept.
+"""Yaw-moment allocation by braking a single wheel, chosen by steer angle and yaw-rate error.
 
     delta > 0,  dr > 0   oversteer    front right        delta <= 0,  dr > 0   understeer   rear right
     delta > 0,  dr <= 0  understeer   rear left          delta <= 0,  dr <= 0  oversteer    front left
 
 with dr = r - r_ref: oversteer brakes the outer front wheel, understeer the inner rear wheel. The chosen
-wheel carries the whole moment through its own arm, F = -|M / arm|, at delta = 0 that is 2 |M| / d.
+wheel supplies the whole moment through its own arm, F = -|M / arm|; at delta = 0 that is 2 |M| / d. The
+driver's force is added unchanged.
 
-The rule does not look at the moment asked for, so it may choose a wheel that turns the car the other
-way. Three readings:
+The rule ignores the requested moment, so it may choose a wheel that turns the car the other way. Three
+readings:
 
     printed     brake the wheel of the rule, whatever the sign of M
-    guarded     only if the wheel's moment has the sign of M, else brake none
-    moment      put -M in the place of dr: the side follows the moment, the axle the driving state
+    guarded     brake it only if its moment has the sign of M
+    moment      replace dr by -M: the side follows the moment, the axle the driving state
 
-Straight ahead, delta = 0, the printed rule brakes a front wheel against one side and a rear wheel against
-the other. `guarded` and `moment` take the front wheel: who does not steer asks for no turn, so all of it is
-oversteer, and left and right are alike.
+Straight ahead, delta = 0, the printed rule brakes a front wheel on one side but a rear wheel on the other.
+`guarded` and `moment` choose the front wheel on both: a driver who does not steer requests no turn, so any
+yaw rate is oversteer, and left and right are treated alike.
 
 Dead band with hysteresis: braking begins when |M| and |dr| both exceed their thresholds, and ends when
-one of them falls below `release_share` of its own.
+either falls below `release_share` of its threshold.
 
 Source: paper C, table 3, equations (7)-(9). Erratum: (7)-(9) share the moment between two wheels, which would
 give the single wheel of section 2.3 only half. Ours differs: the true arm, the guard, straight ahead, the
@@ -49,28 +50,28 @@ class SingleWheelParameters:
     wheel_choice: str = parameter(
         "guarded",
         None,
-        "How the rule is read",
-        "chosen: guarded, brake only a wheel that turns the car the way M asks for",
+        "Reading of the rule",
+        "chosen: guarded, brake only a wheel whose moment has the sign of M",
         choices=("printed", "guarded", "moment"),
     )
     moment_threshold: float = parameter(
-        200.0, "N.m", "Moment from which a wheel is braked", "chosen", minimum=0.0
+        200.0, "N.m", "Moment above which a wheel is braked", "chosen", minimum=0.0
     )
     yaw_rate_threshold: float = parameter(
-        0.005, "rad/s", "Yaw-rate error from which a wheel is braked", "chosen: a sensor's noise", minimum=0.0
+        0.005, "rad/s", "Yaw-rate error above which a wheel is braked", "chosen: sensor noise", minimum=0.0
     )
     release_share: float = parameter(
-        0.5, "1", "Part of a threshold below which braking ends", "chosen: half", minimum=0.0, maximum=1.0
+        0.5, "1", "Share of a threshold below which braking ends", "chosen: half", minimum=0.0, maximum=1.0
     )
     drive_front_share: float = like(DriveParameters, "drive_front_share", 0.0, "chosen: rear drive")
     brake_front_share: float = like(DriveParameters, "brake_front_share")
 
 
 def chosen_wheel(delta: float, dr: float, *, printed: bool = False) -> int:
-    """Return the number of the wheel of table 3 from steer angle [rad] and yaw-rate error [rad/s].
+    """Return the index of the wheel of table 3 for a steer angle [rad] and yaw-rate error [rad/s].
 
     Args:
-        printed: read the rule as printed also straight ahead.
+        printed: apply the rule as printed also straight ahead.
     """
     if delta > 0.0:
         return FR if dr > 0.0 else RL
@@ -84,7 +85,7 @@ def brake_forces(moment: float, wheel: int, *, guarded: bool, arms: Four, least_
 
     Args:
         guarded: brake only if that gives a moment of the sign of `moment`.
-        arms, least_arm: as of `share_moment` [m].
+        arms, least_arm: as in `share_moment` [m].
     """
     forces = share_moment(moment, ONE_WHEEL[wheel], arms, least_arm)
     if forces[wheel] <= 0.0:
@@ -96,7 +97,7 @@ def brake_forces(moment: float, wheel: int, *, guarded: bool, arms: Four, least_
 
 
 class SingleWheel(Allocator):
-    """Yaw moment by braking one wheel, chosen by steer angle and yaw-rate error."""
+    """Yaw-moment allocation by braking a single wheel, chosen by steer angle and yaw-rate error."""
 
     Parameters = SingleWheelParameters
     inputs = (*Allocator.inputs, "yaw_rate", "yaw_rate_ref")

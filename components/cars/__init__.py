@@ -1,1 +1,1 @@
-"""Parts of cars: bodies, wheels, loads, resistance."""
+"""Vehicle dynamics shared by plants: bodies, wheels, loads, resistance."""

@@ -1,22 +1,23 @@
-"""The bases of plants: a car on four wheels, and one whose wheels are driven and braked.
+"""Base classes of plants: a car on four free-rolling wheels, and a car with driven and braked wheels.
 
-A plant adds its body in four methods, called in this order:
+A plant implements its body in four methods, called in this order:
 
-    rest(signals)               the body at start time; returns what is carried (see below)
-    move(h, delta, signals)     body and `self.motion` over a step of held forces; returns what is carried
-    wheel_velocities()          of the wheels at the present motion and steer angle
-    finish(carried)             `self.end` (a_x, a_y) and `self.loads` at the present time
+    rest(signals)               sets the body at start time; returns the extrapolated values (see below)
+    move(h, delta, signals)     advances body and `self.motion` under held forces; returns the same values
+    wheel_velocities()          returns those of the wheels at the current motion and steer angle
+    finish(carried)             sets `self.end` (a_x, a_y) and `self.loads` at the current time
 
-and, if its body has outputs of its own, in `output`. `self.pull` is what road and wind do to all parts of the
-car alike (`cars.road_plane`); what is carried is of the tyres alone.
+and, if its body has further outputs, in `output`. `self.pull` has the accelerations by road and wind, which
+act on all parts of the car alike (`cars.road_plane`); the extrapolated values depend on the tyres alone.
 
-`signals` are the inputs, one item each: steer angle, tyre forces x and y, the plant's own, and in one row
-those of road and wind if it knows them; forces are those at the middle of the step. What `rest` and `move`
-return belongs to that middle; it is carried to the step's end (`mathematics.carry`) and handed to `finish`.
+`signals` has one item per input: steer angle, tyre forces x and y, the plant's own inputs, and, if declared,
+those of road and wind, adjacent; forces are those at the middle of the step. The values that `rest` and
+`move` return belong to that middle; they are extrapolated to the step's end (`mathematics.carry`) and passed
+to `finish`.
 
     beta = atan2(v_y, v_x)        dbeta/dt = (v_x a_y - v_y a_x) / (v_x^2 + v_y^2) - r
 
-Front wheels turn with the steer angle, so their slips and velocities follow it at the same instant.
+Front wheels turn with the steer angle, so their slips and velocities depend on it directly.
 """
 
 from collections.abc import Sequence
@@ -47,17 +48,17 @@ MOTION = (
     "position_y",
     "yaw_angle",
 )
-"""Outputs of every car: its plane motion."""
+"""Outputs of every car: plane motion."""
 
 
 def of_steered_wheels(name: str) -> tuple[Any, ...]:
-    """Declare an output of four wheels, of which those in front follow the steer angle at once."""
+    """Declare an output of four wheels; those of the front wheels depend directly on the steer angle."""
     front = [output(f"{name}_{wheel}", "steer_angle") for wheel in ("fl", "fr")]
     return (*front, f"{name}_rl", f"{name}_rr")
 
 
 WHEEL_SLIPS = (*of_steered_wheels("slip_angle"), *of_steered_wheels("slip_ratio"), "vertical_load_*")
-"""Outputs of every car: slips and loads of its wheels."""
+"""Outputs of every car: slips and loads of the wheels."""
 
 DRIVEN_WHEELS = (*WHEEL_SLIPS, "wheel_speed_*", *of_steered_wheels("wheel_velocity"))
 """Outputs of a car whose wheels are driven and braked."""
@@ -65,14 +66,14 @@ DRIVEN_WHEELS = (*WHEEL_SLIPS, "wheel_speed_*", *of_steered_wheels("wheel_veloci
 
 @dataclass(frozen=True)
 class StartParameters:
-    """Start of a car, and the speed below which its slips refer to that speed."""
+    """Initial motion of a car, and the reference speed of slip at low speed."""
 
     initial_sideslip: float = parameter(0.0, "rad", "Sideslip angle at the start", "chosen: none")
     initial_yaw_rate: float = parameter(0.0, "rad/s", "Yaw rate at the start", "chosen: none")
     low_speed: float = parameter(
         0.5,
         "m/s",
-        "Slips refer to this speed when the wheel is slower",
+        "Reference speed of the slips of slower wheels",
         "chosen: keeps a parked car quiet at 1 ms",
         minimum=0.001,
     )
@@ -101,7 +102,7 @@ class Car(Component):
     loads: Four
     pull: Pull = LEVEL
     of_plane: ClassVar[slice | None]
-    """Indices of the inputs of road and wind; None: there are none."""
+    """Indices of the inputs of road and wind; None without them."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -111,11 +112,11 @@ class Car(Component):
     # ---- for the plant ----------------------------------------------------------------------
 
     def rest(self, signals: Sequence[Any]) -> Values:
-        """Set the body's state at start time from the inputs, by signal; return what is carried."""
+        """Set the body's state at start time from the inputs, by signal; return the values to extrapolate."""
         raise NotImplementedError
 
     def move(self, h: float, delta: float, signals: Sequence[Any]) -> Values:
-        """Take body and motion over `h` > 0 [s]; return what is carried.
+        """Advance body and motion by `h` > 0 [s]; return the values to extrapolate.
 
         Args:
             h: step [s].
@@ -125,7 +126,7 @@ class Car(Component):
         raise NotImplementedError
 
     def finish(self, carried: Values) -> None:
-        """Set `self.end`, accelerations [m/s2], and `self.loads` [N] at the present time."""
+        """Set `self.end`, accelerations [m/s2], and `self.loads` [N] at the current time."""
         raise NotImplementedError
 
     def wheel_velocities(self) -> Eight:
@@ -133,7 +134,7 @@ class Car(Component):
         v_x, v_y, r = self.motion[:3]
         return wheel_velocities(v_x, v_y, r=r, delta=self.steer_angle, p=self.p)
 
-    # ---- what all plants do -----------------------------------------------------------------
+    # ---- common to all plants ---------------------------------------------------------------
 
     def start(self, t: float, u: list[float]) -> None:
         p = self.p
@@ -192,10 +193,10 @@ class Car(Component):
         """Set the wheels' state at start time."""
 
     def turn_wheels(self, h: float, v: Eight, loads: Four, signals: Sequence[Any]) -> None:
-        """Take the wheels' state over `h` [s], from the velocities `v` [m/s] and `loads` [N] at its start."""
+        """Advance the wheels by `h` [s], from their velocities `v` [m/s] and `loads` [N] at the start."""
 
     def rolling_values(self) -> tuple[float, ...]:
-        """Return the values of the wheels' outputs after their slip angles."""
+        """Return the values of the wheels' outputs that follow the slip angles."""
         return (0.0, 0.0, 0.0, 0.0, *self.loads, *self.wheels[:4])
 
 
@@ -214,7 +215,7 @@ class DrivenCar(Car):
     )
 
     rolling_resistance = 0.0
-    """Moment of rolling resistance over load and wheel radius, f [1]; a plant that has one sets it."""
+    """Rolling resistance coefficient f [1], set by plants that have it."""
 
     spins: Four
 
@@ -229,7 +230,7 @@ class DrivenCar(Car):
         radius, inertia, v_low = p.wheel_radius, p.wheel_inertia, p.low_speed
         per_load = p.slip_stiffness_per_load
         resisting = 0.5 * self.rolling_resistance * radius  # of the mean load over the step
-        # Of eight velocities the first four, the longitudinal ones.
+        # The first four of the eight velocities are longitudinal.
         wheels = zip(self.spins, torque, f_x, v, self.wheels, loads, self.loads, slip_stiffness, tyre_slip)  # noqa: B905
         w_fl, w_fr, w_rl, w_rr = [
             spin(

@@ -1,12 +1,12 @@
-"""Contact points of wheels on a sprung body: the forces that act there, and how fast they slide.
+"""Contact points of the wheels of a sprung body: positions, forces and sliding velocities.
 
-Contact points follow the body's roll and pitch and, along the sloping path of the wheel, its travel:
+Contact points follow the roll and pitch of the body and, along the inclined path of the wheel, its travel:
 
     X_i = x_i - h theta          Y_i = y_i + h phi + p_i c_i          from the centre of mass
     v_xi = v_x - r Y_i - h dtheta          v_yi = v_y + r X_i + h dphi + p_i dc_i
 
-Symbols are those of `cars.ride`. The same X_i, Y_i and p_i are the arms of the forces there, so the
-power of the forces at the contact points is the power that body and wheels receive.
+Symbols as in `cars.ride`. X_i, Y_i and p_i are also the arms of the contact forces, so the power of the
+forces at the contact points equals the power that body and wheels receive.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .wheel_kinematics import Eight
 def contact(
     delta: float, f_x: Sequence[float], f_y: Sequence[float], p: Geometry, m_z: Sequence[float] = NO_MOMENTS
 ) -> Contact:
-    """Return the tyre forces in vehicle axes; arguments as of `plane_body.resultants`."""
+    """Return the tyre forces in vehicle axes; arguments as in `plane_body.resultants`."""
     f_fl, f_fr, x_rl, x_rr = f_x
     g_fl, g_fr, y_rl, y_rr = f_y
     c = cos(delta)
@@ -42,7 +42,7 @@ def contact(
 def contact_velocities(
     v_x: float, v_y: float, r: float, y: Sequence[float], *, delta: float, ride: Ride, p: Geometry
 ) -> Eight:
-    """Return the velocities [m/s] of the contact points in wheel axes: four longitudinal, four lateral ones.
+    """Return the velocities [m/s] of the contact points in wheel axes: four longitudinal, then four lateral.
 
     Args:
         v_x, v_y, r: of the centre of mass, vehicle axes [m/s], [rad/s].

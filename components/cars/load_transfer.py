@@ -1,10 +1,10 @@
-"""Quasi-static wheel loads of a rigid car from the accelerations that its tyres give it.
+"""Quasi-static wheel loads of a rigid car.
 
     F_zf = m g b / 2L - m h a_x / 2L -/+ b m h a_y / (L d)        minus left, plus right
     F_zr = m g a / 2L + m h a_x / 2L -/+ a m h a_y / (L d)
 
-A wheel that lifts has no load; the other wheel of its axle then carries the axle, so the loads always
-add up to m g.
+a_x, a_y are the accelerations by the tyre forces. A lifted wheel has no load; the other wheel of its axle
+then carries the load of the axle, so that the loads always add up to m g.
 """
 
 from typing import Protocol
@@ -16,7 +16,7 @@ from .plane_body import Geometry
 
 
 class Weight(Geometry, Protocol):
-    """A car's geometry, its mass m [kg] and the height h [m] of its centre of mass."""
+    """Geometry, mass m [kg] and height h [m] of the centre of mass of a car."""
 
     @property
     def mass(self) -> float: ...
@@ -28,9 +28,9 @@ def quasi_static_loads(a_x: float, a_y: float, p: Weight, gravity: float = G) ->
     """Return F_z [N] of fl, fr, rl, rr.
 
     Args:
-        a_x, a_y: accelerations that the tyres give the car, X / m and Y / m [m/s2].
+        a_x, a_y: accelerations by the tyre forces, X / m and Y / m [m/s2].
         p: the car.
-        gravity: towards the road [m/s2].
+        gravity: component normal to the road [m/s2].
     """
     a, b = p.cg_to_front_axle, p.cg_to_rear_axle
     weight = p.mass * gravity
@@ -40,11 +40,11 @@ def quasi_static_loads(a_x: float, a_y: float, p: Weight, gravity: float = G) ->
 
 
 def loads_of_axles(front: float, weight: float, front_across: float, rear_across: float) -> Four:
-    """Return F_z [N] of fl, fr, rl, rr, none of them negative, that add up to the weight.
+    """Return F_z [N] of fl, fr, rl, rr, never negative and with the sum `weight`.
 
     Args:
         front, weight: load of the front axle and of both axles [N].
-        front_across, rear_across: what goes from the left to the right wheel of an axle [N].
+        front_across, rear_across: load transfer from the left to the right wheel of an axle [N].
     """
     front = min(max(front, 0.0), weight)
     rear = 0.5 * (weight - front)

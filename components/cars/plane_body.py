@@ -1,6 +1,6 @@
-"""The plane motion of a car's body, which plants with wheels share.
+"""Plane motion of a car body under tyre forces.
 
-Resultants of the tyre forces, left and right treated by the same operations:
+Resultants of the tyre forces, with the same operations for left and right:
 
     X   = (F_xfl + F_xfr) cos(delta) - (F_yfl + F_yfr) sin(delta) + F_xrl + F_xrr
     Y_f = (F_xfl + F_xfr) sin(delta) + (F_yfl + F_yfr) cos(delta)        Y_r = F_yrl + F_yrr
@@ -8,9 +8,9 @@ Resultants of the tyre forces, left and right treated by the same operations:
           + M_zfl + M_zfr + M_zrl + M_zrr     where the tyres' own moments are connected
 
 Motion under accelerations held in vehicle axes, a_x = dv_x/dt - v_y r, a_y = dv_y/dt + v_x r, dr/dt:
-the yaw angle is a parabola, and the velocity in earth axes is the integral of the turning
-acceleration, taken by Gauss's rule with two points, so a step is exact to fourth order and a body
-without force keeps its speed to the last bit but rounding.
+the yaw angle is a parabola in time, and the velocity in earth axes is the integral of the rotating
+acceleration, taken by two-point Gauss quadrature. A step is thus of fourth order, and a body without
+forces keeps its speed up to rounding.
 """
 
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ _GAUSS = 0.5 - 0.5 / 3.0**0.5
 
 
 class Geometry(Protocol):
-    """Positions of a car's wheels: a, b and d [m], as in the parameters of every car."""
+    """Positions of the wheels of a car: a, b and d [m], as in the parameters of every car."""
 
     @property
     def cg_to_front_axle(self) -> float: ...
@@ -37,11 +37,11 @@ class Geometry(Protocol):
 
 
 NO_MOMENTS: Four = (0.0, 0.0, 0.0, 0.0)
-"""No moments of four tyres about their vertical axes [N.m]."""
+"""Zero aligning moments of the four tyres [N.m]."""
 
 
 def sum_of(moments: Sequence[float]) -> float:
-    """Return the sum over four wheels, left and right treated alike."""
+    """Return the sum over four wheels, in an order that is symmetric in left and right."""
     fl, fr, rl, rr = moments
     return (fl + fr) + (rl + rr)
 
@@ -86,7 +86,7 @@ def move(motion: Motion, h: float, *, a_x: float, a_y: float, dr: float) -> Moti
     s = sin(turned)
     gained_c = 0.5 * h * (cos(early) + cos(late))
     gained_s = 0.5 * h * (sin(early) + sin(late))
-    # Velocity at the end and distance, both in the axes that the vehicle has at the start.
+    # Velocity at the end and distance, both in the vehicle axes of the start.
     w_x = v_x + (a_x * gained_c - a_y * gained_s)
     w_y = v_y + (a_y * gained_c + a_x * gained_s)
     half = 0.5 * h

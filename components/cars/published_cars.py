@@ -1,4 +1,4 @@
-"""The cars of the papers, as far as several components share them."""
+"""Parameters of the papers' cars that several components share."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ class PaperA:
     track_width: float = of_car(1.65, "paper A, table 1", text="Track width d")
     cg_height: float = of_car(0.7, "paper A, table 1")
     wheel_radius: float = of_car(0.31, "paper A, table 1", text="Wheel radius R")
-    wheel_inertia: float = of_car(2.1, "chosen: paper B's value, paper A names none")
+    wheel_inertia: float = of_car(2.1, "chosen: paper B's value, paper A gives none")
 
 
 @dataclass(frozen=True)

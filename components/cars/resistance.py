@@ -1,13 +1,13 @@
-"""Driving resistance: air drag, on the body, and rolling resistance, on the wheels.
+"""Driving resistance: aerodynamic drag of the body and rolling resistance of the wheels.
 
     F = 1/2 rho C_D A v_x |v_x|         on the body
     M = f F_z R                         on a wheel of load F_z, friction against its rotation
 
-M as the moment M_y of H. B. Pacejka, Tyre and Vehicle Dynamics, 2nd ed. 2006, equation 4.E70, constant over
-speed. The tyre force that turns a free wheel in spite of it slows the car, by m g f in all; a driven wheel's
-torque overcomes it, and the tyre then carries that much less. A car at rest stays at rest: M is friction
-(`cars.wheel_spin`). Left out: M comes of loads that act f R ahead of the wheels, which shifts f R / L of the
-weight from axle to axle, about a thousandth.
+M is the moment M_y of H. B. Pacejka, Tyre and Vehicle Dynamics, 2nd ed. 2006, equation 4.E70, constant over
+speed. The tyre forces that keep free wheels turning against it slow the car, by m g f in total; on a driven
+wheel the torque overcomes it, and the tyre force is smaller by that much. A car at rest stays at rest,
+because M is friction (`cars.wheel_spin`). Neglected: M is due to loads that act f R ahead of the wheels,
+which shifts f R / L of the weight from axle to axle, about a thousandth.
 """
 
 from dataclasses import dataclass
@@ -17,14 +17,14 @@ from ..fmi.variables import of_car
 
 @dataclass(frozen=True)
 class ResistanceParameters:
-    """Parameters of driving resistance; defaults: paper B, table 1."""
+    """Parameters of driving resistance; defaults from paper B, table 1."""
 
     drag_coefficient: float = of_car(0.3, "paper B, table 1")
     frontal_area: float = of_car(1.8, "paper B, table 1")
-    air_density: float = of_car(1.2258, "paper B: what its 1 / 21.15 stands for")
+    air_density: float = of_car(1.2258, "paper B: contained in its 1 / 21.15")
     rolling_resistance: float = of_car(0.008, "paper B, table 1")
 
 
 def drag_of(p: ResistanceParameters) -> float:
-    """Return the drag of a car over v_x |v_x| [kg/m]."""
+    """Return the drag divided by v_x |v_x| [kg/m]."""
     return 0.5 * p.air_density * p.drag_coefficient * p.frontal_area

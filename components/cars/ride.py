@@ -1,16 +1,16 @@
-"""Ride of a sprung body on four unsprung masses: heave, roll, pitch, wheel travel, coupled with yaw.
+"""Ride of a sprung body on four unsprung masses: heave, roll, pitch and wheel travel, coupled with yaw.
 
 Coordinates, all zero at rest: heave z [m] of the sprung mass's centre, roll phi, pitch theta [rad], heights
-u_i [m] of the unsprung masses; x_i, y_i are the wheel's place from the sprung mass's centre. Wheel travel
-and contact point, p_i the lateral slope of the wheel's path, h_ci the height of its roll centre, h that of
-the car's centre of mass:
+u_i [m] of the unsprung masses; x_i, y_i is the position of a wheel from the sprung mass's centre. Wheel
+travel and contact point, with the lateral slope p_i of the wheel's path, the height h_ci of its roll centre
+and h of the car's centre of mass:
 
     c_i = u_i - z - y_i phi + x_i theta                                                    (1)
     X_i = x_i - h theta,  Y_i = y_i + h phi + p_i c_i          from the centre of mass      (2)
 
-The slope is what a roll centre is: p_i = (roll centre height) / y_i lets the contact point stand still
-while the body rolls about that height. Forces of spring, damper and anti-roll bar, of a tyre that
-cannot pull, and, by virtual work of the contact forces f_x, f_y, of the links:
+The slope expresses the roll centre: with p_i = (roll centre height) / y_i the contact point does not move
+while the body rolls about that height. Forces of spring, damper and anti-roll bar, of the links (by virtual
+work of the contact forces f_x, f_y), and of a tyre that cannot pull:
 
     e_i = k c_i + d dc_i + s (c_i - c_other) - p_i f_yi        upward on the body, beyond static   (3)
     N_i = max(N_i0 - k_t u_i, 0)                                                          (4)
@@ -22,7 +22,7 @@ cannot pull, and, by virtual work of the contact forces f_x, f_y, of the links:
 
 Roll, pitch and yaw follow from Lagrange's equations with the kinetic energy to second order in the small
 angles, for any yaw rate r. A, B are roll and pitch inertia about the centre of mass, I_z the yaw
-inertia, D that of the sprung mass, E = B - D; eta = theta + I_xz / A counts from the principal axis:
+inertia, D that of the sprung mass, E = B - D; eta = theta + I_xz / A is measured from the principal axis:
 
     T = A/2 (dphi - r eta)^2 + B/2 (dtheta + r phi)^2 + (I_z - I_xz^2 / A)/2 r^2
         - D (r phi dtheta + r^2 (phi^2 + theta^2) / 2)
@@ -45,14 +45,14 @@ from vocabulary.gravity import G
 from ..mathematics.integrators import rk4
 
 RESOLVED = 0.5
-"""Largest substep times the fastest rate: an error of 3e-4 of the wheels' hop in each of its radians."""
+"""Largest product of substep and fastest rate: an error of 3e-4 per radian of wheel hop."""
 
 AT_REST = (0.0,) * 14
-"""z, phi, theta, u_fl, u_fr, u_rl, u_rr [m], [rad], then their rates."""
+"""State at rest: z, phi, theta, u_fl, u_fr, u_rl, u_rr [m], [rad], then their rates."""
 
 
 class Ride(NamedTuple):
-    """The constants of body, suspension and tyre springs; SI units."""
+    """Constants of body, suspension and tyre springs, in SI units."""
 
     m_s: float
     m_f: float  # unsprung mass of one front wheel
@@ -81,7 +81,7 @@ class Ride(NamedTuple):
     tilt: float  # I_xz / A [rad]
 
     def fastest(self) -> float:
-        """Return a bound of the rates of this system [1/s]."""
+        """Return an upper bound of the natural frequencies and decay rates [1/s]."""
         k = max(self.k_f + 2.0 * abs(self.s_f), self.k_r + 2.0 * abs(self.s_r))
         d = max(self.d_f, self.d_r)
         arm = max(self.a, self.b)
@@ -91,7 +91,7 @@ class Ride(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """Horizontal forces [N] of the tyres in vehicle axes, f_x then f_y, with their plain resultants."""
+    """Horizontal tyre forces [N] in vehicle axes, f_x then f_y, and their resultants."""
 
     x_fl: float
     x_fr: float
@@ -109,7 +109,7 @@ class Contact(NamedTuple):
 def rates(y: Sequence[float], held: Contact, ride: Ride, lighter: float = -0.0) -> tuple[float, ...]:
     """Return the time derivative of `y` = (r, coordinates, their rates); equations (1)-(11).
 
-    `lighter` [m/s2] is what gravity towards the road is less than g, on an incline; -0.0 changes no bit.
+    `lighter` [m/s2] is the reduction of gravity normal to the road on an incline; -0.0 changes no bit.
     """
     r, z, phi, theta, u_fl, u_fr, u_rl, u_rr, dz, dphi, dtheta, du_fl, du_fr, du_rl, du_rr = y
     x_fl, x_fr, x_rl, x_rr, y_fl, y_fr, y_rl, y_rr, x_all, y_all, moment = held
@@ -138,7 +138,7 @@ def rates(y: Sequence[float], held: Contact, ride: Ride, lighter: float = -0.0) 
     e_rr = k_r * c_rr + d_r * (du_rr - rear + side) - bar + p_r * y_rr
     front = e_fl + e_fr
     rear = e_rl + e_rr
-    # A lifted wheel carries nothing: its load is N_0 below the static one.
+    # The load of a lifted wheel is zero, which is N_0 below the static load.
     n_fl = k_t * u_fl
     n_fr = k_t * u_fr
     n_rl = k_t * u_rl

@@ -1,13 +1,13 @@
-"""Accelerations of a car by an inclined road and the wind, which act on all of its mass alike.
+"""Accelerations of a car due to an inclined road and wind.
 
     e_x = -g sin(slope)              e_y = F_w / m - g sin(bank)              [m/s2], vehicle axes
     g_n = g sqrt(1 - sin^2(slope) - sin^2(bank))        gravity towards the road
     a_x = X / m + e_x,  a_y = Y / m + e_y,  dr = (M + M_w) / I_z              X, Y, M of the tyres
 
-Motion is that in the plane of the road. Since e_x and e_y act on every part of the car alike, what moves
-against another part (springs, loads, roll) follows the tyres' forces as on a level road: on a bank as in a
-bend of the same side force. Loads add up to m g_n. The wind F_w is taken to act like that, too: at the height
-of the centre of mass, M_w / F_w before it.
+The motion is that in the plane of the road. e_x and e_y act on every part of the car alike, so relative
+motion (springs, loads, roll) follows from the tyre forces as on a level road: on a bank as in a bend with the
+same side force. Loads add up to m g_n. The wind F_w is assumed to act likewise, at the height of the centre
+of mass and M_w / F_w ahead of it.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ INPUTS = tuple(signal(name, optional=True) for name in ("slope", "bank", "wind_f
 
 
 class Pull(NamedTuple):
-    """e_x, e_y [m/s2], g - g_n [m/s2] and M_w [N.m]."""
+    """Effect of road and wind: e_x, e_y [m/s2], g - g_n [m/s2] and M_w [N.m]."""
 
     x: float
     y: float
@@ -31,11 +31,11 @@ class Pull(NamedTuple):
 
 
 LEVEL = Pull(-0.0, -0.0, -0.0, -0.0)  # adding -0.0 changes no bit of any number
-"""On a level road without wind."""
+"""Level road without wind."""
 
 
 def pull_of(signals: Sequence[float], mass: float) -> Pull:
-    """Return the pull of slope, bank [rad], wind force [N] and moment [N.m] on a car of `mass` [kg]."""
+    """Return the effect of slope, bank [rad], wind force [N] and moment [N.m] on a car of `mass` [kg]."""
     slope, bank, force, moment = signals
     if slope == bank == force == moment == 0.0:
         return LEVEL

@@ -1,15 +1,15 @@
-"""Roll camber: inclination of the wheels against the road when the body rolls.
+"""Roll camber: inclination angle of the wheels due to body roll.
 
     gamma_f = e_f phi        gamma_r = e_r phi
 
-phi is the body's roll against the road, positive with the left side up, gamma the inclination of a wheel,
-positive with its top to the right (ISO 8855), the same for both wheels of an axle. The roll camber e
-[1] is what the suspension leaves of the roll: 1 for trailing arms, near 0 for a rigid axle, less than 0 for
-wheels that lean into the turn. So in a turn wheels lean outward, and their camber thrust points outward, too.
+phi is the body's roll relative to the road, positive with the left side up, gamma the inclination angle of a
+wheel, positive with its top to the right (ISO 8855), the same for both wheels of an axle. The roll camber
+coefficient e [1] depends on the suspension: 1 for trailing arms, near 0 for a rigid axle, negative for wheels
+that lean into the turn. With e > 0 wheels lean outward in a turn, and their camber thrust points outward,
+too.
 
 The coefficient is SAE J670's roll camber, with the roll of the whole car on its tyres, as on a test rig that
-lifts one side. Left out: camber by heave, by steering (caster, kingpin), by forces, and what wheels have at
-rest.
+lifts one side. Neglected: static camber, and camber due to heave, steering (caster, kingpin) and forces.
 """
 
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from vocabulary.wheels import Four
 
 from ..fmi.variables import of_car
 
-_TAKEN_BACK = "chosen: independent suspension that takes back three tenths of the roll"
+_TAKEN_BACK = "chosen: independent suspension that compensates three tenths of the roll"
 
 
 @dataclass(frozen=True)
 class RollCamberParameters:
-    """Roll camber of both axles."""
+    """Roll camber coefficients of both axles."""
 
     roll_camber_front: float = of_car(0.7, _TAKEN_BACK, minimum=-2.0, maximum=2.0)
     roll_camber_rear: float = of_car(0.7, _TAKEN_BACK, minimum=-2.0, maximum=2.0)

@@ -1,6 +1,6 @@
-"""A car's body that rolls on its springs: what `plants.eight_dof` is made of, equation by equation.
+"""Equations of motion of a car body with roll, for `plants.eight_dof`.
 
-Numbers and symbols are those of the plant's docstring.
+Equation numbers and symbols are those of the plant's docstring.
 """
 
 from __future__ import annotations
@@ -30,22 +30,22 @@ class RollingCarParameters(StartParameters, RollCamberParameters, ResistancePara
     roll_stiffness: float = of_car(56000.0, "erratum: paper B, table 1, prints 5600", text="Roll stiffness K")
     roll_damping: float = of_car(2600.0, "paper B, table 1", text="Roll damping C")
     front_roll_share: float = of_car(
-        0.55, "chosen: mild understeer", text="Front part of roll stiffness and damping", maximum=1.0
+        0.55, "chosen: mild understeer", text="Front share of roll stiffness and damping", maximum=1.0
     )
     roll_centre_height_front: float = of_car(0.14, "chosen: h - h_s", text="Front roll centre h_f")
     roll_centre_height_rear: float = of_car(0.14, "chosen: h - h_s", text="Rear roll centre h_r")
     rotating_mass_excess: float = parameter(
-        0.0, "1", "Part xi of m that is added to resist dv_x", "chosen: none, see the erratum", minimum=0.0
+        0.0, "1", "Share xi of m added to resist dv_x", "chosen: none, see the erratum", minimum=0.0
     )
     initial_speed: float = parameter(27.7777778, "m/s", "Speed at the start", "paper B: 100 km/h")
     slip_stiffness_per_load: float = like(DrivenCarParameters, "slip_stiffness_per_load")
 
 
 class RollingBody:
-    """Equations of the rolling body, with constants derived once from the parameters `p`.
+    """Body with roll degree of freedom; its constants are derived once from the parameters `p`.
 
     Raises:
-        ValueError: springs that cannot hold the body up, or an inertia that cannot be.
+        ValueError: springs too soft to support the body, or an impossible inertia.
     """
 
     def __init__(self, p: RollingCarParameters) -> None:
@@ -63,15 +63,15 @@ class RollingBody:
                 f"roll_inertia must exceed (sprung_mass roll_arm)^2 / mass = {coupling * coupling / p.mass:g}"
                 f" kg.m2: it counts from the roll axis (got {p.roll_inertia:g})"
             )
-        self.inertia = inertia  # I_x less what the free lateral motion takes off [kg.m2]
-        self.decay = 0.5 * p.roll_damping / inertia  # of the oscillator, s [1/s]
-        self.stiffness = (p.roll_stiffness - coupling * G) / inertia  # of the oscillator, q [1/s2]
+        self.inertia = inertia  # I_x minus (m_s h_s)^2 / m, for free lateral motion [kg.m2]
+        self.decay = 0.5 * p.roll_damping / inertia  # s of the roll oscillator [1/s]
+        self.stiffness = (p.roll_stiffness - coupling * G) / inertia  # q of the roll oscillator [1/s2]
 
     def __deepcopy__(self, memo: object) -> RollingBody:
-        return self  # never changes: saving a component's state need not copy it
+        return self  # immutable: the saved state of a component may share it
 
     def forcing(self, y: float, phi: float, pull: Pull = LEVEL) -> float:
-        """Return the roll acceleration [rad/s2] that the lateral force `y` [N] drives, springs apart."""
+        """Return the roll acceleration [rad/s2] due to the lateral force `y` [N], without springs."""
         sine = sin(phi)
         driven = y / self.p.mass + G * (sine - phi)
         if pull.lighter:
@@ -84,8 +84,8 @@ class RollingBody:
         """Return (a_x, a_y) [m/s2]; equations (1)-(4).
 
         Args:
-            forces: resultants X, Y_f, Y_r [N], M [N.m] of the tyres.
-            pull: of road and wind.
+            forces: tyre resultants X, Y_f, Y_r [N], M [N.m].
+            pull: effect of road and wind.
             v_x, v_y, r, phi, dphi: motion [m/s], [rad/s], [rad], [rad/s].
         """
         x, y_f, y_r, moment = forces

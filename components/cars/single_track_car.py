@@ -1,4 +1,4 @@
-"""The linear single-track model that references are made of.
+"""Linear single-track model, the basis of references, estimators and linear controllers.
 
     m v (dbeta/dt + r) = -(C_f + C_r) beta - (a C_f - b C_r) r / v + C_f delta
     I_z dr/dt          = -(a C_f - b C_r) beta - (a^2 C_f + b^2 C_r) r / v + a C_f delta
@@ -16,12 +16,12 @@ from dataclasses import dataclass
 from typing import Any
 
 SMALLEST = 1e-3
-"""1 + K v^2 is held here where an oversteering car has no steady state any more."""
+"""Lower bound of 1 + K v^2, reached by an oversteering car above its critical speed."""
 
 
 @dataclass(frozen=True)
 class SingleTrackCar:
-    """Mass m [kg], yaw inertia I_z [kg.m2], lever arms a, b [m], axle stiffnesses C_f, C_r [N/rad]."""
+    """Single-track car: m [kg], yaw inertia I_z [kg.m2], arms a, b [m], axle stiffnesses C_f, C_r [N/rad]."""
 
     m: float
     i_z: float
@@ -32,7 +32,7 @@ class SingleTrackCar:
 
     @classmethod
     def of(cls, p: Any, yaw_inertia: float = 1.0) -> SingleTrackCar:
-        """Return the car of these parameters; its yaw inertia does not matter in a steady turn."""
+        """Return the car with these parameters; the yaw inertia does not matter in a steady turn."""
         return cls(
             p.mass,
             yaw_inertia,

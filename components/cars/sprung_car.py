@@ -1,4 +1,4 @@
-"""The parameters of a car with a sprung body, and what `cars.ride` needs of them."""
+"""Parameters of a car with a sprung body, and the constants of `cars.ride` derived from them."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ from .roll_camber import RollCamberParameters
 
 @dataclass(frozen=True)
 class FourteenDofParameters(StartParameters, RollCamberParameters, ResistanceParameters, PaperC):
-    """A large saloon: paper C, table 1, where it says anything."""
+    """Large saloon; values from paper C, table 1, where it has them."""
 
     sprung_mass: float = of_car(1650.0, "paper C, table 1", text="Sprung mass m_s", minimum=1.0)
     front_unsprung_share: float = of_car(0.5, "chosen: equal wheels", minimum=0.01, maximum=0.99)
@@ -22,7 +22,7 @@ class FourteenDofParameters(StartParameters, RollCamberParameters, ResistancePar
     sprung_roll_inertia: float = of_car(928.0, "chosen: a large saloon")
     sprung_pitch_inertia: float = of_car(2790.0, "chosen: a large saloon")
     sprung_roll_yaw_product: float = of_car(0.0, "chosen: principal axes along the car")
-    cg_height: float = of_car(0.5093, "chosen: that of the sprung mass 0.53")
+    cg_height: float = of_car(0.5093, "chosen: 0.53 for the sprung mass")
     unsprung_height: float = of_car(0.32, "chosen: tyre of 0.34, loaded")
     spring_stiffness_front: float = of_car(34000.0, "chosen: body modes at 1.3 to 1.7 Hz")
     spring_stiffness_rear: float = of_car(32000.0, "chosen: body modes at 1.3 to 1.7 Hz")
@@ -48,7 +48,7 @@ def ride_of(p: FourteenDofParameters) -> Ride:
     """Return the constants of body, suspension and tyre springs.
 
     Raises:
-        ValueError: masses, inertias or springs with which a car cannot stand.
+        ValueError: inconsistent masses or inertias, or springs too soft to support the body.
     """
     m_s = p.sprung_mass
     unsprung = p.mass - m_s

@@ -1,4 +1,4 @@
-"""The kinematics that all plants share: how the wheels of a moving car move over the ground.
+"""Wheel kinematics: velocities, slip angles, slip ratios and lever arms.
 
     v_x,i   = v_x -/+ r d/2          minus on the left, plus on the right
     v_y,f   = v_y + a r              v_y,r = v_y - b r
@@ -6,12 +6,12 @@
     v_lat   = -v_x,i sin(delta_i) + v_y,i cos(delta_i)      wheel axes, lateral
     alpha   = atan2(v_lat, v)        kappa = (w R - v) / max(|w R|, |v|)
 
-Both slips are ratios of speeds and lose their meaning at rest. Below a low speed v_low they refer
-to that speed instead: kappa = (w R - v) / v_low, sin(alpha) = v_lat / v_low. So a car at rest
-has no slip, nothing is divided by zero, and above v_low the definitions hold exactly.
+Both slips are ratios of speeds and undefined at rest. Below a low speed v_low they refer to that
+speed instead: kappa = (w R - v) / v_low, sin(alpha) = v_lat / v_low. Thus a car at rest has no slip,
+there is no division by zero, and above v_low the definitions hold exactly.
 
-Every expression treats left and right by the same operations: mirrored motion gives mirrored
-results to the last bit.
+All expressions use the same operations for left and right: mirrored motion gives mirrored results
+to the last bit.
 """
 
 from math import atan2, cos, sin, sqrt
@@ -50,7 +50,7 @@ def wheel_velocities(v_x: float, v_y: float, *, r: float, delta: float, p: Geome
 def slip_angle(v: float, v_lat: float, v_low: float) -> float:
     """Return the slip angle alpha [rad] in (-pi, pi] from a wheel's velocity in wheel axes [m/s].
 
-    A wheel that rolls backwards has |alpha| > pi/2; tyre models fold it (`tyres.dugoff`).
+    A wheel that rolls backwards has |alpha| > pi/2; tyre models fold it to [-pi/2, pi/2] (`tyres.dugoff`).
     """
     if v > v_low or v * v + v_lat * v_lat >= v_low * v_low:
         return atan2(v_lat, v)
@@ -63,7 +63,7 @@ def slip_ratio(rolling: float, v: float, v_low: float) -> float:
     Args:
         rolling: circumferential speed w R of the wheel [m/s].
         v: longitudinal velocity of the wheel in wheel axes [m/s].
-        v_low: speed below which slip refers to this speed, > 0 [m/s].
+        v_low: reference speed of slip for slower wheels, > 0 [m/s].
     """
     if v > v_low and rolling >= 0.0:
         return (rolling - v) / (rolling if rolling > v else v)
@@ -71,7 +71,7 @@ def slip_ratio(rolling: float, v: float, v_low: float) -> float:
 
 
 def lever_arms(delta: float, a: float, half_track: float) -> Four:
-    """Return the arms [m] with which longitudinal wheel forces turn the car: M_z = sum(F_i arm_i).
+    """Return the yaw lever arms [m] of longitudinal wheel forces: M_z = sum(F_i arm_i).
 
     Paper A, equations (36)-(39), erratum: the front-left arm is a sin(delta) - d/2 cos(delta).
     """

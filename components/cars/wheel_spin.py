@@ -1,15 +1,17 @@
-"""The spin of the wheels from drive or brake torque, rolling resistance and tyre force, down to standstill.
+"""Wheel spin dynamics, stable down to standstill.
 
     J dw/dt = T - F_x R - M w / |w|             T > 0 drives forward, T < 0 brakes; M >= 0 resists
 
-A torque below zero is friction, as M is: it acts against the rotation, stops the wheel and never reverses
-it. A wheel at rest stays at rest until tyre and drive overcome friction.
+T is the drive or brake torque, F_x the tyre force, M the moment of rolling resistance. A negative torque is
+friction, as is M: it opposes the rotation, stops the wheel and never reverses it. A wheel at rest stays at
+rest until tyre and drive overcome friction.
 
 Slip decays with the rate lambda = C R^2 / (J v), C = dF_x/dkappa, which grows without bound as the car
-slows: at walking pace a tyre force that is held over the step swings up. There are two remedies.
+slows down: at walking pace a tyre force held over the step makes the integration unstable. There are two
+remedies.
 
-A tyre that says how its force follows slip: the slip kappa_t that belongs to the force F_x, and the local
-stiffness C > 0 there (signals tyre_slip_ratio, slip_stiffness). The wheel then is integrated with
+Tyre with known slip stiffness: it outputs the slip kappa_t that belongs to the force F_x, and the local
+stiffness C > 0 there (signals tyre_slip_ratio, slip_stiffness). The wheel is then integrated with
 
     F_x + C (kappa(t) - kappa_t),    kappa(t) = kappa_0 + kappa_w (w - w_0) + kappa_v (v - v_0)
 
@@ -18,29 +20,29 @@ and v linear over the step, exactly:
     w_end = w_0 + h phi_1 (T - M - R F_0) / J - h phi_2 (R C / J) kappa_v (v_end - v_0)
     z = h (R C / J) kappa_w,  phi_1 = (1 - exp(-z)) / z,  phi_2 = (1 - phi_1) / z
 
-(the exponential Rosenbrock-Euler step), F_0 the force at kappa_0. It is stable for every z, of second order
-in the step like a force held at its middle, and nearer to the true wheel: only what is left of the
-force beside its tangent is taken from the last two steps. A master hands F_x, C and kappa_t over by the
-same rule, so they belong together whatever the rule is.
+(the exponential Rosenbrock-Euler step), with F_0 the force at kappa_0. It is stable for every z, of second
+order in the step like a force held at its middle, and more accurate: only the deviation of the force from its
+tangent is extrapolated from the last two steps. A master transfers F_x, C and kappa_t by the same coupling
+algorithm, so they belong together, whatever the algorithm.
 
-A tyre that does not (C = 0, and C < 0 beyond the peak, where nothing settles): its stiffness is guessed as
-stiffness_per_load F_z / (1 + (kappa / 0.1)^2), and the slip speed u = w R - v takes only the part of
-its change that a force held over the step can bear,
+Tyre without it (C = 0, or C < 0 beyond the peak, where slip does not settle): the stiffness is estimated as
+stiffness_per_load F_z / (1 + (kappa / 0.1)^2), and the change of the slip speed u = w R - v is reduced to
+what is stable with a force held over the step,
 
     u_end = u_same + gamma (u_free - u_same),     gamma = min(1, 0.6 / (lambda h)),
 
-u_free from the equation above, u_same = u v_end / v that of the same slip at the new speed. A steady
-slip stays exact (gamma multiplies what vanishes there) and the rolling motion is untouched: the wheel
-follows the car without delay, the slip settles within a few steps, later than the true wheel but far
-faster than the car. Above lambda h = 0.6, on 1 ms steps below some 6 to 10 m/s, this trades the
-exactness of the slip's own fast motion for stability; at higher speed or smaller steps gamma = 1
-and nothing is changed.
+where u_free follows from the first equation and u_same = u v_end / v is the slip speed of the same slip at
+the new speed. A steady slip stays exact (u_free = u_same), and the rolling motion is not affected: the wheel
+follows the car without delay, and the slip settles within a few steps, later than that of the true wheel but
+far faster than the car. Above lambda h = 0.6, which is below about 6 to 10 m/s with steps of 1 ms, accuracy
+of the fast slip transient is traded for stability; at higher speed or with smaller steps gamma = 1 and the
+step is unchanged.
 """
 
 from math import expm1
 
 BEARABLE = 0.6
-"""lambda h that a force taken from the last two steps can bear well; above 1 it swings up."""
+"""Largest lambda h for a force extrapolated from the last two steps; above 1 the slip is unstable."""
 
 
 def spin(
@@ -62,14 +64,14 @@ def spin(
 
     Args:
         w: angular velocity [rad/s].
-        torque: wheel torque T [N.m], below zero a friction torque.
-        resistance: moment M of rolling resistance [N.m], >= 0, a friction torque too.
+        torque: wheel torque T [N.m]; if negative, a friction torque.
+        resistance: moment M of rolling resistance [N.m], >= 0, also a friction torque.
         f_x: longitudinal tyre force [N], held.
         v, v_end: longitudinal velocity of the wheel at start and end of the step, wheel axes [m/s].
-        stiffness: about the tyre's slip stiffness dF_x/dkappa at its load [N], where it does not say.
+        stiffness: estimate of dF_x/dkappa at the present load [N], for a tyre without `slip_stiffness`.
         radius, inertia: R [m], J [kg.m2].
-        v_low: speed to which the slip of a slower wheel refers [m/s].
-        slip_stiffness: the tyre's own C = dF_x/dkappa [N]; 0 if it does not say.
+        v_low: reference speed of slip for slower wheels [m/s].
+        slip_stiffness: C = dF_x/dkappa as output by the tyre [N]; 0 if unknown.
         tyre_slip: the slip that `f_x` and `slip_stiffness` belong to [1].
     """
     rolling = w * radius
@@ -111,7 +113,7 @@ def spin(
         if z > 1e-4:
             phi_1 = -expm1(-z) / z
             phi_2 = (1.0 - phi_1) / z
-        else:  # negative where a wheel turns against its travel: nothing settles there
+        else:  # negative for a wheel that turns against its travel: slip does not settle there
             z = max(z, 0.0)
             phi_1 = 1.0 - 0.5 * z
             phi_2 = 0.5 - z / 6.0

@@ -1,1 +1,1 @@
-"""Laws that controllers, allocators and wheel controls share."""
+"""Control laws shared by controllers, references, allocators and wheel controls."""

@@ -1,7 +1,7 @@
-"""The base of allocators: longitudinal forces that give the yaw moment, added to the driver's force.
+"""Base class of allocators: longitudinal forces for a yaw moment, added to the driver's force.
 
-The driver's force is equal left and right on each axle, as from one pedal, and is not part of the requested
-moment: with steered front wheels it turns the car by itself, as it does without any control.
+The driver's force is equal left and right on each axle, as from a pedal, and is not part of the requested
+moment: with steered front wheels it turns the car by itself, as it does without control.
 """
 
 from dataclasses import dataclass
@@ -28,29 +28,29 @@ class DriveParameters:
     brake_front_share: float = parameter(
         -1.0,
         "1",
-        "Share of the driver's braking force in front; below 0: as of the driving force",
-        "chosen: one share for both",
+        "Share of the driver's braking force in front; if negative, that of the driving force",
+        "chosen: the same share for both",
         minimum=-1.0,
         maximum=1.0,
     )
 
 
 class Allocator(Component):
-    """Base: shares the yaw moment among the wheels and adds the driver's force."""
+    """Base class of allocators, which share the yaw moment among the wheels and add the driver's force."""
 
     sampled = True
     inputs: ClassVar[Any] = ("yaw_moment", signal("drive_force", optional=True), "steer_angle")
     outputs = (output("force_request_*", *BASIC),)
 
     least_arm: float
-    """Arm [m] below which a wheel's share fades, an eighth of the track, see `moment_sharing`."""
+    """Arm [m] below which a wheel's share fades (`moment_sharing`): an eighth of the track."""
 
     def configure(self) -> None:
         self.half_track = 0.5 * self.p.track_width
         self.least_arm = 0.25 * self.half_track
 
     def share(self, u: list[float], arms: Four) -> Four:
-        """Return the forces [N] of fl, fr, rl, rr that give the moment; `arms` of the wheels [m]."""
+        """Return the forces [N] of fl, fr, rl, rr that give the moment, with lever arms `arms` [m]."""
         raise NotImplementedError
 
     def output(self, t: float, u: list[float]) -> Four:

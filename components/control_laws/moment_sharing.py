@@ -1,11 +1,11 @@
-"""Turning a yaw moment into longitudinal wheel forces, whatever the rule that shares it out.
+"""Conversion of a yaw moment into longitudinal wheel forces, for any shares of the wheels.
 
     F_i = s_i M_z / arm_i,    sum(s_i) = 1,    so sum(F_i arm_i) = M_z
 
-A wheel whose arm is nearly zero could carry its share only with an enormous force. Below `least_arm`
-its share fades with (arm / least_arm)^2 and the others take over; the force then goes to zero
-with the arm, without a jump, and the sum stays M_z. Only where the others had no share to begin with,
-so that less than `LEAST_CARRIED` of the shares is left, the sum falls short of M_z.
+A wheel whose arm is nearly zero would need an enormous force for its share. Below `least_arm` the share
+fades with (arm / least_arm)^2 and the other wheels take over; the force then goes to zero continuously with
+the arm, and the sum remains M_z. The sum falls short of M_z only where the other wheels have hardly any
+share, so that less than `LEAST_CARRIED` of the shares is left.
 """
 
 from collections.abc import Sequence
@@ -22,12 +22,12 @@ def share_moment(moment: float, weights: Four, arms: Four, least_arm: float) -> 
 
     Args:
         moment: yaw moment M_z [N.m].
-        weights: what each wheel's share is proportional to, not negative, any unit.
+        weights: non-negative weights, to which the shares are proportional, in any unit.
         arms: lever arms [m], from `wheel_kinematics.lever_arms`.
         least_arm: arm below which a wheel's share fades [m], positive.
 
     Returns:
-        No forces where all weights vanish: there is no wheel that could carry anything.
+        Zero forces if all weights are zero.
     """
     a_fl, a_fr, a_rl, a_rr = arms
     w_fl, w_fr, w_rl, w_rr = weights
@@ -41,7 +41,7 @@ def share_moment(moment: float, weights: Four, arms: Four, least_arm: float) -> 
 
 
 def _share_faded(moment: float, weights: Sequence[float], arms: Sequence[float], least_arm: float) -> Four:
-    # Weight per arm, which is finite at arm = 0 where the weight has faded.
+    # Faded weight divided by the arm, finite at arm = 0.
     per_arm = [
         w / arm if abs(arm) >= least_arm else w * arm / least_arm**2
         for w, arm in zip(weights, arms, strict=True)
@@ -60,7 +60,7 @@ def add_drive_force(forces: Four, drive: float, front_share: float) -> Four:
     Args:
         forces: longitudinal forces of fl, fr, rl, rr [N].
         drive: sum of the driver's forces [N], negative when braking.
-        front_share: part of `drive` on the front axle [1].
+        front_share: share of `drive` on the front axle [1].
     """
     front = 0.5 * drive * front_share
     rear = 0.5 * drive * (1.0 - front_share)

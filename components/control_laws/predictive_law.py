@@ -1,13 +1,13 @@
-"""Model-predictive control of sideslip and yaw rate on the linear single-track car, at one speed.
+"""Model-predictive control of sideslip and yaw rate for the linear single-track car, at a fixed speed.
 
-The errors e = (beta - beta_ref, r - r_ref) follow de/dt = A e + B M (`linear_feedback`). Over the horizon the
-references stand still and the moment has a few values, each held for some steps of prediction. These
-values z make
+The errors e = (beta - beta_ref, r - r_ref) obey de/dt = A e + B M (`linear_feedback`). Over the horizon the
+references are constant and the moment takes a few values, each held for several prediction steps. These
+values z minimize
 
     sum over the steps of (e_beta / beta_0)^2 + (e_r / r_0)^2 + (M / M_0)^2
 
-least, with |M| at most the limit. |beta| at the end of each value beyond its bound costs
-`penalty` times the square of the excess over beta_0: a wish, since no moment may be enough to hold it.
+subject to |M| <= limit. The bound of |beta| at the end of each value is a soft constraint, since no moment
+may suffice to hold it: `penalty` times the square of (excess / beta_0) is added to the cost.
 """
 
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ from ..mathematics.sums import added, dot
 from .linear_feedback import Matrix
 
 _ORDER = 14
-"""Order of the series of the matrix exponential: beyond what counts where `A h` is at most 1."""
+"""Order of the series of the matrix exponential, exact to rounding for |A h| <= 1."""
 
 
 def _discrete(a: Matrix, b: float, h: float) -> tuple[Matrix, tuple[float, float]]:
-    """Return the transition over `h` [s] and what a unit of a held input on the second state adds."""
+    """Return the transition matrix over `h` [s] and the response to a held unit input on the second state."""
     (a_11, a_12), (a_21, a_22) = a
-    if h * max(abs(a_11) + abs(a_12), abs(a_21) + abs(a_22)) > 1.0:  # two halves, where the series is slow
+    if h * max(abs(a_11) + abs(a_12), abs(a_21) + abs(a_22)) > 1.0:  # slow convergence: take two halves
         half, (g_1, g_2) = _discrete(a, b, 0.5 * h)
         more_1, more_2 = _stepped(half, (g_1, g_2))
         (p_11, p_21), (p_12, p_22) = (_stepped(half, (row[0], row[1])) for row in zip(*half, strict=True))
@@ -52,20 +52,20 @@ class CostWeights:
     beta_0: float  # [rad]
     r_0: float  # [rad/s]
     moment_0: float  # [N.m]
-    penalty: float  # of the excess over the bound, in squares of beta_0
+    penalty: float  # of the squared excess over the bound, relative to beta_0
     step: float  # of the prediction [s]
     moves: int  # values of the moment
     steps_per_move: int
 
 
 class PredictiveLaw:
-    """The quadratic program of one speed, made ready: what is left for a sample is a vector or two."""
+    """Quadratic program at a fixed speed, prepared so that a sample only computes its vectors."""
 
     def __init__(self, dynamics: Matrix, i_z: float, w: CostWeights) -> None:
         n = w.moves
         phi, gamma = _discrete(dynamics, w.moment_0 / i_z, w.step)
         free = [(1.0, 0.0), (0.0, 1.0)]  # e at the step for e_0 = (1, 0) and (0, 1)
-        forced = [(0.0, 0.0)] * n  # and for each move of M_0
+        forced = [(0.0, 0.0)] * n  # and for each moment, in units of M_0
         hessian = [[0.0] * n for _ in range(n)]
         linear = [[0.0, 0.0] for _ in range(n)]
         self.free_beta: Rows = []
@@ -89,24 +89,24 @@ class PredictiveLaw:
         self.moment_0 = w.moment_0
         self.unbound = [
             [-added(row[k] * linear[k][j] for k in range(n)) for j in range(2)] for row in inverted
-        ]  # z = unbound e_0 where no constraint is met
-        rows += [[-value for value in row] for row in rows]  # upper bounds of all, then lower ones
+        ]  # z = unbound e_0 while no constraint is active
+        rows += [[-value for value in row] for row in rows]  # all upper bounds, then all lower bounds
         self.rows = rows
         self.reach = [[dot(row, line) for row in inverted] for line in rows]
         self.p = [[dot(up, line) for line in rows] for up in self.reach]
         for i, line in enumerate(self.p):
-            if i % (2 * n) >= n:  # the sideslip's
+            if i % (2 * n) >= n:  # bounds of the sideslip
                 line[i] += 1.0 / (w.penalty * q_beta)
 
     def moment(
         self, beta: float, r: float, beta_ref: float, r_ref: float, *, most: float, bound: float
     ) -> float:
-        """Return the moment [N.m] of the present sample.
+        """Return the moment [N.m] of the current sample.
 
         Args:
             beta, r, beta_ref, r_ref: state and references [rad], [rad/s].
             most: limit of the moment [N.m].
-            bound: of the sideslip angle [rad].
+            bound: largest sideslip angle [rad].
         """
         e_beta, e_r = beta - beta_ref, r - r_ref
         z = [k_beta * e_beta + k_r * e_r for k_beta, k_r in self.unbound]

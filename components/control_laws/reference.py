@@ -1,8 +1,9 @@
-"""The base of references: the yaw rate and the sideslip asked for, and their rates.
+"""Base class of references: desired yaw rate and sideslip, and their rates.
 
-The rates are slopes of what is shown over the instance's own step, smoothed by a first-order lag
-(`mathematics.slope`), since a steering angle often comes in steps of a sensor. So they belong to limited
-references, corners included, and a jump gives a pulse of the area of the jump. They are zero at the start.
+The rates are difference quotients of the outputs over the instance's own step, smoothed by a first-order lag
+(`mathematics.slope`), since a steering angle often comes in steps of a sensor. They are thus the rates of the
+limited references, corners included, and the integral of the pulse at a jump is the jump. They are zero at
+the start.
 """
 
 from dataclasses import dataclass
@@ -20,12 +21,12 @@ class RateParameters:
     """Parameters of the rates."""
 
     rate_time_constant: float = parameter(
-        0.005, "s", "Lag tau of the rates", "chosen: one sample of the controllers", minimum=0.0
+        0.005, "s", "Lag tau of the rates", "chosen: the controllers' sample time", minimum=0.0
     )
 
 
 class Reference(Component):
-    """Base: what the driver asks for with the steer angle."""
+    """Base class of references, which derive the desired motion from the steer angle."""
 
     inputs = ("steer_angle", "velocity_x", signal("friction", start=1.0))
     outputs = tuple(output(name, *SEEN) for name in SHOWN)
@@ -35,7 +36,7 @@ class Reference(Component):
         raise NotImplementedError
 
     def follow(self, h: float, u: list[float]) -> tuple[float, float]:
-        """Take the state over `h` [s]; return r_ref [rad/s] and beta_ref [rad]."""
+        """Advance the state by `h` [s]; return r_ref [rad/s] and beta_ref [rad]."""
         raise NotImplementedError
 
     def start(self, t: float, u: list[float]) -> None:

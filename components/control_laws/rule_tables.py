@@ -1,6 +1,6 @@
-"""The rule tables of papers C and D as data, in the form that `mathematics.fuzzy` reads.
+"""Fuzzy rule tables of papers C and D, in the format of `mathematics.fuzzy`.
 
-Rows stand for the error, columns for its rate, both from NB to PB.
+Rows are the error, columns its rate, both from NB to PB.
 """
 
 STANDARD = """
@@ -10,7 +10,7 @@ STANDARD = """
     NS Z  PS PB PB
     Z  PS PB PB PB
 """
-"""The standard monotone table of five sets; in place of paper D's tables 1 and 2, which were lost."""
+"""Standard monotone table of five sets; replaces paper D's tables 1 and 2, which were lost."""
 
 GENTLE = """
     NB NB NS NS Z
@@ -19,7 +19,7 @@ GENTLE = """
     NS Z  PS PS PB
     Z  PS PS PB PB
 """
-"""A published table of five sets, flatter near zero: World Electric Vehicle Journal 13(7), 2022, 109."""
+"""Published table of five sets, flatter near zero: World Electric Vehicle Journal 13(7), 2022, 109."""
 
 FIVE_BY_FIVE = {"standard": STANDARD, "gentle": GENTLE}
 """Name of a table of five sets -> the table."""
@@ -33,4 +33,4 @@ PID_GAINS = """
     PS/ZO/PM  ZO/ZO/PS  NS/PS/PS  NS/PS/PS  NM/PM/PS  NM/PB/PS  NB/PB/PM
     ZO/ZO/PB  ZO/PS/PM  NM/PS/PM  NM/PM/PS  NM/PM/PS  NB/PB/PS  NB/PB/PB
 """
-"""dK_p/dK_i/dK_d; paper C, table 2. Its dK_d of e = NB, NM at de = NS, PB, is NB in the common table."""
+"""dK_p/dK_i/dK_d; paper C, table 2. Its dK_d at e = NB, NM and de = NS, PB is NB in the common table."""

@@ -1,17 +1,17 @@
-"""Turning a yaw moment into one force per side of the car, split between front and rear.
+"""Conversion of a yaw moment into one longitudinal force per side, split between front and rear.
 
     F_fl = n_l F_l    F_rl = (1 - n_l) F_l          F_fr = n_r F_r    F_rr = (1 - n_r) F_r
     opposite halves:   F_r = -F_l = M / d           one side braked:   F_l = -2 M / d   for M > 0
                                                                        F_r =  2 M / d   for M < 0
 
-What "the moment asked for" means. Paper B neglects the steer angle, so that every force has the arm
-d/2. Ours differs: with true arms (`wheel_kinematics.lever_arms`) sum(F_i arm_i) = M exactly at every
-steer angle, and the formulas above are its value at delta = 0. The braked side of a steered car
-changes its force by n a sin(delta) / (d/2), 6 % at 0.09 rad on paper B's car with n = 1/2. M is the
-moment of the longitudinal forces; what lateral force the tyres lose to them is the controller's
-business, as in the paper.
+M is the moment of the longitudinal forces alone; the loss of lateral force is left to the controller, as in
+the paper. Paper B neglects the steer angle, so that every force has the arm d/2. Ours differs: with true arms
+(`wheel_kinematics.lever_arms`) sum(F_i arm_i) = M exactly at every steer angle, and the formulas above are
+the values at delta = 0. The force of the braked side of a steered car changes by n a sin(delta) / (d/2), 6 %
+at 0.09 rad on paper B's car with n = 1/2.
 
-Source: paper B, equations (25)-(29); which of the two readings it means is open, its table 3 fits the second.
+Source: paper B, equations (25)-(29). The paper leaves open which of the two readings it means; its table 3
+fits the second.
 """
 
 from vocabulary.wheels import Four
@@ -31,10 +31,10 @@ def share_sides(
         reading: one of `SIDE_FORCES`.
         front_left, front_right: front shares n_l, n_r of the side forces [1].
         arms: lever arms [m], from `wheel_kinematics.lever_arms`.
-        least_arm: arm below which a wheel's share fades [m], see `moment_sharing`.
+        least_arm: arm below which a wheel's share fades [m] (`moment_sharing`).
     """
     a_fl, a_fr, a_rl, a_rr = arms
-    # Moments in proportion to share times arm are forces in proportion to the share.
+    # Moments proportional to share times arm give forces proportional to the share.
     left = (front_left * abs(a_fl), (1.0 - front_left) * abs(a_rl))
     right = (front_right * abs(a_fr), (1.0 - front_right) * abs(a_rr))
     if reading == "one_side_braked":
@@ -46,6 +46,6 @@ def share_sides(
 
 
 def load_share(front: float, rear: float) -> float:
-    """Return the front wheel's part of the load of one side [1]; half if the side is in the air."""
+    """Return the front wheel's share of the load of a side [1]; half if the side has no load."""
     front, rear = max(front, 0.0), max(rear, 0.0)
     return front / (front + rear) if front + rear > 0.0 else 0.5

@@ -1,12 +1,12 @@
-"""The sliding-mode yaw-moment law that the controllers of paper B share.
+"""Sliding-mode yaw-moment law shared by the controllers of paper B.
 
     s = (r_ref - r) + w (beta_ref - beta)                                                     (19)
     M = I_z [dr_ref/dt + eps switch(s) + k_d s + w (dbeta_ref/dt - dbeta/dt)]                 (23)
     switch(s) = sign(s)   or   sat(s / Delta), Delta the boundary layer                       (24)
 
-The sign of w. On s = 0 with saturated tyres the sideslip obeys
-dbeta/dt = a_y / v - r_ref + w (beta - beta_ref): w > 0 drives it away, w < 0 brings it back. In
-ISO axes w is therefore negative (or zero); the paper does not say.
+Sign of w: on s = 0 with saturated tyres the sideslip obeys
+dbeta/dt = a_y / v - r_ref + w (beta - beta_ref), which is unstable for w > 0. In ISO axes w is therefore
+negative (or zero); the paper does not give the sign.
 
 Source: paper B, section 2.1.
 """
@@ -27,15 +27,15 @@ ERRORS = (
     "sideslip",
     "sideslip_rate",
 )
-"""The inputs of the law, in the order of `surface` and `demand`."""
+"""Inputs of the law, in the order that `SlidingSurface` expects."""
 
 SURFACE = ("yaw_rate_ref", "sideslip_ref", "yaw_rate", "sideslip")
-"""Inputs that the sliding surface itself follows."""
+"""Inputs on which the sliding surface depends."""
 
 
 @dataclass(frozen=True)
 class SurfaceParameters:
-    """Parameters of the surface, its boundary layer and the moment's limits; the paper names none but I_z."""
+    """Parameters of surface, boundary layer and moment limit; the paper gives none but I_z."""
 
     boundary_layer: float = parameter(
         0.1, "rad/s", "Half width Delta of the boundary layer", "chosen: about 6 deg/s", minimum=0.0
@@ -45,7 +45,7 @@ class SurfaceParameters:
     )
     yaw_inertia: float = like(PaperB, "yaw_inertia")
     moment_limit: float = like(
-        LimitParameters, "moment_limit", 10000.0, "chosen: m g d / 2, what the road can give at mu 1"
+        LimitParameters, "moment_limit", 10000.0, "chosen: m g d / 2, the most that the road can give at mu 1"
     )
     fade_speed: float = like(LimitParameters, "fade_speed")
 
@@ -56,18 +56,18 @@ def sign(s: float) -> float:
 
 
 def saturation(s: float, layer: float) -> float:
-    """Return s / layer limited to -1..1, equation (24); the sign of `s` for a layer of zero."""
+    """Return s / layer limited to -1..1, equation (24); for layer = 0, the sign of `s`."""
     if abs(s) >= layer:
         return sign(s)
     return s / layer
 
 
 class SlidingSurface:
-    """The law at one instant: the surface s [rad/s], and the moment that a reaching law adds up to.
+    """Sliding-mode law at an instant: the surface s [rad/s], and the moment for given reaching gains.
 
     Args:
         u: the signals `ERRORS`.
-        p: of the law.
+        p: parameters of the law.
     """
 
     def __init__(self, u: Sequence[float], p: SurfaceParameters) -> None:
@@ -75,14 +75,14 @@ class SlidingSurface:
         w = p.sideslip_weight
         self.p = p
         self.s = (r_ref - r) + w * (beta_ref - beta)
-        self.equivalent = dr_ref + w * (dbeta_ref - dbeta)  # the demand without reaching law [rad/s2]
+        self.equivalent = dr_ref + w * (dbeta_ref - dbeta)  # equivalent control [rad/s2]
 
     def moment(self, *, eps: float, k_d: float, speed: float, switching: str = "saturation") -> float:
-        """Return the yaw moment M [N.m], equation (23), within its limits.
+        """Return the limited yaw moment M [N.m]; equation (23).
 
         Args:
             eps, k_d: gains of the reaching law [rad/s2], [1/s].
-            speed: of the car [m/s].
+            speed: speed of the car [m/s].
             switching: "sign" or "saturation", equation (24).
         """
         p, s = self.p, self.s

@@ -1,8 +1,8 @@
-"""Sliding-mode slip control of one wheel: the torque that holds the slip which gives a requested force.
+"""Sliding-mode slip control of a wheel: torque for the slip at which the tyre gives a requested force.
 
-The slip target is the requested force on the stable branch of the tyre's own curve F_x(kappa) at the
-present load, slip angle and friction, limited to a share of the optimum and to an absolute cap
-(`tyre_models.slip_curve`). With s = kappa_target - kappa and the slip rate asked for
+The slip target is the slip of the requested force on the stable branch of the tyre's own curve F_x(kappa) at
+the current load, slip angle and friction, limited to a share of the optimum and to an absolute cap
+(`tyre_models.slip_curve`). With s = kappa_target - kappa and the desired slip rate
 
     dkappa = eps sat(s / Delta) + k_d s
 
@@ -11,14 +11,14 @@ the wheel's equation of motion, solved for the torque, gives (v wheel velocity, 
     braking, kappa = (R w - v) / v:         T = R F_x + J v / R       ((1 + kappa) / v dv + dkappa)
     driving, kappa = (R w - v) / (R w):     T = R F_x + J v / (R q^2) (q / v dv + dkappa)
 
-with F_x from the same curve at the slip that is, dv the filtered difference of the wheel's velocity.
+with F_x from the same curve at the actual slip, and dv the filtered difference of the wheel's velocity.
 
-What the paper leaves open, and what is done. The target's own rate is left out: it would hand every
-jump of the request to the torque. Below `slip_control_force` the wheel gets R F, so without a request
-it rolls free; below `slip_control_speed`, where slip loses its meaning, R F with F the force at the
-slip target; both fade in linearly. While braking, the torque is never more than stops the wheel
-within one sample. In reverse only positive torque is used, only to brake: negative torque is
-friction to every plant.
+Choices that the paper leaves open: the rate of the target is omitted, since it would pass every jump of the
+request on to the torque. For requests below `slip_control_force` the torque is R F, so that without a request
+the wheel rolls freely; below `slip_control_speed`, where slip is meaningless, it is R F with F the force at
+the slip target; both transitions are linear. While braking, the torque is at most what stops the wheel within
+a sample. In reverse only positive torque is used, and only to brake, since plants treat negative torque as
+friction.
 
 Source: paper B, equations (31)-(38). Ours differs: sat for the sign in (36), which would chatter at every
 sample; the cap (with combined slip the optimum grows with slip angle, at mu 0.3 from 0.05 at 0 to 0.9 at 15
@@ -35,19 +35,19 @@ from ..tyre_models.tyre import Curve
 
 @dataclass(frozen=True)
 class SlipControlParameters:
-    """Parameters of the wheel, the law and the limits; the gains are those tried for paper B."""
+    """Parameters of wheel, law and limits; the gains are those found for paper B."""
 
     wheel_radius: float = like(PaperB, "wheel_radius")
     wheel_inertia: float = like(PaperB, "wheel_inertia")
     optimum_share: float = parameter(
-        0.95, "1", "Largest slip over the optimum", "paper B", minimum=0.1, maximum=0.99
+        0.95, "1", "Largest slip as a share of the optimum", "paper B", minimum=0.1, maximum=0.99
     )
     slip_cap: float = parameter(
         0.25,
         "1",
         "Largest slip",
-        "chosen: at 0.15, tried first, paper B's sliding car is not caught again; beyond the grip slip stays"
-        " below 0.06 straight on, in a turn on friction 0.3 it comes to this cap",
+        "chosen: with 0.15 paper B's sliding car is not caught again; beyond the limit of grip slip stays"
+        " below 0.06 straight ahead, and reaches this cap in a turn at friction 0.3",
         minimum=0.001,
         maximum=0.99,
     )
@@ -61,7 +61,7 @@ class SlipControlParameters:
         60.0,
         "1/s",
         "Gain k_d of the slip error",
-        "chosen: 30, tried first, lets slip lag behind the yaw-moment control",
+        "chosen: with 30 slip lags behind the yaw-moment control",
         minimum=0.0,
     )
     acceleration_filter: float = parameter(
@@ -70,25 +70,25 @@ class SlipControlParameters:
     slip_control_force: float = parameter(
         50.0,
         "N",
-        "Request below which torque is direct, fading until twice that",
+        "Request below which torque is direct; slip control fades in up to twice that",
         "chosen: 1 % of load",
         minimum=0.1,
     )
     slip_control_speed: float = parameter(
         3.0,
         "m/s",
-        "Wheel velocity above which slip is controlled fully, below a third of it not",
+        "Wheel velocity from which slip control is fully active; below a third of it, off",
         "chosen: walking pace",
         minimum=0.1,
     )
     drive_torque_limit: float = parameter(
-        800.0, "N.m", "Largest driving torque", "chosen: the motor tried for paper B", minimum=0.0
+        800.0, "N.m", "Largest driving torque", "chosen: the motor of paper B's runs", minimum=0.0
     )
     brake_torque_limit: float = parameter(
         3300.0,
         "N.m",
         "Largest braking torque, motor and friction brake together",
-        "chosen: those tried for paper B",
+        "chosen: those of paper B's runs",
         minimum=0.0,
     )
 
@@ -96,7 +96,7 @@ class SlipControlParameters:
 def slip_torque(
     kappa: float, target: float, f_x: float, *, v: float, dv: float, p: SlipControlParameters
 ) -> float:
-    """Return the torque [N.m] that moves the slip towards its target; equation (37).
+    """Return the torque [N.m] that drives the slip to its target; equation (37).
 
     Args:
         kappa, target: slip and slip target [1].
@@ -127,14 +127,14 @@ def wheel_torque(
     sample_time: float,
     p: SlipControlParameters,
 ) -> tuple[float, float]:
-    """Return the torque request [N.m] and the slip target [1] of one wheel.
+    """Return the torque request [N.m] and the slip target [1] of a wheel.
 
     Args:
-        request: longitudinal tyre force wanted [N].
+        request: requested longitudinal tyre force [N].
         kappa: longitudinal slip [1].
-        curve: the tyre's, at present slip angle, load and friction.
+        curve: slip curve of the tyre at the current slip angle, load and friction.
         w, v, dv: angular velocity [rad/s], longitudinal velocity [m/s] and its rate [m/s2] of the wheel.
-        sample_time: how long the torque will be held [s].
+        sample_time: time for which the torque is held [s].
     """
     force, first = curve
     target = slip_for_force(request, force, first=first, cap=p.slip_cap, share=p.optimum_share)

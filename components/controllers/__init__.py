@@ -1,1 +1,1 @@
-"""Controllers: from tracking error to yaw moment."""
+"""Controllers: from tracking errors to yaw moment."""

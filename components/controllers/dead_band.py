@@ -1,18 +1,18 @@
-"""Yaw-moment control as it is in production: dead band, sideslip limit, no more than needed.
+"""Yaw-moment control with dead band and sideslip limit, as in production systems.
 
     e_r = r_ref - r                                      dead band: r_0 + share |r_ref|
-    M   = k_r D(e_r) + k_beta E(beta, beta_max)          D, E: what is beyond the dead band, the limit
-    beta_max: the bound for this friction                `control_laws.sideslip_bound`
+    M   = k_r D(e_r) + k_beta E(beta, beta_max)          D, E: excess over the dead band, over the limit
+    beta_max: the bound at this friction                 `control_laws.sideslip_bound`
 
-While the car follows its driver within the dead band and keeps its sideslip below the limit, nothing
-happens. A positive moment raises the yaw rate and lowers the sideslip. Too much turn (|r| above |r_ref|, of
-its sign) is fought with the whole gain; too little, where a car stays predictable, with `understeer_share` of
-it. Below `release_speed` it is off.
+The moment is zero while the car follows its driver within the dead band and its sideslip is below the limit.
+A positive moment raises the yaw rate and lowers the sideslip. Oversteer (|r| above |r_ref|, with its sign) is
+countered with the full gain; understeer, where a car stays predictable, with `understeer_share` of it. Below
+`release_speed` the controller is off.
 
 After A. T. van Zanten, R. Erhardt, G. Pfaff, VDC, the vehicle dynamics control system of Bosch, SAE
-950759, 1995; its numbers are not public, ours are chosen. Ours differs: the moment goes to an allocator, and
-the slip of each wheel is held by the wheel control (`wheel_control_slip`, `wheel_control_hydraulic`),
-where Bosch's controller gives slip targets itself.
+950759, 1995; its parameters are not public, ours are chosen. Ours differs: the moment goes to an allocator,
+and the wheel control (`wheel_control_slip`, `wheel_control_hydraulic`) holds the slip of each wheel, whereas
+Bosch's controller outputs slip targets itself.
 """
 
 from dataclasses import dataclass
@@ -25,39 +25,39 @@ from ..fmi.variables import like, output, parameter, signal
 
 @dataclass(frozen=True)
 class DeadBandParameters:
-    """Dead band, gains and limits; none is public."""
+    """Dead band, gains and limits; none of the originals is public."""
 
     yaw_rate_threshold: float = parameter(
         0.035, "rad/s", "Dead band r_0 of the yaw rate", "chosen: 2 degrees per second", minimum=0.0
     )
     yaw_rate_threshold_share: float = parameter(
-        0.1, "1", "Share of the reference that widens the dead band", "chosen: a model's error", minimum=0.0
+        0.1, "1", "Share of the reference that widens the dead band", "chosen: model error", minimum=0.0
     )
     yaw_rate_gain: float = parameter(
         40000.0, "N.m.s/rad", "Gain k_r beyond the dead band", "chosen: the limit at 7 deg/s", minimum=0.0
     )
     understeer_share: float = parameter(
-        0.5, "1", "Share of the gain against too little turn", "chosen: half", minimum=0.0, maximum=1.0
+        0.5, "1", "Share of the gain against understeer", "chosen: half", minimum=0.0, maximum=1.0
     )
     sideslip_gain: float = parameter(
         60000.0, "N.m/rad", "Gain k_beta beyond the limit", "chosen: the limit at 5 degrees", minimum=0.0
     )
     moment_limit: float = like(LimitParameters, "moment_limit")
     release_speed: float = parameter(
-        4.0, "m/s", "Below it the controller is off", "chosen: 15 km/h, usual", minimum=0.0
+        4.0, "m/s", "Speed below which the controller is off", "chosen: 15 km/h, usual", minimum=0.0
     )
     full_speed: float = parameter(
-        8.0, "m/s", "From here on it has its whole moment", "chosen: twice that", minimum=0.001
+        8.0, "m/s", "Speed from which the moment is full", "chosen: twice that", minimum=0.001
     )
 
 
 def beyond(value: float, threshold: float) -> float:
-    """Return by how much `value` is outside +-`threshold`, with its sign."""
+    """Return the excess of `value` over +-`threshold`, with its sign."""
     return value - threshold if value > threshold else value + threshold if value < -threshold else 0.0
 
 
 class DeadBand(Component):
-    """Yaw-moment controller with dead band and sideslip limit, after van Zanten."""
+    """Yaw-moment controller with dead band and sideslip limit, after van Zanten et al."""
 
     Parameters = DeadBandParameters
     sampled = True

@@ -1,4 +1,4 @@
-"""Fuzzy neural network that learns on line to make the sideslip angle follow its reference.
+"""Fuzzy neural network that controls the sideslip angle and learns online.
 
     e = beta_ref - beta,   E = e^2 / 2                                                      (28)
     x_1 = tanh(theta_1 e / 2),   x_2 = tanh(theta_2 de/dt / 2)                        (22), (23)
@@ -9,27 +9,27 @@
     dc_ij = -g_s e du/dc_ij,   ds_ij = -g_s e du/ds_ij   (30), (31), (34), (35)
     g = alpha J k_e h / 1 ms,   g_s = alpha_s J k_e h / 1 ms    h sample time, k_e error scale
 
-Sign: a positive moment lowers beta and raises e, so de/dM_z > 0, and the weights start as
+Sign: a positive moment lowers beta and raises e, so de/dM_z > 0, and the initial weights are
 -clip(c_1j + c_2k, -1, 1): the standard rule table, negated.
 
-Normalising factors into the two inputs, abar_jk = n_1j n_2k with n_ij = mu_ij / sum_j(mu_ij), so
-the true gradient of the sets is short: du/dc_1j = n_1j (q_j - u) 2 (x_1 - c_1j) / s_1j^2 with
+The normalisation factors into the two inputs, abar_jk = n_1j n_2k with n_ij = mu_ij / sum_j(mu_ij), so
+the exact gradient of the sets is short: du/dc_1j = n_1j (q_j - u) 2 (x_1 - c_1j) / s_1j^2 with
 q_j = sum_k(n_2k w_jk), and du/ds_1j is (x_1 - c_1j) / s_1j times that.
 
 Learning pauses while the moment is at its limit or above the learning limit, where torques may
-saturate: what the network asks for is then not what the car gets, and e would wind the weights
-up. Under violent excitation this is not enough (40 m/s, 0.03 rad, mu 0.65: max|e| is some 130 % of
-max|beta_ref| with learning, 12 % with frozen weights), and not the cause: with all limits lifted it
-is the same. Learning integrates e; where tanh flattens, the proportional and damping parts of the
-control vanish, the integral does not, and the loop oscillates. `recall` pulls each weight towards its
-initial value, by |e|, and cures that (0.1: 13 %, unchanged in the paper's runs): e-modification, K. S.
-Narendra, A. M. Annaswamy, IEEE Trans. Automatic Control 32(2), 1987, 134-145. The paper has
-none, so it is off by default.
+saturate: the car then does not get the requested moment, and e would wind the weights up. Under violent
+excitation this is not enough (40 m/s, 0.03 rad, mu 0.65: max|e| is about 130 % of max|beta_ref| with
+learning, 12 % with frozen weights). Saturation is not the cause: the result is the same without any limits.
+Learning integrates e; where tanh flattens, the proportional and damping parts of the control vanish, the
+integral does not, and the loop oscillates. `recall` pulls each weight towards its initial value, in
+proportion to |e|, and cures this (0.1: 13 %, unchanged in the paper's runs): e-modification, K. S. Narendra,
+A. M. Annaswamy, IEEE Trans. Automatic Control 32(2), 1987, 134-145. The paper does not have it, so it is off
+by default.
 
 Source: paper A, equations (22)-(35). Errata: (24) lacks the minus and the text swaps the names of centre and
 width; the gradients print "e2" for e, a product over "j != i" that is the other input's grade, and lack the
-derivative of the normalisation; (35) prints d/db for d/dsigma; (32) makes J = sign(e / dM_z) 5.5e-4, which is
-no estimate of de/dM_z and loses the car: J is a constant here.
+derivative of the normalisation; (35) prints d/db for d/dsigma; (32) sets J = sign(e / dM_z) 5.5e-4, which is
+not an estimate of de/dM_z and makes the car lose control: here J is a constant.
 """
 
 from collections.abc import Sequence
@@ -45,14 +45,14 @@ from ..mathematics.sums import added, dot
 
 N_SETS = 7
 CENTRES = tuple((j - 3) / 3.0 for j in range(N_SETS))
-"""Centres of the sets NB, NM, NS, ZO, PS, PM, PB before learning; chosen: even in [-1, 1]."""
+"""Centres of the sets NB, NM, NS, ZO, PS, PM, PB before learning; chosen: evenly spaced in [-1, 1]."""
 NARROWEST = 0.1
-"""Least width of a set; chosen: no sum of grades can underflow."""
+"""Smallest width of a set; chosen: no sum of grades can underflow."""
 
 
 @dataclass(frozen=True)
 class FnnParameters:
-    """Parameters of the network, of its learning and of the moment it may ask for."""
+    """Parameters of network, learning and moment limit."""
 
     error_gain: float = parameter(
         400.0, "1/rad", "Scale theta_1 of e", "chosen: at 0.16 degrees x_1 is 1/2", minimum=0.0
@@ -67,9 +67,9 @@ class FnnParameters:
         5000.0, "N.m", "Moment K_u per unit of the network's output", "chosen: the moment limit", minimum=0.0
     )
     moment_limit: float = parameter(
-        5000.0, "N.m", "Largest moment", "chosen: somewhat more than the motors can give", minimum=0.0
+        5000.0, "N.m", "Largest moment", "chosen: slightly more than the motors can give", minimum=0.0
     )
-    learning: bool = parameter(True, None, "Learn on line; false freezes the weights", "paper A")
+    learning: bool = parameter(True, None, "Learn online; false freezes the weights", "paper A")
     learning_rate: float = parameter(2.0, "1", "Learning rate alpha", "paper A, equation (35)", minimum=0.0)
     plant_jacobian: float = parameter(
         5.5e-4, "1", "Constant J in place of de/dM_z", "paper A, equation (32), positive constant"
@@ -77,8 +77,8 @@ class FnnParameters:
     error_scale: float = parameter(
         11000.0,
         "1/rad",
-        "Scale k_e of the error that is learnt from",
-        "chosen: halves the error at 15 m/s with a factor 4 left to the step that chatters at 40 m/s",
+        "Scale k_e of the error in learning",
+        "chosen: halves the error at 15 m/s, a factor 4 below the step that chatters at 40 m/s",
         minimum=0.0,
     )
     weight_limit: float = parameter(
@@ -87,23 +87,23 @@ class FnnParameters:
     learning_limit: float = parameter(
         4250.0,
         "N.m",
-        "No learning above this moment",
-        "chosen: what four motors of 400 N.m give at equal wheel loads, since the controller does not"
-        " see torques",
+        "Moment above which learning pauses",
+        "chosen: what four motors of 400 N.m give at equal wheel loads, since torques are not inputs"
+        " of the controller",
         minimum=0.0,
     )
     recall: float = parameter(
         0.0,
         "1",
-        "Pull of the weights to their initial values, relative to learning",
+        "Pull of the weights towards their initial values, relative to learning",
         "chosen: none, as in the paper; 0.1 holds the car under harsh excitation",
         minimum=0.0,
     )
     set_learning_rate: float = parameter(
         0.0,
         "1",
-        "Learning rate alpha_s of centres and widths, for which paper A takes alpha",
-        "chosen: 0, they stay, since 0.1 gains little and 0.2 shakes the car at 40 m/s",
+        "Learning rate alpha_s of centres and widths (alpha in paper A)",
+        "chosen: 0, fixed sets, since 0.1 gains little and 0.2 shakes the car at 40 m/s",
         minimum=0.0,
     )
 
@@ -114,7 +114,7 @@ def initial_weights() -> list[float]:
 
 
 def normalised_grades(x: float, centres: Sequence[float], widths: Sequence[float]) -> list[float]:
-    """Return the grades n_j = mu_j / sum(mu) of `x` in seven Gaussian sets; equation (24)."""
+    """Return the normalised grades n_j = mu_j / sum(mu) of `x` in seven Gaussian sets; equation (24)."""
     grades = gaussian_grades(x, centres, widths)
     total = added(grades)
     return [grade / total for grade in grades]
@@ -131,7 +131,7 @@ def set_gradients(
     centres: Sequence[Sequence[float]],
     widths: Sequence[Sequence[float]],
 ) -> tuple[list[list[float]], list[list[float]]]:
-    """Return (du/dc, du/ds), each one list per input; the gradient in (30), (31), corrected.
+    """Return (du/dc, du/ds), each with a list per input; the gradient in (30), (31), corrected.
 
     The gradient of the weights, in (29), is `firing_strengths`.
     """
@@ -152,7 +152,7 @@ def set_gradients(
 def learnt(
     values: Sequence[float], gradient: Sequence[float], step: float, low: float, high: float
 ) -> list[float]:
-    """Return values - step gradient, each limited to low..high; equations (33)-(35)."""
+    """Return the values after a gradient step, each limited to low..high; equations (33)-(35)."""
     moved = list(map(sub, values, map(mul, gradient, repeat(step))))
     if max(moved) > high or min(moved) < low:
         return [min(max(v, low), high) for v in moved]
@@ -163,7 +163,7 @@ _SEEN = ("sideslip_ref", "sideslip", "sideslip_rate_ref", "sideslip_rate")
 
 
 class Fnn(Component):
-    """Fuzzy neural network for sideslip control, learning on line."""
+    """Fuzzy neural network for sideslip control, learning online."""
 
     Parameters = FnnParameters
     inputs = _SEEN
@@ -173,7 +173,7 @@ class Fnn(Component):
             "learning_error",
             *_SEEN,
             unit="rad",
-            text="Error e learnt from in this sample, 0 while learning pauses",
+            text="Error e used for learning in this sample, 0 while learning pauses",
         ),
         output(
             "weight_change",
@@ -202,7 +202,7 @@ class Fnn(Component):
         return self.moment, self.learning_error, dist(self.weights, self.initial)
 
     def _sample(self, u: list[float], h: float) -> None:
-        """Take the moment from the network as it is, then let it learn for `h` [s]."""
+        """Compute the moment from the current network, then learn for `h` [s]."""
         p = self.p
         beta_ref, beta, beta_ref_rate, beta_rate = u
         e = beta_ref - beta
@@ -218,7 +218,7 @@ class Fnn(Component):
             self._learn((x_1, x_2), strengths, e, h)
 
     def _learn(self, x: tuple[float, float], strengths: list[float], e: float, h: float) -> None:
-        """Take one step of gradient descent on E = e^2 / 2, scaled with the sample time `h` [s]."""
+        """Take a step of gradient descent on E = e^2 / 2, scaled with the sample time `h` [s]."""
         p = self.p
         slope = self.sensitivity * h * e
         step = p.learning_rate * slope

@@ -1,19 +1,19 @@
-"""Fuzzy feedback of yaw rate and sideslip: two Mamdani systems, their moments weighted and added.
+"""Fuzzy feedback of yaw rate and sideslip: weighted sum of two Mamdani systems.
 
     M_1 =  k_u1 f(k_e1 e_r, k_c1 de_r/dt)             e_r = r_ref - r
     M_2 = -k_u2 f(k_e2 e_beta, k_c2 de_beta/dt)       e_beta = beta_ref - beta
     M = W_1 M_1 + W_2 M_2                             limited to +-moment_limit                       (1)
 
-f has five triangular sets {NB, NS, Z, PS, PB} on [-1, 1] for every variable, centroid; it reaches
-+-5/6. The quantisation factors k_e, k_c scale the inputs, k_u the output. A positive moment lowers
+f has five triangular sets {NB, NS, Z, PS, PB} on [-1, 1] for every variable and centroid defuzzification; its
+range is +-5/6. The quantisation factors k_e, k_c scale the inputs, k_u the output. A positive moment lowers
 the sideslip, so the second system enters negated; the paper's errors are actual minus reference.
 
-de_r/dt is the difference of two samples of e_r (smoothed by `rate_filter`): it holds the moment of the
-sample before, divided by I_z. So k_c1 k_u1 / I_z times the slope of f along its second input must stay
-well below one, or the moment chatters from sample to sample; with the defaults it is about 0.1.
+de_r/dt is the difference of two samples of e_r (smoothed by `rate_filter`), so it contains the moment of the
+previous sample divided by I_z. k_c1 k_u1 / I_z times the slope of f along its second input must therefore
+stay well below 1, or the moment chatters from sample to sample; with the defaults it is about 0.1.
 
 Source: paper D, section 3. Its tables 1, 2 and all factors were lost or not given: see
-`control_laws.rule_tables`, and chosen values below.
+`control_laws.rule_tables` and the chosen values below.
 """
 
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ from ..mathematics.pid_loop import Pid
 
 @dataclass(frozen=True)
 class FuzzyFeedbackParameters:
-    """Scales, weights and the choice of the table; the paper names none."""
+    """Scales, weights and choice of the rule table; the paper gives none."""
 
     rule_table: str = parameter(
         "standard",
@@ -70,7 +70,7 @@ SIDESLIP = ("sideslip_ref", "sideslip", "sideslip_rate_ref", "sideslip_rate")
 
 
 class FuzzyFeedback(Component):
-    """Weighted sum of two fuzzy controllers, of yaw rate and of sideslip."""
+    """Fuzzy yaw-moment controller: weighted sum of a yaw-rate and a sideslip system."""
 
     Parameters = FuzzyFeedbackParameters
     sampled = True

@@ -3,12 +3,12 @@
     M = PID(r_ref - r) + PID(beta - beta_ref)         K_x = max(K_x0 + range_x f_x(e, de/dt), 0)
 
 for x = p, i, d of each loop, e = r_ref - r and beta_ref - beta with their filtered rates. f is a Mamdani
-system of seven triangular sets per variable (`control_laws.rule_tables.PID_GAINS`), one for both loops; the
-centroid reaches +-8/9 of a range.
+system of seven triangular sets per variable (`control_laws.rule_tables.PID_GAINS`), the same for both loops;
+the centroid reaches +-8/9 of a range.
 
-The table read. Its dK_p is antisymmetric: as printed, gains rise for e < 0 and fall for e > 0, so left and
-right turns differ. By default it is therefore read at (-|e|, -sign(e) de/dt), the side on which gains
-rise with the error and with its growth; `printed` reads it at (e, de/dt).
+Reading of the table: its dK_p is antisymmetric, so that as printed gains rise for e < 0 and fall for e > 0,
+and left and right turns differ. By default it is therefore read at (-|e|, -sign(e) de/dt), the half in which
+gains rise with the error and with its growth; `printed` reads it at (e, de/dt).
 
 Source: paper C, section 2.2, table 2; ranges are not given.
 """
@@ -24,12 +24,12 @@ from .pid import PidController, PidParameters, gains_of
 
 @dataclass(frozen=True)
 class FuzzyPidParameters(PidParameters):
-    """Base gains as in `pid`, and the ranges of what is added to them."""
+    """Base gains as in `pid`, and the ranges of the gain corrections."""
 
     table_reading: str = parameter(
         "mirrored",
         None,
-        "How the rule table is read: mirrored at (-|e|, -sign(e) de/dt), printed at (e, de/dt)",
+        "Reading of the rule table: mirrored at (-|e|, -sign(e) de/dt), printed at (e, de/dt)",
         "chosen: left and right turns alike",
         choices=("mirrored", "printed"),
     )
@@ -86,7 +86,7 @@ class FuzzyPidParameters(PidParameters):
 
 
 class GainSchedule:
-    """Fuzzy rules that set the gains of the loop "yaw_rate" or "sideslip" in every step."""
+    """Fuzzy gain scheduling of the loop "yaw_rate" or "sideslip"."""
 
     def __init__(self, p: FuzzyPidParameters, loop: str) -> None:
         self.base, self.ranges = gains_of(p, loop), gains_of(p, loop, "range")
@@ -121,13 +121,13 @@ class FuzzyPid(PidController):
             "yaw_rate_proportional_gain_now",
             *("yaw_rate_ref", "yaw_rate"),
             unit="N.m.s/rad",
-            text="K_p of the yaw rate as set on line",
+            text="Scheduled gain K_p of the yaw rate",
         ),
         output(
             "sideslip_proportional_gain_now",
             *("sideslip_ref", "sideslip"),
             unit="N.m/rad",
-            text="K_p of the sideslip as set on line",
+            text="Scheduled gain K_p of the sideslip",
         ),
     )
 
@@ -135,7 +135,7 @@ class FuzzyPid(PidController):
         self.yaw_rate, self.sideslip = GainSchedule(self.p, "yaw_rate"), GainSchedule(self.p, "sideslip")
 
     def decide(self) -> None:
-        yaw_rate, sideslip = self.loops.yaw_rate, self.loops.sideslip  # whose error is actual minus reference
+        yaw_rate, sideslip = self.loops.yaw_rate, self.loops.sideslip  # its error is actual minus reference
         self.gains = (
             self.yaw_rate.gains(yaw_rate.error, yaw_rate.slope),
             self.sideslip.gains(-sideslip.error, -sideslip.slope),

@@ -4,17 +4,17 @@
     M_z = -moment_range f(e / error_range, (de/dt) / error_rate_range)
 
 f is a Mamdani system (min, max, centroid) of seven triangular sets per variable with the standard
-rule table. A positive moment lowers beta, so the output is negated. f reaches +-8/9, the centroid of
-the outermost set.
+rule table. A positive moment lowers beta, so the output is negated. The range of f is +-8/9, the centroid
+of the outermost set.
 
-Source: paper A, section 3, which names neither table nor ranges.
+Source: paper A, section 3, which gives neither table nor ranges.
 
-Chosen ranges. The moment range is the moment limit of `fnn`, so that both may ask for the same. Over a
-grid of 9 x 9 (0.0025 to 0.04 rad, 0.025 to 0.4 rad/s, factor sqrt 2) the error ranges are those with
-the least mean of max|e| / max|beta_ref| over the three runs (15, 25, 40 m/s), at no more total variation
-of the moment than `fnn` has in its worst run, sampled at 2 and at 5 ms. Left free to chatter,
-narrower ranges (0.0025 rad, 0.05 rad/s) come close to `fnn`; wide ones (0.02 rad, 0.2 rad/s) triple
-the error, which is nearer to the baseline that the paper shows.
+Chosen ranges: the moment range is the moment limit of `fnn`, so that both can request the same moment. The
+error ranges were selected on a grid of 9 x 9 (0.0025 to 0.04 rad, 0.025 to 0.4 rad/s, factor sqrt 2): least
+mean of max|e| / max|beta_ref| over the three runs (15, 25, 40 m/s), with at most the total variation of the
+moment that `fnn` has in its worst run, sampled at 2 and at 5 ms. If chatter is allowed, narrower ranges
+(0.0025 rad, 0.05 rad/s) come close to `fnn`; wide ranges (0.02 rad, 0.2 rad/s) triple the error, which is
+nearer to the paper's baseline.
 """
 
 from dataclasses import dataclass
@@ -37,13 +37,21 @@ RULES = """
 
 @dataclass(frozen=True)
 class FuzzySideslipParameters:
-    """Ranges of the three variables; the paper names none."""
+    """Ranges of the three variables; the paper gives none."""
 
     error_range: float = parameter(
-        0.005, "rad", "e beyond this saturates", "chosen: best of a grid, see the source", minimum=1e-6
+        0.005,
+        "rad",
+        "Error e at which the outer sets saturate",
+        "chosen: best of a grid, see the source",
+        minimum=1e-6,
     )
     error_rate_range: float = parameter(
-        0.05, "rad/s", "de/dt beyond this saturates", "chosen: best of a grid, see the source", minimum=1e-6
+        0.05,
+        "rad/s",
+        "Rate de/dt at which the outer sets saturate",
+        "chosen: best of a grid, see the source",
+        minimum=1e-6,
     )
     moment_range: float = parameter(
         5000.0, "N.m", "Peak of the outermost sets of M_z", "chosen: as controller_fnn", minimum=0.0

@@ -1,9 +1,9 @@
-"""Fuzzy sliding-mode yaw-moment control: the gains of the reaching law follow steering and friction.
+"""Sliding-mode yaw-moment control with gains scheduled by fuzzy rules.
 
-The law is in `control_laws.sliding_surface`, here always with the saturation of equation (24). A Mamdani
-system with five sets per variable sets eps and k_d from |delta| and mu by one table for both: small
-gains on a slippery road and going straight, where a strong law only shakes the car, large ones in a
-sharp turn on a good road. The centroid spans about 0.08 to 0.92 of each gain's range.
+The law is that of `control_laws.sliding_surface`, always with the saturation of equation (24). A Mamdani
+system with five sets per variable sets both eps and k_d from |delta| and mu by a common table: small gains
+on slippery roads and straight ahead, where a strong law only shakes the car, and large gains in sharp turns
+on dry roads. The centroid spans about 0.08 to 0.92 of each gain's range.
 
 Source: paper B, section 2.1, table 2. Ranges, sets and boundary layer are not given there: chosen.
 """
@@ -29,7 +29,7 @@ TABLE = """
 
 @dataclass(frozen=True)
 class FuzzySlidingModeParameters(SurfaceParameters):
-    """Parameters of the law and of the ranges that the paper leaves open."""
+    """Parameters of the law, and the ranges that the paper leaves open."""
 
     largest_reaching_rate: float = parameter(
         3.0, "rad/s2", "Range of eps, from 0", "chosen: its middle exceeds the constant law's", minimum=1e-6
@@ -38,15 +38,19 @@ class FuzzySlidingModeParameters(SurfaceParameters):
         10.0, "1/s", "Range of k_d, from 0", "chosen: up to that of the constant law", minimum=1e-6
     )
     largest_steer_angle: float = parameter(
-        0.09, "rad", "Steer angle from which |delta| is BB", "chosen: the amplitude of the runs", minimum=1e-6
+        0.09,
+        "rad",
+        "Steer angle above which |delta| is BB",
+        "chosen: the amplitude of the runs",
+        minimum=1e-6,
     )
     largest_friction: float = parameter(
-        1.0, "1", "Friction from which mu is BB", "chosen: dry asphalt", minimum=1e-6
+        1.0, "1", "Friction above which mu is BB", "chosen: dry asphalt", minimum=1e-6
     )
 
 
 class FuzzySlidingMode(Component):
-    """Sliding-mode yaw-moment controller whose gains a fuzzy system sets from steering and friction."""
+    """Sliding-mode yaw-moment controller with gains scheduled by fuzzy rules of steer angle and friction."""
 
     Parameters = FuzzySlidingModeParameters
     sampled = True
@@ -54,8 +58,8 @@ class FuzzySlidingMode(Component):
     outputs = (
         output("yaw_moment", *ERRORS, "velocity_x", "steer_angle", "friction"),
         output("sliding_surface", *SURFACE, unit="rad/s", text="Sliding surface s"),
-        output("reaching_rate", "steer_angle", "friction", unit="rad/s2", text="Gain eps as set on line"),
-        output("reaching_gain", "steer_angle", "friction", unit="1/s", text="Gain k_d as set on line"),
+        output("reaching_rate", "steer_angle", "friction", unit="rad/s2", text="Scheduled gain eps"),
+        output("reaching_gain", "steer_angle", "friction", unit="1/s", text="Scheduled gain k_d"),
     )
 
     def configure(self) -> None:

@@ -1,13 +1,13 @@
-"""Linear-quadratic yaw-moment control of sideslip and yaw rate, with gains for every speed.
+"""Linear-quadratic yaw-moment control of sideslip and yaw rate, scheduled by speed.
 
     M = k_beta(v_x) (beta_ref - beta) + k_r(v_x) (r_ref - r)
 
-The gains are optimal for the linear single-track car at the present speed; `control_laws.linear_feedback`
-has their closed form. Below `scheduling_speed` they stay what they are there, and the moment fades out
-below walking pace.
+The gains are optimal for the linear single-track car at the current speed; `control_laws.linear_feedback`
+has their closed form. Below `scheduling_speed` they are constant, and the moment fades out below walking
+pace.
 
-A baseline, not a paper's controller. The limit comes after the law, so at the limit it is not optimal;
-`controllers.mpc` knows of it beforehand.
+A baseline, not from a paper. The limit is applied after the law, so a limited moment is not optimal;
+`controllers.mpc` takes the limit into account.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from .pid import SEEN
 
 @dataclass(frozen=True)
 class LqrParameters:
-    """Parameters of the single-track car that the law is made for; weights, by what counts alike; limits."""
+    """Parameters of the single-track car, weights (as values of equal cost) and limits."""
 
     mass: float = like(PaperA, "mass")
     yaw_inertia: float = like(PaperA, "yaw_inertia")
@@ -35,22 +35,22 @@ class LqrParameters:
     sideslip_scale: float = parameter(
         0.02,
         "rad",
-        "Sideslip error beta_0 that weighs 1",
+        "Sideslip error beta_0 of cost 1",
         "chosen: small enough for a moment against the sideslip of an understeering car above 8 m/s",
         minimum=1e-6,
     )
     yaw_rate_scale: float = parameter(
         0.2,
         "rad/s",
-        "Yaw-rate error r_0 that weighs 1",
+        "Yaw-rate error r_0 of cost 1",
         "chosen: 11 degrees per second, so that actuators of 50 ms can follow",
         minimum=1e-6,
     )
     moment_scale: float = parameter(
-        5000.0, "N.m", "Moment M_0 that weighs 1", "chosen: as large as the limit", minimum=1e-3
+        5000.0, "N.m", "Moment M_0 of cost 1", "chosen: equal to the limit", minimum=1e-3
     )
     scheduling_speed: float = parameter(
-        8.0, "m/s", "Below it the gains stay", "chosen: slower cars are not in danger", minimum=0.1
+        8.0, "m/s", "Speed below which the gains are constant", "chosen: slower cars are safe", minimum=0.1
     )
     moment_limit: float = like(LimitParameters, "moment_limit")
     fade_speed: float = like(LimitParameters, "fade_speed")

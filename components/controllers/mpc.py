@@ -1,13 +1,13 @@
 """Model-predictive yaw-moment control of sideslip and yaw rate.
 
-`control_laws.predictive_law` has the law: the linear single-track car is predicted over
-`moves * steps_per_move * prediction_step`, and the moments that cost least within their limit are found by a
-quadratic program (`mathematics.quadratic_program`); the first of them is given out. Weights are those of
-`controllers.lqr`, which the law becomes where the horizon is long and nothing is at a limit. The sideslip's
-bound is that of `control_laws.sideslip_bound`. The car is linear at every speed of a grid, whose spacing is
-`SPACING`; the program of the last one is kept.
+The motion of the linear single-track car is predicted over `moves * steps_per_move * prediction_step`
+(`control_laws.predictive_law`). A quadratic program (`mathematics.quadratic_program`) finds the moments of
+least cost within the limit, and the first of them is the output. Weights are those of `controllers.lqr`,
+which is the limit of this law for a long horizon without active constraints. The bound of the sideslip is
+that of `control_laws.sideslip_bound`. The car is linearized at the speeds of a grid of spacing `SPACING`; the
+program of the latest grid speed is cached.
 
-A baseline, not a paper's controller.
+A baseline, not from a paper.
 """
 
 from dataclasses import dataclass
@@ -23,22 +23,22 @@ from .lqr import LqrParameters
 from .pid import SEEN
 
 SPACING = 0.5
-"""Spacing of the speeds [m/s]. Chosen: gains change by a hundredth or two from one to the next."""
+"""Spacing of the speed grid [m/s]. Chosen: gains change by 1 to 2 % between neighbours."""
 
 
 @dataclass(frozen=True)
 class MpcParameters(LqrParameters):
-    """Parameters of the LQR, and of the horizon."""
+    """Parameters of `lqr`, and of the horizon."""
 
     prediction_step: float = parameter(
-        0.02, "s", "Step of the prediction", "chosen: a tenth of the car's own times", minimum=1e-4
+        0.02, "s", "Prediction step", "chosen: a tenth of the car's time constants", minimum=1e-4
     )
-    steps_per_move: int = parameter(4, None, "Steps for which a moment is held", "chosen: 80 ms", minimum=1)
+    steps_per_move: int = parameter(4, None, "Steps per held moment", "chosen: 80 ms", minimum=1)
     moves: int = parameter(
         5, None, "Moments in the horizon", "chosen: 0.4 s in all, half a yaw oscillation", minimum=1
     )
     sideslip_penalty: float = parameter(
-        10.0, "1", "Weight of the excess over the sideslip's bound", "chosen: ten errors", minimum=1e-6
+        10.0, "1", "Weight of the excess over the sideslip bound", "chosen: ten errors", minimum=1e-6
     )
 
 
@@ -62,12 +62,12 @@ class Mpc(Component):
             moves=p.moves,
             steps_per_move=p.steps_per_move,
         )
-        self.place = 0  # the law that is kept has the parameters of before
+        self.place = 0  # the cached law has the old parameters
         self.law_at(p.scheduling_speed)
 
     def law_at(self, speed: float) -> PredictiveLaw:
-        """Return the law at the speed of the grid next to `speed` [m/s], which is kept."""
-        place = max(round(max(speed, self.p.scheduling_speed) / SPACING), 1)  # at rest there is none
+        """Return the law at the grid speed nearest to `speed` [m/s], cached."""
+        place = max(round(max(speed, self.p.scheduling_speed) / SPACING), 1)  # singular at rest
         if place != self.place:
             self.place = place
             dynamics = error_dynamics(self.car, place * SPACING)

@@ -1,4 +1,4 @@
-"""No control: the yaw moment is always zero, so the car answers as it would by itself."""
+"""No control: the yaw moment is always zero."""
 
 from ..fmi.component import Component
 

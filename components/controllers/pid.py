@@ -2,11 +2,11 @@
 
     M = PID(r_ref - r) + PID(beta - beta_ref)
 
-A positive moment raises the yaw rate and lowers the sideslip. How the loops integrate, differentiate
-and share their limit: `mathematics.pid_loop`. The moment fades out below walking pace, where sideslip
-means nothing.
+A positive moment raises the yaw rate and lowers the sideslip. `mathematics.pid_loop` describes integration,
+differentiation and the common limit of the loops. The moment fades out below walking pace, where sideslip is
+meaningless.
 
-Source: paper C, section 2.1, which names no gains.
+Source: paper C, section 2.1, which gives no gains.
 """
 
 from dataclasses import dataclass
@@ -49,7 +49,7 @@ class PidParameters:
         100.0, "N.m.s/rad", "K_d of the sideslip", "chosen: as the yaw rate's", minimum=0.0
     )
     derivative_filter: float = parameter(
-        0.02, "s", "Time constant of the derivatives' filter", "chosen: a tenth of the car's own", minimum=0.0
+        0.02, "s", "Time constant of the derivative filter", "chosen: a tenth of the car's own", minimum=0.0
     )
     moment_limit: float = like(LimitParameters, "moment_limit")
     fade_speed: float = like(LimitParameters, "fade_speed")
@@ -60,7 +60,7 @@ SEEN = ("yaw_rate_ref", "yaw_rate", "sideslip_ref", "sideslip")
 
 
 def gains_of(p: PidParameters, loop: str, kind: str = "gain") -> Gains:
-    """Return the three parameters of one `kind` that the loop "yaw_rate" or "sideslip" has."""
+    """Return the P, I and D parameters of a `kind` for the loop "yaw_rate" or "sideslip"."""
     return Gains(
         *(getattr(p, f"{loop}_{part}_{kind}") for part in ("proportional", "integral", "derivative"))
     )
@@ -89,7 +89,7 @@ class PidController(Component):
         self.decide()
 
     def decide(self) -> None:
-        """Set the moment from what the loops have seen."""
+        """Compute the moment from the current state of the loops."""
         self.moment = self.loops.moment(*self.gains, limit=self.p.moment_limit)
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:

@@ -1,8 +1,8 @@
 """Sliding-mode yaw-moment control with constant gains, the baseline of paper B.
 
-The law is in `control_laws.sliding_surface`. Its switching function is the sign, as in the paper's
-baseline, or the saturation of equation (24) with the same constant gains: the second shows how
-much of the fuzzy controller's calm the boundary layer alone achieves.
+The law is that of `control_laws.sliding_surface`. Its switching function is the sign, as in the paper's
+baseline, or the saturation of equation (24) with the same gains, which shows how much of the fuzzy
+controller's smoothness is due to the boundary layer alone.
 
 Source: paper B, section 2.1.
 """
@@ -16,7 +16,7 @@ from ..fmi.variables import output, parameter
 
 @dataclass(frozen=True)
 class SlidingModeParameters(SurfaceParameters):
-    """Parameters of the law; the paper names none of its gains."""
+    """Parameters of the law; the paper gives none of the gains."""
 
     switching: str = parameter(
         "sign",
@@ -38,7 +38,7 @@ class SlidingModeParameters(SurfaceParameters):
 
 
 class SlidingMode(Component):
-    """Sliding-mode yaw-moment controller with constant gains, by sign or saturation."""
+    """Sliding-mode yaw-moment controller with constant gains, switching by sign or saturation."""
 
     Parameters = SlidingModeParameters
     sampled = True

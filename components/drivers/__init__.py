@@ -1,1 +1,1 @@
-"""Drivers: what the person at the wheel does, open or closed loop."""
+"""Drivers: steering and drive force over time, open or closed loop."""

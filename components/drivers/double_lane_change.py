@@ -1,17 +1,17 @@
-"""Closed-loop driver for a double lane change: steers towards the path one preview ahead, holds the speed.
+"""Closed-loop driver for a double lane change by single-point preview, with speed control.
 
     p        = (x, y) + L (cos psi, sin psi),        L = v T_p                  preview point
     e        = (path(p_x) - p_y) cos psi             its distance from the path
-    kappa    = 2 e / L^2                             the arc that ends on the path there
+    kappa    = 2 e / L^2                             curvature of the arc to the path there
     delta_h* = steering_ratio kappa l (1 + K v^2)    within +-largest hand-wheel angle
     tau d(delta_h)/dt = delta_h*(t - delay) - delta_h,    |d(delta_h)/dt| <= largest hand-wheel rate
 
-l wheelbase, K stability factor: the driver knows how the car steers while its tyres are linear. With a
-car that followed at once, the path would be approached as by an oscillator of
-sqrt(2) / T_p and damping ratio 0.7. The path and the cones: `driving.track`. The speed:
-`driving.speed_holding`.
+l is the wheelbase, K the stability factor: the driver inverts the steady-state steering of the car with
+linear tyres. A car without lag would approach the path like an oscillator with natural frequency
+sqrt(2) / T_p and damping ratio 0.7. Path and cones: `driving.track`. Speed: `driving.speed_holding`.
 
-`path_offset` is the car's own distance from the path, `cone_overrun` how far the body is beyond the cones.
+`path_offset` is the distance of the centre of mass from the path, `cone_overrun` that of the body beyond the
+cones.
 
 Source: the single-point preview of C. C. MacAdam, IEEE Trans. Systems, Man, and Cybernetics 11(6), 1981,
 393-399, with an arc in place of an optimal control. Paper C does not describe CarSim's driver.
@@ -31,16 +31,16 @@ from ..mathematics.first_order_lag import Stage
 
 @dataclass(frozen=True)
 class DoubleLaneChangeParameters(HeldSpeedParameters, LaneChangeParameters):
-    """Parameters of the driver, of the car as the driver knows it, and of the track."""
+    """Parameters of the driver, of the driver's model of the car, and of the track."""
 
     preview_time: float = parameter(
         0.78, "s", "Preview T_p", "chosen: through the cones at 70 km/h on mu 0.4", minimum=0.05
     )
     least_preview: float = parameter(
-        4.0, "m", "Shortest preview distance L", "chosen: just before the bumper", minimum=0.1
+        4.0, "m", "Shortest preview distance L", "chosen: just ahead of the bumper", minimum=0.1
     )
     reaction_delay: float = parameter(
-        0.0, "s", "Pure delay of the driver", "chosen: none, the lag stands for it", minimum=0.0
+        0.0, "s", "Pure delay of the driver", "chosen: none, contained in the lag", minimum=0.0
     )
     steering_lag: float = parameter(
         0.1, "s", "Lag tau of arms and steering", "chosen: a practised driver", minimum=0.0
@@ -70,7 +70,7 @@ def arc(x: float, y: float, psi: float, *, track: Track, preview: float) -> floa
 
 
 class DoubleLaneChange(Component):
-    """Driver who takes a double lane change at a held speed, by preview of one point."""
+    """Closed-loop driver for a double lane change by single-point preview, with speed control."""
 
     Parameters = DoubleLaneChangeParameters
     inputs = ("velocity_x", "position_x", "position_y", "yaw_angle")
@@ -89,7 +89,7 @@ class DoubleLaneChange(Component):
     def advance(self, t: float, h: float, u: list[float]) -> None:
         self.speed.advance(t, h, u[0])
         before = self.wanted
-        self.wanted = self._wanted(u)  # positions are those of the end of the step
+        self.wanted = self._wanted(u)  # from positions at the end of the step
         self.hands.advance(t, h, 0.5 * (before + self.wanted))
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
@@ -103,7 +103,7 @@ class DoubleLaneChange(Component):
         )
 
     def _wanted(self, u: list[float]) -> float:
-        """Return the hand-wheel angle [rad] that the driver wants."""
+        """Return the desired hand-wheel angle [rad]."""
         p = self.p
         v, x, y, psi = u
         preview = max(v * p.preview_time, p.least_preview)

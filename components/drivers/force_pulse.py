@@ -1,11 +1,11 @@
-"""Open-loop braking or driving for a while, with the wheel straight or turned.
+"""Open-loop pulse of braking or driving force, straight ahead or with ramp steering.
 
     F(t)     = force                                                    during the pulse, else 0
     delta(t) = final_steer_angle (t - steer_start_time) / steer_time    while the wheel is turned;
                0 before, final_steer_angle after
 
-The pulse begins and ends at once, as a panic stop does. What the car cannot carry out, because the
-road has less grip, is the business of wheel control and tyres. A steer time of zero makes it a step.
+The pulse is a step up and down, as in a panic stop; wheel control and tyres limit the force to the available
+grip. A steer time of zero gives a steering step.
 """
 
 from dataclasses import dataclass
@@ -17,16 +17,16 @@ from ..fmi.variables import parameter
 
 @dataclass(frozen=True)
 class ForcePulseParameters:
-    """Parameters of pedal and steering wheel; in no paper: chosen for slip control on a slippery road."""
+    """Parameters of pedal and steering wheel; not from a paper, chosen for slip control on slippery roads."""
 
     force: float = parameter(
         -6000.0,
         "N",
-        "Sum of the longitudinal tyre forces asked for, negative when braking",
-        "chosen: half again what paper B's car can have at mu 0.3",
+        "Requested sum of the longitudinal tyre forces, negative when braking",
+        "chosen: one and a half times the grip of paper B's car at mu 0.3",
     )
-    start_time: float = parameter(0.5, "s", "Time at which the pulse begins", "chosen: time to see it begin")
-    duration: float = parameter(1.5, "s", "Duration of the pulse", "chosen: long enough to lock", minimum=0.0)
+    start_time: float = parameter(0.5, "s", "Time at which the pulse begins", "chosen: shows the beginning")
+    duration: float = parameter(1.5, "s", "Duration of the pulse", "chosen: wheels can lock", minimum=0.0)
     final_steer_angle: float = parameter(
         0.0, "rad", "Final steer angle at the road wheels", "chosen: straight on"
     )
@@ -34,7 +34,7 @@ class ForcePulseParameters:
         0.5, "s", "Time at which the wheel begins to turn", "chosen: that of the pulse"
     )
     steer_time: float = parameter(
-        0.1, "s", "Time it takes to turn the wheel", "chosen: a quick evasive turn", minimum=0.0
+        0.1, "s", "Duration of the steering ramp", "chosen: a quick evasive turn", minimum=0.0
     )
 
 
@@ -49,7 +49,7 @@ def held_steer(t: float, p: ForcePulseParameters) -> float:
 
 
 class ForcePulse(Component):
-    """Open-loop braking or driving for a while, straight on or in a turn."""
+    """Open-loop pulse of braking or driving force, straight ahead or with ramp steering."""
 
     Parameters = ForcePulseParameters
     outputs = ("steer_angle", "drive_force")

@@ -1,12 +1,11 @@
-"""Drives as a recording says: the hand wheel at its angle, the speed held to its speed.
+"""Driver that follows a recording: hand-wheel angle open loop, speed closed loop.
 
     delta = delta_h / steering_ratio
     F     = mass a_x + K (v - v_x)          between -F_brake and F_drive, held over a step
 
-v, a_x and delta_h are the recording's. Its longitudinal acceleration already has all resistances in it, so
-that the gain has only to hold the rest; without a recorded acceleration (input left at 0) the speed lags by
-mass a_x / K. Negative forces brake. The force follows the speed by a step, so that speed and force make no
-algebraic loop.
+v, a_x and delta_h are those of the recording. The recorded acceleration includes all resistances, so the gain
+only corrects the remaining error; without it (input at 0) the speed lags by mass a_x / K. Negative forces
+brake. The force lags the speed by a step, so that they form no algebraic loop.
 """
 
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ from ..fmi.variables import like, output, parameter, signal
 
 @dataclass(frozen=True)
 class MeasuredParameters:
-    """Parameters of the steering, and of the foot."""
+    """Parameters of steering and speed control."""
 
     steering_ratio: float = like(SteeringParameters, "steering_ratio")
     mass: float = like(PaperC, "mass")
@@ -31,21 +30,26 @@ class MeasuredParameters:
         minimum=0.0,
     )
     drive_force_limit: float = parameter(
-        20000.0, "N", "Largest force that drives", "chosen: above the grip of a car's tyres", minimum=0.0
+        20000.0, "N", "Largest driving force", "chosen: above the grip of a car's tyres", minimum=0.0
     )
     brake_force_limit: float = parameter(
-        30000.0, "N", "Largest force that brakes", "chosen: above the grip of a car's tyres", minimum=0.0
+        30000.0, "N", "Largest braking force", "chosen: above the grip of a car's tyres", minimum=0.0
     )
 
 
 class Measured(Component):
-    """Driver who steers as a recording says and holds its speed by feed-forward and a gain."""
+    """Driver that follows a recording: hand-wheel angle open loop, speed closed loop."""
 
     Parameters = MeasuredParameters
     inputs = (
         signal("steering_wheel_angle_measured", "rad", "Hand-wheel angle of a recording"),
         signal("velocity_x_measured", "m/s", "Speed of a recording along x, at the centre of mass"),
-        signal("acceleration_x_measured", "m/s2", "That acceleration; 0: left to the gain", optional=True),
+        signal(
+            "acceleration_x_measured",
+            "m/s2",
+            "Longitudinal acceleration of a recording; 0: feedback only",
+            optional=True,
+        ),
         "velocity_x",
     )
     outputs = (

@@ -1,29 +1,28 @@
-"""Driver for a double lane change between cones: an optimal path, followed by optimal preview.
+"""Driver for a double lane change between cones: optimal path, followed by optimal preview control.
 
-The path is the one through the cones that asks least of the tyres (`driving.lane_path`), found once for the
-car, its speed and the road. The hand wheel is turned at the rate that is optimal for the linear
-single-track car with the path known for `preview_time` (`mathematics.preview_control`):
+The path through the cones minimizes the tyre forces (`driving.lane_path`); it is computed once for the car,
+its speed and the road. The rate of the hand wheel is optimal for the linear single-track car with the path
+known for `preview_time` (`mathematics.preview_control`):
 
     x = (y, psi, v_y, r, delta)             d delta / dt = the input
     least   sum of  ((y - path) / e_0)^2 + (i_s d delta / dt)^2
 
-with gains that are those of whole metres per second and run straight between them. What the linear car
-needs as side force of its front axle, F = C_f (delta - eta), eta = (v_y + a r) / v, the tyres give at a
-larger slip alpha, after Fiala:
+with gains computed at whole metres per second and interpolated linearly. Real tyres give the front side force
+of the linear car, F = C_f (delta - eta), eta = (v_y + a r) / v, at a larger slip angle alpha, after Fiala:
 
     F = F_max (1 - (1 - C_f alpha / (3 F_max))^3),      F_max = grip_share mu m g b / L
 
-so the hand wheel is at i_s (eta + alpha), and asks for no more than F_max: beyond, more steering does not
-help. Fast: neither lag nor delay, within the largest angle and rate of a skilled driver.
+so the hand-wheel angle is i_s (eta + alpha), and F is limited to F_max, beyond which more steering does not
+help. The driver has neither lag nor delay, only the largest angle and rate of a skilled driver.
 
-The speed is held, or the accelerator let go at a place, `coasting_after` the first cones, as ISO 3888-2 has
-it (`driving.speed_holding`). `path_offset` is the car's own distance from the path, `cone_overrun` how far
-the body is beyond the cones.
+The speed is held, or the accelerator is released `coasting_after` the first cones, as in ISO 3888-2
+(`driving.speed_holding`). `path_offset` is the distance of the centre of mass from the path, `cone_overrun`
+that of the body beyond the cones.
 
 Source: R. S. Sharp, V. Valtetsiotis, Optimal preview car steering control, Vehicle System Dynamics 35
 (supplement), 2001; C. C. MacAdam, Application of an optimal preview control for simulation of closed-loop
 automobile driving, IEEE Trans. Systems, Man, and Cybernetics 11(6), 1981; E. Fiala,
-Seitenkräfte am rollenden Luftreifen, VDI-Zeitschrift 96, 1954. Path and driver's knowledge of the tyres:
+Seitenkräfte am rollenden Luftreifen, VDI-Zeitschrift 96, 1954. The path and the correction for the tyres are
 ours.
 """
 
@@ -47,57 +46,55 @@ from .double_lane_change import DoubleLaneChangeParameters
 STEP = 0.03
 """Time step of the preview [s]. Chosen: half a metre at 18 m/s."""
 SLOWEST = 2.0
-"""Speed below which gains stay what they are there [m/s]."""
+"""Speed below which the gains are constant [m/s]."""
 MOST = 0.99
-"""Share of F_max that is asked for; chosen: Fiala's slip is finite there, 0.78 of that of all."""
+"""Largest share of F_max; chosen: 0.78 of the slip at which Fiala's force saturates."""
 
 
 @dataclass(frozen=True)
 class OptimalPreviewParameters(HeldSpeedParameters, LaneChangeParameters):
-    """Parameters of the driver, of the car as the driver knows it, and of the track."""
+    """Parameters of the driver, of the driver's model of the car, and of the track."""
 
     path_margin: float = parameter(
-        0.1, "m", "Margin between body and cones that the path aims at", "chosen: tuned", minimum=0.0
+        0.1, "m", "Desired margin between body and cones", "chosen: tuned", minimum=0.0
     )
     path_give: float = parameter(
         0.06,
         "m",
-        "Lack of margin s_0 that weighs as much as the side force path_effort",
+        "Lack of margin s_0 with the same cost as the side force path_effort",
         "chosen: tuned",
         minimum=1e-3,
     )
     path_effort: float = parameter(
-        0.75, "1", "Share of the friction that the path asks for unless cones ask for more", "chosen: tuned",
+        0.75, "1", "Share of the friction that the path uses unless the cones require more", "chosen: tuned",
         minimum=0.01,
     )  # fmt: skip
     path_deceleration: float = parameter(
         0.7,
         "m/s2",
-        "Deceleration by tyres and air, while the car coasts, that the path reckons with",
+        "Assumed deceleration of the coasting car by tyres and drag, for the path",
         "chosen: 60 to 53 km/h through ISO 3888-2",
         minimum=0.0,
     )
-    preview_time: float = parameter(
-        1.5, "s", "Time for which the path is known ahead", "chosen: longer changes nothing", minimum=0.05
-    )
+    preview_time: float = parameter(1.5, "s", "Preview time", "chosen: longer changes nothing", minimum=0.05)
     offset_scale: float = parameter(
         0.005,
         "m",
-        "Distance e_0 from the path that weighs as much as 1 rad/s of the hand wheel",
+        "Distance e_0 from the path with the same cost as 1 rad/s of the hand wheel",
         "chosen: tuned",
         minimum=1e-5,
     )
     base_friction: float = parameter(
         0.9,
         "1",
-        "Friction coefficient of the road that the driver reckons with",
+        "Friction coefficient of the road that the driver assumes",
         "chosen: dry asphalt",
         minimum=0.01,
     )
     grip_share: float = parameter(
         0.9,
         "1",
-        "Share of the friction that the front axle can bear",
+        "Share of the friction available to the front axle",
         "chosen: load transfer takes a tenth",
         minimum=0.1,
     )
@@ -105,15 +102,15 @@ class OptimalPreviewParameters(HeldSpeedParameters, LaneChangeParameters):
     steering_wheel_rate_limit: float = parameter(
         20.0,
         "rad/s",
-        "Fastest turn of the hand wheel",
-        "chosen: 1150 deg/s, as in an emergency; with 12 rad/s the wheel would be the limit, not the tyres",
+        "Largest rate of the hand wheel",
+        "chosen: 1150 deg/s, as in an emergency; with 12 rad/s the driver would be the limit, not the tyres",
         minimum=0.01,
     )
     steering_ratio: float = like(DoubleLaneChangeParameters, "steering_ratio")
     coasting_after: float = parameter(
         -1.0,
         "m",
-        "Where the accelerator is let go, from the first cones on; negative: nowhere",
+        "Distance after the first cones at which the accelerator is released; negative: never",
         "chosen: the speed is held",
     )
     mass: float = like(PaperC, "mass")
@@ -125,7 +122,7 @@ class OptimalPreviewParameters(HeldSpeedParameters, LaneChangeParameters):
 
 
 class OptimalPreview(Component):
-    """Driver who takes a double lane change between cones by an optimal path and optimal preview."""
+    """Driver for a double lane change between cones: optimal path, followed by optimal preview control."""
 
     Parameters = OptimalPreviewParameters
     inputs = ("velocity_x", "velocity_y", "yaw_rate", "position_x", "position_y", "yaw_angle")
@@ -140,7 +137,7 @@ class OptimalPreview(Component):
 
     def start(self, t: float, u: list[float]) -> None:
         self.speed = SpeedHold(self.p, u[0])
-        self.linear = self.hand = 0.0  # hand wheel of the linear car and of this one [rad]
+        self.linear = self.hand = 0.0  # hand wheel of the linear and of the real car [rad]
 
     def advance(self, t: float, h: float, u: list[float]) -> None:
         p: OptimalPreviewParameters = self.p
@@ -165,7 +162,7 @@ class OptimalPreview(Component):
         )
 
     def _rate(self, u: list[float]) -> float:
-        """Return the optimal rate of the linear car's hand wheel [rad/s]: between those of two speeds."""
+        """Return the optimal rate of the linear car's hand wheel [rad/s], with interpolated gains."""
         v, v_y, r, x, y, psi = u
         along = STEP * (v * cos(psi) - v_y * sin(psi))
         path = self.path
@@ -178,14 +175,14 @@ class OptimalPreview(Component):
         return rate + share * (above - rate)
 
     def _gains(self, v: int) -> tuple[float, ...]:
-        """Return the gains of the state and of the path ahead at a whole speed [m/s]."""
+        """Return the gains of state and previewed path at a whole speed [m/s], cached."""
         if v not in self.gains:
             p: OptimalPreviewParameters = self.p
             self.gains[v] = preview_gains(v, self.car, p.steering_ratio, p.offset_scale, self.steps)
         return self.gains[v]
 
     def _hand(self, u: list[float]) -> float:
-        """Return the hand-wheel angle [rad] at which the front tyres give what the linear car's would."""
+        """Return the hand-wheel angle [rad] for the front side force of the linear car, with real tyres."""
         p: OptimalPreviewParameters = self.p
         car, ratio = self.car, p.steering_ratio
         v, v_y, r = u[0], u[1], u[2]
@@ -201,7 +198,7 @@ class OptimalPreview(Component):
 def lane_dynamics(
     car: SingleTrackCar, v: float, steering_ratio: float
 ) -> tuple[list[list[float]], list[float]]:
-    """Return A and b of (y, psi, v_y, r, hand wheel), in SI, at `v` [m/s]; input: the last one's rate."""
+    """Return A and b of the state (y, psi, v_y, r, hand wheel) at `v` [m/s]; input: the hand wheel's rate."""
     columns = []
     for v_y, r, delta in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0 / steering_ratio)):
         turning, yawing = car.derivatives(v_y / v, r, delta=delta, v=v)
@@ -220,7 +217,7 @@ def lane_dynamics(
 def preview_gains(
     v: int, car: SingleTrackCar, steering_ratio: float, offset_scale: float, steps: int
 ) -> tuple[float, ...]:
-    """Return the gains of the state and of the path ahead at `v` [m/s], for `steps` of the preview."""
+    """Return the gains of state and previewed path at `v` [m/s], for a preview of `steps` steps."""
     phi, gamma = discrete(*lane_dynamics(car, float(v), steering_ratio), STEP)
     first = (1.0, 0.0, 0.0, 0.0, 0.0)  # y
     state, ahead = tracking_gains(phi, gamma, first, weight=offset_scale**-2, steps=steps)
@@ -229,7 +226,7 @@ def preview_gains(
 
 @lru_cache(maxsize=16)
 def planned(p: OptimalPreviewParameters) -> LanePath:
-    """Return the path through the cones that suits the car, its target speed and the road."""
+    """Compute the path through the cones for the car, its target speed and the road."""
     track, car, v = Track(p), SingleTrackCar.of(p), max(p.target_speed, SLOWEST)
     yaw_gain, slip_gain = car.gains(v)
     lost = 2.0 * p.path_deceleration / (v * v) if p.coasting_after >= 0.0 else 0.0

@@ -1,9 +1,9 @@
-"""Open-loop ramp steering: the wheel is turned at a steady rate to an angle and held there.
+"""Open-loop ramp steering: the hand wheel turns at a constant rate to an angle and is held there.
 
     delta_h(t) = amplitude (t - start_time) / ramp_time,   held at 0 before and at the amplitude after
     delta(t) = delta_h(t) / steering_ratio
 
-A ramp time of zero makes it a step. The speed is held by default (`driving.speed_holding`).
+A ramp time of zero gives a step. The speed is held by default (`driving.speed_holding`).
 
 Source: paper C, section 3.3: 1.5 rad, reached in 2 s.
 """
@@ -24,7 +24,7 @@ class RampParameters(SteeringParameters, HeldSpeedParameters):
 
 
 class Ramp(HandWheelDriver):
-    """Open-loop steering to an angle, held there, at a held speed."""
+    """Open-loop ramp steering to an angle, at constant speed."""
 
     Parameters = RampParameters
 

@@ -1,10 +1,10 @@
-"""Open-loop sine steering: a number of whole periods, then the wheel is held straight.
+"""Open-loop sine steering for a number of periods, then straight ahead.
 
     delta_h(t) = amplitude sin(2 pi frequency (t - start_time)),   0 <= frequency (t - start_time) <= periods
     delta(t) = delta_h(t) / steering_ratio
 
-With the default steering ratio of one the amplitude is that of the road wheels. The speed is held if
-`speed_gain` says so (`driving.speed_holding`).
+With the default steering ratio of 1 the amplitude is that of the road wheels. The speed is held if
+`speed_gain` is positive (`driving.speed_holding`).
 """
 
 import math
@@ -17,12 +17,12 @@ from ..fmi.variables import of_car, parameter
 
 @dataclass(frozen=True)
 class SineParameters(SteeringParameters, SpeedHoldingParameters):
-    """Parameters of the steering input; papers A and B name a sine but neither amplitude nor period."""
+    """Parameters of the steering input; papers A and B mention a sine but neither amplitude nor period."""
 
     amplitude: float = parameter(0.05, "rad", "Amplitude at the hand wheel", "chosen: paper A at 15 m/s")
     steering_ratio: float = of_car(1.0, "chosen: 1, the amplitude is that of the road wheels")
     frequency: float = parameter(
-        0.2, "Hz", "Frequency", "chosen: one period of 5 s, as in paper A's figure 6", minimum=0.0
+        0.2, "Hz", "Frequency", "chosen: a period of 5 s, as in paper A's figure 6", minimum=0.0
     )
     periods: float = parameter(1.0, "1", "Number of periods, then straight ahead", "chosen: one", minimum=0.0)
 
@@ -36,7 +36,7 @@ def sine_steer(t: float, p: SineParameters) -> float:
 
 
 class Sine(HandWheelDriver):
-    """Open-loop sine steering; the speed may be held."""
+    """Open-loop sine steering, optionally at constant speed."""
 
     Parameters = SineParameters
 

@@ -1,4 +1,4 @@
-"""Open-loop sweep: a sine of the hand wheel whose frequency rises steadily, at a held speed.
+"""Open-loop sine sweep: hand-wheel sine with linearly rising frequency, at constant speed.
 
     delta_h(t) = amplitude sin(2 pi (f_0 s + (f_1 - f_0) s^2 / (2 T))),   s = t - t_0,   0 <= s <= T,   else 0
     delta(t) = delta_h(t) / steering_ratio
@@ -42,7 +42,7 @@ def sweep(t: float, p: SineSweepParameters) -> float:
 
 
 class SineSweep(HandWheelDriver):
-    """Open-loop sine of rising frequency, at a held speed."""
+    """Open-loop sine sweep with linearly rising frequency, at constant speed."""
 
     Parameters = SineSweepParameters
 

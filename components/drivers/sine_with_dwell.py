@@ -1,12 +1,12 @@
-"""Open-loop sine with dwell: one period of a sine that pauses at its second peak, while the car coasts.
+"""Open-loop sine with dwell: a sine period with a pause at its second peak, while the car coasts.
 
     delta_h(t) = amplitude sin(2 pi f s),    s = t - t_0                    0 <= s <= 3 / (4 f)
                = -amplitude                                                 for the dwell
                = amplitude sin(2 pi f (s - dwell))                          until s = 1 / f + dwell, else 0
     delta(t) = delta_h(t) / steering_ratio
 
-A positive amplitude steers to the left first. The speed is held until the accelerator is let go, shortly
-before the steering begins (`driving.speed_holding`), so that drive forces have died down by then.
+A positive amplitude steers to the left first. The speed is held until the accelerator is released, shortly
+before the steering begins (`driving.speed_holding`), so that drive forces have decayed by then.
 
 Source: UN Global Technical Regulation No. 8 and UN Regulation No. 140, Electronic stability control
 systems: 0.7 Hz, a pause of 500 ms, coasting in the highest gear at 80 km/h; likewise FMVSS 126.
@@ -25,7 +25,7 @@ class SineWithDwellParameters(SteeringParameters, HeldSpeedParameters):
     """Parameters of the steering input and of the accelerator."""
 
     amplitude: float = parameter(
-        math.radians(270.0), "rad", "Amplitude at the hand wheel", "UN R140: least of the last runs"
+        math.radians(270.0), "rad", "Amplitude at the hand wheel", "UN R140: smallest of the final runs"
     )
     frequency: float = parameter(0.7, "Hz", "Frequency f of the sine", "UN R140, GTR 8", minimum=0.01)
     dwell: float = parameter(0.5, "s", "Pause at the second peak", "UN R140, GTR 8", minimum=0.0)
@@ -33,13 +33,13 @@ class SineWithDwellParameters(SteeringParameters, HeldSpeedParameters):
         1.5,
         "s",
         "Time t_0 at which steering begins",
-        "chosen: room for the second that signals are zeroed by",
+        "chosen: leaves the second over which signals are zeroed",
     )
     coasting_before: float = parameter(
         1.1,
         "s",
-        "How long before the steering the accelerator is let go",
-        "chosen: the car coasts throughout the second that signals are zeroed by",
+        "Time between releasing the accelerator and steering",
+        "chosen: the car coasts throughout the second over which signals are zeroed",
     )
     target_speed: float = parameter(
         80.0 / 3.6, "m/s", "Speed held until then", "UN R140, GTR 8: 80 km/h", minimum=0.0
@@ -58,7 +58,7 @@ def sine_with_dwell(t: float, p: SineWithDwellParameters) -> float:
 
 
 class SineWithDwell(HandWheelDriver):
-    """Open-loop sine with dwell of a coasting car."""
+    """Open-loop sine with dwell, with the car coasting."""
 
     Parameters = SineWithDwellParameters
 

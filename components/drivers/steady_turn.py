@@ -1,14 +1,14 @@
-"""Round a circle at a held speed; then the hand wheel is held, and the accelerator let go or the car braked.
+"""Steady-state circle at constant speed, then lift-off or braking with a fixed hand wheel.
 
     kappa*   = ramp to 1 / radius within turn_in_time
-    delta    = c kappa* + I,   dI/dt = c (kappa* - r / v) / T_i,    c = L (1 + K v^2)       until the action
-    from it on delta is held, the drive force falls to 0, the brakes rise to -mass deceleration
+    delta    = c kappa* + I,   dI/dt = c (kappa* - r / v) / T_i,    c = L (1 + K v^2)       before the action
+    then delta is held, the drive force falls to 0, and the brake force rises to mass deceleration
 
-L wheelbase, K stability factor: the driver knows how the car steers while its tyres are linear, and learns
-the rest on the circle. With a deceleration of 0 it is a lift-off.
+L is the wheelbase, K the stability factor: feedforward for a car with linear tyres, and an integral for the
+rest. A deceleration of 0 is a lift-off.
 
 Source: after ISO 7975 (braking in a turn) and ISO 9816 (power-off in a turn), open loop, from memory of the
-standards: 100 m, 5 m/s2 of lateral acceleration, the hand wheel held.
+standards: 100 m, lateral acceleration of 5 m/s2, fixed hand wheel.
 """
 
 from dataclasses import dataclass
@@ -25,33 +25,33 @@ from .double_lane_change import DoubleLaneChangeParameters
 
 @dataclass(frozen=True)
 class SteadyTurnParameters(HeldSpeedParameters):
-    """Parameters of the circle, of the action, and of the car as the driver knows it."""
+    """Parameters of the circle, of the action, and of the driver's model of the car."""
 
     radius: float = parameter(
-        100.0, "m", "Radius of the circle, positive: to the left", "after ISO 7975, from memory"
+        100.0, "m", "Radius of the circle, positive to the left", "after ISO 7975, from memory"
     )
     target_speed: float = parameter(
         sqrt(500.0), "m/s", "Speed held", "after ISO 7975: 5 m/s2 on 100 m", minimum=0.0
     )
     start_time: float = parameter(1.0, "s", "Time at which steering begins", "chosen: 1 s straight ahead")
     turn_in_time: float = parameter(
-        2.0, "s", "Time until all of the curvature is asked for", "chosen: without overshoot", minimum=0.0
+        2.0, "s", "Time until the requested curvature is full", "chosen: without overshoot", minimum=0.0
     )
     integral_time: float = parameter(
-        1.0, "s", "Integral time T_i of the curvature", "chosen: slower than the yaw rate", minimum=0.01
+        1.0, "s", "Integral time T_i of the curvature", "chosen: slower than the yaw response", minimum=0.01
     )
     action_time: float = parameter(
-        9.0, "s", "Time from which the hand wheel is held and the pedals change", "chosen: a steady turn"
+        9.0, "s", "Time at which the hand wheel is fixed and the pedals change", "chosen: a steady turn"
     )
     deceleration: float = parameter(
         0.0,
         "m/s2",
-        "Braking, over the mass; 0: the accelerator is let go only",
+        "Brake force over mass; 0: lift-off only",
         "chosen: lift-off",
         minimum=0.0,
     )
     brake_rise_time: float = parameter(
-        0.2, "s", "Time until the brake is pressed", "chosen: a quick foot", minimum=0.0
+        0.2, "s", "Time until the brake force is full", "chosen: a quick foot", minimum=0.0
     )
     steering_ratio: float = like(DoubleLaneChangeParameters, "steering_ratio")
     mass: float = like(PaperC, "mass")
@@ -62,7 +62,7 @@ class SteadyTurnParameters(HeldSpeedParameters):
 
 
 class SteadyTurn(Component):
-    """Driver who holds a circle and a speed, then lets go of the accelerator or brakes."""
+    """Driver that holds a circle and a speed, then releases the accelerator or brakes."""
 
     Parameters = SteadyTurnParameters
     inputs = ("velocity_x", "yaw_rate")
@@ -81,7 +81,7 @@ class SteadyTurn(Component):
 
     def advance(self, t: float, h: float, u: list[float]) -> None:
         self.speed.advance(t, h, u[0])
-        held = min(max(self.p.action_time - t, 0.0), h)  # of the step, how much is before the action
+        held = min(max(self.p.action_time - t, 0.0), h)  # part of the step before the action
         if held > 0.0:
             v = max(u[0], 1.0)
             lacking = self._wanted(t) - u[1] / v

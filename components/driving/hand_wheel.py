@@ -1,9 +1,9 @@
-"""The base of open-loop drivers: a hand-wheel angle over time, at a speed that may be held.
+"""Base class of open-loop drivers: hand-wheel angle as a function of time, with optional speed control.
 
     delta(t) = delta_h(t) / steering_ratio
 
-A manoeuvre is one function of time. Stimuli live in a component, not in the master, so that they are exact at
-every instant and not quantised to whole communication steps. The speed: `driving.speed_holding`.
+A manoeuvre is a function of time. Stimuli come from a component, not from the master, so that they are exact
+at every instant and not quantised to communication steps. Speed: `driving.speed_holding`.
 """
 
 from dataclasses import dataclass
@@ -16,21 +16,21 @@ from .speed_holding import SpeedHold
 
 @dataclass(frozen=True)
 class SteeringParameters:
-    """Parameters of the steering and of when it begins."""
+    """Parameters of the steering."""
 
     steering_ratio: float = of_car(17.0, "chosen: large saloon")
     start_time: float = parameter(1.0, "s", "Time at which steering begins", "chosen: 1 s straight ahead")
 
 
 def ramp(late: float, duration: float, final: float) -> float:
-    """Return what rises from 0 to `final` over `duration` [s], `late` [s] after its begin; a step if 0 s."""
+    """Return a ramp from 0 to `final` over `duration` [s], `late` [s] after its start; 0 s gives a step."""
     if late <= 0.0:
         return 0.0
     return final if late >= duration else final * late / duration
 
 
 class HandWheelDriver(Component):
-    """Base: steers by `hand_wheel_angle`, and holds the speed if told to."""
+    """Base class of open-loop drivers, which steer by `hand_wheel_angle`."""
 
     inputs = (signal("velocity_x", optional=True),)
     outputs = ("steer_angle", "drive_force", "steering_wheel_angle")
@@ -40,7 +40,7 @@ class HandWheelDriver(Component):
         raise NotImplementedError
 
     def coasts_from(self) -> float:
-        """Return when the accelerator is let go for good [s]; infinite: never."""
+        """Return the time at which the accelerator is released for good [s]; infinity for never."""
         return inf
 
     def start(self, t: float, u: list[float]) -> None:

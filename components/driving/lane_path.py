@@ -1,20 +1,20 @@
-"""The path through the lanes of a double lane change that asks least of the tyres where it asks most.
+"""Path through the lanes of a double lane change with the least peak of the tyre forces.
 
     F_f / m_f = v^2 (y'' + i_f y'''),    i_f = I_z / (m b)        side force of the front axle over the mass
     F_r / m_r = v^2 (y'' - i_r y'''),    i_r = I_z / (m a)        that it carries, of the rear axle likewise
 
-    least  integral of  sum (F / m / a_0)^8 / 8  over x  +  sum (what the margin lacks / s_0)^2 / 2
-           (and a little of (F / m / a_0)^2, so that a slow car's path is calm, too)
+    minimize  integral of  sum (F / m / a_0)^8 / 8  over x  +  sum (lack of margin / s_0)^2 / 2
+              (and a small weight of (F / m / a_0)^2, so that the path of a slow car is smooth, too)
 
-A power of eight is nearly the largest value: the path spreads its curvature, begins to turn in lanes that
-are wider than the car, and goes as near to the cones as the tyres need. a_0 is the acceleration, s_0 the
-lack of margin that weigh alike. The speed falls while the car coasts, and with it what a bend asks for.
+The power of eight approximates the peak: the path spreads its curvature, begins to turn in lanes that are
+wider than the car, and passes the cones as closely as the tyres require. The acceleration a_0 and the lack of
+margin s_0 have equal cost. The speed falls while the car coasts, and so do the forces in a given bend.
 
-y'' runs along straight lines between knots, so that y, y' and y'' at any x are linear in its values there,
-and so are the places of the body, y + s (y' - beta) +- w / 2 at s ahead of the centre of mass, with the
-sideslip beta = c y'' of a steady turn. The sum is convex; Newton's method finds its least value.
+y'' is piecewise linear between knots, so that y, y' and y'' at any x are linear in its values at the knots,
+as are the positions of the body, y + s (y' - beta) +- w / 2 at s ahead of the centre of mass, with the
+sideslip beta = c y'' of a steady turn. The cost is convex; Newton's method minimizes it.
 
-Source: ours. The forces are those of the single-track car whose sideslip changes slowly.
+Source: ours. The forces are those of a single-track car with slowly changing sideslip.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,37 +28,37 @@ from ..mathematics.sums import dot
 from .track import Outline
 
 LEAD, TAIL = 15.0, 15.0
-"""Path before the first cones and behind the last ones [m]. Chosen: a turn of the wheel at 25 m/s."""
+"""Path before the first and after the last cones [m]. Chosen: time to turn the wheel at 25 m/s."""
 INTERVALS = 40
-"""Number of intervals between the knots. Chosen: half of them raise the largest force by 2 %."""
+"""Number of intervals between knots. Chosen: with half of them the largest force is 2 % higher."""
 POWER = 8
 MOST_STEPS = 60
 """Largest number of steps of Newton's method; chosen: twice what the standard's tracks need."""
 CLOSE = 1e-5
-"""Relative gain of a step at which it ends."""
+"""Relative decrease of the cost at which Newton's method stops."""
 AHEAD = 5.0
-"""The slope of the path's end counts by where it leads over this length [m]. Chosen: a car's length."""
+"""Length [m] by which the slope at the path's end is converted to an offset. Chosen: a car's length."""
 CALM = 0.02
-"""Weight of (F / m / a_0)^2 / 2 beside the eighth power, which does not count where forces are small. Chosen:
-it is a twelfth of that power's share at a_0."""
+"""Weight of (F / m / a_0)^2 / 2 beside the eighth power, which is negligible for small forces. Chosen: a
+twelfth of that power's share at a_0."""
 CONES = 4
-"""Intervals along a lane, at whose ends the corners keep the margin."""
+"""Intervals along a lane; the corners of the body keep the margin at their ends."""
 POINTS = 5
-"""Along the body, that pass the outer cones of a lane."""
+"""Points along the side of the body that keep the margin at the outer cones of a lane."""
 
 
 class LanePath:
-    """The path y(x) through lanes; straight on before and behind them.
+    """Path y(x) through lanes, continued in a straight line before and after them.
 
     Args:
-        lanes: from x to x, between two borders each.
+        lanes: each from x to x, between two borders.
         outline: of the car.
         margin: between body and cones [m].
         give: lack of margin s_0 [m].
         bend: curvature a_0 / v^2 at the first cones [1/m].
         levers: i_f and -i_r [m].
         slip: c, sideslip of a steady turn over its curvature [m].
-        easing: of x: (v / v at the first cones)^2.
+        easing: (v / v at the first cones)^2 as a function of x.
     """
 
     def __init__(
@@ -103,7 +103,7 @@ class LanePath:
     def _constraints(
         self, lanes: Sequence[Lane], outline: Outline, margin: float, slip: float
     ) -> tuple[Rows, list[float]]:
-        """Return rows over y'' at the knots and what they may come to [m]."""
+        """Return the rows of the inequality constraints on y'' at the knots, and their upper bounds [m]."""
         basis = _Basis(self.spacing)
         front, rear, half = outline
         body = [-rear + (front + rear) * k / (POINTS - 1) for k in range(POINTS)]
@@ -123,7 +123,7 @@ class LanePath:
 
 
 class _Demand(NamedTuple):
-    """A force at a knot k: `here` y''(k) + `next` y''(k + 1)."""
+    """Axle force at a knot k: `here` y''(k) + `next` y''(k + 1)."""
 
     k: int
     here: float
@@ -141,7 +141,7 @@ def _demands(spacing: float, levers: tuple[float, float], easing: Sequence[float
 
 
 class _Basis:
-    """y, y' and y'' as rows over the values of y'' at the knots."""
+    """Linear maps from the values of y'' at the knots to y, y' and y'', as rows."""
 
     def __init__(self, spacing: float) -> None:
         self.spacing = h = spacing
@@ -170,16 +170,16 @@ class _Basis:
 
 
 class _Program:
-    """Sum of what demands and unmet constraints cost, and where it is least."""
+    """Cost of axle forces and violated constraints, and its minimization."""
 
     def __init__(
         self, demands: Sequence[_Demand], rows: Rows, bounds: Sequence[float], spacing: float
     ) -> None:
         self.demands, self.rows, self.bounds = demands, rows, bounds
-        self.weight = spacing / 4.0  # four demands in an interval
+        self.weight = spacing / 4.0  # four forces per interval
 
     def solved(self) -> list[float]:
-        """Return the values of y'' at the knots, over the bend that weighs 1."""
+        """Return the values of y'' at the knots, in units of the bend of cost 1."""
         z = [0.0] * (INTERVALS + 1)
         cost = self._cost(z)
         for _ in range(MOST_STEPS):

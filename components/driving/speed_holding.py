@@ -1,12 +1,12 @@
-"""Speed control of drivers: a PI law for the drive force, through the lag of pedal and engine.
+"""Speed control of drivers: PI control of the drive force, with the lag of pedal and engine.
 
-    F* = K e + (K / T_i) integral(e),   e = v_target - v_x,     0 <= F* <= F_max    no windup at the limits
+    F* = K e + (K / T_i) integral(e),   e = v_target - v_x,     0 <= F* <= F_max    with anti-windup
     tau dF/dt = F* - F                  drive force = constant part + F
 
-From the time at which the accelerator is let go, F* = 0 and the constant part goes with it.
+After the accelerator is released, F* = 0 and the constant part is 0.
 
-The force follows the speed through the lag alone, never at the same instant, so that speed and force
-make no algebraic loop. A driver who holds the speed accelerates or lets go, but does not brake.
+The force depends on the speed through the lag alone, so that they form no algebraic loop. The driver
+accelerates or releases the accelerator, but does not brake.
 
 Paper C's runs are "at a constant 90 km/h"; the paper does not say how.
 """
@@ -21,18 +21,18 @@ from ..mathematics.pid_loop import Gains, Pid
 
 @dataclass(frozen=True)
 class SpeedHoldingParameters:
-    """Parameters of the driver's right foot and the engine. By default the speed is not held."""
+    """Parameters of speed control and engine. By default the speed is not held."""
 
     constant_drive_force: float = parameter(
-        0.0, "N", "Sum of the longitudinal tyre forces asked for, always", "paper A: no driving"
+        0.0, "N", "Constant part of the requested sum of longitudinal tyre forces", "paper A: no driving"
     )
     speed_gain: float = parameter(
-        0.0, "N.s/m", "Gain K of speed holding, 0 for none", "chosen: none in papers A, B, D", minimum=0.0
+        0.0, "N.s/m", "Gain K of speed control, 0 for none", "chosen: none in papers A, B, D", minimum=0.0
     )
     speed_integral_time: float = parameter(
-        2.0, "s", "Integral time T_i of speed holding", "chosen: slower than the car follows", minimum=0.01
+        2.0, "s", "Integral time T_i of speed control", "chosen: slower than the car follows", minimum=0.01
     )
-    target_speed: float = parameter(25.0, "m/s", "Speed held, if it is held", "paper C: 90 km/h", minimum=0.0)
+    target_speed: float = parameter(25.0, "m/s", "Speed held, if any", "paper C: 90 km/h", minimum=0.0)
     drive_force_limit: float = parameter(
         3000.0, "N", "Largest force F_max for holding the speed", "chosen: 75 kW at 25 m/s", minimum=0.0
     )
@@ -46,17 +46,17 @@ class HeldSpeedParameters(SpeedHoldingParameters):
     """Parameters of a driver who holds the speed by default."""
 
     speed_gain: float = parameter(
-        4000.0, "N.s/m", "Gain K of speed holding, 0 for none", "chosen: 1000 N at 0.25 m/s", minimum=0.0
+        4000.0, "N.s/m", "Gain K of speed control, 0 for none", "chosen: 1000 N at 0.25 m/s", minimum=0.0
     )
 
 
 class SpeedHold:
-    """The drive force of a driver.
+    """Speed controller of a driver.
 
     Args:
-        p: of the driver; read again at every step, never changed.
+        p: parameters of the driver, read again at every step.
         v_x: speed at the start [m/s].
-        let_go: when the accelerator is let go [s], for good; default: never.
+        let_go: time at which the accelerator is released for good [s]; default: never.
     """
 
     def __init__(self, p: SpeedHoldingParameters, v_x: float, let_go: float = inf) -> None:
@@ -69,11 +69,11 @@ class SpeedHold:
 
     @property
     def force(self) -> float:
-        """The drive force [N]."""
+        """Drive force [N]."""
         return self.constant + self.engine.value
 
     def advance(self, t: float, h: float, v_x: float) -> None:
-        """Take the force from `t` to `t + h` [s] at the speed `v_x` [m/s]."""
+        """Advance the force from `t` to `t + h` [s] at the speed `v_x` [m/s]."""
         held = min(max(self.let_go - t, 0.0), h)
         if held > 0.0:
             self._hold(t, held, v_x)

@@ -1,9 +1,9 @@
-"""The track of a double lane change as its driver knows it: a path through the lanes, overruns of cones.
+"""Track of a double lane change: path through the lanes, and overrun of the cones.
 
-The lanes are those of ISO 3888 (`vocabulary.lane_change`); x = 0 is the start of the car. The path runs
-along the middles of lanes 1 and 5 and, in lane 3, at the lane offset from lane 1's: right of the middle by
-5 % of the vehicle width in part 1, since cars run wide to the left there. In the transitions 2 and 4 it is a
-half cosine. Paper C names neither path nor lanes.
+The lanes are those of ISO 3888 (`vocabulary.lane_change`); x = 0 is the start of the car. The path follows
+the middles of lanes 1 and 5 and, in lane 3, is at the lane offset from the middle of lane 1: in part 1 that
+is right of lane 3's middle by 5 % of the vehicle width, since cars run wide to the left there. In the
+transitions 2 and 4 it is a half cosine. Paper C gives neither path nor lanes.
 """
 
 from dataclasses import dataclass
@@ -20,14 +20,14 @@ TRACK_OUTPUTS = (
         "cone_overrun",
         *("position_x", "position_y", "yaw_angle"),
         unit="m",
-        text="How far the car's outline is beyond the cones, 0 inside",
+        text="Distance of the car's outline beyond the cones, 0 inside",
     ),
 )
-"""Outputs of a driver about the way through the track."""
+"""Outputs of a driver on a track."""
 
 
 class Outline(NamedTuple):
-    """A car seen from above: front and rear end from the centre of mass, half its width [m]."""
+    """Outline of a car from above: front and rear end from the centre of mass, half the width [m]."""
 
     front: float
     rear: float
@@ -36,7 +36,7 @@ class Outline(NamedTuple):
 
 @dataclass(frozen=True)
 class LaneChangeParameters:
-    """Parameters of the track and of the car that has to fit in."""
+    """Parameters of the track and of the car's outline."""
 
     vehicle_width: float = parameter(
         1.85, "m", "Vehicle width, from which lane widths follow", "chosen: large saloon", minimum=0.5
@@ -59,14 +59,14 @@ class LaneChangeParameters:
     track_standard: str = parameter(
         PART_1,
         None,
-        "Lanes of which standard; in part 2 of lane_offset only the sign counts",
+        "Standard that defines the lanes; in part 2 only the sign of lane_offset counts",
         "chosen: part 1",
         choices=(PART_1, PART_2),
     )
 
 
 class Track:
-    """The three lanes between cones and the path through them."""
+    """Three lanes between cones, and the path through them."""
 
     def __init__(self, p: LaneChangeParameters) -> None:
         self.lanes = lanes(
@@ -87,7 +87,7 @@ class Track:
         return transition(x, second.end, third.start, self.offset, third.middle)
 
     def overrun(self, x: float, y: float, psi: float) -> float:
-        """Return by how much [m] a car at `x`, `y` [m], `psi` [rad] is beyond the cones; 0 inside."""
+        """Return the distance [m] of a car at `x`, `y` [m], `psi` [rad] beyond the cones; 0 inside."""
         front, rear, half = self.outline
         reach = hypot(max(front, rear), half)
         worst = 0.0

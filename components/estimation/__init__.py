@@ -1,1 +1,1 @@
-"""Code shared by estimators: reference speed, zero points, the filter on a single track."""
+"""Code shared by estimators: reference speed, zero points, single-track Kalman filter."""

@@ -1,9 +1,9 @@
-"""The lateral force of an axle by Dugoff's law, free of longitudinal force, with its slopes.
+"""Lateral force of an axle by Dugoff's tyre model without longitudinal slip, and its derivatives.
 
     s = mu F_z / (2 C |tan(alpha)|)         F = -C tan(alpha)                          s >= 1
                                             F = -mu F_z (1 - s/2) sign(alpha)          s < 1
 
-Source: that of `tyres.dugoff`, equations (10)-(12) with kappa = 0.
+Source: as `tyres.dugoff`, equations (10)-(12) with kappa = 0.
 """
 
 from math import tan

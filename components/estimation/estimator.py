@@ -1,27 +1,28 @@
-"""The base of estimators: what sensors say, taken to one state of the car and to all that follows from it.
+"""Base class of estimators: from sensor signals to sideslip, speed, wheel slips and loads.
 
 An estimator overrides two methods:
 
-    begin()                          sets its state, for a car that goes straight ahead
-    lateral(h, r, delta, a_x, a_y, straight)    takes it to a message; returns v_y and dv_y/dt
+    begin()                          sets its state, for a car driving straight ahead
+    lateral(h, r, delta, a_x, a_y, straight)    updates it with a message; returns v_y and dv_y/dt
 
 Common to all, in this order:
 
     zero points of gyro and a_y      learned straight ahead                        `estimation.zero_points`
     a_y = (f_y - zero) / (1 + phi_g)        phi_g: roll angle at 1 g               roll compensation
-    delta                            made as old as what inertial sensors say      `mathematics.low_pass`
+    delta                            delayed like the inertial signals             `mathematics.low_pass`
     v_x                              from wheels and a_x                       `estimation.reference_speed`
     beta, dbeta/dt                   atan2(v_y, v_x), (v_x dv_y - v_y dv_x) / (v_x^2 + v_y^2)
     slips, velocities of wheels      kinematics                                 `cars.wheel_kinematics`
     loads                            quasi-static from a_x, a_y                  `cars.load_transfer`
 
-Gyro and accelerometers have a low pass and the hand wheel has none, so the steer angle is put through the
-same one to be of their time; otherwise a model steered too early would lay the difference in a_y at sideslip
-and friction. v_x and v_y, which are of that time, are carried on by their rates over `signal_delay`. The body
-leans by g phi_g per a_y / g, which adds phi_g a_y to what the accelerometer feels.
+Gyro and accelerometers have a low pass, the hand wheel has none; the steer angle passes through the same low
+pass to be simultaneous with them. Otherwise the model would be steered too early and attribute the difference
+in a_y to sideslip and friction. v_x and v_y, which are as old as the filtered signals, are extrapolated by
+their rates over `signal_delay`. The body rolls by phi_g a_y / g, which adds phi_g a_y to the acceleration
+that the accelerometer measures.
 
-There is no output `friction_*`: by its name it would drive the tyres of a scenario, and what an estimator
-believes is not the road. Connect `friction` to who has to know it by wheel.
+There is no output `friction_*`: wired by name, it would drive the tyres of a scenario with an estimate
+instead of the road. Connect `friction` explicitly to inputs that need it per wheel.
 """
 
 from math import atan2
@@ -46,7 +47,7 @@ OUTPUTS = tuple(output(name, *INPUTS[:-1], *wheels("wheel_speed_*")) for name in
 
 
 class Estimator(Component):
-    """Base: an estimator of the car's motion from what its sensors say."""
+    """Base class of estimators of a car's motion from sensor signals."""
 
     sampled = True
     inputs = INPUTS
@@ -55,21 +56,21 @@ class Estimator(Component):
     # ---- for the estimator ------------------------------------------------------------------
 
     def begin(self) -> None:
-        """Set the state of a car that goes straight ahead."""
+        """Set the state for a car driving straight ahead."""
 
     def lateral(
         self, h: float, *, r: float, delta: float, a_x: float, a_y: float, straight: float
     ) -> tuple[float, float]:
-        """Take the state over `h` [s] to a message; return v_y [m/s] and dv_y/dt [m/s2].
+        """Advance the state by `h` [s] to a message; return v_y [m/s] and dv_y/dt [m/s2].
 
         Args:
             r, delta: yaw rate [rad/s] and steer angle [rad].
-            a_x, a_y: accelerations [m/s2], those of the road plane.
-            straight: time for which the car has gone straight ahead [s].
+            a_x, a_y: accelerations in the road plane [m/s2].
+            straight: time for which the car has been driving straight ahead [s].
         """
         raise NotImplementedError
 
-    # ---- what all estimators do -------------------------------------------------------------
+    # ---- common to all estimators------------------------------------------------------------
 
     def start(self, t: float, u: list[float]) -> None:
         self.zeros = ZeroPoints(self.p)
@@ -97,7 +98,7 @@ class Estimator(Component):
         return self.known
 
     def _steered(self, h: float, delta: float) -> float:
-        """Return the steer angle [rad] at the time of what the inertial sensors say."""
+        """Return the steer angle [rad] at the time of the inertial signals."""
         if self.steering is None:
             return delta
         self.steering.advance(h, self.steered, delta)
@@ -105,7 +106,7 @@ class Estimator(Component):
         return self.steering.x
 
     def _conclude(self, u: list[float], a_y: float, rate: float) -> None:
-        """Set what is known of the car now, from a_y and dv_y/dt [m/s2]."""
+        """Set the estimates for the current time, from a_y and dv_y/dt [m/s2]."""
         p = self.p
         r, a_x, delta = u[0] - self.zeros.yaw_rate, u[1], u[3]
         ahead = self.speed.rate
@@ -127,4 +128,4 @@ class Estimator(Component):
 
 
 LOW_SPEED = 2.0
-"""Speed [m/s] that slips and rates refer to when the car is slower; chosen: walking pace."""
+"""Reference speed [m/s] of slips and rates of a slower car; chosen: walking pace."""

@@ -1,4 +1,4 @@
-"""Parameters of all estimators: the car, as a control unit knows it, and the noise of its signals."""
+"""Parameters common to all estimators: the control unit's model of the car, and its signals."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from ..fmi.variables import like, parameter
 
 @dataclass(frozen=True)
 class EstimatorParameters:
-    """Parameters of the car, as a control unit knows it, and of what all estimators do."""
+    """Parameters common to all estimators: the control unit's model of the car, and its signals."""
 
     mass: float = like(PaperB, "mass")
     cg_to_front_axle: float = like(PaperB, "cg_to_front_axle")
@@ -17,7 +17,7 @@ class EstimatorParameters:
     cg_height: float = like(PaperB, "cg_height")
     wheel_radius: float = like(PaperB, "wheel_radius")
     roll_at_1_g: float = parameter(
-        0.0, "rad", "Roll angle phi_g of the body at 1 g", "chosen: a car that does not roll", minimum=0.0
+        0.0, "rad", "Roll angle phi_g of the body at 1 g", "chosen: a car without roll", minimum=0.0
     )
     slip_stiffness_per_load: float = parameter(
         20.0,
@@ -36,15 +36,15 @@ class EstimatorParameters:
     signal_delay: float = parameter(
         0.02,
         "s",
-        "Age of what the inertial sensors say",
+        "Age of the inertial signals",
         "chosen: 10 ms of a message and its latency, 10 ms of a low pass of 21 Hz",
         minimum=0.0,
     )
     speed_gain: float = parameter(
-        10.0, "1/s", "How fast the speed follows wheels that are believed", "chosen: 0.1 s", minimum=0.0
+        10.0, "1/s", "Gain by which the speed follows trusted wheels", "chosen: 0.1 s", minimum=0.0
     )
     speed_doubt: float = parameter(
-        0.5, "m/s", "Difference s from which on a wheel is doubted", "chosen: 2 % of 90 km/h", minimum=0.01
+        0.5, "m/s", "Difference s above which a wheel is distrusted", "chosen: 2 % of 90 km/h", minimum=0.01
     )
     straight_steer_angle: float = parameter(
         0.003, "rad", "Straight ahead: largest steer angle", "chosen: 3 deg at the hand wheel", minimum=0.0
@@ -53,7 +53,7 @@ class EstimatorParameters:
         0.01, "rad/s", "Straight ahead: largest yaw rate", "chosen: six times the gyro's noise", minimum=0.0
     )
     straight_time: float = parameter(
-        0.3, "s", "Straight ahead: since when at least", "chosen: a yaw motion has died away", minimum=0.0
+        0.3, "s", "Straight ahead: least duration", "chosen: a yaw motion has died away", minimum=0.0
     )
     straight_fade: float = parameter(
         0.1, "s", "Time constant with which v_y fades straight ahead", "chosen: fast", minimum=0.001

@@ -6,15 +6,15 @@
     v_x    <- v_x + gain mean(weight_i (v_i - v_x)),      weight_i = 1 / (1 + (d_i / s)^2)^2,
               d_i = v_i - v_x                                                           (3)
 
-Between messages (1) is integrated; each wheel gives a speed of the centre of mass by (2), where kappa is the
-slip that a wheel needs for its share of a_x, with the slip stiffness over load c. A wheel counts the less the
-further it is from the prediction, (3), so wheels that lock or spin lose their say and (1) goes on alone.
-While the car brakes, wheels slower than the prediction are doubted sooner, while it accelerates, faster
-ones. At large sideslip no wheel rolls freely, and all count less.
+Between messages (1) is integrated. Each wheel gives a speed of the centre of mass by (2), where kappa is the
+slip that a wheel needs for its share of a_x, with the slip stiffness over load c. The weight (3) of a wheel
+decreases with its distance from the prediction, so that locking or spinning wheels are ignored and (1)
+continues alone. While the car brakes, wheels slower than the prediction are distrusted sooner; while it
+accelerates, faster wheels. At large sideslip no wheel rolls freely, and all weights are reduced.
 
-Source: chosen, in the manner of U. Kiencke, L. Nielsen, Automotive Control Systems, 2nd edition, 2005,
-chapter on vehicle parameters and states (weighted wheel speeds and integrated acceleration); ours weighs by
-distance, without fuzzy rules.
+Source: chosen, similar to U. Kiencke, L. Nielsen, Automotive Control Systems, 2nd edition, 2005, chapter on
+vehicle parameters and states (weighted wheel speeds and integrated acceleration); ours weights by distance,
+without fuzzy rules.
 """
 
 from collections.abc import Sequence
@@ -26,15 +26,15 @@ from ..mathematics.sums import added
 from .estimator_parameters import EstimatorParameters
 
 ROLLING = 0.3
-"""v_y / v_x from which on no wheel rolls freely any more; chosen: 17 degrees, beyond any tyre's peak."""
+"""v_y / v_x above which no wheel rolls freely; chosen: 17 degrees, beyond any tyre's peak."""
 DOUBTED = 0.4
-"""Share of s on the side to which a braked or driven wheel slips; chosen: a wheel locks within some 0.1 s."""
+"""Factor of s in the direction of brake or drive slip; chosen: a wheel locks within about 0.1 s."""
 
 
 def wheel_speeds_at_centre(
     spins: Sequence[float], *, r: float, v_y: float, delta: float, a_x: float, p: EstimatorParameters
 ) -> list[float]:
-    """Return v_x [m/s] as each of fl, fr, rl, rr has it; equation (2).
+    """Return v_x [m/s] according to each of fl, fr, rl, rr; equation (2).
 
     Args:
         spins: angular velocities of the wheels [rad/s].
@@ -64,9 +64,9 @@ def believed(difference: float, doubt: float, a_x: float) -> float:
 
 
 def shared(a_x: float, rate: float) -> float:
-    """Return what a_x and dv_x/dt [m/s2] have in common: what the wheels drive or brake.
+    """Return the common part of a_x and dv_x/dt [m/s2], which is due to driving or braking wheels.
 
-    In a spin the one is of cornering tyres and the other of turning axes.
+    In a spin a_x is due to cornering tyres and dv_x/dt to rotating axes.
     """
     if a_x * rate <= 0.0:
         return 0.0
@@ -74,7 +74,7 @@ def shared(a_x: float, rate: float) -> float:
 
 
 class ReferenceSpeed:
-    """v_x [m/s], begun from the wheels."""
+    """Reference speed v_x [m/s], initialized from the wheel speeds."""
 
     def __init__(self, spins: Sequence[float], p: EstimatorParameters) -> None:
         self.p = p
@@ -84,7 +84,7 @@ class ReferenceSpeed:
     def see(
         self, spins: Sequence[float], h: float, *, r: float, v_y: float, delta: float, a_x: float
     ) -> None:
-        """Take v_x over `h` [s] to a new message; arguments as of `wheel_speeds_at_centre`."""
+        """Advance v_x by `h` [s] to a new message; arguments as in `wheel_speeds_at_centre`."""
         p = self.p
         self.rate = a_x + r * v_y
         self.v += h * self.rate

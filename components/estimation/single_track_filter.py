@@ -1,24 +1,24 @@
-"""Lateral velocity and friction from yaw rate and lateral acceleration: a Kalman filter on a single track.
+"""Extended Kalman filter for lateral velocity and friction, on a single-track model with Dugoff axles.
 
     a_m      = (F_f(alpha_f) cos(delta) + F_r(alpha_r)) / m                    `estimation.dugoff_axle`    (1)
     alpha_f  = atan2(v_y + a r, v_x) - delta,     alpha_r = atan2(v_y - b r, v_x)
     dv_y/dt  = (1 - share) a_m + share a_y - v_x r,        dmu/dt = 0                                      (2)
     y        = a_m + noise                                                                           (3)
 
-The state is (v_y, mu), the measurement y the lateral acceleration, which also shares in the prediction; the
-yaw rate is taken as measured. Extended Kalman filter: P follows from the slopes of (1) by v_y and mu. While
-the tyres grip, a_m depends on v_y alone and mu stays; where they slide, it depends on mu, which is then
-learned upwards and downwards. So friction is known only where it is used.
+The state is (v_y, mu), the measurement y the lateral acceleration, a share of which also enters the
+prediction; the yaw rate is taken as measured. The covariance P uses the derivatives of (1) by v_y and mu.
+While the tyres grip, a_m depends on v_y alone and mu is constant; when they slide, it depends on mu, which is
+then learned upwards and downwards. Friction is thus observable only when it is used.
 
-Guards, because a prediction that learns may explain anything:
+Safeguards against a filter that explains any measurement by friction:
 
     mu >= used_share max over the last seconds of |a_y| / g, forgotten with `friction_memory`              (4)
-    v_y fades within `straight_fade` once the car goes straight ahead                                      (5)
-    P_mu <= initial_friction_deviation^2, so that friction stays where it was rather than nowhere          (6)
+    v_y decays with `straight_fade` while the car drives straight ahead                                    (5)
+    P_mu <= initial_friction_deviation^2, so that friction does not drift while it is not observable       (6)
 
-Source: R. E. Kalman, Journal of Basic Engineering 82(1), 1960, 35-45; that sideslip and friction are
-observed together, H. F. Grip et al., Vehicle sideslip estimation, IEEE Control Systems Magazine 29(5), 2009,
-36-52. Ours has other tyres and another gain, and adds the share and (4) to (6).
+Source: R. E. Kalman, Journal of Basic Engineering 82(1), 1960, 35-45; joint estimation of sideslip and
+friction: H. F. Grip et al., Vehicle sideslip estimation, IEEE Control Systems Magazine 29(5), 2009, 36-52.
+Ours has other tyres and another gain, and adds the share and (4) to (6).
 """
 
 from dataclasses import dataclass
@@ -32,9 +32,9 @@ from .estimator_parameters import EstimatorParameters
 from .zero_points import faded
 
 SLOWEST = 2.0
-"""Speed [m/s] below which slip angles are taken at this speed; chosen: walking pace."""
+"""Reference speed [m/s] of the slip angles of a slower car; chosen: walking pace."""
 SMALLEST = 0.05
-"""Least friction [1]; chosen: wet ice."""
+"""Smallest friction [1]; chosen: wet ice."""
 _TUNED = "chosen: on runs of four cars, see docs/estimators.md"
 
 
@@ -49,36 +49,40 @@ class FilterParameters(EstimatorParameters):
         67800.0, "N/rad", "Stiffness C_r of the rear axle", "chosen: that of the tyres of set 1", minimum=1.0
     )
     initial_friction: float = parameter(
-        0.6, "1", "Friction to begin with", "chosen: low, since upwards is learned at once", minimum=0.05
+        0.6, "1", "Initial friction", "chosen: low, since an increase is learned at once", minimum=0.05
     )
     initial_friction_deviation: float = parameter(
-        0.3, "1", "How far that may be wrong", "chosen: from ice to dry roads within two of it", minimum=0.0
+        0.3,
+        "1",
+        "Standard deviation of the initial friction",
+        "chosen: twice it spans ice to dry road",
+        minimum=0.0,
     )
     largest_friction: float = parameter(
-        1.2, "1", "Largest friction that is believed", "chosen: beyond tyres of cars", minimum=0.1
+        1.2, "1", "Largest friction", "chosen: beyond tyres of cars", minimum=0.1
     )
     friction_memory: float = parameter(
         2.0, "s", "Time after which a used friction is forgotten", "chosen: a lane change", minimum=0.01
     )
     used_share: float = parameter(
-        0.95, "1", "Friction is at least this part of what is used", "chosen: for noise in a_y", minimum=0.0
+        0.95, "1", "Least friction as a share of the used friction", "chosen: for noise in a_y", minimum=0.0
     )
     measured_share: float = parameter(
         0.5, "1", "Share of the measured a_y in the prediction", _TUNED, minimum=0.0, maximum=1.0
     )
     velocity_wander: float = parameter(
-        0.1, "m/s2", "Random walk of v_y, m/s per root of a second", _TUNED, minimum=0.0
+        0.1, "m/s2", "Random walk of v_y, in m/s per square root of a second", _TUNED, minimum=0.0
     )
     friction_wander: float = parameter(
-        0.3, "1", "Random walk of friction, per root of a second", _TUNED, minimum=0.0
+        0.3, "1", "Random walk of friction, per square root of a second", _TUNED, minimum=0.0
     )
     acceleration_deviation: float = parameter(
-        0.5, "m/s2", "How far the model's a_y is from the measured one", _TUNED, minimum=0.001
+        0.5, "m/s2", "Standard deviation of the measured a_y from the model's", _TUNED, minimum=0.001
     )
 
 
 class SingleTrackFilter:
-    """v_y [m/s] and its rate [m/s2], mu [1], begun straight ahead."""
+    """Kalman filter for v_y [m/s], its rate [m/s2] and mu [1], initialized straight ahead."""
 
     def __init__(self, p: FilterParameters) -> None:
         self.p = p
@@ -88,7 +92,7 @@ class SingleTrackFilter:
         self.p_v, self.p_vm, self.p_m = 0.0, 0.0, p.initial_friction_deviation**2
 
     def model(self, *, v_x: float, r: float, delta: float, a_x: float) -> tuple[float, float, float]:
-        """Return a_m [m/s2] and its slopes by v_y [1/s] and mu [m/s2]; equation (1)."""
+        """Return a_m [m/s2] and its derivatives by v_y [1/s] and mu [m/s2]; equation (1)."""
         p = self.p
         a, b, weight = (
             p.cg_to_front_axle,
@@ -111,11 +115,11 @@ class SingleTrackFilter:
     def see(
         self, h: float, *, v_x: float, r: float, delta: float, a_x: float, a_y: float, straight: float
     ) -> None:
-        """Take the state over `h` [s] to a message; equations (2) to (6).
+        """Advance the state by `h` [s] to a message; equations (2) to (6).
 
         Args:
             v_x, r, delta, a_x, a_y: speed [m/s], yaw rate [rad/s], steer angle [rad], accelerations [m/s2].
-            straight: time for which the car has gone straight ahead [s].
+            straight: time for which the car has been driving straight ahead [s].
         """
         p = self.p
         at = {"v_x": v_x, "r": r, "delta": delta, "a_x": a_x}

@@ -1,10 +1,10 @@
-"""Single track with axles that saturate, turned by steer angle and moment: the yaw rate that a driver wishes.
+"""Single-track model with saturating axles, driven by steer angle and yaw moment: the intended yaw rate.
 
     alpha_f = (v_y + a r) / v - delta, alpha_r = (v_y - b r) / v,  F = C alpha / sqrt(1 + (C alpha / mu N)^2)
     m (dv_y/dt + v r) = - F_f - F_r,   I dr/dt = b F_r - a F_f + M
 
-Euler steps, four in a step of the caller. It begins straight ahead, sees no measurement, and stays within
-the bounds below, so that it comes back after a slide.
+Explicit Euler, with four substeps per step of the caller. The model starts straight ahead, uses no
+measurements, and stays within the bounds below, so that it recovers after a slide.
 """
 
 from math import sqrt
@@ -13,15 +13,15 @@ from typing import Any
 from vocabulary.gravity import G
 
 SUBSTEPS = 4
-"""Steps of the single track in a step; chosen: stable from `SLOWEST` on."""
+"""Euler steps per step; chosen: stable above `SLOWEST`."""
 SLIDING = 0.3
-"""Largest sideslip of the single track [rad]; chosen: beyond cars under control, so that it comes back."""
+"""Largest sideslip of the model [rad]; chosen: above that of cars under control, so that it recovers."""
 OF_THE_ROAD = 1.3
-"""Largest yaw rate of the single track, of mu g / v; chosen: what a car reaches for a moment."""
+"""Largest yaw rate of the model over mu g / v; chosen: reached by cars for a moment."""
 
 
 class SteeredTrack:
-    """v_y [m/s], yaw rate [rad/s], lateral acceleration [m/s2] and the share of the grip that is used.
+    """Single-track model: v_y [m/s], yaw rate [rad/s], lateral acceleration [m/s2], used share of the grip.
 
     Args:
         p: parameters with the car's names: mass, yaw_inertia, cg_to_front_axle, cg_to_rear_axle,
@@ -32,10 +32,10 @@ class SteeredTrack:
         self.p = p
         self.v_y = self.yaw_rate = 0.0
         self.acceleration = 0.0
-        self.used = 0.0  # share of the grip, at the axle that uses more
+        self.used = 0.0  # share of the grip, at the axle that uses most
 
     def advance(self, h: float, v: float, delta: float, mu: float, moment: float) -> None:
-        """Take the state over `h` [s]: speed v [m/s], steer angle [rad], friction, moment [N.m]."""
+        """Advance the state by `h` [s]: speed v [m/s], steer angle [rad], friction, yaw moment [N.m]."""
         p = self.p
         weight = mu * p.mass * G / (p.cg_to_front_axle + p.cg_to_rear_axle)
         limits = weight * p.cg_to_rear_axle, weight * p.cg_to_front_axle
@@ -56,7 +56,7 @@ class SteeredTrack:
 
 
 def saturated(linear: float, limit: float) -> float:
-    """Return a force that follows its linear part and saturates."""
+    """Return the axle force, linear for small slip and saturating."""
     return linear / sqrt(1.0 + (linear / limit) ** 2)
 
 

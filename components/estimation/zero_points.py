@@ -1,19 +1,19 @@
-"""Zero points of gyro and lateral accelerometer, learned while a car goes straight ahead.
+"""Zero points of gyro and lateral accelerometer, learned while a car drives straight ahead.
 
-Straight ahead means |delta|, |r| and |a_y|, as they come, below thresholds for some time. The zero points are
-then the mean of what is measured: of all such messages at first, with a long memory later
+Straight ahead means that |delta|, |r| and |a_y| as measured are below thresholds for some time. The zero
+points are then the mean of the measurements, at first of all of them, later with a long memory
 
     b <- b + max(1 / n, h / memory) (y - b)
 
-A zero point of the accelerometer is also what a bank of the road gives. What is learned is limited: a car
-does not have more.
+The zero point of the accelerometer includes the bank of the road. Zero points are limited to plausible
+values.
 """
 
 from .estimator_parameters import EstimatorParameters
 
 
 class ZeroPoints:
-    """Zero points of yaw rate [rad/s] and lateral acceleration [m/s2], and the time straight ahead [s]."""
+    """Zero points of yaw rate [rad/s] and lateral acceleration [m/s2], and time straight ahead [s]."""
 
     def __init__(self, p: EstimatorParameters) -> None:
         self.p = p
@@ -22,7 +22,7 @@ class ZeroPoints:
         self.straight = 0.0
 
     def see(self, h: float, *, r: float, a_y: float, delta: float) -> None:
-        """Learn from a message, `h` [s] after the last: yaw rate, lateral acceleration, steer angle."""
+        """Learn from a message `h` [s] after the last: yaw rate, lateral acceleration, steer angle."""
         p = self.p
         if abs(delta) > p.straight_steer_angle or abs(r - self.yaw_rate) > p.straight_yaw_rate:
             self.straight = 0.0
@@ -40,5 +40,5 @@ class ZeroPoints:
 
 
 def faded(v_y: float, h: float, straight: float, p: EstimatorParameters) -> float:
-    """Return v_y [m/s] `h` [s] later, where it fades because the car has gone straight ahead for long [s]."""
+    """Return v_y [m/s] after `h` [s]; it decays once the car drives straight ahead long enough."""
     return v_y * (1.0 - min(h / p.straight_fade, 1.0)) if straight > p.straight_time else v_y

@@ -1,1 +1,1 @@
-"""Estimators: what a car can know of what it does not measure."""
+"""Estimators of the quantities that a car does not measure, such as sideslip and friction."""

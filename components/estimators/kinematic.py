@@ -1,14 +1,15 @@
-"""Kinematic estimator of sideslip: integrated lateral acceleration that is washed out.
+"""Kinematic estimator of sideslip: integrated lateral acceleration with washout.
 
     dv_y/dt = a_y - v_x r - v_y / washout
 
-It needs to know nothing of the tyres and nothing of friction, and finds out nothing: whatever bias is left in
-a_y or r, and whatever bank the road has, ends in v_y times the washout; sideslip that lasts longer than that
-is forgotten. The baseline that others have to beat. v_y fades once the car goes straight ahead.
+The estimator needs no tyre model and no friction. Any bias left in a_y or r and any bank of the road appear
+in v_y, multiplied by the washout time; sideslip that lasts longer is forgotten. v_y decays while the car
+drives straight ahead. It is the baseline for other estimators.
 
 Zero points, roll compensation, speed, slips and loads: `estimation.estimator`.
 
-Source: the equation of lateral motion, (1) of `plants.two_dof` solved for the velocity; the washout chosen.
+Source: the equation of lateral motion, (1) of `plants.two_dof` solved for the velocity; the washout is
+chosen.
 """
 
 from dataclasses import dataclass
@@ -29,7 +30,7 @@ class KinematicParameters(EstimatorParameters):
 
 
 class Kinematic(Estimator):
-    """Kinematic estimator: sideslip from integrated acceleration with washout; speed, slips, loads."""
+    """Kinematic estimator: sideslip by integrated acceleration with washout; speed, slips, loads."""
 
     Parameters = KinematicParameters
 

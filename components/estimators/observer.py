@@ -1,11 +1,12 @@
-"""Observer of sideslip and friction: a Kalman filter on a single track whose axles saturate.
+"""Observer of sideslip and friction: extended Kalman filter on a single-track model with saturating axles.
 
-The filter is in `estimation.single_track_filter`, with its equations and its guards; zero points, roll
-compensation, speed, slips and loads in `estimation.estimator`. Friction begins at `initial_friction`, best
-low: upwards it is learned at once, from the acceleration that there is; it stays where tyres are not used.
+`estimation.single_track_filter` has the equations and safeguards of the filter, `estimation.estimator` zero
+points, roll compensation, speed, slips and loads. `initial_friction` should be low: an increase is learned at
+once, from the present acceleration, whereas friction is constant while the tyres are not used.
 
-Tuned once, the same for all cars: the spread of a_y stands for what a single track leaves out (load transfer,
-combined slip, another tyre law), not for the sensor's noise. Limits and what it reaches: docs/estimators.md.
+The tuning is the same for all cars: the standard deviation of a_y covers the effects that a single-track
+model neglects (load transfer, combined slip, another tyre model), not sensor noise. Limits and accuracy:
+docs/estimators.md.
 """
 
 from ..estimation.estimator import OUTPUTS, Estimator
@@ -14,7 +15,7 @@ from ..fmi.variables import signal
 
 
 class Observer(Estimator):
-    """Observer of sideslip and friction on a single track with saturating axles; speed, slips, loads."""
+    """Kalman filter for sideslip and friction on a saturating single-track model; speed, slips, loads."""
 
     Parameters = FilterParameters
     outputs = (*OUTPUTS, signal("friction", depends_on=OUTPUTS[0].depends_on))

@@ -1,10 +1,10 @@
-"""Estimator that is told the truth: what a perfect one would know, at the pace of messages.
+"""Ideal estimator: true states, sampled at the message rate.
 
-    said    x(t_k) from t_k + latency until the next is said,      t_k = t_0 + k sample_time
+    output = x(t_k) from t_k + latency until the next message,     t_k = t_0 + k sample_time
 
-In place of an estimator, it keeps only the delay of estimation; what another
-then does worse is the other's error. With sample time and latency zero a run is that with the truth itself.
-Friction is not a signal of the car: it comes as `friction_true`, from a road or as a constant.
+In place of an estimator it keeps only the delay of the estimation, so that differences from it are estimation
+errors. With zero sample time and latency a run equals that with the true values. Friction is not a signal of
+the car: it comes as `friction_true`, from a road or as a constant.
 
 Inputs are the true values, named `*_true`, as those of sensors: `{from: plant.*, to: estimator.*_true}`.
 
@@ -22,7 +22,7 @@ from ..sensing.channel import Channel, ChannelSpec
 
 KNOWN = (*NAMES, "friction")
 NEEDED = ("velocity_x", "sideslip")
-"""Signals that every car has; others count as zero if the car lacks them."""
+"""Signals that every car has; others are zero if the car lacks them."""
 
 
 @dataclass(frozen=True)
@@ -30,14 +30,14 @@ class ToldParameters:
     """Parameters of the messages."""
 
     sample_time: float = parameter(
-        0.01, "s", "Time between messages, 0: one at every communication point", "chosen: as of sensors",
+        0.01, "s", "Time between messages, 0: at every communication point", "chosen: as of sensors",
         minimum=0.0,
     )  # fmt: skip
     latency: float = parameter(0.0, "s", "Latency of every message", "chosen: none", minimum=0.0)
 
 
 class Told(Component):
-    """Estimator that is told the truth: sampled and late, otherwise perfect."""
+    """Ideal estimator: true states, sampled at the message rate and delayed."""
 
     Parameters = ToldParameters
     sampled = True

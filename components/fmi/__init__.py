@@ -1,1 +1,1 @@
-"""Base class of components, declarations of their variables, and their FMI interface."""
+"""FMI interface of components: base class, declarations of variables, model description."""

@@ -1,30 +1,30 @@
-"""The base class of every FMU.
+"""Base class of all components: the FMI 2.0 interface of an FMU written in Python.
 
 A component declares parameters, inputs and outputs on its class and overrides up to four methods:
 
-    configure()         values derived from the parameters `self.p`; after every change of them
-    start(t, u)         the state at start time, from the inputs u; may be called repeatedly
-    advance(t, h, u)    the state from t to t + h (t in s, h in s)
-    output(t, u)        all outputs at t in declared order; changes nothing
+    configure()         derives values from the parameters `self.p`; called after every change of them
+    start(t, u)         sets the state at start time from the inputs u; may be called repeatedly
+    advance(t, h, u)    advances the state from t to t + h [s]
+    output(t, u)        returns all outputs at t in declared order, without side effects
 
 `u` is the list of all inputs in declared order, `*` expanded to fl, fr, rl, rr; `self.by_signal(u)`
-has one item per declared signal instead, a list of four for a `*`. Whatever a component stores on
-`self` in these methods is its state: it is saved and restored with the FMU state, bit for bit,
-without being listed anywhere.
+has one item per declared signal instead, a list of four for a `*`. All attributes that a component
+sets on `self` in these methods are its state: they are saved and restored with the FMU state, bit
+for bit, without being declared.
 
-What PythonFMU 0.7.0 makes necessary, and is done here once for all:
+PythonFMU 0.7.0 requires the following, which this class does for all components:
 
-* No exception leaves a component. After one, PythonFMU releases the instance twice and the
-  process dies. Every entry point catches everything, logs one sentence and the traceback; from
-  then on the instance answers its steps with False.
-* Log text is used as a printf format and as UTF-8, so `%` is doubled and what cannot be encoded
-  is escaped.
+* No exception leaves a component: PythonFMU would release the instance twice and crash the process.
+  Every entry point catches everything and logs one sentence and the traceback; all later steps of
+  the instance return False.
+* Log text is used as a printf format and as UTF-8, so `%` is doubled and characters that cannot be
+  encoded are escaped.
 * `get_real` and `set_real` look all values up in one list; per-variable getters cost three times
-  as much. All inputs set, or all outputs read, at once is one slice.
+  as much. Setting all inputs, or reading all outputs, is a single slice.
 * Until initialization ends, state and outputs are computed when they are read, so inputs
   may be set in any order before that.
-* The resource folder is taken off `sys.path` again, so a process that makes many instances does
-  not search ever more folders.
+* The resource folder is removed from `sys.path` again, so that the path does not grow with every
+  instance of a process.
 """
 
 import copy
@@ -63,7 +63,7 @@ _CATEGORY = {
 
 
 def _picker(inputs: Sequence[str | VariableSpec]) -> Callable[[list[float]], tuple[Any, ...]]:
-    """Return what makes one item per declared signal of a list of all inputs."""
+    """Return a function that groups the list of all inputs into one item per declared signal."""
     places: list[int | slice] = []
     end = 0
     for item in inputs:
@@ -95,7 +95,7 @@ class Component(Fmi2Slave):
 
     variables: ClassVar[tuple[VariableSpec, ...]] = ()
     fmu_name: ClassVar[str] = ""
-    """Name of the FMU: `<role>_<file>`, unless the class itself says otherwise."""
+    """Name of the FMU: `<role>_<file>`, unless the class sets another."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -106,7 +106,7 @@ class Component(Fmi2Slave):
         ins = input_variables(cls.inputs)
         outs = output_variables(cls.outputs, [v.name for v in ins], discrete=cls.sampled)
         pars = parameter_variables(cls.Parameters)
-        pars.sort(key=lambda v: v.type != "Real")  # stable: all Reals have the lowest references
+        pars.sort(key=lambda v: v.type != "Real")  # stable sort: Reals get the lowest references
         cls.variables = (*ins, *outs, *pars)
         cls.by_signal = staticmethod(_picker(cls.inputs))
         cls._n_in = len(ins)
@@ -129,10 +129,10 @@ class Component(Fmi2Slave):
         super().__init__(**kwargs)
         self.modelName = self.fmu_name
         self.description = (type(self).__doc__ or self.fmu_name).strip().splitlines()[0]
-        if "logger" in kwargs:  # made by PythonFMU's library; its builder tidies up by itself
+        if "logger" in kwargs:  # created by PythonFMU's library; its builder restores sys.path itself
             sys.path[:] = [entry for entry in sys.path if entry != self.resources]
         self._not_state = frozenset((*self.__dict__, "_not_state"))
-        # Everything below, and whatever the subclass adds, is the FMU state.
+        # All attributes set below, and those that the subclass adds, are the FMU state.
         self._values: list[Any] = [
             0.0 if v.start is None else float(v.start) for v in self.variables[: self._n_real]
         ]
@@ -147,16 +147,16 @@ class Component(Fmi2Slave):
     # ---- for the subclass -------------------------------------------------------------------
 
     def configure(self) -> None:
-        """Derive what is needed from the parameters `self.p`."""
+        """Derive values from the parameters `self.p`."""
 
     def start(self, t: float, u: list[float]) -> None:
         """Set the state at start time `t` [s] from the inputs `u`."""
 
     def advance(self, t: float, h: float, u: list[float]) -> None:
-        """Take the state from `t` to `t + h` [s] with the inputs `u`."""
+        """Advance the state from `t` to `t + h` [s] with the inputs `u`."""
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
-        """Return all outputs at `t` [s], in declared order, without changing anything."""
+        """Return all outputs at `t` [s], in declared order, without side effects."""
         raise NotImplementedError
 
     def warn(self, message: str) -> None:
@@ -211,7 +211,7 @@ class Component(Fmi2Slave):
             return False
 
     def _configure(self) -> None:
-        """Bring the parameters up to date with what has been set."""
+        """Update the parameters from the values that have been set."""
         if self._configured:
             return
         values = {}
@@ -225,7 +225,7 @@ class Component(Fmi2Slave):
         self._configured = True
 
     def _refresh(self) -> None:
-        """Bring parameters, state and outputs up to date with what has been set."""
+        """Update parameters, state and outputs from the values that have been set."""
         self._configure()
         values = self._values
         n = self._n_in
@@ -235,7 +235,7 @@ class Component(Fmi2Slave):
         self._stale = False
 
     def _checked_output(self, t: float, u: list[float]) -> list[float]:
-        """Return what `output` gives, checked."""
+        """Return the outputs, with their number checked."""
         outputs: Any = self.output(t, u)
         if outputs is None:
             raise TypeError("output() returned nothing; it must return all outputs in declared order")
@@ -245,7 +245,7 @@ class Component(Fmi2Slave):
         return y
 
     def _fail(self, what: str, t: float) -> None:
-        """Log the exception being handled, once as a sentence and once in full; stop for good."""
+        """Log the current exception, as a sentence and as a traceback, and mark the instance as failed."""
         self._failed = True
         try:
             kind, error, trace = sys.exc_info()
@@ -253,7 +253,7 @@ class Component(Fmi2Slave):
             home = os.path.dirname(room)
             machinery = [os.path.join(room, name) for name in ("component.py", "variables.py")]
             lines = [(frame.filename, frame.lineno, frame.name) for frame in traceback.extract_tb(trace)]
-            if lines and lines[-1][2] == "_checked_output":  # what `output` returned is wrong
+            if lines and lines[-1][2] == "_checked_output":  # `output` returned a bad value: point to it
                 code = type(self).output.__code__
                 lines.append((code.co_filename, code.co_firstlineno, code.co_name))
             where = ""

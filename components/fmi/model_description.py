@@ -1,8 +1,8 @@
-"""The complete FMI 2.0 model description of a component.
+"""FMI 2.0 model description of a component.
 
-Written here, not by PythonFMU 0.7.0, which leaves out units, limits, dependencies, InitialUnknowns
-and the ability to save the state. The GUID and the date are filled in by the build, which derives
-them from the content.
+It replaces that of PythonFMU 0.7.0, which lacks units, limits, dependencies, InitialUnknowns and the
+capability flags for saving the state. The build fills in the GUID and the date, which it derives from
+the content.
 """
 
 from collections.abc import Mapping, Sequence
@@ -31,11 +31,11 @@ def to_xml(
 ) -> Element:
     """Return the element `fmiModelDescription`; value references are positions in `variables`.
 
-    `needsExecutionTool` is false: Python, which the process needs, is not a tool in the sense of the
-    standard, and some hosts load nothing that says true. `credits` are attributes that may be empty.
+    `needsExecutionTool` is false: the Python interpreter in the process is not a tool in the sense of the
+    standard, and some hosts refuse FMUs that say true. `credits` are attributes that may be empty.
 
-    `InitialUnknowns` carry no list of dependencies, which by FMI 2.0.4, section 2.2.8, means
-    that they depend on all knowns; outputs list exactly the inputs they depend on directly.
+    `InitialUnknowns` have no list of dependencies, which by FMI 2.0.4, section 2.2.8, means
+    that they depend on all knowns; outputs list exactly the inputs on which they depend directly.
     """
     root = Element(
         "fmiModelDescription",
@@ -71,7 +71,7 @@ def to_xml(
     for category, text in LOG_CATEGORIES.items():
         SubElement(categories, "Category", name=category, description=text)
     SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize="0.001")
-    if host_packages:  # FMI has no word for it
+    if host_packages:  # FMI 2.0 has no attribute for it
         tool = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name="yawbench")
         SubElement(tool, "hostPackages", names=" ".join(host_packages))
     listed = SubElement(root, "ModelVariables")

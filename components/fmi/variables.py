@@ -1,8 +1,8 @@
 """Declarations of a component's parameters, inputs and outputs.
 
-Parameters are the fields of a frozen dataclass (`parameter`), inputs and outputs are names from
-the signal dictionary, or signals of the component's own (`signal`), outputs say in `output` on
-which inputs they depend directly at the same instant. `*` in a name stands for the four wheels.
+Parameters are fields of a frozen dataclass (`parameter`). Inputs and outputs are names from the
+signal dictionary, or the component's own signals (`signal`); `output` also lists the inputs on which
+an output depends directly (feedthrough). `*` in a name means the four wheels.
 """
 
 import sys
@@ -19,12 +19,12 @@ _FMI_TYPES: dict[type, str] = {float: "Real", int: "Integer", bool: "Boolean", s
 
 
 class DeclarationError(TypeError):
-    """A component declares something that cannot be: found when its class is read."""
+    """Invalid declaration of a component, raised when its class is defined."""
 
 
 @dataclass(frozen=True)
 class VariableSpec:
-    """A variable of an FMU, ready for the model description once `*` in its name is expanded."""
+    """Declaration of an FMU variable; a `*` in its name is not expanded yet."""
 
     name: str
     unit: str | None
@@ -52,7 +52,7 @@ def signal(
     depends_on: Iterable[str] = (),
     optional: bool = False,
 ) -> VariableSpec:
-    """Declare an input or output, from the signal dictionary unless unit and text are given.
+    """Declare an input or output; unit and text default to those of the signal dictionary.
 
         >>> signal("roll_angle", optional=True).unit
         'rad'
@@ -60,17 +60,17 @@ def signal(
         220000.0
 
     Args:
-        name: spelled-out snake_case; `*` stands for the four wheels.
+        name: spelled-out snake_case; `*` means the four wheels.
         unit: one of `units.UNITS`; must agree with the dictionary for a name that is in it.
-        description: one line; the dictionary's text if left out.
+        description: a single line; default: the dictionary's text.
         start: value of an input until it is set.
-        minimum, maximum: limits written into the model description; the dictionary's if left out.
-        depends_on: of an output, the inputs it depends on directly at the same instant. A `*`
-            there means the same wheel if the output's own name has one, else all four.
-        optional: of an input, that the component does its work at the start value if nothing drives it.
+        minimum, maximum: limits written into the model description; default: the dictionary's.
+        depends_on: for an output, the inputs on which it depends directly at the same instant. A `*`
+            there means the same wheel if the output's own name has a `*`, else all four.
+        optional: for an input, whether the component works at the start value if no wire drives it.
 
     Raises:
-        DeclarationError: unknown name without unit and text, a name that is not lower-case
+        DeclarationError: unknown name without unit and text, a name that is not a lower-case
             identifier, unknown unit, or a unit that contradicts the dictionary.
     """
     _check("signal", "name", name, str)
@@ -116,7 +116,7 @@ def signal(
 
 
 def _check(what: str, argument: str, value: Any, kind: type, *, optional: bool = False) -> None:
-    """Raise DeclarationError if a value is not of a kind, or no finite number; `optional`: or None."""
+    """Raise DeclarationError if a value has the wrong type or is not finite; `optional` allows None."""
     if optional and value is None:
         return
     wanted = {str: "text", float: "a finite number", bool: "True or False"}[kind]
@@ -130,10 +130,10 @@ def _check(what: str, argument: str, value: Any, kind: type, *, optional: bool =
 
 
 def _names(what: str, argument: str, value: Iterable[str]) -> tuple[str, ...]:
-    """Return a tuple or list of texts as a tuple.
+    """Return a tuple or list of strings as a tuple.
 
     Raises:
-        DeclarationError: it is something else.
+        DeclarationError: another type.
     """
     if type(value) not in (tuple, list):
         raise DeclarationError(f"{what}: {argument} must be a tuple of texts (got {type(value).__name__})")
@@ -143,13 +143,13 @@ def _names(what: str, argument: str, value: Iterable[str]) -> tuple[str, ...]:
 
 
 def _shown(text: str | None) -> str:
-    """Return a text for a message, cut if long."""
+    """Return a text quoted for a message, shortened if long."""
     return repr(text if text is None or len(text) <= 60 else f"{text[:57]}...")
 
 
 def _guess(name: str) -> str:
-    """Return "; did you mean 'x'?" for a name that is like one of the dictionary."""
-    from difflib import get_close_matches  # takes long to import, and FMUs have no need of it
+    """Return "; did you mean 'x'?" for a name similar to a name of the dictionary."""
+    from difflib import get_close_matches  # slow to import, and not needed in FMUs
 
     likely = get_close_matches(name, SIGNALS, n=1, cutoff=0.65)
     return f"; did you mean {likely[0]!r}?" if likely else ""
@@ -182,9 +182,9 @@ def parameter(
         >>> Parameters().gain
         20000.0
 
-    The FMI type follows from the default's type. `unit` is None for everything but Real.
-    `source` says where the default comes from, and its first word of what kind that is: "paper A, table 1",
-    "chosen: why", "erratum: what is printed", or anything else for other literature.
+    The FMI type follows from the default's type. `unit` is None for all types but Real.
+    `source` says where the default comes from; its first word is the kind of source: "paper A, table 1",
+    "chosen: why", "erratum: what is printed", or any other text for other literature.
     """
     kind = _FMI_TYPES.get(type(default))
     if kind is None:
@@ -221,7 +221,7 @@ def of_car(
     minimum: float | None = None,
     maximum: float | None = None,
 ) -> Any:
-    """Declare a parameter whose name, unit, meaning and least value are in `vocabulary.vehicle`.
+    """Declare a parameter whose unit, description and minimum are in `vocabulary.vehicle`.
 
         >>> @dataclass(frozen=True)
         ... class Parameters:
@@ -230,9 +230,9 @@ def of_car(
         'm2'
 
     Args:
-        default, source: as of `parameter`.
-        text: this component's text in place of the dictionary's meaning.
-        minimum: in place of the dictionary's.
+        default, source: as in `parameter`.
+        text: replaces the dictionary's description.
+        minimum: replaces the dictionary's.
         maximum: largest value.
     """
     return parameter(default, None, text, source, minimum=minimum, maximum=maximum)
@@ -241,7 +241,7 @@ def of_car(
 def like(
     parameters: type, name: str, default: float | int | bool | str | None = None, source: str = ""
 ) -> Any:
-    """Declare anew a field that a dataclass of parameters has, with another default value if given."""
+    """Declare a copy of a parameter of another class, optionally with another default value."""
     (declared,) = (variable for variable in parameter_variables(parameters) if variable.name == name)
     if default is not None and (source or default != declared.start):
         declared = replace(declared, start=default, source=source or "chosen: for this FMU")
@@ -249,12 +249,12 @@ def like(
 
 
 def parameter_class(module: str, name: str, declared: Mapping[str, Any], bases: tuple[type, ...] = ()) -> Any:
-    """Return a dataclass of the parameters in a table.
+    """Create a dataclass from a table of parameters.
 
     Args:
-        module, name: of the class, so that its values can be kept in an FMU's state.
-        declared: name -> what `parameter` returned.
-        bases: dataclasses to add to.
+        module, name: of the class, so that its instances can be pickled with an FMU's state.
+        declared: name -> result of `parameter`.
+        bases: base dataclasses.
     """
     made = [(key, type(variable.default), variable) for key, variable in declared.items()]
     return make_dataclass(name, made, bases=bases, frozen=True, namespace={"__module__": module})
@@ -262,7 +262,7 @@ def parameter_class(module: str, name: str, declared: Mapping[str, Any], bases: 
 
 @dataclass(frozen=True)
 class NoParameters:
-    """Parameters of a component that has none."""
+    """Empty set of parameters."""
 
 
 def parameter_variables(parameters: type) -> list[VariableSpec]:
@@ -291,7 +291,7 @@ def parameter_variables(parameters: type) -> list[VariableSpec]:
 
 
 def check_parameter(variable: VariableSpec, value: Any) -> None:
-    """Raise ValueError, naming the allowed values, if `value` is none of them."""
+    """Raise ValueError, naming the allowed values, if `value` is not allowed."""
     if variable.choices is not None and value not in variable.choices:
         raise ValueError(f"{variable.name} must be one of {', '.join(variable.choices)} (got {value!r})")
     if variable.type == "Real" and not -1e308 <= value <= 1e308:
@@ -349,7 +349,7 @@ def output_variables(
 
 
 def _on_wheel(s: VariableSpec, name: str) -> str:
-    """Return the description of one scalar, naming the wheel where there is one."""
+    """Return the description of a scalar, with the name of its wheel if it has one."""
     of_wheel = name.removesuffix("_true")
     wheel = WHEEL_NAMES.get(of_wheel[-2:]) if of_wheel[-3:-2] == "_" else None
     return s.description if wheel is None else f"{s.description}, {wheel}"

@@ -1,1 +1,1 @@
-"""Mathematics that knows nothing of cars."""
+"""General mathematics: integration, filters, control and optimization."""

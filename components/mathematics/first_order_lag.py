@@ -1,11 +1,10 @@
-"""Pure delay and first-order lag with limited rate, solved exactly for an input that is held in steps.
+"""Pure delay and first-order lag with limited rate, solved exactly for piecewise constant input.
 
     tau dx/dt = u(t - delay) - x,        -falling rate <= dx/dt <= rate
 
-A request u is held over the step for which it is given. Between two changes of the delayed request the
-lag has a closed form, also while its rate is limited (a straight line until the exponential is
-slower), so nothing is integrated numerically: the delay may be any time, no multiple of the step,
-and a request held over two half steps gives what it gives over one.
+A request u is held over its step. Between two changes of the delayed request the lag has a closed form, also
+while its rate is limited (a straight line until the exponential is slower). Without numerical integration the
+delay need not be a multiple of the step, and two half steps give the same result as a full step.
 """
 
 from collections.abc import Sequence
@@ -13,13 +12,13 @@ from itertools import pairwise
 from math import exp, inf
 
 History = list[tuple[float, float]]
-"""Requests as (time from which it holds [s], value), oldest first."""
+"""Requests as (start time [s], value), oldest first."""
 
 
 def relax(x: float, target: float, h: float, *, tau: float, rate: float) -> float:
-    """Return x after `h` [s] with a held target: lag `tau` [s], `rate` limit [1/s of x] both ways."""
+    """Return x after `h` [s] with a constant target: lag `tau` [s], `rate` limit [1/s of x] both ways."""
     gap = target - x
-    excess = abs(gap) - rate * tau  # what is left for the straight line
+    excess = abs(gap) - rate * tau  # the gap that is closed at the rate limit
     if excess > 0.0:
         line = excess / rate
         if h <= line:
@@ -32,13 +31,13 @@ def relax(x: float, target: float, h: float, *, tau: float, rate: float) -> floa
 
 
 class Stage:
-    """One delay and lag: its value and the requests that still count.
+    """Pure delay and lag of a scalar.
 
     Args:
         tau, delay: time constant and pure delay [s].
         rate: rate limit [1/s of the value].
-        falling_rate: rate limit where the value falls; `rate` if left out.
-        value: at the start, as after a request held for ever.
+        falling_rate: rate limit of a falling value; default: `rate`.
+        value: initial value, settled.
     """
 
     def __init__(
@@ -56,7 +55,7 @@ class Stage:
         self.history: History = [(-inf, value)]
 
     def advance(self, t: float, h: float, request: float) -> None:
-        """Take the value from `t` to `t + h` [s], the request holding over that step."""
+        """Advance the value from `t` to `t + h` [s] with a constant request."""
         history = self.history
         if history[-1][1] != request:
             history.append((t, request))
@@ -79,7 +78,7 @@ class Stage:
 
 
 def current(history: Sequence[tuple[float, float]], t: float) -> float:
-    """Return the request that holds from `t` [s] on."""
+    """Return the request in force at `t` [s]."""
     value = history[0][1]
     for time, later in history:
         if time > t:

@@ -1,15 +1,14 @@
-"""Mamdani inference with two inputs: min for "and" and for implication, max, centroid.
+"""Mamdani inference with two inputs: min for "and" and implication, max for aggregation, centroid.
 
-A variable is split by triangular sets with one peak each; neighbours cross at 1/2, grades add up to
-one, the outer sets saturate. At most two sets per input have a grade, so at most four rules fire:
-only those are evaluated. Between two neighbouring peaks the union of the clipped output sets is
-piecewise linear and depends on their two clips alone, so its centroid is exact (`clipped_pair`),
-without a grid. The outer output sets are half triangles inside the range, so an output reaches
-its range only up to a third of the outermost spacing.
+The sets of a variable are triangular: neighbours cross at 1/2, grades add up to 1, the outer sets saturate.
+At most two sets per input have a non-zero grade, so at most four rules fire, and only those are evaluated.
+Between two neighbouring peaks the union of the clipped output sets is piecewise linear and depends only on
+their two clips, so its centroid is exact (`clipped_pair`), without a grid. The outer output sets are half
+triangles inside the range, so an output approaches the ends of its range only to a third of the outermost
+spacing.
 
-A rule table is text: one line per set of the first input, one cell per set of the second, in each
-cell the label of the output's set; with several outputs `PB/NB/PS` in their order, or one label
-for all of them.
+A rule table is text: a line per set of the first input, a cell per set of the second, and in each cell the
+label of the output's set; with several outputs `PB/NB/PS` in their order, or a common label for all.
 
 Source: E. H. Mamdani, S. Assilian, Int. J. Man-Machine Studies 7(1), 1975, 1-13. The centroid in
 closed form is derived here.
@@ -31,8 +30,8 @@ SEVEN = "NB NM NS ZO PS PM PB"
 def clipped_pair(a: float, b: float) -> tuple[float, float]:
     """Return area and moment about t = 1/2 of max(min(a, 1 - t), min(b, t)) over 0 <= t <= 1.
 
-    That is the union of two neighbouring sets clipped at `a` (peak at t = 0) and `b` (peak at
-    t = 1), both in 0..1, between their peaks. Where both exceed 1/2 it has a dip at t = 1/2.
+    This is the union of two neighbouring sets clipped at `a` (peak at t = 0) and `b` (peak at
+    t = 1), both in 0..1, between their peaks. If both exceed 1/2, it has a dip at t = 1/2.
     """
     difference = b * b - a * a
     moment = 0.25 * difference - (b * b * b - a * a * a) / 6.0
@@ -48,11 +47,11 @@ def gaussian_grades(x: float, centres: Sequence[float], widths: Sequence[float])
 
 
 class Partition:
-    """Triangular sets over one variable, as an input or as an output.
+    """Triangular sets of an input or output variable.
 
     Args:
         labels: names of the sets, from low to high, separated by blanks.
-        peaks: where each set has the grade one, strictly rising; at least two.
+        peaks: positions of grade 1, strictly rising; at least two.
 
     Raises:
         ValueError: peaks that do not rise or do not fit the labels, or a repeated label.
@@ -77,7 +76,7 @@ class Partition:
         return cls(labels, [low, *(((n - k) * low + k * high) / n for k in range(1, n)), high])
 
     def locate(self, x: float) -> tuple[int, float]:
-        """Return (k, t): set k has the grade 1 - t, set k + 1 the grade t, all others none."""
+        """Return (k, t): set k has the grade 1 - t, set k + 1 the grade t, all others zero."""
         peaks = self.peaks
         if x <= peaks[0]:
             return 0, 0.0
@@ -107,7 +106,7 @@ class Partition:
 
 
 class Mamdani:
-    r"""A Mamdani system of two inputs and one or more outputs that share the antecedents.
+    r"""Mamdani system with two inputs and one or more outputs.
 
     >>> error, rate = Partition.even("N Z P", -0.02, 0.02), Partition.even("N Z P", -0.2, 0.2)
     >>> system = Mamdani(error, rate, [Partition.even("N Z P")], "N N Z \n N Z P \n Z P P")
@@ -115,9 +114,9 @@ class Mamdani:
     [0.0]
 
     Args:
-        rows, columns: sets of the first and of the second input.
+        rows, columns: sets of the first and second input.
         outputs: sets of each output.
-        table: the rules, as described at the top of this module.
+        table: rules, in the format described in the module's docstring.
 
     Raises:
         ValueError: the table does not fit the sets; the message names the cell.
@@ -126,7 +125,7 @@ class Mamdani:
     def __init__(self, rows: Partition, columns: Partition, outputs: Sequence[Partition], table: str) -> None:
         self.rows, self.columns, self.outputs = rows, columns, tuple(outputs)
         self.rules = parse_rules(table, rows, columns, self.outputs)
-        # For each square of four neighbouring cells and each output: its four consequents.
+        # The four consequents of each square of neighbouring cells, for each output.
         self._squares = [
             [
                 tuple(zip(upper[j], upper[j + 1], lower[j], lower[j + 1], strict=True))
@@ -136,7 +135,7 @@ class Mamdani:
         ]
 
     def __deepcopy__(self, memo: object) -> Mamdani:
-        return self  # never changes: saving a component's state need not copy it
+        return self  # immutable: the saved state of a component may share it
 
     def __call__(self, x: float, y: float) -> list[float]:
         """Return the outputs for the inputs `x` (rows) and `y` (columns); NaN for NaN."""
@@ -164,7 +163,7 @@ class Mamdani:
 def parse_rules(
     table: str, rows: Partition, columns: Partition, outputs: Sequence[Partition]
 ) -> list[list[tuple[int, ...]]]:
-    """Return rules[row][column][output] as positions of the outputs' sets.
+    """Return rules[row][column][output] as indices of the outputs' sets.
 
     Raises:
         ValueError: a wrong number of rows or cells, or a label that the output does not have.

@@ -1,4 +1,4 @@
-"""The fixed-step integrator of the components: the classical Runge-Kutta method of order four.
+"""Fixed-step integration by the classical fourth-order Runge-Kutta method.
 
     k1 = f(t, y)                    k2 = f(t + h/2, y + h/2 k1)
     k3 = f(t + h/2, y + h/2 k2)     k4 = f(t + h, y + h k3)
@@ -15,8 +15,8 @@ Derivatives = Callable[[float, Sequence[float]], Sequence[float]]
 def rk4(f: Derivatives, t: float, h: float, y: Sequence[float]) -> tuple[float, ...]:
     """Return the state at `t + h` [s] of dy/dt = f(t, y), from the state `y` at `t` [s].
 
-    The error of one step is of order h^5. The sum is formed in one fixed order without any
-    branch, so a system that is mirror symmetric stays so to the last bit.
+    The local error is of order h^5. The order of summation is fixed, without branches, so a mirror-symmetric
+    system stays symmetric to the last bit.
     """
     half = 0.5 * h
     k1 = f(t, y)

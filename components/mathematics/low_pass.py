@@ -1,8 +1,8 @@
-"""A low pass of second order (Butterworth), solved exactly for a signal that runs in straight lines.
+"""Second-order low pass (Butterworth), solved exactly for piecewise linear input.
 
-    x'' + sqrt(2) w x' + w^2 x = w^2 u           w = 2 pi bandwidth, -3 dB there
+    x'' + sqrt(2) w x' + w^2 x = w^2 u           w = 2 pi bandwidth (-3 dB)
 
-It follows a signal that changes slowly sqrt(2) / w late: 11 ms at 21 Hz.
+The delay of slow signals is sqrt(2) / w: 11 ms at 21 Hz.
 """
 
 from math import pi, sqrt
@@ -11,11 +11,11 @@ from .oscillator import transition
 
 
 class LowPass:
-    """The filter and where it is.
+    """Second-order Butterworth filter and its state.
 
     Args:
-        bandwidth: [Hz], positive.
-        value: of the signal at the start, where the filter has settled.
+        bandwidth: cutoff frequency (-3 dB), positive [Hz].
+        value: initial value of the signal; the filter starts settled.
     """
 
     def __init__(self, bandwidth: float, value: float) -> None:
@@ -25,12 +25,12 @@ class LowPass:
         self.phi = (1.0, 0.0, 0.0, 1.0)
 
     def advance(self, h: float, begin: float, end: float) -> None:
-        """Take the filter over `h` > 0 [s], the signal running from `begin` to `end`."""
+        """Advance the filter by `h` > 0 [s], with a signal that changes linearly from `begin` to `end`."""
         if h != self.h:
             self.h = h
             self.phi = transition(self.w / sqrt(2.0), self.w * self.w, h)
         slope = (end - begin) / h
-        behind = slope * sqrt(2.0) / self.w  # the settled filter follows a ramp that far behind
+        behind = slope * sqrt(2.0) / self.w  # lag of the settled filter behind a ramp
         x, dx = self.x - (begin - behind), self.dx - slope
         t_11, t_12, t_21, t_22 = self.phi
         self.x = end - behind + (t_11 * x + t_12 * dx)

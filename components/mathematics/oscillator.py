@@ -1,16 +1,16 @@
-"""The damped oscillator, solved exactly over a step.
+"""Damped oscillator, solved exactly over a step.
 
     x'' + 2 s x' + q x = 0        =>        (x, x') after h  =  Phi(h) (x, x')
 
-for every damping, so a stiff oscillator needs no small step. With a held force, x counts from the
-equilibrium that the force has.
+for any damping, so a stiff oscillator needs no small step. With a constant force, x is measured from the
+equilibrium under that force.
 """
 
 from math import cos, exp, sin, sinh, sqrt
 
 
 def transition(s: float, q: float, h: float) -> tuple[float, float, float, float]:
-    """Return Phi(h) by rows, from s [1/s], q [1/s2] and the time `h` [s]."""
+    """Return the rows of Phi(h) for s [1/s], q [1/s2] and the time `h` [s]."""
     discriminant = s * s - q
     if discriminant < 0.0:
         rate = sqrt(-discriminant)

@@ -1,18 +1,18 @@
-"""PID control in samples: trapezoidal integral, filtered derivative, anti-windup at the output's limit.
+"""Sampled PID control: trapezoidal integral, filtered derivative, anti-windup at the output limit.
 
     u = K_p e + I + K_d q
-    dI/dt = K_i e                       but I never moves u beyond its limit, only back towards it
-    q the slope of e, smoothed by a lag of tau (`mathematics.slope`)
+    dI/dt = K_i e                       I never moves u beyond its limit, only back towards it
+    q is the rate of e, smoothed by a lag of tau (`mathematics.slope`)
 
-I is kept in units of the output, so gains may change on line without a jump of the output.
+I is stored in units of the output, so gains may change online without a jump of the output.
 
-Two loops for yaw stability share one limit:
+Two loops for yaw stability have a common limit:
 
     M = PID(r_ref - r) + PID(beta - beta_ref)
 
 A positive moment raises the yaw rate and lowers the sideslip, hence the order of the second difference.
 
-Source: paper C, section 2.1, whose block diagram leaves that sign open and names neither filter nor limit.
+Source: paper C, section 2.1, whose block diagram leaves that sign open and has neither filter nor limit.
 """
 
 from math import inf
@@ -22,7 +22,7 @@ from .slope import Slope
 
 
 class Gains(NamedTuple):
-    """K_p, K_i, K_d: output per error, per error and second, per error rate."""
+    """PID gains K_p, K_i, K_d: output per error, per integral of the error, per error rate."""
 
     p: float
     i: float
@@ -30,45 +30,45 @@ class Gains(NamedTuple):
 
 
 class Pid:
-    """One loop: its last error, integral part and filtered derivative.
+    """PID loop: last error, integral part and filtered derivative.
 
     Args:
-        tau: time constant of the derivative's filter [s].
-        error: at the start, where there is no integral and no derivative.
+        tau: time constant of the derivative filter [s].
+        error: initial error; integral and derivative start at zero.
     """
 
     def __init__(self, tau: float = 0.0, error: float = 0.0) -> None:
         self.error = error
         self.rate = Slope(error, tau)
-        self.area = 0.0  # under the error, over the last sample
+        self.area = 0.0  # integral of the error over the last sample
         self.integral = 0.0
 
     @property
     def slope(self) -> float:
-        """The filtered derivative of the error."""
+        """Filtered derivative of the error."""
         return self.rate.rate
 
     def see(self, e: float, h: float) -> None:
-        """Take in the error `e` at the end of a sample of `h` [s]."""
+        """Update the loop with the error `e` at the end of a sample of `h` [s]."""
         self.rate.see(e, h)
         self.area = 0.5 * h * (self.error + e)
         self.error = e
 
     def value(self, gains: Gains) -> float:
-        """Return K_p e + I + K_d q with the integral as it is."""
+        """Return K_p e + I + K_d q with the current integral."""
         return gains.p * self.error + self.integral + gains.d * self.slope
 
     def integrate(self, gains: Gains, total: float, low: float, high: float) -> float:
-        """Add the last sample to the integral and return by how much the output rises.
+        """Add the last sample to the integral and return the increase of the output.
 
         Args:
-            total: output so far, of which this loop may be a part.
-            low, high: its limits.
+            total: current output, to which this loop may contribute only a part.
+            low, high: limits of the output.
         """
         step = gains.i * self.area
         room = high - total if step > 0.0 else low - total
         if step * room <= 0.0:
-            return 0.0  # beyond the limit already
+            return 0.0  # already beyond the limit
         if abs(step) > abs(room):
             step = room
         self.integral += step
@@ -76,11 +76,11 @@ class Pid:
 
 
 class YawLoops:
-    """The loops of yaw rate and sideslip, with one limit for the sum of both.
+    """PID loops of yaw rate and sideslip, with a limit for their sum.
 
     Args:
-        tau: time constant of both derivatives' filters [s].
-        r_ref, r, beta_ref, beta: yaw rates [rad/s] and sideslip angles [rad] at the start.
+        tau: time constant of both derivative filters [s].
+        r_ref, r, beta_ref, beta: initial yaw rates [rad/s] and sideslip angles [rad].
     """
 
     def __init__(self, tau: float, r_ref: float, r: float, beta_ref: float, beta: float) -> None:
@@ -88,12 +88,12 @@ class YawLoops:
         self.sideslip = Pid(tau, beta - beta_ref)
 
     def see(self, r_ref: float, r: float, beta_ref: float, beta: float, *, h: float) -> None:
-        """Take in yaw rates [rad/s] and sideslip angles [rad] at the end of a sample of `h` [s]."""
+        """Update the loops with yaw rates [rad/s] and sideslips [rad] at the end of a sample of `h` [s]."""
         self.yaw_rate.see(r_ref - r, h)
         self.sideslip.see(beta - beta_ref, h)
 
     def moment(self, yaw_rate: Gains, sideslip: Gains, limit: float = inf) -> float:
-        """Return the yaw moment [N.m] within +-`limit`, the last sample integrated."""
+        """Integrate the last sample and return the yaw moment [N.m] within +-`limit`."""
         total = self.yaw_rate.value(yaw_rate) + self.sideslip.value(sideslip)
         total += self.yaw_rate.integrate(yaw_rate, total, -limit, limit)
         total += self.sideslip.integrate(sideslip, total, -limit, limit)

@@ -1,15 +1,15 @@
-"""Linear-quadratic tracking of a target that is known ahead, for one input.
+"""Linear-quadratic preview control: tracking of a target known in advance, with a scalar input.
 
     x(k+1) = Phi x(k) + Gamma u(k),       y = c' x
-    least   sum of  w (y(k) - target(k))^2 + u(k)^2   over all steps to come
+    minimize  sum of  w (y(k) - target(k))^2 + u(k)^2   over all future steps
 
     u = -K x + sum over j >= 1 of f_j target(k + j)
 
     P = w c c' + Phi' P (Phi - Gamma K),  K = Gamma' P Phi / s,  s = 1 + Gamma' P Gamma
     f_j = Gamma' ((Phi - Gamma K)')^(j-1) w c / s
 
-The target is known for a number of steps; what is beyond them does not count. P is iterated from the end of
-a horizon that grows until K stands still.
+The target is known for a number of steps; later values are ignored. P is iterated backwards from the end of a
+growing horizon until K converges.
 
 Source: R. S. Sharp, V. Valtetsiotis, Optimal preview car steering control, Vehicle System Dynamics 35
 (supplement), 2001, with the target outside the state, which gives the same gains.
@@ -21,15 +21,15 @@ from .quadratic_program import Rows
 from .sums import added, dot
 
 ORDER = 12
-"""Order of the series of the matrix exponential: beyond what counts where its argument is at most 1."""
+"""Order of the series of the matrix exponential, exact to rounding for arguments up to 1."""
 LONGEST = 2000
-"""Steps of the growing horizon at most."""
+"""Largest number of steps of the growing horizon."""
 STILL = 1e-9
-"""Relative change of K per step that no longer counts."""
+"""Relative change of K per step at which it is converged."""
 
 
 def discrete(a: Sequence[Sequence[float]], b: Sequence[float], h: float) -> tuple[Rows, list[float]]:
-    """Return Phi and Gamma of dx/dt = A x + b u over `h` [s] with u held; exact to rounding."""
+    """Return Phi and Gamma of dx/dt = A x + b u over `h` [s] with constant u, exact to rounding."""
     n = len(b)
     whole = [[*map(float, row), float(gain)] for row, gain in zip(a, b, strict=True)] + [[0.0] * (n + 1)]
     largest = max(added(map(abs, row)) for row in whole)
@@ -49,13 +49,13 @@ def discrete(a: Sequence[Sequence[float]], b: Sequence[float], h: float) -> tupl
 def tracking_gains(
     phi: Rows, gamma: Sequence[float], c: Sequence[float], *, weight: float, steps: int
 ) -> tuple[list[float], list[float]]:
-    """Return K, one number per state, and f_1 to f_steps.
+    """Return K, with an element per state, and f_1 to f_steps.
 
     Args:
-        phi, gamma: of `discrete`.
-        c: what of the state is to be at the target.
+        phi, gamma: from `discrete`.
+        c: output vector, y = c' x.
         weight: w, in squares of the input over those of the target.
-        steps: for which the target is known.
+        steps: number of steps for which the target is known.
     """
     aim = [[weight * x * y for y in c] for x in c]
     across = [list(column) for column in zip(*phi, strict=True)]

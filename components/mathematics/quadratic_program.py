@@ -1,13 +1,14 @@
-"""A small convex quadratic program, solved in its dual by Hildreth's method.
+"""Small convex quadratic programs, solved in the dual by Hildreth's method.
 
-    least 1/2 z' H z + g' z      subject to      A z <= b
+    minimize 1/2 z' H z + g' z      subject to      A z <= b
 
-H is positive definite. With the multipliers y >= 0 of the constraints, z = -H^-1 (g + A' y), and y makes
+H is positive definite. With the multipliers y >= 0 of the constraints, z = -H^-1 (g + A' y), and y minimizes
 
     1/2 y' P y + d' y,     P = A H^-1 A',     d = b + A H^-1 g
 
-least. One y_i at a time is set to what is best for it while the others stay; that ends at the solution
-if there is one. What is soft in A z <= b + s, at a cost of w s^2 / 2, has 1 / w more on the diagonal of P.
+by coordinate descent: each y_i in turn is set to its optimum for fixed other multipliers. This converges to
+the solution if there is one. A soft constraint A z <= b + s with the cost w s^2 / 2 adds 1 / w to the
+diagonal of P.
 
 Source: C. Hildreth, A quadratic programming procedure, Naval Research Logistics Quarterly 4, 1957; L. Wang,
 Model Predictive Control System Design and Implementation Using MATLAB, 2009, section 2.4.4.
@@ -20,16 +21,16 @@ from .sums import dot
 Rows = list[list[float]]
 
 SWEEPS = 500
-"""Most sweeps. Chosen: ten times what control of a car's yaw needs; programs without a solution end, too."""
+"""Largest number of sweeps. Chosen: ten times what yaw control needs; ends programs without a solution."""
 CLOSE = 1e-10
-"""Share of the largest multiplier by which none may have moved. Chosen: far below a sensor's resolution."""
+"""Change of the multipliers, relative to the largest, at convergence. Chosen: far below sensor resolution."""
 
 
 def inverse(h: Sequence[Sequence[float]]) -> Rows:
-    """Return the inverse of a symmetric positive definite matrix, by Gauss and Jordan.
+    """Return the inverse of a symmetric positive definite matrix, by Gauss-Jordan elimination.
 
     Raises:
-        ZeroDivisionError: a pivot is zero, so that it is not positive definite.
+        ZeroDivisionError: a pivot is zero, so the matrix is not positive definite.
     """
     n = len(h)
     rows = [[*map(float, row), *(1.0 if i == j else 0.0 for j in range(n))] for i, row in enumerate(h)]
@@ -43,10 +44,10 @@ def inverse(h: Sequence[Sequence[float]]) -> Rows:
 
 
 def solution(h: Sequence[Sequence[float]], g: Sequence[float]) -> list[float]:
-    """Return z with H z = g, H symmetric and positive definite, by Gauss's elimination.
+    """Return z with H z = g, H symmetric and positive definite, by Gaussian elimination.
 
     Raises:
-        ZeroDivisionError: a pivot is zero, so that H is not positive definite.
+        ZeroDivisionError: a pivot is zero, so H is not positive definite.
     """
     rows = [[*row[i:], value] for i, (row, value) in enumerate(zip(h, g, strict=True))]  # upper triangle
     n = len(rows)
@@ -62,11 +63,11 @@ def solution(h: Sequence[Sequence[float]], g: Sequence[float]) -> list[float]:
 
 
 def multipliers(p: Sequence[Sequence[float]], d: Sequence[float]) -> list[float]:
-    """Return y >= 0 that makes 1/2 y' P y + d' y least.
+    """Return y >= 0 that minimizes 1/2 y' P y + d' y.
 
     Args:
         p: symmetric, positive semidefinite, with a positive diagonal.
-        d: as many numbers; none of them negative means y = 0.
+        d: vector of the same size; y = 0 if no element is negative.
     """
     y = [0.0] * len(d)
     slopes = list(d)  # d + P y

@@ -1,9 +1,9 @@
-"""The rate of a value that is known in samples: its slope over a step, smoothed by a first-order lag.
+"""Rate of a sampled value: difference quotient over a step, smoothed by a first-order lag.
 
     tau dq/dt = slope - q        solved exactly over a step; tau = 0: the backward difference
 
-A change that takes no time to speak of has no slope: a host's last step may be as short as a rounding
-error. Steps shorter than `SHORTEST` are added to the next; until then the rate stays as it is.
+Over very short steps the quotient is meaningless: a host's last step may be as short as a rounding error.
+Steps shorter than `SHORTEST` are added to the next step; until then the rate is constant.
 """
 
 from math import exp
@@ -13,22 +13,22 @@ SHORTEST = 1e-6
 
 
 class Slope:
-    """The rate of one value.
+    """Smoothed rate of a sampled value.
 
     Args:
-        value: at the start; the rate begins at zero.
+        value: initial value; the rate starts at zero.
         tau: time constant of the lag [s].
     """
 
     def __init__(self, value: float, tau: float) -> None:
         self.tau = tau
         self.value = value
-        self.elapsed = 0.0  # since then [s]
+        self.elapsed = 0.0  # since the last value [s]
         self.rate = 0.0
-        self.h = self.kept = 0.0  # of the last step: its length [s], what is left of the rate after it
+        self.h = self.kept = 0.0  # length [s] of the last step, and decay of the rate over it
 
     def see(self, value: float, h: float) -> None:
-        """Take in the value at the end of a step of `h` [s]."""
+        """Update the rate with the value at the end of a step of `h` [s]."""
         if self.elapsed:
             h += self.elapsed
         if h < SHORTEST:

@@ -1,6 +1,6 @@
-"""Sums of floating-point numbers: the same bits whatever Python adds them.
+"""Sums of floating-point numbers with identical bits in all Python versions.
 
-From CPython 3.12 on, `sum` compensates for rounding, so its last bits are others than before.
+Since CPython 3.12, `sum` compensates for rounding, which changes its last bits.
 """
 
 from collections.abc import Iterable, Sequence
@@ -8,7 +8,7 @@ from operator import mul
 
 
 def added(values: Iterable[float]) -> float:
-    """Return the sum of numbers, from the first to the last, rounded after each."""
+    """Return the sum of numbers, from first to last, rounded after each addition."""
     total = 0.0
     for value in values:
         total += value
@@ -16,5 +16,5 @@ def added(values: Iterable[float]) -> float:
 
 
 def dot(a: Sequence[float], b: Sequence[float]) -> float:
-    """Return the sum of the products of two rows of numbers."""
+    """Return the dot product of two vectors."""
     return added(map(mul, a, b))

@@ -1,1 +1,1 @@
-"""Monitors: whether signals can be believed, and what becomes of control if they cannot."""
+"""Monitors: detection of sensor faults, and fade-out of control in response."""

@@ -1,46 +1,48 @@
-"""Monitor of gyro, accelerometer, hand wheel and wheel speeds by parity relations, accumulated over time.
+"""Fault monitor of gyro, accelerometer, hand wheel and wheel speeds by parity relations with memory.
 
-Four signals say how fast the car turns:
+Four signals give the yaw rate:
 
     gyro            r
-    accelerometer   a_y / v, short of it by the rate of the sideslip angle
-    hand wheel      r_s of a single track that steer angle and moment turn (`estimation.steered_track`)
-    wheel speeds    r_w = the mean over axles of R (w_right - w_left) / track, less v M / (track^2 C_x)
+    accelerometer   a_y / v, apart from the rate of the sideslip angle
+    hand wheel      r_s of a single-track model with steer angle and moment (`estimation.steered_track`)
+    wheel speeds    r_w = mean over axles of R (w_right - w_left) / track, minus v M / (track^2 C_x)
 
-Every two of them make a relation, whose contradiction e is zero while both are right. That of gyro and
-accelerometer integrates, so that a small bias counts in time:
+Each pair of them is a relation, whose residual e is zero while both are correct. The residual of gyro and
+accelerometer is integrated, so that a small bias accumulates:
 
     z' = a_y / v - r - z / washout - beta',     beta = b r / v - m a a_y / (l C_r)                  (1)
 
-and that of accelerometer and wheel speeds likewise, with r_w for r. Each has a tolerance that grows with
-what its model leaves out: with how far tyres were used within the last `forget` (2), with the moment, which
-slips wheels (3), and with how far r_w of the two axles differ:
+and likewise that of accelerometer and wheel speeds, with r_w for r. Tolerances grow with the effects that the
+models neglect: with the use of the tyres within the last `forget` (2), with the moment, which causes wheel
+slip (3), and with the difference of r_w between the axles:
 
     tol_s = base + share |r_s| + (0.8 used_s + used_y) mu g / v + 0.6 M dr/dM                        (2)
     tol_w = base + 0.1 |r_w| + v M / (track^2 C_x) (1 + 9 (M / M_mu)^2) + |r_wf - r_wr|              (3)
 
-Contradictions pass a lag of `smoothing`; the mean of (e / tol)^2 with the time constant `memory` is the
-statistic of a relation, and more than 1 is a fault. Which signal it is follows from longer means, with
-`evidence_time`: if a signal is wrong, the relations without it leave little. The fault is located at the
-signal whose absence leaves the least, if that is below `ratio` times what the next leaves. A fault that
-is not located within `patience` is output as such (`UNLOCATED`) and may be located later. Further faults:
+Residuals pass a lag of `smoothing`; the mean of (e / tol)^2 with the time constant `memory` is the statistic
+of a relation, and a value above 1 is a fault. The faulty signal is isolated by longer means, with
+`evidence_time`: without a faulty signal the remaining relations have little evidence. The fault is located at
+the signal whose exclusion leaves the least evidence, if that is below `ratio` times that of the next
+candidate. A fault not located within `patience` is output as such (`UNLOCATED`) and may be located later.
+Further faults:
 
     a gyro or accelerometer that jumps, as a yaw rate, by `jump`, more than a car can, and stays away, or that
-    stands still to the last digit while the others move, for `still_time`
-    a wheel that is off the speed of its place by more than a tolerance like (3), by the same statistic
+    is constant to the last digit for `still_time` while the others change
+    a wheel whose speed deviates from that of its position by more than a tolerance like (3), by the same
+    statistic
 
-Of a located fault that control needs (`uses_*`), the moment fades to zero within `fade_time`, for good. Of
-one that it does not need, the signal bears no more witness. An unlocated fault takes nothing away.
+If control needs the faulty signal (`uses_*`), the moment fades to zero within `fade_time`, permanently.
+Otherwise the signal is excluded from the relations. An unlocated fault has no consequence.
 
-Limits: a gain of the gyro that is a little wrong is not found while the car goes nearly straight, and not
-located while tyres slide. A hand wheel that is wrong looks like a wish if the controller follows it, as M
-then explains why the car turns. Noise is averaged out.
+Limits: a small gain error of the gyro is not detected while the car drives nearly straight ahead, and not
+located while tyres slide. A wrong hand wheel cannot be distinguished from the driver's intention if the
+controller follows it, because M then explains the car's yaw rate. Noise is averaged out.
 
-Source: parity relations, and the location of a fault by those that it leaves alone: E. Y. Chow, A. S.
+Source: parity relations, and isolation of a fault by the relations that it does not affect: E. Y. Chow, A. S.
 Willsky, Analytical redundancy and the design of robust failure detection systems, IEEE Trans. Automatic
 Control 29 (1984) 603-614. Exponentially weighted means as a statistic: S. W. Roberts, Control chart tests
-based on geometric moving averages, Technometrics 1 (1959) 239-250. Four ways to a yaw rate: A. T. van
-Zanten, SAE 2000-01-1633. Tolerances are chosen, on the runs that docs/faults.md names.
+based on geometric moving averages, Technometrics 1 (1959) 239-250. Four sources of a yaw rate: A. T. van
+Zanten, SAE 2000-01-1633. Tolerances are chosen on the runs described in docs/faults.md.
 """
 
 from dataclasses import dataclass
@@ -70,32 +72,32 @@ SEEN = (
     "friction",
     "yaw_moment_wanted",
 )
-"""Inputs in which any step may show a fault."""
+"""Inputs on which the detection of faults depends directly."""
 SLOWEST = 5.0
-"""Speed below which nothing is judged [m/s]; chosen: a_y / v is noise there."""
+"""Speed below which the monitor is inactive [m/s]; chosen: a_y / v is noise there."""
 SMALLEST = 0.1
-"""Least friction [1]; chosen: ice."""
+"""Smallest friction [1]; chosen: ice."""
 LARGEST = 25.0
-"""Largest (e / tol)^2 in a mean; chosen: a single message weighs no more."""
+"""Largest (e / tol)^2 in a mean; chosen: bounds the weight of a single message."""
 SATURATED, USED = 0.5, 0.4
-"""Share of the grip from which axles, and a_y, make tolerances wider; chosen: tyres are linear below."""
+"""Share of the grip above which axles, and a_y, widen tolerances; chosen: tyres are linear below."""
 LEAN_SHARE = 0.04
-"""Share of a_y that may be wrong; chosen: a body leans by 2 degrees more or less at 1 g than told."""
+"""Tolerated relative error of a_y; chosen: error of the roll angle of 2 degrees at 1 g."""
 LEVEL_LAG = 0.03
-"""Lag of the level that a jump leaves [s]; chosen: three messages, so that noise is not taken for a jump."""
+"""Lag of the level before a jump [s]; chosen: three messages, so that noise is not taken for a jump."""
 SLIP_LIMIT = 0.1
-"""Slip that the moment makes at most; chosen: what slip control allows."""
+"""Largest slip due to the moment; chosen: limit of slip control."""
 WHEEL_HARD = 0.17
-"""Slip of a wheel where the moment uses all grip, in addition; chosen: on runs of paper B's car at mu 0.3."""
+"""Additional wheel slip when the moment uses all grip; chosen: on runs of paper B's car at mu 0.3."""
 LARGEST_OF_WHEELS = 4.0
-"""Largest (e / tol)^2 of wheels; chosen: slip control lets a wheel go for a moment."""
+"""Largest (e / tol)^2 of wheels; chosen: slip control may release a wheel for a moment."""
 SMALL = 0.1
-"""Evidence below which nothing is suspected; chosen: a third of a tolerance, squared."""
+"""Evidence below which no signal is suspected; chosen: a third of a tolerance, squared."""
 
 
 @dataclass(frozen=True)
 class ParityParameters:
-    """Parameters of the car, and how far signals may be apart."""
+    """Parameters of the car, and tolerances of the relations."""
 
     mass: float = like(PaperB, "mass")
     yaw_inertia: float = like(PaperB, "yaw_inertia")
@@ -116,37 +118,41 @@ class ParityParameters:
     rate_share: float = parameter(
         0.15,
         "1",
-        "Tolerance share_s of yaw rates, of themselves",
+        "Relative tolerance share_s of yaw rates",
         "chosen: stiffness known to 15 %",
         minimum=0.0,
     )
     sideslip_tolerance: float = parameter(
-        0.02, "rad", "Tolerance of z, more where tyres are used", "chosen: a bias of 0.6 deg/s passes",
+        0.02, "rad", "Tolerance of z, larger when tyres are used", "chosen: a bias of 0.6 deg/s passes",
         minimum=0.001,
     )  # fmt: skip
     wheel_tolerance: float = parameter(
-        0.02, "1", "Share of its speed that a wheel may be off", "chosen: drive and tyre wear", minimum=0.001
+        0.02, "1", "Relative tolerance of a wheel's speed", "chosen: drive and tyre wear", minimum=0.001
     )
     washout: float = parameter(
         2.0, "s", "Time constant of the implied sideslip angle", "chosen: longer than a lane change",
         minimum=0.1,
     )  # fmt: skip
-    smoothing: float = parameter(0.1, "s", "Lag of contradictions", "chosen: ten messages", minimum=0.001)
+    smoothing: float = parameter(0.1, "s", "Lag of the residuals", "chosen: ten messages", minimum=0.001)
     memory: float = parameter(
         0.3, "s", "Time constant of the statistic", "chosen: a large fault is found in 0.1 s", minimum=0.01
     )
     evidence_time: float = parameter(
-        1.0, "s", "Time constant of what locates a fault", "chosen: half a lane change", minimum=0.01
+        1.0,
+        "s",
+        "Time constant of the evidence that locates a fault",
+        "chosen: half a lane change",
+        minimum=0.01,
     )
     forget: float = parameter(
-        0.5, "s", "Time in which use of tyres and moment is forgotten", "chosen: a car settles in it",
+        0.5, "s", "Time in which use of tyres and moment is forgotten", "chosen: a car settles within it",
         minimum=0.01,
     )  # fmt: skip
     patience: float = parameter(
-        0.5, "s", "Time after which a fault is told without its place", "chosen: as `memory`", minimum=0.0
+        0.5, "s", "Time after which an unlocated fault is output", "chosen: as `memory`", minimum=0.0
     )
     ratio: float = parameter(
-        0.5, "1", "A fault is located where it leaves this share of the next", "chosen: twice as likely",
+        0.5, "1", "Largest ratio of remaining evidence to the next candidate's", "chosen: twice as likely",
         minimum=0.0, maximum=1.0,
     )  # fmt: skip
     jump: float = like(RedundancyParameters, "jump")
@@ -160,13 +166,13 @@ class ParityParameters:
 
 
 class Parity(Component):
-    """Monitor that accumulates contradictions of gyro, a_y, hand wheel and wheels and locates the fault."""
+    """Fault monitor of gyro, a_y, hand wheel and wheel speeds by parity relations with memory."""
 
     Parameters = ParityParameters
     sampled = True
     inputs = (
         *INPUTS,
-        signal("yaw_moment_wanted", "N.m", "Yaw moment that the controller asks for"),
+        signal("yaw_moment_wanted", "N.m", "Yaw moment requested by the controller"),
     )
     outputs = (
         output("yaw_moment", "yaw_moment_wanted"),
@@ -176,7 +182,7 @@ class Parity(Component):
         ),
         output(
             "implied_sideslip", *SEEN, unit="rad",
-            text="Sideslip angle z that gyro and accelerometer imply and the rear axle does not",
+            text="Sideslip angle z implied by gyro and accelerometer, minus that of the rear axle",
         ),
         output("contradiction", *SEEN, unit="1", text="Largest statistic of a relation; 1 is a fault"),
     )  # fmt: skip
@@ -192,23 +198,23 @@ class Parity(Component):
     def start(self, t: float, u: list[float]) -> None:
         self.fault, self.share = 0.0, 1.0
         self.lost = [False] * 4  # as `SIGNALS`
-        self.rolling = [True] * 4  # wheels that are believed
+        self.rolling = [True] * 4  # wheels that are trusted
         self.last = (u[0], u[1])
         self.track = SteeredTrack(self.p)
         self._forget()
 
     def _forget(self) -> None:
-        """Begin all means anew."""
+        """Restart all means."""
         self.z = self.z_wheels = self.z_tolerance = self.z_allowed = 0.0
-        self.sideslip: tuple[float, float] | None = None  # of the rear axle, by gyro and by wheels
+        self.sideslip: tuple[float, float] | None = None  # of the rear axle, from gyro and from wheels
         self.used = self.used_y = self.moment = self.apart = 0.0
         self.lagged, self.statistic = [0.0] * 6, [0.0] * 6
         self.long_lagged, self.evidence = [0.0] * 6, [0.0] * 6
         self.off, self.wheel_statistic = [0.0] * 4, [0.0] * 4
         self.pending = 0.0
-        self.levels, self.away = [0.0, 0.0], [0.0, 0.0]  # what a jump left, since how long
-        self.still = [0.0, 0.0]  # how long gyro and accelerometer have not changed
-        self.then = [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]  # rates when they last did
+        self.levels, self.away = [0.0, 0.0], [0.0, 0.0]  # level before the jump, time since the jump
+        self.still = [0.0, 0.0]  # time for which gyro and accelerometer have been constant
+        self.then = [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]  # rates at their last change
 
     def advance(self, t: float, h: float, u: list[float]) -> None:
         if any(uses and self.fault == fault for uses, fault in zip(self.uses, SIGNALS, strict=True)):
@@ -240,18 +246,18 @@ class Parity(Component):
         return self.share * u[-1], self.fault, self.z, max(*self.statistic, *self.wheel_statistic)
 
     def _grip_moment(self, mu: float) -> float:
-        """Return the moment [N.m] of all wheels of one side that drive or brake as far as the road bears."""
+        """Return the moment [N.m] of the wheels of a side at their grip limit."""
         return float(mu * self.p.mass * G * 0.5 * self.p.track_width)
 
     def _remember(self, h: float, a_y: float, mu: float, moment: float) -> None:
-        """Keep the largest use of tyres and moment for a while."""
+        """Update the peaks of tyre use and moment, which decay with `forget`."""
         kept = 1.0 - min(h / self.p.forget, 1.0)
         self.used = max(kept * self.used, min(self.track.used, 3.0))
         self.used_y = max(kept * self.used_y, min(abs(a_y) / (mu * G), 1.2))
         self.moment = max(kept * self.moment, abs(moment))
 
     def _by_wheels(self, v: float, wheels: list[float], moment: float) -> tuple[float, float]:
-        """Return r_w [rad/s] and how far its two axles differ; of one axle if the other has a lost wheel."""
+        """Return r_w [rad/s] and the difference of its axles; only one axle if the other has a lost wheel."""
         p = self.p
         front = p.wheel_radius * (wheels[1] - wheels[0]) / p.track_width
         rear = p.wheel_radius * (wheels[3] - wheels[2]) / p.track_width
@@ -263,14 +269,14 @@ class Parity(Component):
         return 0.5 * (front + rear) - slipped, abs(front - rear)
 
     def _slipped(self, v: float) -> float:
-        """Return what a moment adds to r_w by slip, v / (track^2 C_x) [rad/s per N.m]."""
+        """Return the increase of r_w by the slip due to a moment, v / (track^2 C_x) [rad/s per N.m]."""
         p = self.p
         return float(v / (p.track_width * p.track_width * p.wheel_slip_stiffness))
 
     def _relate(
         self, h: float, v: float, seen: tuple[float, float], wheels: list[float], mu: float, moment: float
     ) -> float:
-        """Take all relations over a step; return r_s [rad/s]."""
+        """Advance all relations by a step; return r_s [rad/s]."""
         p, (r, a_y) = self.p, seen
         steered = self.track.yaw_rate
         rolled, apart = self._by_wheels(v, wheels, moment)
@@ -299,7 +305,7 @@ class Parity(Component):
         return steered
 
     def _integrate(self, h: float, v: float, r: float, a_y: float, rolled: float) -> None:
-        """Take the implied sideslip angles over a step; equation (1)."""
+        """Advance the implied sideslip angles by a step; equation (1)."""
         p = self.p
         rear = self.softness * a_y
         now = p.cg_to_rear_axle * r / v - rear, p.cg_to_rear_axle * rolled / v - rear
@@ -316,7 +322,7 @@ class Parity(Component):
         rolling: float,
         rolling_tolerance: float,
     ) -> None:
-        """Take statistics and evidence over a step; evidence compares a_y and wheels as yaw rates."""
+        """Advance statistics and evidence by a step; evidence compares a_y and wheels as yaw rates."""
         p = self.p
         lag, short = min(h / p.smoothing, 1.0), min(h / p.memory, 1.0)
         long = min(h / p.evidence_time, 1.0)
@@ -335,7 +341,7 @@ class Parity(Component):
         ]
 
     def _compare_wheels(self, h: float, r: float, v: float, wheels: list[float], mu: float) -> None:
-        """Take the statistics of single wheels over a step: how far each is off the speed of its place."""
+        """Advance the statistics of the wheels' deviations from the speeds of their positions by a step."""
         p = self.p
         hard = min(1.0, (2.0 * self.moment / self._grip_moment(mu)) ** 2)
         slip = 2.0 * self.moment / (p.track_width * p.wheel_slip_stiffness)
@@ -353,11 +359,11 @@ class Parity(Component):
         ]
 
     def _pairs(self) -> list[bool]:
-        """Return which relations have both of their signals."""
+        """Return the relations with two valid signals."""
         return [not (self.lost[i] or self.lost[k]) for i, k in PAIRS]
 
     def _located(self, h: float) -> float:
-        """Return the number of a fault that is located in this step, 0 if there is none."""
+        """Return the number of the fault located in this step, 0 if none."""
         known = self._pairs()
         if max(self.wheel_statistic) > 1.0 and not (known[0] and self.statistic[0] > 1.0):
             return WHEEL
@@ -384,7 +390,7 @@ class Parity(Component):
         return 0.0
 
     def _lose(self, located: float) -> None:
-        """Believe a signal no more: of the wheels that which is off most, and all at the second."""
+        """Exclude a signal; of the wheel speeds, the worst, and after a second fault all."""
         self.fault = located
         if located == WHEEL:
             worst = max(self.wheel_statistic)
@@ -398,11 +404,11 @@ class Parity(Component):
         self._forget()
 
     def _jumped(self, h: float, rates: tuple[float, float], last: tuple[float, float]) -> float:
-        """Return the number of a gyro or accelerometer that has jumped and stays away, or 0."""
+        """Return the number of the signal (gyro or accelerometer) that has jumped and stays away, or 0."""
         p, lag = self.p, min(h / LEVEL_LAG, 1.0)
         jumps = [abs(rate - before) > p.jump for rate, before in zip(rates, last, strict=True)]
         stays = [
-            jump == (away == 0.0) and abs(rate - level) > p.jump and not lost  # noise jumps on
+            jump == (away == 0.0) and abs(rate - level) > p.jump and not lost  # noise keeps jumping
             for jump, away, rate, level, lost in zip(
                 jumps, self.away, rates, self.levels, self.lost[:2], strict=True
             )
@@ -415,7 +421,7 @@ class Parity(Component):
         return self._longest(self.away)
 
     def _still(self, h: float, seen: tuple[float, float], rates: tuple[float, float, float]) -> float:
-        """Return the number of a gyro or accelerometer that does not change while the others move, or 0."""
+        """Return the number of the signal (gyro or accelerometer) that is stuck while others change, or 0."""
         same = [now == before for now, before in zip(seen, self.last, strict=True)]
         self.still = [still + h if alike else 0.0 for still, alike in zip(self.still, same, strict=True)]
         self.then = [then if still > h else rates for then, still in zip(self.then, self.still, strict=True)]
@@ -429,14 +435,14 @@ class Parity(Component):
     def _others_moved(
         self, k: int, rates: tuple[float, float, float], then: tuple[float, float, float]
     ) -> bool:
-        """Return whether the believed ones of the other two signals have moved, one at least."""
+        """Return whether all trusted ones of the other two signals have changed, at least one."""
         others = [j for j in range(3) if j != k]
         alone = all(self.lost[j] for j in others)
         moved = all(self.lost[j] or abs(rates[j] - then[j]) > self.p.moved for j in others)
         return moved and not alone and not self.lost[k]
 
     def _longest(self, times: list[float]) -> float:
-        """Return the number of gyro or accelerometer if its time is over `still_time`, or 0."""
+        """Return the number of the signal (gyro or accelerometer) whose time exceeds `still_time`, or 0."""
         if times[0] >= self.p.still_time:
             return GYRO
         return ACCELEROMETER if times[1] >= self.p.still_time else 0.0

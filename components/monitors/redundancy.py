@@ -1,36 +1,36 @@
-"""Monitor of gyro, accelerometer, hand wheel and wheel speeds by comparing what they imply about each other.
+"""Fault monitor of gyro, accelerometer, hand wheel and wheel speeds by instantaneous redundancy.
 
-Wheels say how fast the car goes, three signals how fast it turns:
+The wheels give the speed, three signals the yaw rate:
 
     v   = R median(w_i)
-    r_1 = r                                          the gyro
-    r_2 = a_y / v                                    short of it by the rate of the sideslip angle
-    r_3 = v delta / (l (1 + v^2 / v_ch^2)), at most mu g / v       the car's, as far as the road bears it
+    r_1 = r                                          gyro
+    r_2 = a_y / v                                    apart from the rate of the sideslip angle
+    r_3 = v delta / (l (1 + v^2 / v_ch^2))           of a car that follows its steering; at most mu g / v
 
-A signal is taken for faulty
+The following signals are faulty:
 
-    that jumps, as a yaw rate, by `jump` from one sample to the next, more than a car can                 (0)
-    that stands still to the last digit for `still_time` while both others move by `moved`                (1)
-    that is the further one from r_3, of gyro and accelerometer, when the sideslip angle which the two
-      imply, the integral of r_2 - r_1 with a washout of `washout`, passes `largest_sideslip`             (2)
-    the hand wheel, if r_1 and r_2 agree to `agreeing` but differ from r_3 by `differing`                 (3)
-    the wheel whose speed is off the median by the share `wheel_share`                                    (4)
+    gyro or accelerometer, if it jumps, as a yaw rate, by `jump` between samples, more than a car can     (0)
+    gyro or accelerometer, if it is constant to the last digit for `still_time` while both other
+      signals change by `moved`                                                                           (1)
+    gyro or accelerometer, whichever is further from r_3, if the sideslip angle implied by both, the
+      integral of r_2 - r_1 with a washout of `washout`, exceeds `largest_sideslip`                       (2)
+    hand wheel, if r_1 and r_2 agree to `agreeing` but differ from r_3 by `differing`                     (3)
+    a wheel whose speed deviates from the median by the share `wheel_share`                               (4)
 
-where (3) and (4) must last for `lasting`. (0) and (1) are about gyro and accelerometer alone: a driver may
-jerk or hold the wheel. The output `fault` is the last fault found. If control needs the signal
-(`uses_*`), the yaw moment fades to zero within `fade_time`, for good, and nothing more is looked for: no
-control is the law that needs no signal. If it does not, the signal bears no more witness, for good, and the
-others are watched on without it: (1) asks those that are left, (2) and (3) need both gyro and accelerometer,
-(2) lays it at the gyro's door if the hand wheel is lost, (4) needs three wheels. With fewer than two wheels
-nothing is judged any more.
+where (3) and (4) must last for `lasting`. (0) and (1) do not apply to the hand wheel, which a driver may jerk
+or hold. The output `fault` is the last fault detected. If control needs the signal (`uses_*`), the yaw moment
+fades to zero within `fade_time`, permanently, and monitoring ends, since zero moment needs no signal.
+Otherwise the signal is excluded permanently and monitoring continues without it: (1) compares with the
+remaining signals, (2) and (3) need both gyro and accelerometer, (2) blames the gyro if the hand wheel is
+excluded, (4) needs three wheels. With fewer than two wheels monitoring ends.
 
-Limits: what is late or a little wrong passes, and so does a fault while nothing moves, until something does.
-A gyro that is a little wrong passes where the accelerometer is lost. A bias that grows slowly may be laid at
-the accelerometer's door. A car that slides far without control gives alarms too: (2) and (3) know cars that
-follow their steering. One that understeers and is taken for neutral gives a false alarm (3).
+Limits: delayed or slightly wrong signals are not detected, nor is any fault while no signal changes. A
+slightly wrong gyro is not detected without the accelerometer. A slowly growing bias may be attributed to the
+accelerometer. An uncontrolled car at large sideslip causes alarms, because (2) and (3) assume a car that
+follows its steering. An understeering car with parameters of a neutral car causes a false alarm (3).
 
-Source: that signals are judged by such relations is the practice of van Zanten, Bosch ESP Systems: 5 Years of
-Experience, SAE 2000-01-1633; the relations are kinematics, all thresholds are chosen.
+Source: relations between signals as in van Zanten, Bosch ESP Systems: 5 Years of Experience, SAE
+2000-01-1633; the relations are kinematic, all thresholds are chosen.
 """
 
 from dataclasses import dataclass
@@ -45,44 +45,44 @@ from ..fmi.variables import like, output, parameter, signal
 
 GYRO, ACCELEROMETER, HAND_WHEEL, WHEEL = 1.0, 2.0, 3.0, 4.0
 SIGNALS = (GYRO, ACCELEROMETER, HAND_WHEEL)
-"""Signals from which the three yaw rates are made, in their order."""
+"""Signals of the three yaw rates, in their order."""
 INPUTS = ("yaw_rate", "acceleration_y", "steer_angle", "wheel_speed_*", "friction")
 SEEN = (*INPUTS[:3], *wheels("wheel_speed_*"), "friction")
-"""Inputs in which any step may show a fault."""
+"""Inputs on which the detection of faults depends directly."""
 SLOWEST = 3.0
-"""Speed below which nothing is judged [m/s]; chosen: a_y / v is noise there."""
+"""Speed below which the monitor is inactive [m/s]; chosen: a_y / v is noise there."""
 SLOW = 10.0
-"""Speed below which a jump of a_y counts as at this one [m/s]; chosen: five times the noise of a_y / v."""
+"""Smallest speed for jumps of a_y / v [m/s]; chosen: five times the noise of a_y / v."""
 
 
 def median_speed(wheels: list[float], rolling: list[bool], count: int) -> float:
-    """Return the median speed [rad/s] of the wheels that are believed, `count` of them, two at least."""
+    """Return the median speed [rad/s] of the trusted wheels; `count` is their number, at least two."""
     ordered = sorted([w if rolls else inf for rolls, w in zip(rolling, wheels, strict=True)])
     return 0.5 * (ordered[(count - 1) // 2] + ordered[count // 2])
 
 
 @dataclass(frozen=True)
 class RedundancyParameters:
-    """Parameters of the car, and how far signals may be apart."""
+    """Parameters of the car, and thresholds of the relations."""
 
     cg_to_front_axle: float = like(PaperB, "cg_to_front_axle")
     cg_to_rear_axle: float = like(PaperB, "cg_to_rear_axle")
     wheel_radius: float = like(PaperB, "wheel_radius")
     characteristic_speed: float = parameter(
         0.0, "m/s",
-        "Speed v_ch at which an understeering car turns half as much as a neutral one; 0: neutral",
+        "Characteristic speed v_ch, at which the yaw gain is half that of a neutral car; 0: neutral",
         "chosen: the car of paper B is nearly neutral",
         minimum=0.0,
     )  # fmt: skip
     jump: float = parameter(
-        0.1, "rad/s", "What no car turns faster by from sample to sample", "chosen: 10 rad/s2 in 10 ms",
+        0.1, "rad/s", "Change of a yaw rate between samples beyond any car's", "chosen: 10 rad/s2 in 10 ms",
         minimum=0.001,
     )  # fmt: skip
     still_time: float = parameter(
-        0.1, "s", "A signal that is alive changes within this", "chosen: ten messages", minimum=0.0
+        0.1, "s", "Time within which a working signal changes", "chosen: ten messages", minimum=0.0
     )
     moved: float = parameter(
-        0.05, "rad/s", "What others must have moved by, as yaw rates", "chosen: 3 deg/s", minimum=0.001
+        0.05, "rad/s", "Required change of the other signals, as yaw rates", "chosen: 3 deg/s", minimum=0.001
     )
     washout: float = parameter(
         1.0, "s", "Time constant of the implied sideslip angle", "chosen: bias of 1 deg/s passes", minimum=0.1
@@ -91,37 +91,37 @@ class RedundancyParameters:
         0.12, "rad", "Largest implied sideslip angle", "chosen: cars under control reach 0.09", minimum=0.01
     )
     agreeing: float = parameter(
-        0.1, "rad/s", "Up to this gyro and accelerometer agree", "chosen: 6 deg/s", minimum=0.001
+        0.1, "rad/s", "Difference up to which gyro and accelerometer agree", "chosen: 6 deg/s", minimum=0.001
     )
     differing: float = parameter(
-        0.1, "rad/s", "From this on the hand wheel is wrong", "chosen: 6 deg/s", minimum=0.001
+        0.1, "rad/s", "Difference above which the hand wheel is faulty", "chosen: 6 deg/s", minimum=0.001
     )
     wheel_share: float = parameter(
-        0.3, "1", "Share of its speed that a wheel may be off", "chosen: beyond what slip control allows",
+        0.3, "1", "Relative tolerance of a wheel's speed", "chosen: beyond what slip control allows",
         minimum=0.01,
     )  # fmt: skip
     lasting: float = parameter(
-        0.3, "s", "How long (3) and (4) must last", "chosen: longer than a tyre or a brake takes", minimum=0.0
+        0.3, "s", "Time for which (3) and (4) must last", "chosen: slower than tyres and brakes", minimum=0.0
     )
-    uses_yaw_rate: bool = parameter(True, None, "Control needs the gyro", "chosen: so does every law here")
-    uses_acceleration: bool = parameter(True, None, "Control needs a_y", "chosen: no fault is taken lightly")
+    uses_yaw_rate: bool = parameter(True, None, "Control needs the gyro", "chosen: all laws here do")
+    uses_acceleration: bool = parameter(True, None, "Control needs a_y", "chosen: every fault counts")
     uses_steer_angle: bool = parameter(
         True, None, "Control needs the hand wheel", "chosen: the reference does"
     )
     uses_wheel_speeds: bool = parameter(True, None, "Control needs wheel speeds", "chosen: as of a_y")
     fade_time: float = parameter(
-        0.1, "s", "Time in which the yaw moment fades", "chosen: no jolt, and soon", minimum=0.001
+        0.1, "s", "Time in which the yaw moment fades", "chosen: fast, without a jolt", minimum=0.001
     )
 
 
 class Redundancy(Component):
-    """Monitor that fades the yaw moment out when gyro, a_y, hand wheel or a wheel contradict the others."""
+    """Fault monitor of gyro, a_y, hand wheel and wheel speeds by instantaneous redundancy."""
 
     Parameters = RedundancyParameters
     sampled = True
     inputs = (
         *INPUTS,
-        signal("yaw_moment_wanted", "N.m", "Yaw moment that the controller asks for"),
+        signal("yaw_moment_wanted", "N.m", "Yaw moment requested by the controller"),
     )
     outputs = (
         output("yaw_moment", "yaw_moment_wanted"),
@@ -129,7 +129,7 @@ class Redundancy(Component):
             "fault", *SEEN, unit="1", text="0: none; 1: gyro, 2: accelerometer, 3: hand wheel, 4: wheel speed"
         ),
         output(
-            "implied_sideslip", *SEEN, unit="rad", text="Sideslip angle that gyro and accelerometer imply"
+            "implied_sideslip", *SEEN, unit="rad", text="Sideslip angle implied by gyro and accelerometer"
         ),
     )
 
@@ -152,7 +152,7 @@ class Redundancy(Component):
         self.since: list[tuple[float, tuple[float, float, float]] | None] = [None, None]
         self.contradicted = 0.0
         self.off = [0.0] * 4
-        self.rolling = [True] * 4  # wheels that are believed
+        self.rolling = [True] * 4  # wheels that are trusted
 
     def advance(self, t: float, h: float, u: list[float]) -> None:
         p = self.p
@@ -192,7 +192,7 @@ class Redundancy(Component):
         return self.share * u[-1], self.fault, self.implied
 
     def _lose(self, fault: float) -> None:
-        """Believe a signal no more."""
+        """Exclude a signal."""
         self.fault = fault
         if fault == WHEEL:
             self.rolling = [
@@ -221,7 +221,7 @@ class Redundancy(Component):
         rates: tuple[float, float, float],
         jumps: tuple[float, float],
     ) -> float:
-        """Return the number of the first fault that is found, 0 if there is none."""
+        """Return the number of the first fault detected, 0 if none."""
         p, lost = self.p, self.lost
         for k in (0, 1):
             if not lost[k] and jumps[k] > p.jump:

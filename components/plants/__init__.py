@@ -1,1 +1,1 @@
-"""Plants: the car without its tyres."""
+"""Plants: vehicle models without the tyres."""

@@ -8,25 +8,26 @@
     F_zf = (m g b - h X) / 2L -/+ (K_f phi + C_f dphi + h_f Y_f) / d      minus left, plus right   (13)
     F_zr = (m g a + h X) / 2L -/+ (K_r phi + C_r dphi + h_r Y_r) / d
 
-with a_x = dv_x - v_y r, a_y = dv_y + v_x r, dotted quantities written with a d, phi positive with the
-left side up, X, Y_f, Y_r, M the resultants of the tyre forces (`cars.plane_body`). phi belongs to the
-sprung mass; v_x, v_y, a_x, a_y to the point of the roll axis below the centre of mass, which is what the
-paper calls the centre of mass. The pair (1), (4) is solved for a_y and ddphi exactly. A wheel that
-lifts: `cars.load_transfer`. Inclines and wind: `cars.road_plane`,
-camber for tyres that take it: `cars.roll_camber`.
+with a_x = dv_x - v_y r, a_y = dv_y + v_x r; a prefix d denotes the time derivative, phi is positive with the
+left side up, and X, Y_f, Y_r, M are the resultants of the tyre forces (`cars.plane_body`). phi is the roll
+angle of the sprung mass; v_x, v_y, a_x, a_y refer to the point of the roll axis below the centre of mass,
+which the paper calls the centre of mass. (1) and (4) are solved for a_y and ddphi exactly. Lifted wheels:
+`cars.load_transfer`. Inclines and wind: `cars.road_plane`. Camber for tyre models that use it:
+`cars.roll_camber`.
 
-Ours differs: rolling resistance is a moment on each wheel (`cars.resistance`), where the paper has a force
-m g f on the body in (2). Free wheels slow the car alike; of driven ones the tyres carry m g f less.
+Ours differs: rolling resistance is a moment on each wheel (`cars.resistance`), whereas the paper has a force
+m g f on the body in (2). Free wheels slow the car equally; with driven wheels the tyre forces are smaller by
+m g f.
 
 Source: paper B, equations (1)-(4), (8)-(13). Errata: (2) prints m_s h_s dphi, whose units are wrong, and adds
 xi m dv_x with xi = 1.04, which would double the mass (here the excess alone, 0: the wheels' inertia is in
 (8)); C_D A V^2 / 21.15 is for km/h; the printed roll stiffness 5600 lies barely above m_s g h_s. The paper
 numbers the wheels fl, fr, rr, rl.
 
-How it couples, and why nothing but the front wheels' slip depends directly on an input: as in
-`plants.seven_dof`. The equations are in `cars.rolling_body`. How they are solved over a step with
-held forces: roll exactly (`mathematics.oscillator`), so any roll stiffness goes with any step, plane
-motion by `cars.plane_body`, wheels by `cars.wheel_spin`.
+Coupling as in `plants.seven_dof`, which explains why only the front wheels' slips depend directly on an
+input. The equations are in `cars.rolling_body`. Under held forces roll is solved exactly
+(`mathematics.oscillator`), so any roll stiffness works with any step, plane motion by `cars.plane_body`, the
+wheels by `cars.wheel_spin`.
 """
 
 from collections.abc import Sequence
@@ -41,7 +42,7 @@ from ..mathematics.oscillator import transition
 
 
 class EightDof(DrivenCar):
-    """Car with eight degrees of freedom (plane motion, roll, four wheel spins), loads through roll."""
+    """Car with eight degrees of freedom (plane motion, roll, four wheel spins), load transfer by roll."""
 
     Parameters = RollingCarParameters
     outputs = (*MOTION, "roll_angle", "roll_rate", *DRIVEN_WHEELS, "inclination_angle_*")
@@ -54,7 +55,7 @@ class EightDof(DrivenCar):
     def rest(self, signals: Sequence[Any]) -> Values:
         held = resultants(signals[0], signals[1], signals[2], self.p, signals[6])
         phi = 0.0
-        for _ in range(20):  # the body hangs in its springs; sin(phi) - phi is tiny
+        for _ in range(20):  # static roll angle by fixed-point iteration; sin(phi) - phi is tiny
             phi = self.body.forcing(held[1] + held[2], phi, self.pull) / self.body.stiffness
         self.angle, self.rate = phi, 0.0
         return held

@@ -1,4 +1,4 @@
-"""Car with fourteen degrees of freedom: body in space, four wheels up and down, spin of the four wheels.
+"""Car with fourteen degrees of freedom: body in space, vertical motion and spin of the four wheels.
 
     m (dv_x/dt - v_y r) = X - 1/2 rho C_D A v_x |v_x|                                  (a)
     m (dv_y/dt + v_x r) = Y                                                            (b)
@@ -9,22 +9,21 @@ Yaw, roll, pitch, heave and the vertical motion of the wheels are those of `cars
 (1)-(11): springs, dampers, anti-roll bars, roll centres, tyre springs that cannot pull. Slips are those
 of the contact points, which move with body and wheels (`cars.contact_points`).
 
-Stands in for a multi-body model. Degrees of freedom and assumptions as in T. Shim, C. Ghike,
+The model replaces a multi-body model. Degrees of freedom and assumptions as in T. Shim, C. Ghike,
 Understanding the limitations of different vehicle models for roll dynamics studies, Vehicle System
 Dynamics 45(3), 2007, 191-216: rigid body, vertical wheel travel, linear springs and dampers at the
-wheels, no bump stops, no steering by roll. Ours differs: yaw axis vertical, roll and pitch to
-second order in the kinetic energy, roll centres as slopes of the wheels' paths. Wheels share the
-body's horizontal motion at `unsprung_height`, no anti-dive. Derivation: docs/plant_fourteen_dof.md. A car
-that rolls over, beyond 45 degrees of roll or pitch, is an error.
-Drag acts at the centre of mass, rolling resistance at the wheels (`cars.resistance`). Wheels lean with the
-body (`cars.roll_camber`), for tyres that take camber.
+wheels, no bump stops, no roll steer. Ours differs: vertical yaw axis, roll and pitch to second order in the
+kinetic energy, roll centres as slopes of the wheels' paths. Wheels have the body's horizontal motion at
+`unsprung_height`; no anti-dive. Derivation: docs/plant_fourteen_dof.md. Rollover, beyond 45 degrees of roll
+or pitch, is an error. Drag acts at the centre of mass, rolling resistance at the wheels (`cars.resistance`).
+Wheels incline with the body (`cars.roll_camber`), for tyre models with camber.
 
-How it couples. Vertical loads follow from the tyre springs, that is from the state: there is no loop of
-loads and forces here. Nothing but the front wheels' slip and longitudinal velocity follows an input
-directly; tyre forces and torques belong to the middle of the step, accelerations are carried to
-its end (`mathematics.carry`), as in `plants.seven_dof`. Solved over a step with held forces: plane motion by
-`cars.plane_body`, wheels by `cars.wheel_spin`, the rest by Runge-Kutta, in substeps where the
-springs are stiff or the step is long.
+Coupling: vertical loads follow from the tyre springs, that is from the state, so there is no loop of loads
+and forces. Only the slips and longitudinal velocities of the front wheels depend directly on an input; tyre
+forces and torques belong to the middle of the step, and accelerations are extrapolated to its end
+(`mathematics.carry`), as in `plants.seven_dof`. Under held forces plane motion is solved by
+`cars.plane_body`, the wheels by `cars.wheel_spin`, the rest by Runge-Kutta, in substeps if springs are stiff
+or the step is long.
 """
 
 from collections.abc import Sequence
@@ -43,13 +42,13 @@ from ..fmi.variables import output
 from ..mathematics.carry import Values
 
 ROLLED_OVER = 0.25 * pi
-"""Roll or pitch [rad] from which on these equations are wrong; chosen: half way on to its side."""
+"""Roll or pitch [rad] above which the equations are not valid; chosen: half way to lying on the side."""
 
-HEAVE = output("heave", unit="m", text="Height of the sprung mass's centre above its place at rest")
+HEAVE = output("heave", unit="m", text="Height of the sprung mass's centre above its position at rest")
 
 
 class FourteenDof(DrivenCar):
-    """Car with fourteen degrees of freedom (body in space, wheel travel, wheel spins) on tyre springs."""
+    """Car with fourteen degrees of freedom (body in space, wheel travel, wheel spins), on tyre springs."""
 
     Parameters = FourteenDofParameters
     outputs = (

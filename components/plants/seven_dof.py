@@ -4,23 +4,22 @@
     I_z dr/dt = M                                                                           (7)
     J dw_i/dt = T_i - F_xi R                                                                (8)
 
-with the resultants X, Y_f, Y_r, M of the tyre forces (`cars.plane_body`), to which inclines and wind add
-theirs (`cars.road_plane`), and the loads of a_x = X / m, a_y = (Y_f + Y_r) / m (`cars.load_transfer`,
-equations (17), (18)). Roll, pitch and suspension are left out.
+with the resultants X, Y_f, Y_r, M of the tyre forces (`cars.plane_body`), to which those of inclines and wind
+are added (`cars.road_plane`), and quasi-static loads from a_x = X / m, a_y = (Y_f + Y_r) / m
+(`cars.load_transfer`, equations (17), (18)). Roll, pitch and suspension are neglected.
 
 Source: paper A, equations (5)-(8), (13)-(20). Ours differs: the lifted wheel; slips at rest, see
 `cars.wheel_kinematics`. Errata: (7) prints the rear-track term with the opposite sign; (13)-(16) print
 sideslip for yaw rate; (17), (18) print b where a is meant.
 
-How it couples. Tyre forces and wheel torques enter the integration only: they are held over the
-step, and a master that knows this hands over their values at its middle. The steer angle feeds
-the slip angles directly, so its value belongs to the end of the step; the forces are turned
-by the mean of it and the last one. The loads follow from the accelerations, these from the
-forces and these from the loads: to leave that loop open, the accelerations, known at the middle
-of each step, are carried on to its end along the straight line nearest to the last three
-(`mathematics.carry`).
-All of this is exact to second order in the step, which may vary. The body's motion is solved by
-`cars.plane_body`, the wheels' by `cars.wheel_spin`, which also says what becomes of slow, braked wheels.
+Coupling: tyre forces and wheel torques enter only the integration: they are held over the step, and the
+master should supply their values at its middle. The steer angle feeds through to the slip angles, so its
+value belongs to the end of the step; the forces are rotated by the mean of the last two steer angles. The
+loads depend on the accelerations, these on the forces, and the forces on the loads: to avoid this algebraic
+loop, the accelerations, known at the middle of each step, are extrapolated to its end by the least-squares
+line through the last three (`mathematics.carry`). The result is of second order in the step, which may vary.
+The body's motion is solved by `cars.plane_body`, the wheels by `cars.wheel_spin`, which also covers slow,
+braked wheels.
 """
 
 from collections.abc import Sequence
@@ -39,16 +38,16 @@ from ..mathematics.carry import Values
 
 @dataclass(frozen=True)
 class SevenDofParameters(StartParameters, PaperA):
-    """The car of paper A, table 1."""
+    """Parameters of paper A's car, table 1."""
 
-    initial_speed: float = parameter(25.0, "m/s", "Speed at the start", "paper A drives 15, 25, 40 m/s")
+    initial_speed: float = parameter(25.0, "m/s", "Speed at the start", "paper A: 15, 25, 40 m/s")
     slip_stiffness_per_load: float = like(
         DrivenCarParameters, "slip_stiffness_per_load", 15.0, "chosen: paper A's tyre at rest"
     )
 
 
 class SevenDof(DrivenCar):
-    """Car with seven degrees of freedom (plane motion, four wheel spins), quasi-static wheel loads."""
+    """Car with seven degrees of freedom (plane motion, four wheel spins), quasi-static loads."""
 
     Parameters = SevenDofParameters
     outputs = (*MOTION, *DRIVEN_WHEELS)
@@ -70,7 +69,7 @@ class SevenDof(DrivenCar):
         self.loads = quasi_static_loads(a_x, a_y, self.p, G - pull.lighter)
 
     def _accelerations(self, delta: float, signals: Sequence[Any]) -> tuple[float, float, float]:
-        """Return what the tyres give, a_x, a_y [m/s2], dr/dt [rad/s2]; equations (5)-(7)."""
+        """Return a_x, a_y [m/s2] and dr/dt [rad/s2] by the tyre forces; equations (5)-(7)."""
         p = self.p
         x, front, rear, moment = resultants(delta, signals[1], signals[2], p, signals[6])
         return x / p.mass, (front + rear) / p.mass, moment / p.yaw_inertia

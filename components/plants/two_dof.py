@@ -1,29 +1,30 @@
-"""Car with two degrees of freedom, lateral and yaw motion at constant v_x, on four tyres.
+"""Car with two degrees of freedom: lateral and yaw motion at constant v_x, on four tyres.
 
     m (dv_y/dt + v_x r) = Y = (F_yfl + F_yfr) cos(delta) + F_yrl + F_yrr                      (1)
     I_z dr/dt = a (F_yfl + F_yfr) cos(delta) - b (F_yrl + F_yrr)
                 + d/2 (F_yfl - F_yfr) sin(delta) + M                                      (2)
 
-Each wheel has its own slip angle and its own load, quasi-static from a_y = Y / m
-(`cars.load_transfer`, a_x = 0: whatever holds the speed loads no axle). The wheels roll freely:
-longitudinal slip is 0, and longitudinal tyre forces, which the role has as inputs, are left out as in
-the paper. The controller's yaw moment M acts on the body from outside.
+Each wheel has its own slip angle and its own load, quasi-static from a_y = Y / m (`cars.load_transfer` with
+a_x = 0: the constraint on v_x loads no axle). The wheels roll freely: longitudinal slip is 0, and
+longitudinal tyre forces, which are inputs of the role, are neglected as in the paper. The controller's yaw
+moment M acts on the body as an external moment.
 
-If a speed is given from outside (`velocity_x_measured` above 0), v_x follows it: the value at the middle of
-a step is carried on to its end, and dv_x/dt is its slope. Loads stay those of a_x = 0.
+If a measured speed is connected (`velocity_x_measured` above 0), v_x follows it: the value at the middle of a
+step is extrapolated to its end, and dv_x/dt is its slope. Loads remain those of a_x = 0.
 
-A bank and wind act as `cars.road_plane` says; on a slope, too, something holds v_x and loads no axle.
+Bank and wind act as described in `cars.road_plane`; on a slope v_x is also constant, without axle load
+transfer.
 
-Whatever holds v_x does work: a car that spins gains speed here, v_x / cos(beta), at 60 degrees of sideslip
-twice its own. Beyond some 20 degrees the model says that the car is lost, not how it moves.
+The constraint on v_x does work: a spinning car gains speed, v_x / cos(beta), and is twice as fast at 60
+degrees of sideslip. Above about 20 degrees the model shows that control is lost, but not how the car moves.
 
 Source: paper D, 2-DOF model with four wheels. The height h is the paper's 0.5 m.
 
-How it couples. Tyre forces and the yaw moment enter the integration only, at the middle of the step; the
-steer angle feeds the front slip angles directly. The lateral acceleration, known at the middle of each
-step, is carried to its end (`mathematics.carry`), which leaves the loop of loads and forces open, as in
-`plants.seven_dof`. With held forces r is linear and v_y a parabola, both exact; the path is taken by
-Gauss's rule with two points.
+Coupling: tyre forces and the yaw moment enter only the integration, at the middle of the step; the steer
+angle feeds through to the front slip angles. The lateral acceleration, known at the middle of each step, is
+extrapolated to its end (`mathematics.carry`), which avoids the algebraic loop of loads and forces, as in
+`plants.seven_dof`. With held forces r is linear and v_y a parabola, both exact; the path is computed by
+two-point Gauss quadrature.
 """
 
 from collections.abc import Sequence
@@ -47,7 +48,7 @@ _GAUSS = (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5)
 
 @dataclass(frozen=True)
 class TwoDofParameters(StartParameters):
-    """The car of paper D."""
+    """Parameters of paper D's car."""
 
     mass: float = like(PaperA, "mass", 1820.0, "paper D")
     yaw_inertia: float = like(PaperA, "yaw_inertia", 3800.0, "paper D")
@@ -55,7 +56,9 @@ class TwoDofParameters(StartParameters):
     cg_to_rear_axle: float = of_car(1.585, "paper D")
     track_width: float = like(PaperA, "track_width", 1.5, "paper D")
     cg_height: float = of_car(0.5, "paper D")
-    initial_speed: float = parameter(25.0, "m/s", "Speed at the start, its part along x is kept", "paper D")
+    initial_speed: float = parameter(
+        25.0, "m/s", "Speed at the start; its component v_x is constant", "paper D"
+    )
 
 
 def lateral_resultants(delta: float, f_y: Sequence[float], p: Geometry) -> tuple[float, float]:
@@ -87,14 +90,19 @@ def drift(motion: Motion, h: float, *, a_y: float, dr: float) -> Motion:
 
 
 class TwoDof(Car):
-    """Car with two degrees of freedom (lateral, yaw) at constant speed on four tyres, quasi-static loads."""
+    """Car with two degrees of freedom (lateral, yaw) at constant v_x, four tyres, quasi-static loads."""
 
     Parameters = TwoDofParameters
     inputs = (
         *("steer_angle", "tyre_force_x_*", "tyre_force_y_*", "yaw_moment"),
         signal("tyre_moment_z_*", optional=True),
         *ROAD_PLANE,
-        signal("velocity_x_measured", "m/s", "Speed along x that the car is given; 0: none", optional=True),
+        signal(
+            "velocity_x_measured",
+            "m/s",
+            "Speed along x that the car follows; 0: constant speed",
+            optional=True,
+        ),
     )
     outputs = (
         *MOTION,

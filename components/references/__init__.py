@@ -1,1 +1,1 @@
-"""References: the motion the driver asks for."""
+"""References: yaw rate and sideslip desired by the driver."""

@@ -1,18 +1,18 @@
-"""Reference from the linear single-track model, dynamic or in its steady state, limited by friction.
+"""Reference from the linear single-track model, dynamic or in steady state, limited by friction.
 
-    the model of cars.single_track_car,        |delta| <= share mu g / (v r/delta)     `limit_steer_angle`
+    model of cars.single_track_car,            |delta| <= share mu g / (v r/delta)     `limit_steer_angle`
     r_ref    = r limited to                +-share mu g / v                        `limit_yaw_rate`, (17)
     beta_ref = beta limited to             +-atan(c mu)             `control_laws.sideslip_bound`, (18)
 
-The limits keep the sign of the linear value (paper B writes the sign of delta). Limiting the outputs
-alone leaves yaw rate and sideslip of two different turns; limiting the steer angle that feeds the
-model keeps them of one. Paper B limits the outputs, paper D needs the steer angle limited first.
+The limits keep the sign of the linear value (paper B writes the sign of delta). If only the outputs are
+limited, yaw rate and sideslip belong to different turns; if the steer angle of the model is limited, they
+belong to the same turn. Paper B limits the outputs, paper D requires the steer angle to be limited first.
 
-Sliding mode needs the rates of the limited references: `control_laws.reference`.
+Rates of the limited references, as needed by sliding mode: `control_laws.reference`.
 
-The model takes the steer angle and the speed in a straight line from the last value to the new one.
-Below `low_speed`, where its time constants vanish, it runs at that speed and the yaw rate is scaled
-down with the true one; a car that stands or rolls backwards is asked for none.
+The model interpolates steer angle and speed linearly between their last and new values. Below `low_speed`,
+where its time constants vanish, it runs at that speed and the yaw rate is reduced in proportion to the true
+speed; for a car at rest or rolling backwards it is zero.
 
 Source: paper B, equations (16)-(18); paper D, equation (3).
 """
@@ -32,7 +32,7 @@ from ..mathematics.integrators import rk4
 
 @dataclass(frozen=True)
 class SingleTrackParameters:
-    """The car of paper B, table 1, and the limits."""
+    """Parameters of paper B's car, table 1, and of the limits."""
 
     mass: float = like(PaperB, "mass")
     yaw_inertia: float = like(PaperB, "yaw_inertia")
@@ -48,12 +48,12 @@ class SingleTrackParameters:
         "steady_state", None, "Steady state or dynamic model", "chosen", choices=("steady_state", "dynamic")
     )
     limit_steer_angle: bool = parameter(
-        False, None, "Limit the steer angle that feeds the model to the road's friction", "paper B does not"
+        False, None, "Limit the steer angle of the model according to friction", "paper B does not"
     )
     limit_yaw_rate: bool = parameter(True, None, "Limit the yaw rate", "paper B, equation (17)")
     limit_sideslip: bool = parameter(True, None, "Limit the sideslip", "paper B, equation (18)")
     friction_share: float = parameter(
-        1.0, "1", "Share of mu that steer and yaw-rate limits use", "paper B: all of it", minimum=0.0
+        1.0, "1", "Share of mu in the limits of steer angle and yaw rate", "paper B: all of it", minimum=0.0
     )
     sideslip_per_friction: float = parameter(
         PER_FRICTION,
@@ -64,17 +64,17 @@ class SingleTrackParameters:
     )
     rate_time_constant: float = like(RateParameters, "rate_time_constant")
     low_speed: float = parameter(
-        2.0, "m/s", "Slowest speed of the model", "chosen: walking pace", minimum=0.1
+        2.0, "m/s", "Smallest speed of the model", "chosen: walking pace", minimum=0.1
     )
 
 
 def clamp(x: float, most: float) -> float:
-    """Return `x` limited to +-`most`, which keeps its sign."""
+    """Return `x` limited to +-`most`."""
     return min(max(x, -most), most)
 
 
 class SingleTrack(Reference):
-    """Reference from the linear single-track model, steady state or dynamic, limited by friction."""
+    """Reference from the linear single-track model, dynamic or in steady state, limited by friction."""
 
     Parameters = SingleTrackParameters
 
@@ -105,21 +105,21 @@ class SingleTrack(Reference):
         return self._limit(u)
 
     def _feed(self, u: list[float]) -> tuple[float, float]:
-        """Return steer angle [rad] and speed [m/s] as the model takes them."""
+        """Return the steer angle [rad] and speed [m/s] of the model."""
         p = self.p
         delta, v = u[0], max(u[1], p.low_speed)
-        if p.limit_steer_angle:  # to what a steady turn needs of the friction
+        if p.limit_steer_angle:  # to that of a steady turn at the friction limit
             gain, _ = self.car.gains(v)
             delta = clamp(delta, p.friction_share * max(u[2], 0.0) * G / max(v * gain, 1e-9))
         return delta, v
 
     def _steady(self, delta: float, v: float) -> tuple[float, float]:
-        """Return (beta [rad], r [rad/s]) of the steady turn."""
+        """Return (beta [rad], r [rad/s]) in the steady state."""
         r_gain, beta_gain = self.car.gains(v)
         return beta_gain * delta, r_gain * delta
 
     def _limit(self, u: list[float]) -> tuple[float, float]:
-        """Return (r_ref [rad/s], beta_ref [rad]) of the model's state; equations (17), (18)."""
+        """Return (r_ref [rad/s], beta_ref [rad]) for the model's state; equations (17), (18)."""
         p = self.p
         beta, r = self.model
         v = max(u[1], 0.0)

@@ -1,15 +1,15 @@
-"""Steady state of the linear single-track model: what the driver asks for with the steer angle.
+"""Reference from the steady state of the linear single-track model, limited by friction.
 
     r_ref    = v_x / (L (1 + K v_x^2)) delta,                 |r_ref| <= mu g / |v_x|               (3)
     beta_1   = (b - m a v_x^2 / (C_r L)) / (L (1 + K v_x^2)) delta                                  (4)
     beta_ref = beta_1,   |beta_ref| <= min(|mu g (b / v_x^2 - m a / (C_r L))|, beta_max)
 
 with positive axle stiffnesses C_f, C_r and the stability factor K of `cars.single_track_car`.
-`friction_share` is the share of mu that the limits use. The rates: `control_laws.reference`.
+`friction_share` is the share of mu used in the limits. Rates: `control_laws.reference`.
 
 beta_1 / delta crosses zero at v_x^2 = b C_r L / (m a) (16 m/s for the car of paper A), and so does
-its limit. An oversteering car (K < 0) has no steady state from v_x^2 = -1 / K on: there
-1 + K v_x^2 is held at `SMALLEST` and the limits, if on, take over.
+its limit. An oversteering car (K < 0) has no steady state above the critical speed v_x^2 = -1 / K; there
+1 + K v_x^2 is held at `SMALLEST` and the limits, if on, take effect.
 
 Source: paper A, equations (1)-(4). Errata: (3), (4) mix both sign conventions of cornering stiffness; (2)
 lacks r in m (dv_y/dt + v_x r). Ours differs: |v_x|, so that a car rolling backwards has its own steady state;
@@ -35,17 +35,15 @@ class SteadyStateParameters:
     cg_to_rear_axle: float = like(PaperA, "cg_to_rear_axle")
     cornering_stiffness_front: float = of_car(100000.0, "paper A, table 1, two tyres")
     cornering_stiffness_rear: float = of_car(100000.0, "paper A, table 1, two tyres")
-    limited: bool = parameter(
-        True, None, "Limit the references to what the road's friction allows", "paper A"
-    )
+    limited: bool = parameter(True, None, "Limit the references according to friction", "paper A")
     friction_share: float = parameter(
-        1.0, "1", "Share of the friction that the limits use", "paper A: all of it", minimum=0.0
+        1.0, "1", "Share of the friction in the limits", "paper A: all of it", minimum=0.0
     )
     sideslip_limit: float = parameter(
         0.1,
         "rad",
         "Largest reference sideslip beta_max",
-        "chosen: 6 degrees, the paper names none",
+        "chosen: 6 degrees, the paper gives none",
         minimum=0.0,
     )
     rate_time_constant: float = like(RateParameters, "rate_time_constant")

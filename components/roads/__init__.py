@@ -1,1 +1,1 @@
-"""Roads: what lies under the wheels, and what blows from the side."""
+"""Roads: friction, slope and bank under the wheels, and side wind."""

@@ -1,15 +1,15 @@
-"""Road of patches: friction under each wheel by its place, slope, bank, a gust from the side.
+"""Road with patches of friction, slope, bank, and a gust of side wind.
 
-    mu_i     = friction of the last patch that holds x_i, y_i, else of the table there, else the base friction
+    mu_i     = friction of the last patch with x_i, y_i, else of the table there, else the base friction
     x_i, y_i = x + a_i cos(psi) - d_i sin(psi),  y + a_i sin(psi) + d_i cos(psi)        wheel i at a_i, d_i
     friction = (mu_fl + mu_fr + mu_rl + mu_rr) / 4
 
-Split friction, jumps, a chequerboard are patches (`vocabulary.patches`): "y > 0", "60 < x < 80",
-"x % 10 < 5, y % 3 < 1.5; x % 10 > 5, y % 3 > 1.5". What is measured over a grid is a table
-(`vocabulary.friction_table`). A tyre touches the road in one point.
+Split friction, jumps and chequerboards are patches (`vocabulary.patches`): "y > 0", "60 < x < 80",
+"x % 10 < 5, y % 3 < 1.5; x % 10 > 5, y % 3 > 1.5". Friction measured on a grid is a table
+(`vocabulary.friction_table`). A tyre touches the road in a point.
 
-`friction_delayed` is `friction` as it was `friction_delay` ago: what an estimator would know. Scenarios say
-with their connections which of them, or which constant, reference and controller are told.
+`friction_delayed` is `friction` delayed by `friction_delay`, like that of an estimator. The connections of a
+scenario decide whether reference and controller get the true friction, the delayed friction or a constant.
 
 The road is a plane that rises by the angle sigma along its x axis and by epsilon along its y axis. Along the
 vehicle's axes it rises by
@@ -17,11 +17,12 @@ vehicle's axes it rises by
     sin(slope) = sin(sigma) cos(psi) + sin(epsilon) sin(psi)
     sin(bank)  = sin(epsilon) cos(psi) - sin(sigma) sin(psi)
 
-x, y, psi are measured in that plane. Between `incline_start` and `incline_end` sigma and epsilon hold, over
-`incline_run` at either end they grow in proportion to the way. The wind likewise, F along the vehicle's y
-axis and F `wind_arm` about its z axis.
+x, y, psi are measured in that plane. Between `incline_start` and `incline_end` sigma and epsilon are
+constant; over `incline_run` at either end they change linearly with x. The same applies to the wind, with the
+force F along the vehicle's y axis and the moment F `wind_arm` about its z axis.
 
-Left out: heights of the road under single wheels, curvature of hills and dips, wind that depends on the car.
+Neglected: road height under single wheels, curvature of crests and dips, and the influence of the car's
+motion on the wind.
 """
 
 from dataclasses import dataclass
@@ -41,22 +42,26 @@ EVERYWHERE = 1e6
 
 @dataclass(frozen=True)
 class PatchworkParameters:
-    """Parameters of the road, the wind, and the positions of the car's wheels."""
+    """Parameters of road and wind, and the positions of the car's wheels."""
 
     base_friction: float = parameter(
-        0.9, "1", "Friction coefficient where there is no patch", "chosen: dry asphalt", minimum=0.0
+        0.9, "1", "Friction coefficient outside patches", "chosen: dry asphalt", minimum=0.0
     )
     patch_friction: float = parameter(
-        0.2, "1", "Friction coefficient of patches that name none", "chosen: packed snow", minimum=0.0
+        0.2,
+        "1",
+        "Friction coefficient of patches without a value of their own",
+        "chosen: packed snow",
+        minimum=0.0,
     )
     patches: str = parameter(
-        "", None, "Places of another friction, such as 'y > 0' or '0.3: 60 < x < 80'", "chosen: none"
+        "", None, "Patches of other friction, such as 'y > 0' or '0.3: 60 < x < 80'", "chosen: none"
     )
     friction_table: str = parameter(
         "", None, "Friction over x and y, a row of x, then rows of y and friction", "chosen: none"
     )
     friction_delay: float = parameter(
-        0.3, "s", "How much later friction_delayed is", "chosen: an estimator's", minimum=0.0
+        0.3, "s", "Delay of friction_delayed", "chosen: as of an estimator", minimum=0.0
     )
     cg_to_front_axle: float = like(PaperA, "cg_to_front_axle")
     cg_to_rear_axle: float = like(PaperA, "cg_to_rear_axle")
@@ -77,21 +82,21 @@ class PatchworkParameters:
     )
     incline_end: float = parameter(EVERYWHERE, "m", "x up to which slope and bank hold", "chosen: everywhere")
     incline_run: float = parameter(
-        10.0, "m", "Way over which slope and bank come and go", "chosen: two car lengths", minimum=0.0
+        10.0, "m", "Distance over which slope and bank come and go", "chosen: two car lengths", minimum=0.0
     )
     wind_force: float = parameter(0.0, "N", "Side force F of the wind, to the left", "chosen: calm")
     wind_arm: float = parameter(
-        0.3, "m", "How far before the centre of mass the wind acts", "chosen: a saloon's", minimum=-3.0
+        0.3, "m", "Distance of the wind force ahead of the centre of mass", "chosen: a saloon's", minimum=-3.0
     )
     wind_start: float = parameter(-EVERYWHERE, "m", "x from which the wind blows", "chosen: everywhere")
     wind_end: float = parameter(EVERYWHERE, "m", "x up to which the wind blows", "chosen: everywhere")
     wind_run: float = parameter(
-        5.0, "m", "Way over which the wind comes and goes", "chosen: the length of a car", minimum=0.0
+        5.0, "m", "Distance over which the wind comes and goes", "chosen: the length of a car", minimum=0.0
     )
 
 
 def section(x: float, start: float, end: float, run: float) -> float:
-    """Return how much holds at `x` [m]: 1 from `start` to `end`, fading to 0 over `run` [m] beyond."""
+    """Return the factor at `x` [m]: 1 from `start` to `end`, falling to 0 over `run` [m] on either side."""
     outside = max(start - x, x - end)
     if outside <= 0.0:
         return 1.0
@@ -102,7 +107,7 @@ def inclination(sigma: float, epsilon: float, psi: float) -> tuple[float, float]
     """Return slope and bank [rad] in the axes of a vehicle at the yaw angle `psi` [rad].
 
     Args:
-        sigma, epsilon: by which the road rises along its own axes x and y [rad].
+        sigma, epsilon: angles by which the road rises along its own axes x and y [rad].
     """
     along, across = sin(sigma), sin(epsilon)
     c, s = cos(psi), sin(psi)
@@ -110,7 +115,7 @@ def inclination(sigma: float, epsilon: float, psi: float) -> tuple[float, float]
 
 
 class Patchwork(Component):
-    """Road with patches of friction by place, slope and bank, and a gust of side wind."""
+    """Road with patches of friction, slope, bank, and a gust of side wind."""
 
     Parameters = PatchworkParameters
     inputs = ("position_x", "position_y", "yaw_angle")
@@ -177,6 +182,6 @@ class Patchwork(Component):
 
 
 def mean(frictions: Four) -> float:
-    """Return the mean of four wheels, left and right treated alike."""
+    """Return the mean over four wheels, in an order that is symmetric in left and right."""
     fl, fr, rl, rr = frictions
     return 0.25 * ((fl + fr) + (rl + rr))

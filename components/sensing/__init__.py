@@ -1,1 +1,1 @@
-"""Code shared by sensors: the channel from a signal to a message, and counted noise."""
+"""Code shared by sensors: channels from signals to messages, parameters, noise."""

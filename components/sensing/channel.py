@@ -1,15 +1,15 @@
-"""One channel of a sensor: from a true signal to the messages that a control unit receives.
+"""Sensor channel: from a true signal to the messages that a control unit receives.
 
     low pass    x'' + sqrt(2) w x' + w^2 x = w^2 u           w = 2 pi bandwidth                  (1)
     measured    y_k = gain x(t_k) + bias + drift (t_k - t_0) + noise N_k       t_k = t_0 + k T    (2)
     message     m_k = round(limit(y_k) / quantum) quantum                                        (3)
     received    m_k from t_k + latency until the next message is there                            (4)
 
-A bandwidth, noise, range, quantum or latency of zero is none of it, not a zero; without sample time T every
-communication point is a message. The signal runs in a straight line from one communication point to the
-next and the low pass (`mathematics.low_pass`) is solved exactly for that, so messages fall at their own
-times, whatever the step. N_k is counted, not drawn one after the other (`sensing.noise`). Until the first
-message arrives, its value is there already; a low pass starts settled.
+A bandwidth, noise, range, quantum or latency of zero disables the effect; without a sample time T every
+communication point is a message. The signal is linear between communication points and the low pass
+(`mathematics.low_pass`) is solved exactly for that, so the times of messages do not depend on the step. N_k
+is a function of k, not drawn from a stream (`sensing.noise`). The value of the first message is output from
+the start; the low pass starts settled.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from ..mathematics.low_pass import LowPass
 from . import noise
 
 SLACK = 1e-9
-"""Times [s] nearer to each other than this are one; chosen: far below a step, far above rounding."""
+"""Tolerance [s] for comparing times; chosen: far below a step, far above rounding."""
 
 
 @dataclass(frozen=True)
@@ -26,15 +26,15 @@ class ChannelSpec:
     """Properties of a channel; `unit` is that of its signal.
 
     Attributes:
-        bandwidth: of the low pass [Hz].
-        gain: measured over true [1].
-        bias: [unit].
-        drift: of the bias [unit/s].
+        bandwidth: cutoff frequency of the low pass [Hz].
+        gain: measured over true value [1].
+        bias: offset [unit].
+        drift: rate of the bias [unit/s].
         noise: root mean square [unit].
         range: largest magnitude [unit].
-        quantum: step of a message [unit].
-        sample_time: from one message to the next [s].
-        latency: from a message's time to its arrival [s].
+        quantum: resolution of a message [unit].
+        sample_time: time between messages [s].
+        latency: time from the sample to the arrival of the message [s].
     """
 
     bandwidth: float = 0.0
@@ -62,13 +62,13 @@ class ChannelSpec:
 
 
 class Channel:
-    """The messages of one signal.
+    """Messages of a signal.
 
     Args:
-        figures: what the channel does.
-        key: of its noise, see `sensing.noise.key`.
+        figures: properties of the channel.
+        key: key of its noise, see `sensing.noise.key`.
         t: start time t_0 [s].
-        value: of the signal at the start.
+        value: initial value of the signal.
     """
 
     def __init__(self, figures: ChannelSpec, key: int, t: float, value: float) -> None:
@@ -80,7 +80,7 @@ class Channel:
         self.under_way: list[tuple[float, float]] = []  # (arrival [s], message)
 
     def advance(self, t: float, h: float, value: float) -> None:
-        """Take the channel from `t` to `t + h` [s], where the signal has the value `value`."""
+        """Advance the channel from `t` to `t + h` [s], where the signal has the value `value`."""
         if h <= 0.0:
             return
         end, figures = t + h, self.figures

@@ -1,10 +1,10 @@
-"""The parameters of a cluster of sensors, made from a table of what each of its channels does.
+"""Parameters of a sensor cluster, created from a table of the properties of its channels.
 
     YAW_RATE_NOISE = {"yaw_rate": {"noise": (0.0017, "a data sheet")}}
     parameters_of(__name__, "NoisyParameters", YAW_RATE_NOISE)
 
-is a dataclass with the nine figures of every channel (`sensing.channel.Figures`), all without effect but the
-noise of the gyro, and what the whole cluster has in common.
+is a dataclass with the nine properties of every channel (`sensing.channel.ChannelSpec`), all without effect
+except the noise of the gyro, and the common parameters of a cluster.
 """
 
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from .channel import ChannelSpec
 
 
 class MeasuredSignal(NamedTuple):
-    """A signal that is measured: its unit, that of its drift, and what measures it."""
+    """Measured signal: its unit, the unit of its drift, and the name of its sensor."""
 
     unit: str
     rate_unit: str
@@ -30,21 +30,21 @@ CHANNELS = {
     "wheel_speed": MeasuredSignal("rad/s", "rad/s2", "wheel-speed sensors"),
     "brake_pressure": MeasuredSignal("Pa", "Pa/s", "brake-pressure sensors"),
 }
-"""Signal, without `_*` for four wheels -> how it is measured."""
+"""Signal, without `_*` for four wheels -> its measurement."""
 
 Figures = Mapping[str, Mapping[str, tuple[float, str]]]
-"""Channel -> figure -> value in SI units, and where it comes from."""
+"""Channel -> property -> value in SI units, and its source."""
 
 NONE = "chosen: none"
 
 
 def parameters_of(module: str, name: str, by_channel: Figures, *, common: Mapping[str, Any]) -> type:
-    """Return a dataclass of parameters: the figures of every channel, those that it lacks without effect.
+    """Create a dataclass with the properties of every channel; properties not given have no effect.
 
     Args:
         module, name: of the class.
-        by_channel: the figures that a kind of cluster has.
-        common: name -> parameter of the whole cluster; those of `COMMON` that are left out are added.
+        by_channel: properties of the channels.
+        common: name -> common parameter of the cluster; missing ones are taken from `COMMON`.
     """
     fields: dict[str, Any] = {**COMMON, **common}
     for channel, (unit, rate_unit, text) in CHANNELS.items():
@@ -68,23 +68,23 @@ _FIGURES = {
     "bias": ("signal", "Bias of the {}", None),
     "drift": ("rate", "Drift of the bias of the {}", None),
     "noise": ("signal", "Noise of the {}, root mean square", 0.0),
-    "range": ("signal", "Largest magnitude that the {} can tell, 0: any", 0.0),
-    "quantum": ("signal", "Step of the values of the {}, 0: none", 0.0),
+    "range": ("signal", "Largest magnitude measured by the {}, 0: unlimited", 0.0),
+    "quantum": ("signal", "Resolution of the {}, 0: unlimited", 0.0),
     "sample_time": ("s", "Time between messages of the {}, 0: that of the cluster", 0.0),
     "latency": ("s", "Latency of the {} beyond that of the cluster", 0.0),
 }
-"""Figure -> unit, text, smallest value."""
+"""Property -> unit, text, smallest value."""
 
 COMMON = {
-    "seed": parameter(1, None, "Seed of the noise", "chosen: any will do"),
+    "seed": parameter(1, None, "Seed of the noise", "chosen: arbitrary"),
     "sample_time": parameter(
-        0.0, "s", "Time between messages, 0: one at every communication point", NONE, minimum=0.0
+        0.0, "s", "Time between messages, 0: at every communication point", NONE, minimum=0.0
     ),
     "latency": parameter(0.0, "s", "Latency of every message", NONE, minimum=0.0),
     "feels_gravity": parameter(
         True,
         None,
-        "The accelerometers roll and pitch with the body and feel gravity",
+        "Whether the accelerometers roll and pitch with the body and measure gravity",
         "chosen: they are fixed to the body",
     ),
 }
@@ -92,10 +92,10 @@ COMMON = {
 
 
 def figures_of(p: Any) -> dict[str, ChannelSpec]:
-    """Return the figures of every channel from the parameters `p` of a cluster.
+    """Return the properties of every channel from the parameters `p` of a cluster.
 
     Raises:
-        ValueError: a channel with noise has no sample time: its noise would belong to the step size.
+        ValueError: a channel with noise has no sample time, so its noise would depend on the step size.
     """
     made = {}
     for channel in CHANNELS:

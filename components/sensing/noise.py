@@ -1,14 +1,14 @@
-"""Noise by a counter: the number that belongs to a seed, a channel and the number of a message.
+"""Counter-based noise: a normal random number for a seed, a channel and the index of a message.
 
     z_n   = mix(key + n g)          g = 2^64 / golden ratio, odd                    SplitMix64
     u_n   = (z_n / 2^12 + 1/2) / 2^52                                               in (0, 1)
     N_k   = sqrt(-2 ln u_2k) cos(2 pi u_2k+1)                                       Box and Muller
 
-No state is kept, so the number does not depend on the step size, on other channels, on what was restored or
-on who computes it. The key is that of FNV-1a of "seed/channel", mixed once more.
+The generator has no state, so a number does not depend on the step size, on other channels, on a restored
+FMU state or on the program. The key is the FNV-1a hash of "seed/channel", mixed once more.
 
 Source: G. L. Steele, D. Lea, C. H. Flood, Fast splittable pseudorandom number generators, OOPSLA 2014,
-figures 16, 17 (whose n-th number is reached at once); G. E. P. Box, M. E. Muller, Annals of Mathematical
+figures 16, 17 (with direct access to the n-th number); G. E. P. Box, M. E. Muller, Annals of Mathematical
 Statistics 29(2), 1958, 610-611; G. Fowler, L. C. Noll, K.-P. Vo, D. Eastlake, The FNV non-cryptographic hash
 algorithm, constants of 64 bits.
 """
@@ -21,14 +21,14 @@ _FNV_START, _FNV_PRIME = 0xCBF29CE484222325, 0x100000001B3
 
 
 def mix(z: int) -> int:
-    """Return the finalizer of SplitMix64 of an integer of 64 bits."""
+    """Apply the finalizer of SplitMix64 to a 64-bit integer."""
     z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & _MASK
     z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & _MASK
     return z ^ (z >> 31)
 
 
 def key(seed: int, channel: str) -> int:
-    """Return what tells the noise of one channel under one seed from all others."""
+    """Return the key of the noise of a channel with a seed."""
     hashed = _FNV_START
     for byte in f"{seed}/{channel}".encode():
         hashed = ((hashed ^ byte) * _FNV_PRIME) & _MASK

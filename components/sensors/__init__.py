@@ -1,1 +1,1 @@
-"""Sensors: what a car knows of itself."""
+"""Sensors: clusters of the signals that a car measures."""

@@ -1,8 +1,8 @@
-"""Ideal sensors: every signal as it is, at once.
+"""Ideal sensor cluster: true signals without delay.
 
-The cluster of `sensors.production` with all figures without effect and accelerometers that do not feel
-gravity, so a run with it in the loop is that without it, to the bit. Where a figure is set, it alone acts:
-a sample time and a latency show what time costs, noise on the gyro what that noise costs.
+The cluster of `sensors.production` without any effect, and with accelerometers that do not measure gravity,
+so that a run with it equals the run without it, to the bit. Single properties can be set to study their
+effect: sample time and latency, or the noise of the gyro.
 """
 
 from ..fmi.variables import parameter
@@ -17,14 +17,14 @@ IdealParameters = parameters_of(
         "feels_gravity": parameter(
             False,
             None,
-            "The accelerometers roll and pitch with the body and feel gravity",
-            "chosen: the acceleration as it is",
+            "Whether the accelerometers roll and pitch with the body and measure gravity",
+            "chosen: the true acceleration",
         )
     },
 )
 
 
 class Ideal(Production):
-    """Ideal sensors: every signal as it is, at once, unless a figure is set."""
+    """Ideal sensor cluster: true signals without delay, unless a property is set."""
 
     Parameters = IdealParameters

@@ -1,7 +1,7 @@
-"""Poor sensors: noise, biases and times at the bad end of what cars have had.
+"""Poor sensor cluster: noise, biases and delays at the bad end of production cars.
 
-The cluster of `sensors.production` with other figures. Noise and slow messages are those of sensors of the
-1990s, biases those that a production sensor may have and that no zero-point learning has removed.
+The cluster of `sensors.production` with other values. Noise and slow messages are those of sensors of the
+1990s, biases those of a production sensor without zero-point learning.
 """
 
 from ..fmi.variables import parameter
@@ -15,7 +15,7 @@ POOR: Figures = {
     "yaw_rate": {
         **PRODUCTION["yaw_rate"],
         "noise": (0.006981, _OLD),
-        "bias": (0.005236, "chosen: 0.3 deg/s, what is left where the zero point is not learned well"),
+        "bias": (0.005236, "chosen: 0.3 deg/s, remaining after poor zero-point learning"),
     },
     "acceleration_x": {**PRODUCTION["acceleration_x"], "noise": (0.1472, _OLD)},
     "acceleration_y": {
@@ -48,6 +48,6 @@ PoorParameters = parameters_of(
 
 
 class Poor(Production):
-    """Poor cluster of sensors: noisy, biased, slow and late."""
+    """Poor sensor cluster: noisy, biased, slow and delayed."""
 
     Parameters = PoorParameters

@@ -1,22 +1,22 @@
-"""Cluster of sensors as in a production car: gyro, accelerometers, wheel speeds, hand wheel, brakes.
+"""Sensor cluster of a production car: gyro, accelerometers, wheel speeds, hand wheel, brake pressures.
 
     gyro             r
     accelerometers   f_x = a_x cos(theta) - g sin(theta)                theta = pitch - slope         (1)
                      f_y = a_y cos(phi) + g sin(phi)                    phi = roll + bank
     wheel speeds     w_i;      hand wheel: delta;      brake pressures: p_i
 
-Each signal takes the way of `sensing.channel`: low pass, gain, bias, drift, noise, range, quantum, latency,
-held from message to message. Accelerometers are fixed to the body, which leans: with roll positive for the
-left side up, pitch for the nose down, and the angles by which a road rises forwards and to the left, (1) is
-what they feel of gravity and acceleration. They are at the centre of mass. What no unit says (a plant that
-does not roll, a road that is flat) counts as zero.
+Each signal passes a channel (`sensing.channel`) with low pass, gain, bias, drift, noise, range, quantum and
+latency, and is held from message to message. Accelerometers are fixed to the body at the centre of mass and
+measure gravity and acceleration according to (1), with roll positive for the left side up, pitch positive for
+the nose down, and the angles by which the road rises forwards and to the left. Inputs that are not connected
+(plant without roll, flat road) are zero.
 
 Inputs are the true values, named `*_true`: `{from: [plant, driver], to: sensor.*_true}`. Outputs have the
-bare names, so that `{from: [sensor], to: [controller]}` puts a measurement in place of the truth.
+plain names, so that `{from: [sensor], to: [controller]}` replaces the true values by measurements.
 
-The hand-wheel sensor counts in road-wheel angles: its figures are those at the hand wheel over a steering
-ratio of 16. Biases are zero here, as after the zero-point learning of a control unit that worked; what
-is left in cars is up to 0.3 deg/s and 0.2 m/s2.
+The hand-wheel sensor gives road-wheel angles: its properties are those at the hand wheel divided by a
+steering ratio of 16. Biases are zero here, as after successful zero-point learning of a control unit;
+remaining biases in cars are up to 0.3 deg/s and 0.2 m/s2.
 
 Sources are given with the parameters. `sensors.ideal` and `sensors.poor` are the same with other values.
 """
@@ -92,7 +92,7 @@ _AT_TIMES = ("roll_angle", "pitch_angle", "slope", "bank")
 
 
 class Production(Component):
-    """Production cluster of sensors: gyro, accelerometers, wheel speeds, hand wheel, brake pressures."""
+    """Sensor cluster of a production car: gyro, accelerometers, wheel speeds, hand wheel, brakes."""
 
     Parameters = ProductionParameters
     sampled = True
@@ -130,7 +130,7 @@ class Production(Component):
         return [channel.received for channel in self.channels]
 
     def _named(self) -> list[tuple[str, ChannelSpec]]:
-        """Return name and figures of every channel, in the order of the outputs."""
+        """Return name and properties of every channel, in the order of the outputs."""
         named = []
         for name, figures in self.figures.items():
             pattern = f"{name}_*" if name in ("wheel_speed", "brake_pressure") else name
@@ -138,7 +138,7 @@ class Production(Component):
         return named
 
     def _felt(self, u: list[float]) -> list[float]:
-        """Return what reaches the sensors, in the order of the outputs; equation (1)."""
+        """Return the physical inputs of the sensors, in the order of the outputs; equation (1)."""
         r, a_x, a_y, *others, roll, pitch, slope, bank = u
         if self.p.feels_gravity:
             theta, phi = pitch - slope, roll + bank

@@ -1,1 +1,1 @@
-"""Laws of one tyre, shared by several components."""
+"""Models of a single tyre, shared by several components."""

@@ -1,4 +1,4 @@
-"""The Magic Formula, original form of 1987: forces of one wheel, combined slip by similarity.
+"""Magic Formula, original form of 1987: forces of a tyre, with combined slip by similarity.
 
 Pure slip, F_z in kN, alpha in degrees, kappa in percent, zero camber (SAE 870421):
 
@@ -6,16 +6,16 @@ Pure slip, F_z in kN, alpha in degrees, kappa in percent, zero camber (SAE 87042
     F_y: C = a0   D = a1 F_z^2 + a2 F_z   BCD = a3 sin(a4 atan(a5 F_z))            E = a6 F_z^2 + a7 F_z + a8
     F_x: C = b0   D = b1 F_z^2 + b2 F_z   BCD = (b3 F_z^2 + b4 F_z) exp(-b5 F_z)   E = b6 F_z^2 + b7 F_z + b8
 
-Combined slip: one normalised slip k measures how far the tyre is from its limit, the pure-slip
-curves give the size of the force there, and the force's direction goes from that of the elastic
-tyre (small k) to that of sliding (k >= 2 pi):
+Combined slip: the normalised slip k measures the distance from the limit, the pure-slip curves give the
+magnitude of the force at k, and its direction changes from that of the elastic tyre (small k) to that of
+sliding (k >= 2 pi):
 
     k = sqrt(p_x^2 + p_y^2)      p_x = K_x kappa / D_x      p_y = K_y alpha / D_y      K = BCD at the origin
     F_x = D_x f_x(k) cos(l)      F_y = -D_y f_y(k) sin(l)   tan(l) = eta(k) tan(alpha) / kappa
     eta = (1 + eta_0) / 2 - (1 - eta_0) / 2 cos(k / 2)      eta_0 = (K_y / D_y) / (K_x / D_x)
 
-with f(k) = F / D at B x = k / C. Pure slip gives the formulae above exactly. The force of a locked
-wheel opposes the sliding as far as both directions have the same sliding friction (D_x f_x = D_y f_y).
+with f(k) = F / D at B x = k / C. For pure slip this is identical to the formulae above. The force of a locked
+wheel opposes the sliding if both directions have the same sliding friction (D_x f_x = D_y f_y).
 
 Sources: E. Bakker, L. Nyborg, H. B. Pacejka, Tyre modelling for use in vehicle dynamics studies, SAE
 870421, 1987 (pure slip); H. S. Radt, D. A. Glemming, Normalization of tire force and moment data,
@@ -32,7 +32,7 @@ from .pacejka_2002 import SMALLEST_FRICTION, SMALLEST_LOAD, lateral_slip, practi
 from .pacejka_2002_set import MagicFormulaParameters
 
 SMALLEST_SLIP = 1e-150
-"""Slip below which there is no force: its square would vanish."""
+"""Slip below which the force is zero, since its square would underflow."""
 
 
 def _c(default: float, description: str) -> Any:
@@ -41,13 +41,13 @@ def _c(default: float, description: str) -> Any:
 
 @dataclass(frozen=True)
 class MagicFormula1987Parameters:
-    """One set for all four tyres."""
+    """Coefficients, equal for all four tyres."""
 
     peak_friction: str = parameter(
         "road",
         None,
-        "Peak D of a force: road is mu F_z, measured is mu over reference_friction times the set's "
-        "own; the slip stiffness is the set's in both",
+        "Peak D of a force: road: mu F_z; measured: that of the set times mu / reference_friction. "
+        "The slip stiffness is that of the set in both",
         "chosen: paper D",
         choices=("road", "measured"),
     )
@@ -80,7 +80,7 @@ class MagicFormula1987Parameters:
 
 
 class Coefficients1987(NamedTuple):
-    """A parameter set made ready; see `coefficients_1987`."""
+    """Preprocessed coefficients, see `coefficients_1987`."""
 
     general: tuple[float, float]  # maximum load, 1 / reference friction or 0 for a peak of mu F_z
     lateral: tuple[float, ...]
@@ -88,7 +88,7 @@ class Coefficients1987(NamedTuple):
 
 
 class LoadedTyre(NamedTuple):
-    """The two pure-slip curves at one load and friction; stiffnesses K in N per rad and per unit slip."""
+    """Pure-slip curves at a given load and friction; stiffnesses K in N per rad and per unit slip."""
 
     c_x: float
     d_x: float
@@ -101,10 +101,10 @@ class LoadedTyre(NamedTuple):
 
 
 def coefficients_1987(p: MagicFormula1987Parameters) -> Coefficients1987:
-    """Return the set `p` made ready.
+    """Return the preprocessed coefficients of `p`.
 
     Raises:
-        ValueError: a peak or a stiffness is not positive from no load to maximum_load.
+        ValueError: a peak or a stiffness is not positive for all loads up to maximum_load.
     """
     top = 0.001 * p.maximum_load
     for name, at_zero, at_top in (
@@ -128,7 +128,7 @@ def coefficients_1987(p: MagicFormula1987Parameters) -> Coefficients1987:
 
 
 def loaded_tyre(f_z: float, mu: float, c: Coefficients1987) -> LoadedTyre | None:
-    """Return the pure-slip curves at vertical load `f_z` [N] and friction `mu` [1]; None without force."""
+    """Return the pure-slip curves at vertical load `f_z` [N] and friction `mu` [1]; None for zero force."""
     if not (f_z > SMALLEST_LOAD and mu > SMALLEST_FRICTION):
         return None
     (top, measured), (a0, a1, a2, a3, a4, a5, a6, a7, a8), (b0, b1, b2, b3, b4, b5, b6, b7, b8) = c
@@ -152,8 +152,8 @@ def loaded_tyre(f_z: float, mu: float, c: Coefficients1987) -> LoadedTyre | None
 def forces_1987(kappa: float, alpha: float, tyre: LoadedTyre) -> tuple[float, float, float]:
     """Return F_x, F_y and dF_x/dkappa [N] at the interface's slip `kappa` [1] and slip angle `alpha` [rad].
 
-    The slope, at constant slip angle: F_x = D_x f_x(k) kappa / n, n^2 = kappa^2 + T^2,
-    T = eta(k) tan(alpha), times the derivative of the practical slip.
+    dF_x/dkappa, at constant slip angle, is the derivative of F_x = D_x f_x(k) kappa / n,
+    n^2 = kappa^2 + T^2, T = eta(k) tan(alpha), times that of the practical slip.
     """
     c_x, d_x, k_x, e_x, c_y, d_y, k_y, e_y = tyre
     tan_alpha, forward = lateral_slip(alpha)

@@ -1,37 +1,36 @@
-"""The Magic Formula, 2002 form: forces and aligning moment of one wheel from its slips.
+"""Magic Formula, 2002 form: forces and aligning moment of a tyre.
 
     F_x  = G_xa F_x0                    F_x0 = D sin(C atan(B k - E (B k - atan(B k)))) + S_Vx    (4.E9 ff.)
-    F_y  = G_yk F_y0 + S_Vyk            F_y0 = the same in tan(alpha), + S_Vy                     (4.E19 ff.)
+    F_y  = G_yk F_y0 + S_Vyk            F_y0 = likewise in tan(alpha), + S_Vy                     (4.E19 ff.)
     M_z  = -t (F_y - S_Vyk) + M_zr + s F_x                                                        (4.E71 ff.)
     G_xa = cos(C atan(B tan(alpha))), B = RBX1 cos(atan(RBX2 k)); G_yk likewise in k              (4.E50 ff.)
 
 Source: H. B. Pacejka, Tyre and Vehicle Dynamics, 2nd ed. 2006, section 4.3.2, equations 4.E1-4.E78,
-without camber, turn slip and speed dependence. The set's signs are those of ISO 8855.
+without camber, turn slip and speed dependence. The signs of the coefficients follow ISO 8855.
 
-Friction. With lambda = mu / reference_friction, pure slip obeys F(slip) = lambda F_dry(slip / lambda),
-which is what lambda_mu does in the book: lower peak, same stiffness. So pure slip is evaluated at
-scaled slips, and `low_friction` says at which slips the weights G are: scaled too (`similarity`, the
-default: the whole of the wheel's forces then obeys that law, as by the similarity method of section 4.2)
-or unscaled (`scale`, as equations 4.E50 ff. print it). Unscaled, both forces are near their peaks at
-slips that the weights of a dry road still take for small: over friction and load the resultant grows
-from 1.21 on the dry road, the peak of F_x alone, to 1.42 at lambda = 0.3 and 1.53 at 0.1. No friction
-does that.
+Friction: with lambda = mu / reference_friction, pure slip obeys F(slip) = lambda F_dry(slip / lambda), as
+with lambda_mu in the book: lower peak, same stiffness. Pure slip is therefore evaluated at scaled slips.
+`low_friction` selects the slips of the weights G: scaled, too (`similarity`, the default; combined slip then
+obeys the same law, as in the similarity method of section 4.2), or unscaled (`scale`, as printed in equations
+4.E50 ff.). Unscaled, both forces are near their peaks at slips that are still small for the weights of a dry
+road: the resultant over friction and load grows from 1.21 on the dry road, the peak of F_x alone, to 1.42 at
+lambda = 0.3 and 1.53 at 0.1, which is not physical.
 
 Asymmetric terms, all zero unless switched on: PHX*, PVX*, PHY*, PVY* and QHZ* (shifts), PEY3, QEZ4
 (left-right difference of the curvatures), RHX1, RBY3 (shifts in the weights), RVY* (side force
 induced by kappa), QDZ6, QDZ7 (residual moment) and SSZ1 (constant lever arm of F_x). Without them
 F_x is even and F_y, M_z are odd in alpha, to the bit, and zero slip gives zero force. PEX4 and RHY*
-stay: they tell driving from braking, not left from right, and give no force at zero slip.
+are kept: they distinguish driving from braking, not left from right, and give no force at zero slip.
 
-The side force induced by kappa is that over mu_y F_z (4.E67), and mu_y of table A3.1 is below zero, with
+The side force induced by kappa is proportional to mu_y F_z (4.E67), and mu_y of table A3.1 is negative, with
 signs of ISO 8855 throughout: read literally, as here, the force has the sign of -RVY1 sin(RVY5 atan(RVY6
-kappa)). So read it programs that fit or use such sets too: Chrono's `ChPac02Tire` and the Magic Formula
+kappa)). Programs that fit or use such sets read it likewise: Chrono's `ChPac02Tire` and the Magic Formula
 Tyre Library for MATLAB (teasit) both multiply by a mu_y that keeps the sign of PDY1.
 
-Beyond the measured range. G is not allowed below zero (with this set it would be for alpha > 31
-degrees at kappa 0). Above `maximum_load` everything is proportional to load. kappa is defined by
-the interface as (w R - v) / max(|w R|, |v|), by the book as (w R - v) / |v|: `practical_slip`
-converts, up to 99 (w R = 100 v).
+Beyond the measured range G is bounded below by zero (with this set it would be negative for alpha > 31
+degrees at kappa 0), and above `maximum_load` all outputs are proportional to load. kappa is defined by the
+interface as (w R - v) / max(|w R|, |v|), by the book as (w R - v) / |v|: `practical_slip` converts it, up
+to 99 (w R = 100 v).
 """
 
 from math import atan, cos, exp, pi, sin, sqrt, tan
@@ -40,15 +39,15 @@ from typing import NamedTuple
 from .pacejka_2002_set import Coefficients
 
 SMALLEST_LOAD = 1e-6
-"""Vertical load [N] at and below which a tyre gives nothing."""
+"""Vertical load [N] up to which forces are zero."""
 SMALLEST_FRICTION = 1e-6
-"""lambda = mu / reference_friction [1] at and below which a tyre gives nothing."""
+"""lambda = mu / reference_friction [1] up to which forces are zero."""
 SLIP_STEP = 1e-6
-"""Difference of kappa for dF_x/dkappa: truncation and rounding both below 1e-4 of the slip stiffness."""
+"""Step of kappa in the difference quotient dF_x/dkappa: truncation and rounding errors below 1e-4."""
 
 
 class LongitudinalCurve(NamedTuple):
-    """All of F_x(kappa) that is not kappa; see `longitudinal_curve`."""
+    """Coefficients of F_x(kappa) at fixed slip angle, load and friction, see `longitudinal_curve`."""
 
     forward: bool
     c: float
@@ -59,23 +58,23 @@ class LongitudinalCurve(NamedTuple):
     e_driving: float
     s_v: float
     stiffness: float  # K_x of pure slip [N]
-    weight_slip: float  # tan(alpha) + S_Hxa as the weight G_xa sees it
+    weight_slip: float  # tan(alpha) + S_Hxa in the weight G_xa
     weight_b: float
-    weight_variation: float  # RBX2, over lambda where slips are scaled in the weights
+    weight_variation: float  # RBX2, divided by lambda if the weights use scaled slips
     weight_c: float
     weight_e: float
     weight_shift: float  # S_Hxa
 
 
 def lateral_slip(alpha: float) -> tuple[float, bool]:
-    """Return (tan(alpha) sgn(v_x) [1], whether the wheel travels forward) for a slip angle [rad] (4.E3)."""
+    """Return (tan(alpha) sgn(v_x) [1], whether the wheel moves forward) for a slip angle [rad] (4.E3)."""
     if -0.5 * pi <= alpha <= 0.5 * pi:
         return tan(alpha), True
     return -tan(alpha), False
 
 
 def practical_slip(kappa: float, forward: bool) -> float:
-    """Return (w R - v) / |v| for (w R - v) / max(|w R|, |v|); they differ for a driven wheel only."""
+    """Return (w R - v) / |v| for (w R - v) / max(|w R|, |v|); they differ only for driven wheels."""
     if kappa > 0.0:
         if forward:
             return kappa / (1.0 - kappa) if kappa < 0.99 else 99.0
@@ -85,22 +84,22 @@ def practical_slip(kappa: float, forward: bool) -> float:
 
 
 def digressive(friction: float) -> float:
-    """Return lambda' of lambda, which lets vertical shifts fade on ice only (4.E8, A_mu = 10)."""
+    """Return lambda' of lambda, with which vertical shifts vanish only on ice (4.E8, A_mu = 10)."""
     return 10.0 * friction / (1.0 + 9.0 * friction)
 
 
 def longitudinal_curve(
     tan_alpha: float, forward: bool, f_z: float, mu: float, c: Coefficients
 ) -> LongitudinalCurve | None:
-    """Return F_x(kappa) of one wheel at fixed slip angle, load and friction, ready for `longitudinal_force`.
+    """Return the curve F_x(kappa) at fixed slip angle, load and friction, for `longitudinal_force`.
 
     Args:
-        tan_alpha, forward: as `lateral_slip` gives them.
+        tan_alpha, forward: from `lateral_slip`.
         f_z, mu: vertical load [N] and friction coefficient [1].
-        c: the axle's set.
+        c: coefficients of the axle.
 
     Returns:
-        The curve, or None where there is no load or no friction, hence no force.
+        The curve, or None without load or friction, where the force is zero.
     """
     per_reference, similar = c[0]
     friction = mu * per_reference
@@ -146,7 +145,7 @@ def longitudinal_curve(
 
 
 def longitudinal_force(kappa: float, curve: LongitudinalCurve) -> float:
-    """Return F_x [N] at longitudinal slip `kappa` (w R - v) / max(|w R|, |v|) on a curve."""
+    """Return F_x [N] of a curve at the longitudinal slip `kappa` = (w R - v) / max(|w R|, |v|)."""
     forward, c, d, b, shift, e, e_driving, s_v, _, slip, b_w, variation, c_w, e_w, slip_0 = curve
     kappa = practical_slip(kappa, forward)
     x = b * kappa + shift
@@ -170,15 +169,15 @@ def longitudinal_force(kappa: float, curve: LongitudinalCurve) -> float:
 def wheel_forces(
     kappa: float, alpha: float, f_z: float, mu: float, axle: Coefficients
 ) -> tuple[float, float, float, float]:
-    """Return F_x, F_y [N], M_z [N.m] and dF_x/dkappa [N] of one wheel, at the contact point, ISO 8855.
+    """Return F_x, F_y [N], M_z [N.m] and dF_x/dkappa [N] of a tyre, at the contact point, ISO 8855.
 
-    The slope, at constant slip angle, is a difference over `SLIP_STEP` away from |kappa| = 1, beyond which
-    slip has no meaning.
+    dF_x/dkappa, at constant slip angle, is a difference quotient over `SLIP_STEP` towards smaller |kappa|,
+    since slip is not defined beyond |kappa| = 1.
 
     Args:
-        kappa, alpha: longitudinal slip [1] and slip angle [rad] as the interface defines them.
+        kappa, alpha: longitudinal slip [1] and slip angle [rad] as defined by the interface.
         f_z, mu: vertical load [N] and friction coefficient [1].
-        axle: its set.
+        axle: coefficients of the axle.
     """
     tan_alpha, forward = lateral_slip(alpha)
     curve = longitudinal_curve(tan_alpha, forward, f_z, mu, axle)

@@ -1,14 +1,14 @@
-"""The coefficients of the Magic Formula, 2002 form, as parameters that tyre and wheel control share.
+"""Coefficients of the Magic Formula, 2002 form, as parameters of tyre and wheel control.
 
 Names are those of the tyre property file (PCX1 is p_Cx1 of the book), so a set can be pasted in.
 Defaults: H. B. Pacejka, Tyre and Vehicle Dynamics, 2nd ed. 2006, table A3.1, 205/60R15 91V at 2.2 bar.
 Coefficients that the table does not list are zero.
 
-Not here, because they would do nothing: coefficients of camber (PDX3, PDY3, PEY4, PKY3, PHY3, PVY3,
-PVY4, RVY3, QBZ4, QBZ5, QDZ3, QDZ4, QDZ8, QDZ9, QEZ5, QHZ3, QHZ4, SSZ3, SSZ4: it takes no camber), the
-reference speed V_0 (it only enters the speed decay of friction, zero in this set) and rolling
-resistance (QSY1: the plants have it). Scaling factors that multiply a whole group of coefficients
-are left out too: scale the coefficients.
+Omitted because they have no effect: coefficients of camber (PDX3, PDY3, PEY4, PKY3, PHY3, PVY3, PVY4, RVY3,
+QBZ4, QBZ5, QDZ3, QDZ4, QDZ8, QDZ9, QEZ5, QHZ3, QHZ4, SSZ3, SSZ4: this form has no camber input), the
+reference speed V_0 (only used for the decay of friction with speed, zero in this set) and rolling resistance
+(QSY1: the plants have it). Scaling factors of a whole group of coefficients are also omitted: scale the
+coefficients.
 """
 
 from dataclasses import dataclass
@@ -26,14 +26,14 @@ NAMES = """
     RHY2 RVY1 RVY2 RVY4 RVY5 RVY6
     QBZ1 QBZ2 QBZ3 QBZ9 QBZ10 QCZ1 QDZ1 QDZ2 QDZ6 QDZ7 QEZ1 QEZ2 QEZ3 QEZ4 QHZ1 QHZ2 SSZ1 SSZ2
 """
-"""The coefficients of F_x, F_y and M_z that count here."""
+"""Coefficients of F_x, F_y and M_z in use."""
 
 ODD = """
     PHX1 PHX2 PVX1 PVX2 RHX1
     PEY3 PHY1 PHY2 PVY1 PVY2 RBY3 RVY1 RVY2 RVY4 RVY5 RVY6
     QBZ9 QBZ10 QDZ6 QDZ7 QEZ4 QHZ1 QHZ2 SSZ1
 """
-"""Coefficients that are used with `asymmetric_terms` only."""
+"""Coefficients used only with `asymmetric_terms`."""
 
 
 def _one(description: str) -> Any:
@@ -49,7 +49,7 @@ class _General:
     maximum_load: float = parameter(
         12000.0,
         "N",
-        "Load above which forces are proportional to it, all coefficients held",
+        "Load above which forces are proportional to load, with constant coefficients",
         "chosen: three times nominal",
         minimum=1.0,
     )
@@ -57,13 +57,13 @@ class _General:
     low_friction: str = parameter(
         "similarity",
         None,
-        "Combined slip where lambda_mu is not 1: similarity scales the slips in the weights too, scale keeps "
-        "the weights of the dry tyre",
-        "chosen: no wheel gives more than on a dry road, over friction; scale, the book's, does",
+        "Combined slip at low friction: similarity also scales the slips in the weights, scale keeps the "
+        "weights of the dry tyre",
+        "chosen: force over friction stays that of the dry road; with scale, the book's, it is exceeded",
         choices=("similarity", "scale"),
     )
     asymmetric_terms: bool = parameter(
-        False, None, "Use the terms that break mirror symmetry or give force at zero slip", "chosen: off"
+        False, None, "Use terms that break mirror symmetry or give force at zero slip", "chosen: off"
     )
     friction_scale_x: float = _one("Scaling lambda_mux of longitudinal friction")
     friction_scale_y: float = _one("Scaling lambda_muy of lateral friction")
@@ -74,7 +74,7 @@ class _General:
 
 
 def _declared() -> dict[str, Any]:
-    """Declare the coefficients: those of the table of 2012, whose set is the same."""
+    """Declare the coefficients, from the table of the 2012 form, whose set is the same."""
     rows = {name.upper(): row for name, row in (COMMON | LONGITUDINAL | REST).items()}
     rows["PKY2"] = rows["PKY2"]._replace(minimum=0.01)
     rows["RBY3"] = rows["RBY3"]._replace(text="Shift of the slip angle in RBY2")
@@ -87,11 +87,11 @@ def _declared() -> dict[str, Any]:
 
 
 MagicFormulaParameters = parameter_class(__name__, "MagicFormulaParameters", _declared(), bases=(_General,))
-"""One set for all four tyres, with stiffness scalings per axle."""
+"""Coefficients, equal for all four tyres, with stiffness scalings per axle."""
 
 
 class Coefficients(NamedTuple):
-    """A parameter set made ready for one axle, scalings and switches applied; see `coefficients`."""
+    """Preprocessed coefficients of an axle, with scalings and switches applied, see `coefficients`."""
 
     friction: tuple[float, float]
     longitudinal: tuple[float, ...]
@@ -101,7 +101,7 @@ class Coefficients(NamedTuple):
 
 
 def coefficients(p: Any, name: str) -> Coefficients:
-    """Return the set `p` made ready for the axle called "front" or "rear".
+    """Return the preprocessed coefficients of `p` for the axle "front" or "rear".
 
     Raises:
         ValueError: a peak or a stiffness vanishes or changes its sign below maximum_load.

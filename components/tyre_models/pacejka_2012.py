@@ -1,14 +1,14 @@
-"""The Magic Formula of MF-Tyre 6.1, 6.2 and 5.2: forces and moments of one wheel from its slips.
+"""Magic Formula of MF-Tyre 6.1, 6.2 and 5.2: forces and moments of a tyre.
 
 The equations are in `tyres/magic_formula_62.py`; numbers in brackets are those of the book, H. B. Pacejka,
 Tyre and Vehicle Dynamics, 3rd ed. 2012, section 4.3.2.
 
-What depends on the set and the pressure alone is worked out once per wheel (`longitudinal_set`,
-`whole_set`), what a wheel's camber, load and friction make of F_x once per evaluation (`longitudinal_curve`),
-since slip control asks the same curve for many slips.
+Values that depend only on coefficients and pressure are computed once per wheel (`longitudinal_set`,
+`whole_set`), the dependence of F_x on camber, load and friction once per evaluation (`longitudinal_curve`),
+because slip control evaluates the same curve at many slips.
 
-The wheel is always evaluated as one on the set's own side of the car that rolls forward: a wheel of the other
-side is its mirror (slip angle, camber, F_y, M_x and M_z change sign), one that rolls backward its reflection
+A wheel is always evaluated as a wheel on the tyreside of the set that rolls forward: a wheel on the other
+side is mirrored (slip angle, camber, F_y, M_x and M_z change sign), a wheel that rolls backward is reflected
 fore and aft (kappa, F_x and M_z change sign). Both are exact.
 """
 
@@ -20,14 +20,14 @@ from .pacejka_2012_set import of_axle
 
 Numbers = tuple[float, ...]
 Curve2012 = tuple[float, ...]
-"""All of F_x(kappa) that is not kappa; see `longitudinal_curve`."""
+"""Coefficients of F_x(kappa) at fixed slip angle, camber, load and friction, see `longitudinal_curve`."""
 
 LARGEST_SLIP = 0.99
-"""Slip of the interface above which a driven wheel's slip of the book, kappa / (1 - kappa), stays at 99."""
+"""Slip of the interface above which the book's slip of a driven wheel, kappa / (1 - kappa), is held at 99."""
 
 
 def longitudinal_set(p: Any, axle: str, *, left: bool) -> tuple[Numbers, Numbers]:
-    """Return what F_x needs of the parameters `p` on the axle "front" or "rear", of its left or right wheel.
+    """Return the preprocessed parameters of F_x for the left or right wheel of the axle "front" or "rear".
 
     Raises:
         ValueError: a stiffness has the wrong sign.
@@ -58,7 +58,7 @@ def longitudinal_set(p: Any, axle: str, *, left: bool) -> tuple[Numbers, Numbers
 
 
 def whole_set(p: Any, axle: str, *, left: bool) -> tuple[Numbers, ...]:
-    """Return what all forces and moments need; arguments and errors as of `longitudinal_set`."""
+    """Return the preprocessed parameters of all forces and moments, as `longitudinal_set` for F_x."""
 
     of = of_axle(p, axle)
     six = of("fittyp") >= 60.0
@@ -133,12 +133,14 @@ def _check_stiffness(axle: str, what: str, at_nominal: float) -> None:
 
 
 def forward_slip(alpha: float, mirror: float, book: float) -> tuple[float, bool]:
-    """Return the slip angle [rad] of the wheel as one of the set's side that rolls forward, and if it does.
+    """Return the slip angle [rad] mirrored to a forward-rolling wheel on the tyreside, and the direction.
+
+    The second item is true if the wheel rolls forward.
 
     Args:
-        alpha: slip angle [rad] as the interface defines it.
-        mirror: -1 on the side of the car that the set does not belong to, else 1.
-        book: not zero: its tangent, as in (4.E3).
+        alpha: slip angle [rad] as defined by the interface.
+        mirror: 1 on the tyreside of the set, -1 on the other side.
+        book: if not zero, return its tangent, as in (4.E3).
     """
     forward = True
     if alpha > 0.5 * pi:
@@ -149,7 +151,7 @@ def forward_slip(alpha: float, mirror: float, book: float) -> tuple[float, bool]
 
 
 def practical_slip(kappa: float) -> tuple[float, float]:
-    """Return (w R - v) / v of a wheel rolling forward, and its slope over kappa = (w R - v) / max(w R, v)."""
+    """Return (w R - v) / v of a forward-rolling wheel, and its derivative by (w R - v) / max(w R, v)."""
     if kappa <= 0.0:
         return kappa, 1.0
     if kappa < LARGEST_SLIP:
@@ -161,13 +163,13 @@ def practical_slip(kappa: float) -> tuple[float, float]:
 def longitudinal_curve(
     alpha: float, gamma: float, load: float, df: float, friction: float, s: Numbers
 ) -> Curve2012:
-    """Return F_x(kappa) at fixed slip angle, camber, load and friction, ready for `longitudinal_force`.
+    """Return the curve F_x(kappa) at fixed slip angle, camber, load and friction, for `longitudinal_force`.
 
     Args:
-        alpha, gamma: slip angle and camber as the set counts them [rad].
+        alpha, gamma: slip angle and camber on the tyreside of the set [rad].
         load, df: vertical load [N], not above fzmax, and F_z / F_z0' - 1.
         friction: lambda = mu / reference_friction.
-        s: the set of F_x.
+        s: preprocessed parameters of F_x.
     """
     (
         c, d1, d2, d3, e1, e2, e3, e4, k1, k2, k3, h1, h2, v1, v2, rb1, rb2, rb3, rc, re1, re2, rh,
@@ -225,7 +227,7 @@ def longitudinal_force(kappa: float, curve: Curve2012) -> tuple[float, float]:
 
 
 def _weight(slip: float, b: float, c: float, e: float) -> tuple[float, float]:
-    """Return cos(C atan(B x - E (B x - atan(B x)))) and its slope over B."""
+    """Return cos(C atan(B x - E (B x - atan(B x)))) and its derivative by B."""
     x = b * slip
     if not e:
         angle = c * atan(x)
@@ -272,13 +274,13 @@ def side_force(alpha: float, gamma: float, load: float, df: float, friction: flo
 def wheel_forces(
     kappa: float, alpha: float, gamma: float, f_z: float, mu: float, sets: tuple[Numbers, ...]
 ) -> tuple[float, float, float, float, float]:
-    """Return F_x, F_y [N], M_z, M_x [N.m] and dF_x/dkappa [N] of one wheel, at the contact point, ISO 8855.
+    """Return F_x, F_y [N], M_z, M_x [N.m] and dF_x/dkappa [N] of a tyre, at the contact point, ISO 8855.
 
     Args:
-        kappa, alpha: longitudinal slip [1] and slip angle [rad] as the interface defines them.
+        kappa, alpha: longitudinal slip [1] and slip angle [rad] as defined by the interface.
         gamma: camber [rad], positive with the top of the wheel to the right.
         f_z, mu: vertical load [N] and friction coefficient [1].
-        sets: what `whole_set` made of the parameters.
+        sets: from `whole_set`.
     """
     common, longitudinal, lateral, combined, aligning, overturning = sets
     mirror, per_reference, f_top, load_scale, book, similar = common
@@ -292,7 +294,7 @@ def wheel_forces(
     gamma = mirror * (sin(gamma) if book else gamma)
     kappa, stretch = practical_slip(kappa if forward else -kappa)
     scale = 1.0
-    if similar:  # the dry tyre at scaled slips, its forces scaled
+    if similar:  # scaled forces of the dry tyre at scaled slips
         scale, friction = friction, 1.0
         slip /= scale
         kappa /= scale

@@ -1,13 +1,13 @@
-"""The coefficients of a tyre property file as parameters: each once for the front, once for the rear axle.
+"""Coefficients of a tyre property file as parameters, for the front and the rear axle.
 
-Names are those of the file in lower case with the axle behind: PCX1 (p_Cx1 of the book) is pcx1_front and
-pcx1_rear. A coefficient that a file lacks keeps its default, so files are handed over whole.
+Names are those of the file in lower case with the axle as suffix: PCX1 (p_Cx1 of the book) is pcx1_front and
+pcx1_rear. A parameter that is not set keeps its default, so the reader of a file sets all of them.
 
 Defaults: H. B. Pacejka, Tyre and Vehicle Dynamics, 3rd ed. 2012, table A3.1, 205/60R15 91V at 2.2 bar.
-Coefficients that the table does not list are zero, scaling factors one.
+Coefficients that the table does not list are zero, scaling factors are 1.
 
-Not here: turn slip (PDXP*, PKYP*, PDYP*, PHYP*, PECP*, QDTP1, QCRP*, QBRP1, QDRP*), the moment M_y of rolling
-resistance (QSY*: plants have their own), the decay of friction with speed (LMUV), ranges but FZMAX.
+Omitted: turn slip (PDXP*, PKYP*, PDYP*, PHYP*, PECP*, QDTP1, QCRP*, QBRP1, QDRP*), the moment M_y of rolling
+resistance (QSY*: plants have their own), the decay of friction with speed (LMUV), and ranges except FZMAX.
 """
 
 from collections.abc import Callable
@@ -28,7 +28,7 @@ class _Row(NamedTuple):
     maximum: float | None = None
 
     def declared(self, text: str) -> Any:
-        """Declare the coefficient as a parameter with this text."""
+        """Declare the coefficient as a parameter with a description."""
         return parameter(
             self.default, self.unit, text, self.source, minimum=self.minimum, maximum=self.maximum
         )
@@ -41,7 +41,7 @@ def _scale(of: str) -> _Row:
 COMMON = {
     "tyreside": _Row(
         1.0,
-        "Side of the car that the set belongs to: 1 left, -1 right; wheels of the other side are its mirror",
+        "Side of the car for which the set is valid: 1 left, -1 right; the other side is mirrored",
         "chosen: left",
         minimum=-1.0,
         maximum=1.0,
@@ -49,7 +49,7 @@ COMMON = {
     "fnomin": _Row(4000.0, "Nominal load F_z0", _BOOK, "N", 1.0),
     "fzmax": _Row(
         12000.0,
-        "Load above which forces are proportional to it, all coefficients held",
+        "Load above which forces are proportional to load, with constant coefficients",
         "chosen: three times nominal",
         "N",
         1.0,
@@ -58,7 +58,7 @@ COMMON = {
     "inflpres": _Row(220000.0, "Inflation pressure p_i", _BOOK, "Pa", 1e-3),
     "lfzo": _Row(1.0, "Scaling of the nominal load", "chosen: the set as measured", "1", 0.01),
 }
-"""Parameters of every part of the law."""
+"""Parameters used in all forces and moments."""
 
 LONGITUDINAL = {
     "lcx": _scale("the shape factor C of F_x"),
@@ -215,14 +215,14 @@ REST = {
 RELAXATION = {
     "longitudinal_stiffness": _Row(
         358000.0,
-        "Longitudinal stiffness C_x of the standing tyre (6)",
+        "Longitudinal stiffness C_x of the tyre at rest (6)",
         "chosen: relaxation over 0.24 m at nominal load",
         "N/m",
         0.0,
     ),
     "lateral_stiffness": _Row(
         102700.0,
-        "Lateral stiffness C_y of the standing tyre (6)",
+        "Lateral stiffness C_y of the tyre at rest (6)",
         "chosen: relaxation over 0.45 m at nominal load",
         "N/m",
         0.0,
@@ -241,11 +241,11 @@ RELAXATION = {
     "lsgkp": _scale("the relaxation length of F_x (5.2)"),
     "lsgal": _scale("the relaxation length of F_y (5.2)"),
 }
-"""Further parameters of the lag of forces behind slips."""
+"""Further parameters of tyre relaxation."""
 
 
 def of_axles(rows: dict[str, _Row]) -> dict[str, Any]:
-    """Declare every row as a parameter of the front and of the rear axle."""
+    """Declare every row as parameters of the front and the rear axle."""
     return {
         f"{key}_{axle}": row.declared(f"{row.text}, {axle} tyres")
         for axle in ("front", "rear")
@@ -254,7 +254,7 @@ def of_axles(rows: dict[str, _Row]) -> dict[str, Any]:
 
 
 def of_axle(p: Any, axle: str) -> Callable[[str], float]:
-    """Return what gives a coefficient of the axle "front" or "rear" by its name without it."""
+    """Return a getter of the coefficients of the axle "front" or "rear" by their names without suffix."""
     return lambda name: float(getattr(p, f"{name}_{axle}"))
 
 
@@ -265,22 +265,22 @@ class _General:
     reference_friction: float = parameter(
         1.0,
         "1",
-        "Friction coefficient of the road the set was measured on: lambda_mu is friction over it",
-        "chosen: the papers' mu = 1 is the set as it is",
+        "Friction coefficient of the road on which the set was measured; lambda_mu is friction over it",
+        "chosen: the set is unchanged at the papers' mu = 1",
         minimum=0.01,
     )
     slip_angle_as_tangent: bool = parameter(
         False,
         None,
-        "Use tan(alpha) and sin(gamma) for alpha and gamma, as the book prints it",
-        "chosen: off, as programs do that fit and use such sets",
+        "Use tan(alpha) and sin(gamma) for alpha and gamma, as printed in the book",
+        "chosen: off, as in programs that fit and use such sets",
     )
     file_low_friction: str = parameter(
         "scale",
         None,
         "low_friction of tyres from a property file: scale keeps the weights of the dry tyre in "
-        "combined slip, similarity scales the slips in them too",
-        "chosen: scale, as programs do that fit and use such sets",
+        "combined slip, similarity also scales the slips in them",
+        "chosen: scale, as in programs that fit and use such sets",
         choices=("scale", "similarity"),
     )
 

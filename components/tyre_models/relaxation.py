@@ -1,16 +1,16 @@
-"""The lag of tyre forces behind slip: the deflection of the carcass, a state over the distance rolled.
+"""Tyre relaxation: lag of forces behind slip due to the deflection of the carcass.
 
-The contact patch is carried along by the ground and held by the carcass. Its deflection u grows with the slip
-speed s and is rolled away over the relaxation length sigma,
+The deflection u of the contact patch relative to the rim grows with the slip speed s and decays over the
+relaxation length sigma,
 
     du/dt = s - V u / sigma,        slip of the contact patch = u / sigma
 
-so in steady rolling it has the slip s / V of the wheel, and at rest the tyre is a spring. Over a step with
-held s, V and sigma this is solved exactly, z = V h / sigma:
+so in steady rolling the contact patch has the slip s / V of the wheel, and at rest the tyre is a spring. Over
+a step with constant s, V and sigma this is solved exactly, with z = V h / sigma:
 
     u_end = u exp(-z) + s h (1 - exp(-z)) / z
 
-Contact that slides holds no more than its grip, which limits the deflection of a slow wheel (`gripped`).
+The deflection of a slow wheel is limited by the grip of the sliding contact (`gripped`).
 """
 
 from math import atan, exp, expm1, hypot, sin
@@ -19,21 +19,22 @@ from typing import Any
 from .pacejka_2012_set import of_axle
 
 SHORTEST = 0.02
-"""Relaxation lengths [m] are not below this: a hardly loaded tyre; chosen: less than a contact patch has."""
+"""Smallest relaxation length [m], of tyres with hardly any load; chosen: shorter than a contact patch."""
 
 SLIDES = 3.0
-"""K slip over mu F_z from which on all of the contact slides: the brush model's (Pacejka, section 3.2)."""
+"""K slip over mu F_z above which the whole contact slides, from the brush model (Pacejka, section 3.2)."""
 
 
 def gripped(of_patch: tuple[float, float], of_wheel: tuple[float, float], grip: float) -> float:
-    """Return the part [1] of a deflection that the contact holds.
+    """Return the share [1] of a deflection that the contact can hold.
 
-    All of it up to the grip; beyond, as much as the wheel's own slip points in its direction. So a wheel that
-    keeps sliding keeps its deflection, and one that stops or turns about loses what no contact could hold.
+    It is 1 up to the grip; beyond, it depends on the component of the wheel's own slip in the direction of
+    the deflection. A wheel that keeps sliding thus keeps its deflection, and a wheel that stops or reverses
+    loses the excess over the grip.
 
     Args:
-        of_patch, of_wheel: slips of the contact patch and the wheel, each times its stiffness, x and y [N].
-        grip: deflecting force that is held [N].
+        of_patch, of_wheel: slips of contact patch and wheel, each times its stiffness, x and y [N].
+        grip: largest deflecting force that the contact holds [N].
     """
     held = hypot(*of_patch)
     if held <= grip:
@@ -47,7 +48,7 @@ def deflected(u: float, s: float, v: float, sigma: float, h: float) -> float:
 
     Args:
         u: deflection [m].
-        s, v: slip speed and speed of rolling, not negative, held [m/s].
+        s, v: slip speed and rolling speed, not negative, constant over the step [m/s].
         sigma: relaxation length, positive [m].
     """
     z = v * h / sigma
@@ -60,7 +61,7 @@ def part(z: float) -> float:
 
 
 def relaxation_set(p: Any, axle: str) -> tuple[float, ...]:
-    """Return what `relaxation_lengths` needs of the parameters `p` on the axle "front" or "rear"."""
+    """Return the preprocessed parameters of `relaxation_lengths` for the axle "front" or "rear"."""
 
     of = of_axle(p, axle)
     pressure = of("inflpres") / of("nompres") - 1.0
@@ -84,12 +85,12 @@ def relaxation_lengths(
         5.2:  F_z (PTX1 + PTX2 df) exp(-PTX3 df) R_0 / F_z0 LSGKP,
               PTY1 sin(2 atan(F_z / (PTY2 F_z0'))) (1 - PKY3 |gamma|) R_0 LFZO LSGAL
 
-    A set that says nothing has the length chosen for this case.
+    A set without these coefficients has the default length.
 
     Args:
         load, gamma: vertical load [N] and camber [rad].
         k_x, k_y: slip stiffness [N] and cornering stiffness [N/rad] at that load.
-        s: what `relaxation_set` returned.
+        s: from `relaxation_set`.
     """
     (
         six, otherwise, load_scale, c_x, x1, x2, c_y, y1, y2, t1, t2, t3, per_load, largest, at, k3,

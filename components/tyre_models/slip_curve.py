@@ -1,27 +1,26 @@
-"""The question to a tyre's force curve which slip gives a force.
+"""Inverse of a tyre's force curve: the slip that gives a force.
 
-The stable branch of F_x(kappa), at fixed slip angle, load and friction, goes from zero slip to the first
-optimum kappa_opt on either side; it may be flat near zero. Nothing else of the tyre is known here, no
-derivative either: a force costs about a microsecond, so the search needs no table and no memory of
-earlier samples.
+The stable branch of F_x(kappa), at fixed slip angle, load and friction, extends from zero slip to the first
+optimum kappa_opt on either side; it may be flat near zero. The search uses only values of the curve, no
+derivatives: an evaluation costs about a microsecond, so neither a table nor results of earlier samples are
+needed.
 
-The optimum itself is only looked for when it matters. A slip kappa lies within a share q of it exactly
-if the curve still rises at kappa / q, so a force far below the limit needs two evaluations to be
-known as such.
+The optimum is only searched for if it matters. A slip kappa is within a share q of it if and only if the
+curve still rises at kappa / q, so a force far below the limit is recognized with two evaluations.
 """
 
 from collections.abc import Callable
 from math import sqrt
 
 GROWTH = 1.6
-"""Factor from one slip to the next on the way to the optimum. Some tyres' curves (large slip angle on
-low friction) have two optima with a shallow dip between; one narrower than this factor is passed over."""
+"""Ratio of successive slips in the search for the optimum. Some tyres' curves (large slip angle at low
+friction) have two optima with a shallow dip between; a dip narrower than this factor is skipped."""
 FORCE_TOLERANCE = 1e-5
-"""Relative error of the force at the slip found."""
+"""Relative error of the force at the result."""
 SMALLEST_FORCE = 1e-6
-"""Absolute error [N] of the force at the slip found, for forces near zero."""
+"""Absolute error [N] of the force at the result, for forces near zero."""
 SLIP_TOLERANCE = 1e-3
-"""Relative error of the optimum found."""
+"""Relative error of the optimum."""
 _GOLDEN = 0.5 * (sqrt(5.0) - 1.0)
 
 
@@ -31,14 +30,14 @@ def slip_for_force(
     """Return the longitudinal slip kappa [1] on the stable branch whose force is nearest to `force` [N].
 
     Args:
-        force: longitudinal tyre force wanted, negative for braking.
+        force: requested longitudinal tyre force, negative for braking.
         curve: F_x [N] of kappa.
-        first: |kappa| [1] at which to begin, surely on the stable branch, of its order of size.
+        first: initial |kappa| [1], on the stable branch and of its order of magnitude.
         cap: largest |kappa| [1].
         share: largest |kappa| / |kappa_opt| [1], below 1.
 
     Returns:
-        The slip with `curve(kappa) == force` to `FORCE_TOLERANCE`, or, where that would exceed a limit,
+        The slip with `curve(kappa) == force` to `FORCE_TOLERANCE`, or, if that would exceed a limit,
         the limit: the smaller of `cap` and `share` times kappa_opt, with the sign of the force's branch.
     """
     at_low = curve(0.0) - force
@@ -47,14 +46,14 @@ def slip_for_force(
     sign = 1.0 if at_low < 0.0 else -1.0
     at_low *= sign
 
-    def rise(x: float) -> float:  # turned so that it rises from x = 0, less the force: a root is sought
+    def rise(x: float) -> float:  # rises from x = 0; its root is the result
         return sign * (curve(sign * x) - force)
 
     end = min(cap / share, 1.0)
     low, high = 0.0, min(max(first, 1e-6), end)
     at_high = rise(high)
     before, at_before = low, at_low
-    optimum = 0.0  # not known
+    optimum = 0.0  # unknown
     while at_high < 0.0:
         if at_high < at_low or (high == end and at_high < rise(end * (1.0 - SLIP_TOLERANCE))):
             optimum = high = _optimum(rise, before, high)
@@ -63,7 +62,7 @@ def slip_for_force(
                 return sign * min(cap, share * optimum)
             low, at_low = before, at_before
             break
-        if not high < end:  # the end, or no number
+        if not high < end:  # the end, or NaN
             return sign * cap
         before, at_before = low, at_low
         low, at_low = high, at_high

@@ -1,11 +1,11 @@
-"""The base of tyres: four wheels by the law of one.
+"""Base class of tyres: four wheels with the same tyre model.
 
 A tyre declares its parameters and overrides up to four functions:
 
-    wheel(kappa, alpha, f_z, mu, axle)    its outputs on one wheel, without `tyre_slip_ratio`: the law
-    axle(p, name)                         what the law needs of the parameters for "front" or "rear"
-    curve(alpha, f_z, mu, axle)           F_x of kappa alone, for who looks for the slip of a force
-    for_curve(p)                          what `curve` needs of the parameters, per wheel
+    wheel(kappa, alpha, f_z, mu, axle)    the tyre model: outputs of a wheel, without `tyre_slip_ratio`
+    axle(p, name)                         preprocessed parameters of `wheel` for "front" or "rear"
+    curve(alpha, f_z, mu, axle)           F_x as a function of kappa, for slip control
+    for_curve(p)                          preprocessed parameters of `curve`, per wheel
 
 Slips and axes are those of the interface: forces act at the contact point, in wheel axes.
 """
@@ -18,28 +18,28 @@ from ..fmi.component import Component
 from ..fmi.variables import VariableSpec, output
 
 Curve = tuple[Callable[[float], float], float]
-"""F_x [N] of kappa, and a slip that is surely on its stable branch, of the order of the optimum."""
+"""F_x [N] of kappa, and a slip on its stable branch of the order of the optimum."""
 
 INPUTS = ("slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*")
 
 
 def law_outputs(*names: str, inputs: Iterable[str] = INPUTS) -> tuple[VariableSpec, ...]:
-    """Declare what the law of one wheel gives of `inputs`, in this order, and the slip that it belongs to."""
+    """Declare the outputs of a tyre model that depends on `inputs`, and the slip of its forces."""
     return (*(output(name, *inputs) for name in names), output("tyre_slip_ratio_*", "slip_ratio_*"))
 
 
 def no_force(kappa: float) -> float:
-    """Return the force [N] of a tyre without load or friction."""
+    """Return zero: the force [N] of a tyre without load or friction."""
     return 0.0
 
 
 class Tyre(Component):
-    """Base: four tyres by the law of one wheel."""
+    """Base class of tyres: four wheels with the same tyre model."""
 
     inputs: ClassVar[Any] = INPUTS
     outputs = law_outputs("tyre_force_x_*", "tyre_force_y_*", "slip_stiffness_*")
     CurveParameters: ClassVar[type]
-    """The parameters that `curve` needs; left out: all."""
+    """Parameters of `curve`; default: all."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -48,29 +48,29 @@ class Tyre(Component):
 
     @staticmethod
     def wheel(kappa: float, alpha: float, f_z: float, mu: float, axle: Any) -> tuple[float, ...]:
-        """Return F_x, F_y, dF_x/dkappa [N], or what `outputs` declares in their place, of one wheel.
+        """Return F_x, F_y, dF_x/dkappa [N] of a wheel, or the outputs declared in their place.
 
         Args:
             kappa, alpha: longitudinal slip [1] and slip angle [rad].
             f_z, mu: vertical load [N] and friction coefficient [1].
-            axle: what `axle` returned.
+            axle: from `axle`.
         """
         raise NotImplementedError
 
     @staticmethod
     def axle(p: Any, name: str) -> Any:
-        """Return what the law needs of the parameters `p` on the axle "front" or "rear"."""
+        """Return the preprocessed parameters of `wheel` for the axle "front" or "rear"."""
         return p
 
     @classmethod
     def curve(cls, alpha: float, f_z: float, mu: float, axle: Any) -> Curve:
-        """Return F_x [N] of kappa at fixed slip angle [rad], load [N] and friction [1]."""
+        """Return F_x [N] as a function of kappa at fixed slip angle [rad], load [N] and friction [1]."""
         wheel = cls.wheel
         return lambda kappa: wheel(kappa, alpha, f_z, mu, axle)[0], 1.0
 
     @classmethod
     def for_curve(cls, p: Any) -> tuple[Any, Any, Any, Any]:
-        """Return what `curve` needs of the parameters `p` as `axle`, for fl, fr, rl, rr."""
+        """Return the argument `axle` of `curve` for fl, fr, rl, rr."""
         front, rear = cls.axle(p, "front"), cls.axle(p, "rear")
         return front, front, rear, rear
 

@@ -1,1 +1,1 @@
-"""Tyres: from slip and load to forces at the contact point."""
+"""Tyres: from slip and load to forces and moments at the contact point."""

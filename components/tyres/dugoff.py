@@ -1,4 +1,4 @@
-"""Dugoff's tyre: combined slip with a friction limit, from two stiffnesses.
+"""Dugoff tyre: combined slip with a friction limit, from two stiffnesses.
 
     F_x = C_x kappa / (1 + kappa) f(s)          F_y = -C_y tan(alpha) / (1 + kappa) f(s)     (9), (10)
     f(s) = s (2 - s) for s < 1, else 1                                                   (11)
@@ -9,12 +9,12 @@ c = |cos(alpha)|, q_x = C_x kappa c, q_y = -C_y sin(alpha), n = sqrt(q_x^2 + q_y
 
     s = mu F_z g c / 2n;    s < 1:  F = mu F_z (1 - s/2) q / n;    else:  F = q / (g c)
 
-so a locked or sideways sliding wheel has exactly mu F_z against its sliding, and a wheel that turns
-against its travel (kappa < -1) slides like a locked one. c is positive also for a wheel that rolls
-backwards, |alpha| > 90 degrees.
+so a locked or sideways sliding wheel has exactly the force mu F_z against its sliding, and a wheel that turns
+against its direction of travel (kappa < -1) slides like a locked wheel. c is also positive for a wheel that
+rolls backwards, |alpha| > 90 degrees.
 
-C_y is half the cornering stiffness of the axle where the car's is known, else that of one tyre for all four;
-mu is the friction of the road times the grip of the axle (`tyre_models.axles`).
+C_y is half the cornering stiffness of the axle if given, else that of a tyre, equal for all four; mu is the
+friction of the road times the grip of the axle (`tyre_models.axles`).
 
 Source: paper A, equations (9)-(12); H. Dugoff, P. S. Fancher, L. Segel, SAE 700377, 1970. Erratum: (10)
 prints cos(alpha) for tan(alpha); slip is positive when driving, as (9) needs.
@@ -30,7 +30,7 @@ from ..tyre_models.tyre import Curve, Tyre
 
 @dataclass(frozen=True)
 class DugoffParameters(AxleParameters):
-    """Parameters of one tyre, and of the axles where they differ."""
+    """Parameters of a tyre, and of axles that differ."""
 
     longitudinal_stiffness: float = parameter(
         40000.0, "N", "Longitudinal stiffness C_x of one tyre per unit slip", "paper A, table 1", minimum=1.0
@@ -45,12 +45,12 @@ def dugoff(
 ) -> tuple[float, float, float]:
     """Return F_x, F_y, dF_x/dkappa [N] in wheel axes; equations (9)-(12), finite for every slip.
 
-    dF_x/dkappa, at constant slip angle, is C_x / (1 + kappa)^2 where the tyre grips; where it slides, with
+    dF_x/dkappa, at constant slip angle, is C_x / (1 + kappa)^2 while the tyre grips; while it slides, with
     q_x' = C_x c and s' = ds/dkappa, mu F_z ((1 - s/2) q_x' q_y^2 / n^3 - s' q_x / 2n).
 
     Args:
         alpha, kappa: slip angle [rad] and longitudinal slip [1].
-        f_z, mu: vertical load [N] and friction coefficient [1]; no force unless both are positive.
+        f_z, mu: vertical load [N] and friction coefficient [1]; zero force unless both are positive.
         c_x, c_y: stiffnesses [N], [N/rad], positive.
     """
     if f_z <= 0.0 or mu <= 0.0:

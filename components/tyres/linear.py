@@ -1,13 +1,13 @@
-"""Linear tyre: forces proportional to slip, on request limited by friction.
+"""Linear tyre: forces proportional to slip, optionally limited by friction.
 
     F_x = C_x kappa        F_y = -C_y alpha
-    limited:  F scaled by mu F_z / |F| where |F| > mu F_z; none without friction
+    limited:  F scaled by mu F_z / |F| if |F| > mu F_z; zero without friction
 
-C_y is half the cornering stiffness of the axle where the car's is known, else that of one tyre for all four;
-mu is the friction of the road times the grip of the axle (`tyre_models.axles`).
+C_y is half the cornering stiffness of the axle if given, else that of a tyre, equal for all four; mu is the
+friction of the road times the grip of the axle (`tyre_models.axles`).
 
-For comparison with linear theory. A wheel that rolls backwards has its slip angle folded back to
-[-pi/2, pi/2], so that the force still opposes the lateral sliding. No load, no force.
+For comparison with linear theory. The slip angle of a wheel that rolls backwards is folded to [-pi/2, pi/2],
+so that the force still opposes the lateral sliding. Without load the force is zero.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from ..tyre_models.tyre import Tyre
 
 @dataclass(frozen=True)
 class LinearTyreParameters(AxleParameters):
-    """Parameters of one tyre, and of the axles where they differ."""
+    """Parameters of a tyre, and of axles that differ."""
 
     longitudinal_stiffness: float = parameter(
         40000.0, "N", "Longitudinal stiffness C_x of one tyre per unit slip", "paper A, table 1", minimum=0.0
@@ -32,11 +32,11 @@ class LinearTyreParameters(AxleParameters):
 
 
 LinearAxle = tuple[float, float, float, bool]
-"""Longitudinal [N] and cornering stiffness [N/rad], grip [1], whether friction limits the force."""
+"""Longitudinal [N] and cornering stiffness [N/rad], grip [1], and whether friction limits the force."""
 
 
 class LinearTyre(Tyre):
-    """Linear tyres on four wheels, without or with a friction limit."""
+    """Linear tyres on four wheels, optionally limited by friction."""
 
     Parameters = LinearTyreParameters
 

@@ -1,7 +1,7 @@
 """Magic Formula tyre, 2002 form: load dependence, combined slip, aligning moment, friction per wheel.
 
-The formulae, their source and what stands for friction are described in `tyre_models/pacejka_2002.py`,
-the default set, of a 205/60R15, in `tyre_models/pacejka_2002_set.py`.
+Formulae, source and the treatment of friction are described in `tyre_models/pacejka_2002.py`, the default
+set, of a 205/60R15, in `tyre_models/pacejka_2002_set.py`.
 """
 
 from ..tyre_models.pacejka_2002 import lateral_slip, longitudinal_curve, longitudinal_force, wheel_forces

@@ -1,7 +1,6 @@
-"""Magic Formula tyre, original form of 1987: the set many papers use, combined slip by similarity.
+"""Magic Formula tyre, original form of 1987 as used in many papers, with combined slip by similarity.
 
-The formulae and their sources are described in `tyre_models/bakker_1987.py`. There is no aligning
-moment: the set has none.
+Formulae and sources are described in `tyre_models/bakker_1987.py`. The set has no aligning moment.
 """
 
 from ..tyre_models.bakker_1987 import (

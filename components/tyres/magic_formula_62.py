@@ -1,4 +1,4 @@
-"""Magic Formula tyre of MF-Tyre 6.1, 6.2 and 5.2 (PAC2002), for the coefficients of a tyre property file.
+"""Magic Formula tyre of MF-Tyre 6.1, 6.2 and 5.2 (PAC2002), with the coefficients of a tyre property file.
 
 With F_z0' = LFZO FNOMIN, df = F_z / F_z0' - 1, dp = INFLPRES / NOMPRES - 1, lambda = mu / reference_friction,
 MF(x; B, C, D, E) = D sin(C atan(B x - E (B x - atan(B x)))), MG the same with cos for sin and D = 1, E <= 1:
@@ -47,24 +47,25 @@ LGAZ in place of LKYC and LKZC, and F_y' = F_y - S_Vyk.
 Source: H. B. Pacejka, Tyre and Vehicle Dynamics, 3rd ed. 2012, section 4.3.2; I. J. M. Besselink, A. J. C.
 Schmeitz, H. B. Pacejka, An improved Magic Formula/Swift tyre model that can handle inflation pressure
 changes, Vehicle System Dynamics 48 (2010). Where these differ, or programs that fit and use such sets differ
-from the book, it is done as the programs do: alpha and gamma themselves in place of tan(alpha) and
-sin(gamma) (`slip_angle_as_tangent` has the book's, with a_t = sqrt((tan(alpha) + S_Ht)^2 + ...)); A_mu = 1
+from the book, this model follows the programs: alpha and gamma instead of tan(alpha) and sin(gamma)
+(`slip_angle_as_tangent` selects the book's form, with a_t = sqrt((tan(alpha) + S_Ht)^2 + ...)); A_mu = 1
 in (4.E8); QBZ4 gamma for QBZ6 gamma^2 in (4.E40); gamma for |gamma| beside QDZ3 in (4.E43); tangents in
 (4.E77) and (4.E78); FNOMIN for F_z0' in (4.E42) and (4.E76); in (4.E74) G_yk with camber. The book's small
-epsilons are left out: nothing is divided by zero.
+epsilons are omitted, because no division by zero occurs.
 
-Left out: turn slip; the rolling resistance M_y, which plants have; friction that decays with speed. G < 0,
-which the book excludes, is 0. Above fzmax everything is proportional to load, with all coefficients held;
-other ranges bound nothing. kappa is converted from the interface's (w R - v) / max(|w R|, |v|).
+Neglected: turn slip; the rolling resistance M_y, which plants have; decay of friction with speed. Negative G,
+which the book excludes, is set to 0. Above fzmax all outputs are proportional to load, with constant
+coefficients; other ranges are not enforced. kappa is converted from the interface's
+(w R - v) / max(|w R|, |v|).
 
-Friction. lambda as above is the book's lambda_mu, `file_low_friction` scale: it lowers the peaks, but
-combined slip keeps the weights of the dry tyre, so that on ice both forces together exceed the friction.
-With similarity forces are lambda times those of the set at lambda = 1 and the slips kappa / lambda and
-alpha / lambda, M_z with them; pure slip without shifts is the same by either. Camber is not scaled.
+Friction: with `file_low_friction` = scale, lambda is the book's lambda_mu: it lowers the peaks, but combined
+slip keeps the weights of the dry tyre, so that on ice the resultant force exceeds the friction. With
+similarity, forces and M_z are lambda times those of the set at lambda = 1 and the slips kappa / lambda and
+alpha / lambda; for pure slip without shifts both are the same. Camber is not scaled.
 
-tyreside says on which side of the car the set was measured. Wheels of the other side are its mirror image,
-so a car on one set runs straight, whatever conicity and plysteer the set has. A wheel that rolls
-backward is the forward one reflected fore and aft.
+tyreside is the side of the car for which the set was measured. Wheels on the other side are its mirror image,
+so a car with equal sets drives straight ahead, whatever conicity and plysteer the set has. A wheel that rolls
+backward is the reflection fore and aft of a forward-rolling wheel.
 """
 
 from itertools import chain
@@ -85,7 +86,7 @@ from ..tyre_models.pacejka_2012_set import LongitudinalParameters, Pacejka2012Pa
 from ..tyre_models.tyre import INPUTS, Curve, Tyre, law_outputs, no_force
 
 WHEELS = (("front", True), ("front", False), ("rear", True), ("rear", False))
-"""Axle of fl, fr, rl, rr, and whether the wheel is a left one."""
+"""Axle of fl, fr, rl, rr, and whether the wheel is on the left."""
 
 
 class MagicFormula62(Tyre):
@@ -112,7 +113,7 @@ class MagicFormula62(Tyre):
 
     @classmethod
     def curve(cls, alpha: float, f_z: float, mu: float, axle: Any) -> Curve:
-        """Return F_x [N] of kappa without camber; arguments as of `Tyre.curve`."""
+        """Return F_x [N] as a function of kappa without camber; arguments as in `Tyre.curve`."""
         (mirror, per_reference, f_top, load_scale, book, similar), longitudinal = axle
         friction = mu * per_reference
         if not (f_z > SMALLEST_LOAD and friction > SMALLEST_FRICTION):

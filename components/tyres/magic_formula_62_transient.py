@@ -1,29 +1,30 @@
-"""Magic Formula tyre of MF-Tyre 6.1, 6.2 and 5.2 whose forces lag behind slip.
+"""Magic Formula tyre of MF-Tyre 6.1, 6.2 and 5.2 with relaxation lengths.
 
-Forces and moments are those of `tyres/magic_formula_62.py`, at the slips of the contact patch in place of
-those of the wheel. These follow over the relaxation lengths sigma_x and sigma_y of F_x and F_y
-(`tyre_models/relaxation.py`):
+Forces and moments are those of `tyres/magic_formula_62.py`, at the slips of the contact patch instead of
+those of the wheel. The slips of the contact patch follow over the relaxation lengths sigma_x and sigma_y of
+F_x and F_y (`tyre_models/relaxation.py`):
 
     du_x/dt = s_x - V_x u_x / sigma_x    s_x = w R - v,      V_x = max(|w R|, |v|),    kappa' = u_x / sigma_x
     du_y/dt = s_y - V_y u_y / sigma_y    s_y lateral speed,  V_y = sqrt(v^2 + s_y^2),
                                                                                sin(alpha') = u_y / sigma_y
 
 solved exactly over a step. In steady motion kappa' and alpha' are the wheel's own slips. At rest both
-deflections are springs, so the car stands, and would rock on them without end: below `damping_speed` a
-damper beside the spring fades in, kappa' + k s_x / K_x, sin(alpha') - k s_y / K_y. Contact that slides holds
-no more than its grip: there deflections end where hypot(K_x kappa', K_y sin(alpha')) is 3 mu F_z, or what the
-wheel's own slips make of it in their direction. Without that a car that slides to rest on locked wheels,
-kappa' = -1, would be thrown back over a whole relaxation length.
+deflections are springs, on which a stopped car would oscillate without end: below `damping_speed` a parallel
+damper fades in, kappa' + k s_x / K_x, sin(alpha') - k s_y / K_y. The grip of the sliding contact limits the
+deflections to hypot(K_x kappa', K_y sin(alpha')) = 3 mu F_z, or to the value for the wheel's own slips in
+their direction if that is larger. Otherwise a car that slides to rest on locked wheels, kappa' = -1, would be
+thrown back by a whole relaxation length.
 
-Slip speeds are told from wheel_speed, wheel_velocity and slip_angle; the latter refers to `low_speed` where a
-wheel is slower. So wheel_radius and low_speed have to be those of the plant, as a vehicle file gives them.
+Slip speeds are computed from wheel_speed, wheel_velocity and slip_angle; the latter refers to `low_speed` for
+slower wheels. wheel_radius and low_speed must therefore be those of the plant, as with a vehicle file.
 
-slip_stiffness is the slope of the force at the end of a step over the slip held in it, dF_x/dkappa'
-(1 - exp(-V_x h / sigma_x)) and the damper's part: what the plant needs to solve the wheel's spin with it.
+slip_stiffness is the derivative of the force at the end of a step by the slip held over the step,
+dF_x/dkappa' (1 - exp(-V_x h / sigma_x)) plus the part of the damper, which the plant needs to integrate the
+wheel spin.
 
 Source: H. B. Pacejka, Tyre and Vehicle Dynamics, 3rd ed. 2012, sections 7.2 and 8.6; I. J. M. Besselink,
 A. J. C. Schmeitz, H. B. Pacejka, Vehicle System Dynamics 48 (2010), for the relaxation lengths. Ours differs:
-V_x and V_y bound the deflections when a wheel spins or slides sideways, where |v| would not.
+V_x and V_y bound the deflections when a wheel spins or slides sideways, which |v| would not.
 """
 
 from dataclasses import dataclass
@@ -42,34 +43,34 @@ from .magic_formula_62 import WHEELS
 AT_ONCE = ("vertical_load_*", "friction_*", "inclination_angle_*")
 OF_SIDE = ("vertical_load_*", "inclination_angle_*")
 FIRST_STEP = 0.001
-"""Step [s] for the slip stiffness until one is known; chosen: the usual one."""
+"""Step [s] for the slip stiffness before the first step; chosen: the usual communication step."""
 
 _Relaxation = parameter_class(__name__, "_Relaxation", of_axles(RELAXATION), bases=(Pacejka2012Parameters,))
 
 
 @dataclass(frozen=True)
 class TransientParameters(_Relaxation):  # type: ignore[misc, valid-type]  # made by make_dataclass
-    """Coefficients of both axles, and what slip speeds and standstill need."""
+    """Coefficients of both axles, and parameters of slip speeds and standstill."""
 
     relaxation_length: float = parameter(
-        0.5, "m", "Relaxation length where a set tells none", "chosen: a passenger car tyre's", minimum=0.02
+        0.5, "m", "Relaxation length of a set without one", "chosen: a passenger car tyre's", minimum=0.02
     )
     damping: float = parameter(
         3000.0,
         "N.s/m",
-        "Damping k beside the deflection at rest",
-        "chosen: a car that stops rocks for less than a second",
+        "Damping k parallel to the deflection at rest",
+        "chosen: a stopping car oscillates for less than a second",
         minimum=0.0,
     )
     damping_speed: float = parameter(
-        2.5, "m/s", "Speed from which there is no such damping", "chosen: walking pace", minimum=0.001
+        2.5, "m/s", "Speed above which this damping is zero", "chosen: walking pace", minimum=0.001
     )
     wheel_radius: float = like(PaperB, "wheel_radius")
     low_speed: float = like(StartParameters, "low_speed")
 
 
 class MagicFormula62Transient(Tyre):
-    """Magic Formula tyres (MF-Tyre 6.2, 6.1, 5.2) whose forces lag behind slip by relaxation lengths."""
+    """Magic Formula tyres (MF-Tyre 6.2, 6.1, 5.2) with relaxation lengths."""
 
     Parameters = TransientParameters
     inputs = (
@@ -114,7 +115,7 @@ class MagicFormula62Transient(Tyre):
         low, slow = self.p.low_speed, self.p.damping_speed
         for i, ((x, y), (s_x, v_x, s_y, v_y, _), old, new) in enumerate(
             zip(self.deflections, self.speeds, before, self.lengths, strict=True)
-        ):  # loads are those of the step's end: lengths in its middle are means
+        ):  # loads are those of the step's end; lengths at its middle are means
             x = deflected(x, s_x, v_x, 0.5 * (old[0] + new[0]), h)
             y = deflected(y, s_y, v_y, 0.5 * (old[1] + new[1]), h)
             if v_x < slow and v_y < slow:
@@ -145,7 +146,7 @@ class MagicFormula62Transient(Tyre):
         return [value for of_wheels in zip(*rows, strict=True) for value in of_wheels]
 
     def _see(self, u: list[float]) -> None:
-        """Keep slip speeds, speeds of rolling and direction from the inputs."""
+        """Store slip speeds, rolling speeds and direction of travel from the inputs."""
         angles, self.slips, _, _, _, velocities, spins = self.by_signal(u)
         radius, low = self.p.wheel_radius, self.p.low_speed
         self.speeds = []
@@ -156,7 +157,7 @@ class MagicFormula62Transient(Tyre):
             self.speeds.append((rolling - v, max(abs(rolling), abs(v)), s_y, hypot(v, s_y), forward))
 
     def _stiffnesses(self, u: list[float]) -> list[tuple[float, float, float, float]]:
-        """Return per wheel sigma_x, sigma_y [m], K_x [N] and K_y [N/rad] at the load of the inputs."""
+        """Return sigma_x, sigma_y [m], K_x [N] and K_y [N/rad] of each wheel at the load of the inputs."""
         _, _, loads, _, cambers, _, _ = self.by_signal(u)
         rows = []
         for load, gamma, (common, longitudinal, lateral, *_), lag in zip(
@@ -171,6 +172,6 @@ class MagicFormula62Transient(Tyre):
         return rows
 
     def _damping(self, v: float) -> float:
-        """Return k [N.s/m] at a speed of rolling."""
+        """Return the damping k [N.s/m] at a rolling speed."""
         p = self.p
         return p.damping * 0.5 * (1.0 + cos(pi * v / p.damping_speed)) if v < p.damping_speed else 0.0

@@ -1,8 +1,8 @@
-"""The torque that gives the requested force while the wheel's speed does not change.
+"""Direct wheel control: the torque of the requested force at constant wheel speed.
 
     T_i = F_i R,    |T_i| <= T_max
 
-Source: paper A, section 3.3. Ours differs: the motor's limit, which the paper leaves open.
+Source: paper A, section 3.3. Ours differs: the motor limit, which the paper leaves open.
 """
 
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ def limited_torque(force: float, radius: float, limit: float) -> float:
 
 
 class Direct(Component):
-    """Wheel torque from requested force times wheel radius, limited."""
+    """Direct wheel control: requested force times wheel radius, limited."""
 
     Parameters = DirectParameters
     inputs = ("force_request_*",)

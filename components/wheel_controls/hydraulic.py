@@ -1,17 +1,17 @@
-"""Hydraulic brakes: braking force to cylinder pressure to wheel torque; driving force passed on.
+"""Hydraulic brakes: from braking force to cylinder pressure to wheel torque; driving force passes through.
 
     P* = min(F R / C, P_max) g(kappa),   F > 0 the braking part of the request
     tau dP/dt = P* - P,                  -falling rate <= dP/dt <= rising rate
     T = R (driving part of the request) - C P
 
-C = A_w u_b R_b is the torque per pressure of a drum brake, A_w area and u_b friction coefficient of the
-shoe, R_b radius of the drum. The slip release g falls from one to nothing between two values of braking
-slip, so a wheel does not lock; it fades out at walking pace, where slip means nothing.
+C = A_w u_b R_b is the torque per pressure of a drum brake, A_w area and u_b friction coefficient of the shoe,
+R_b radius of the drum. The slip release g falls from 1 to 0 between two values of braking slip, so that a
+wheel does not lock; it fades out at walking pace, where slip is meaningless.
 
-A request holds from the communication point at which it arrives, so pressure never follows it at the
-same instant; the driving part does.
+A request takes effect from the communication point at which it arrives, so the pressure has no direct
+feedthrough; the driving part has.
 
-Source: paper C, equations (10), (11); no value is given there.
+Source: paper C, equations (10), (11), without values.
 """
 
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ class HydraulicParameters:
         2.2e-4, "m3", "Torque per pressure C of a front brake", "chosen: large saloon", minimum=1e-7
     )
     brake_factor_rear: float = parameter(
-        1.1e-4, "m3", "Torque per pressure C of a rear brake", "chosen: half of the front's", minimum=1e-7
+        1.1e-4, "m3", "Torque per pressure C of a rear brake", "chosen: half of the front", minimum=1e-7
     )
     pressure_limit: float = parameter(
         1e7, "Pa", "Largest cylinder pressure P_max", "chosen: 100 bar", minimum=0.0
@@ -44,19 +44,19 @@ class HydraulicParameters:
     )
     pressure_lag: float = parameter(0.08, "s", "Lag tau of the pressure", "chosen", minimum=0.0)
     release_slip: float = parameter(
-        0.05, "1", "Braking slip from which pressure is released", "chosen: before the optimum", minimum=0.0
+        0.05, "1", "Braking slip above which pressure is released", "chosen: before the optimum", minimum=0.0
     )
     full_release_slip: float = parameter(
         0.1,
         "1",
-        "Braking slip from which no pressure is asked for",
+        "Braking slip above which the pressure request is zero",
         "chosen: about the optimum",
         minimum=0.001,
     )
     release_speed: float = parameter(
         3.0,
         "m/s",
-        "Wheel velocity above which slip releases fully, below a third of it not",
+        "Wheel velocity from which slip release is fully active; below a third of it, off",
         "chosen: walking pace",
         minimum=0.1,
     )
@@ -66,11 +66,11 @@ class HydraulicParameters:
 
 
 def asked_pressure(force: float, kappa: float, v: float, *, factor: float, p: HydraulicParameters) -> float:
-    """Return the cylinder pressure [Pa] asked for by a force request [N], negative when braking.
+    """Return the requested cylinder pressure [Pa] for a force request [N], negative when braking.
 
     Args:
         kappa, v: longitudinal slip [1] and velocity [m/s] of the wheel.
-        factor: torque per pressure C of its brake [m3].
+        factor: torque per pressure C of the brake [m3].
     """
     if force >= 0.0:
         return 0.0
@@ -84,7 +84,7 @@ def asked_pressure(force: float, kappa: float, v: float, *, factor: float, p: Hy
 
 
 class Hydraulic(Component):
-    """Wheel torques of hydraulic brakes with slip release, and of the drive."""
+    """Hydraulic brakes with slip release, and drive torque."""
 
     Parameters = HydraulicParameters
     inputs = ("force_request_*", "slip_ratio_*", "wheel_velocity_*")

@@ -1,8 +1,8 @@
-"""Wheel torque by sliding-mode slip control, with the curve of a known tyre.
+"""Sliding-mode slip control with a known tyre model.
 
-The law is described in `control_laws.slip_control`. It needs the tyre's F_x(kappa) at the present slip
-angle, load and friction; it evaluates the very functions that the tyre components evaluate, so no table is
-typed in. Give it the same parameters as the tyre, as a scenario's vehicle file does by itself.
+The law is described in `control_laws.slip_control`. It needs the tyre's F_x(kappa) at the current slip angle,
+load and friction, which it evaluates with the functions of the tyre components. Its tyre parameters must be
+those of the tyre, as with a vehicle file in a scenario.
 
 Source: paper B, equations (31)-(38).
 """
@@ -27,7 +27,7 @@ TYRES: dict[str, type[Tyre]] = {
     "dugoff": Dugoff,
     "linear": LinearTyre,
 }
-"""The tyres whose curve can be asked for."""
+"""Tyre models available to the slip control."""
 
 
 OF_TYRES: Any = tuple(tyre.CurveParameters for tyre in TYRES.values())
@@ -35,19 +35,19 @@ OF_TYRES: Any = tuple(tyre.CurveParameters for tyre in TYRES.values())
 
 @dataclass(frozen=True)
 class SlipParameters(SlipControlParameters, *OF_TYRES):  # type: ignore[misc]  # as many bases as tyres
-    """The slip control's own, and those of all tyres' curves; only those of the chosen tyre are used."""
+    """Parameters of the slip control and of all tyre models; only those of the selected model are used."""
 
     tyre: str = parameter(
         "magic_formula",
         None,
-        "Tyre model whose curve is inverted",
+        "Tyre model",
         "chosen: the tyre of paper B",
         choices=tuple(TYRES),
     )
 
 
 class Slip(Component):
-    """Slip control: wheel torque that holds the slip which gives the requested force."""
+    """Slip control: wheel torque for the slip at which the tyre gives the requested force."""
 
     Parameters = SlipParameters
     inputs = (
@@ -76,7 +76,7 @@ class Slip(Component):
     def start(self, t: float, u: list[float]) -> None:
         *_, self.velocities, _ = self.by_signal(u)
         self.accelerations = [0.0, 0.0, 0.0, 0.0]
-        self.sample_time = 0.001  # until the first step tells
+        self.sample_time = 0.001  # until the first step
 
     def advance(self, t: float, h: float, u: list[float]) -> None:
         if h <= 0.0:
