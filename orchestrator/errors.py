@@ -316,6 +316,21 @@ class Interrupted(KeyboardInterrupt):
         return error if isinstance(error, cls) else cls()
 
 
+def error_record(error: YawbenchError | Interrupted) -> dict[str, Any]:
+    """Return an error as JSON-ready data, for `rebuilt` in another process."""
+    where = {name: value for name, value in vars(error).items() if name in ("instance", "time", "number")}
+    diagnostics = [diagnostic.record() for diagnostic in error.diagnostics]
+    return {"kind": type(error).__name__, "diagnostics": diagnostics, "where": where}
+
+
+def rebuilt(record: dict[str, Any]) -> YawbenchError | Interrupted:
+    """Return the error of an `error_record` from another process."""
+    kinds = {kind.__name__: kind for kind in (*YawbenchError.__subclasses__(), Interrupted)}
+    kind = kinds.get(record["kind"], YawbenchError)
+    error: YawbenchError | Interrupted = kind(map(Diagnostic.of, record["diagnostics"]), **record["where"])
+    return error
+
+
 for _public in (
     Diagnostic,
     Location,

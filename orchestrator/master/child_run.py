@@ -34,7 +34,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import Interrupted, SimulationError, YawbenchError
+from ..errors import Interrupted, SimulationError, YawbenchError, error_record, rebuilt
 from ..fork_server import ForkedChild, die_with_parent
 from ..interrupts import StopFlag, stop_requested_at
 from ..messages import listed
@@ -43,9 +43,8 @@ from ..results.recorder import BLOCK, RowBlock
 from ..supervised_process import LOG, REPLY, PipeChannel, ProcessLost, ProtocolError
 from .fmi import open_instance
 from .instance import CtypesInstance
-from .ipc import FmuProcess, LogRelay, error_record, rebuilt
 from .isolation import Isolation
-from .process_state import MASTER, WARNING, Log, flush_output
+from .process_state import MASTER, WARNING, FmuProcess, Log, LogRelay, flush_output
 from .run_lifecycle import OpenInstance, RunLifecycle, RunProgress
 from .signal_pool import InstanceSlot
 from .step_loop import WORDS, EndRequested, Master

@@ -1,7 +1,8 @@
 """Log of the messages that FMUs send through the FMI logger, and process-wide state that an FMU may corrupt.
 
 There is one receiver of messages for all instances of a process. The number passed to an instance as its
-component environment identifies whose message it is.
+component environment identifies whose message it is. A process that runs FMUs passes its messages on
+(`LogRelay`) to the log of the master (`FmuProcess`).
 
 Libraries compiled for speed flush small numbers to zero for the whole process from the moment they are
 loaded; others set a rounding mode or a locale (after which `strtod` reads "0,5") and leave it. Loading,
@@ -26,11 +27,13 @@ import struct
 import sys
 import threading
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
+from ..fork_server import Child
 from ..plan import Instance
+from ..supervised_process import LOG, PipeChannel, ProtocolError, SupervisedProcess
 
 OK, WARNING, DISCARD, ERROR, FATAL, PENDING, UNKNOWN = range(7)
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending", "a status that FMI does not have")
@@ -129,6 +132,69 @@ class Log:
             if m.status == WARNING or (m.instance != ended_by and m.category != "traceback")
         )
         return sorted(chosen, key=lambda m: m.category != MASTER)
+
+
+class LogRelay(Log):
+    """Log that passes messages on at once, as the FMU may be about to crash; a flood is only counted.
+
+    Args:
+        timed: the simulation time of the messages is known in this process.
+    """
+
+    def __init__(self, channel: PipeChannel, *, timed: bool) -> None:
+        super().__init__()
+        self._channel = channel
+        self._timed = timed
+        self._unreported = 0  # dropped messages not passed on yet
+
+    def add(self, instance: str, status: int, category: str, text: str, time: float | None = None) -> None:
+        kept = len(self.messages)
+        super().add(instance, status, category, text, time)
+        if len(self.messages) > kept:
+            last = self.messages[-1]
+            at = last.time if self._timed else None
+            self._channel.send(LOG, (instance, last.status, category, last.text, at))
+
+    def drop(self, count: int) -> None:
+        super().drop(count)
+        self._unreported += count
+        if self._unreported >= KEPT:
+            self.finish()
+
+    def finish(self) -> None:
+        """Pass on the number of messages dropped since the last call."""
+        if self._unreported:
+            count, self._unreported = self._unreported, 0
+            self._channel.send(LOG, count)
+
+
+class FmuProcess(SupervisedProcess):
+    """Parent's side of a process that runs FMUs, and passes on what they log."""
+
+    unasked: ClassVar[tuple[int, ...]] = (LOG,)
+
+    def __init__(self, start: Callable[[int, int], Child], log: Log) -> None:
+        super().__init__(start)
+        self.log = log
+
+    def take(self, kind: int, content: Any) -> None:
+        """Log a message of an FMU, or the number of dropped messages (see `LogRelay`)."""
+        if kind != LOG:
+            return super().take(kind, content)
+        match content:
+            case int():
+                self.log.drop(content)
+            case [
+                str() as instance,
+                int() as status,
+                str() as category,
+                str() as text,
+                float() | None as time,
+            ]:
+                self.log.add(instance, status, category, text, time)
+            case _:
+                raise ProtocolError("an invalid message")
+        return None
 
 
 def describe(instance: str, what: str, time: float, status: int, log: Log) -> str:
