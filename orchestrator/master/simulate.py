@@ -16,7 +16,7 @@ from ..interrupts import StopFlag, interrupts
 from ..messages import printable
 from ..metrics.plausibility import PlausibilityWatch
 from ..plan import Plan
-from ..results.freshness import key_of, run_record
+from ..results.freshness import key_of, recorded_variables, run_record, units_of
 from ..results.reader import Results
 from ..results.recorder import MemoryRecorder, Recorder, recorder_of
 from ..results.run_folder import RunStatus
@@ -121,12 +121,8 @@ def simulate_in_memory(
 
 def _columns(plan: Plan) -> tuple[list[str], list[bool], dict[str, str | None]]:
     """Return the names of the recorded columns, whether each is Real, and the units of measurement."""
-    instances = {instance.name: instance for instance in plan.instances}
-    recorded = {
-        str(signal): instances[signal.instance].fmu.variables[signal.variable] for signal in plan.record
-    }
-    units_of = {"time": "s", **{column: variable.unit for column, variable in recorded.items()}}
-    return list(recorded), [variable.type == "Real" for variable in recorded.values()], units_of
+    recorded = recorded_variables(plan)
+    return list(recorded), [variable.type == "Real" for variable in recorded.values()], units_of(plan)
 
 
 class Simulation:

@@ -288,17 +288,14 @@ def evaluate(results: Results, chosen: Metric, window: TimeWindow | None = None)
 
 def results_to_be(plan: Plan) -> Results:
     """Return results without rows that have the columns which a plan will record."""
-    from ..results.freshness import connections_of
+    from ..results.freshness import connections_of, recorded_variables
     from ..results.reader import Results
     from ..results.run_record import FmuRecord, RunRecord
 
-    instances = {instance.name: instance for instance in plan.instances}
-    variables = {
-        str(signal): instances[signal.instance].fmu.variables[signal.variable] for signal in plan.record
-    }
+    variables = recorded_variables(plan)
     columns = {name: np.empty(0, float if v.type != "String" else str) for name, v in variables.items()}
     fmus = {
-        name: FmuRecord(name=instance.fmu.name, role=instance.role) for name, instance in instances.items()
+        instance.name: FmuRecord(name=instance.fmu.name, role=instance.role) for instance in plan.instances
     }
     run = RunRecord(fmus=fmus, connections=connections_of(plan))
     return Results(Path(), np.empty(0), columns, {n: v.unit or "" for n, v in variables.items()}, run)

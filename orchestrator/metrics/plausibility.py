@@ -18,6 +18,7 @@ from vocabulary.wheels import WHEEL_NAMES, wheels
 
 from ..errors import Diagnostic, Location
 from ..plan import Plan
+from ..results.freshness import recorded_variables
 from .expressions import columns_of, results_to_be
 
 SignalArrays = Sequence[np.ndarray]
@@ -91,12 +92,7 @@ class PlausibilityWatch:
 
     def __init__(self, plan: Plan, checks: Iterable[PlausibilityCheck] = CHECKS) -> None:
         results = results_to_be(plan)
-        instances = {instance.name: instance.fmu.variables for instance in plan.instances}
-        reals = [
-            str(signal_name)
-            for signal_name in plan.record
-            if instances[signal_name.instance][signal_name.variable].type == "Real"
-        ]
+        reals = [column for column, variable in recorded_variables(plan).items() if variable.type == "Real"]
         index = {column: 1 + k for k, column in enumerate(reals)}
         friction = _highest_friction(plan)
         self._states: list[_CheckState] = []

@@ -22,7 +22,7 @@ from typing import Any
 from ..cache import OF_RESULTS, checksum, sources_hash
 from ..errors import ResultsError
 from ..fmu.archive import runs_as
-from ..plan import DEFAULT, Fmu, InputSeries, Instance, Plan, ValueSource, Wire
+from ..plan import DEFAULT, Fmu, InputSeries, Instance, Plan, ValueSource, Variable, Wire
 from ..signal_names import SignalName
 from .reader import load_results
 from .run_folder import RUN_FILE, RunStatus, is_dead
@@ -65,9 +65,7 @@ def run_record(plan: Plan, *, status: RunStatus, started: datetime) -> RunRecord
         ended=None,
         evaluation_order=list(instances),
         units=units_of(plan),
-        texts=[
-            str(n) for n in plan.record if instances[n.instance].fmu.variables[n.variable].type == "String"
-        ],
+        texts=[column for column, variable in recorded_variables(plan).items() if variable.type == "String"],
         fmus={name: _fmu(instance, plan, sources) for name, instance in instances.items()},
         sources=[SourceRecord(**asdict(source)) for source in sources],
         changes=[OverrideRecord.model_validate(change.record) for change in plan.changes],
@@ -81,13 +79,15 @@ def run_record(plan: Plan, *, status: RunStatus, started: datetime) -> RunRecord
     return record
 
 
+def recorded_variables(plan: Plan) -> dict[str, Variable]:
+    """Return the variables that a plan records, by the names of their columns and in this order."""
+    variables = {instance.name: instance.fmu.variables for instance in plan.instances}
+    return {str(name): variables[name.instance][name.variable] for name in plan.record}
+
+
 def units_of(plan: Plan) -> dict[str, str | None]:
     """Return the units of time and of all recorded columns."""
-    instances = {instance.name: instance for instance in plan.instances}
-    columns = {
-        str(signal): instances[signal.instance].fmu.variables[signal.variable].unit for signal in plan.record
-    }
-    return {"time": "s", **columns}
+    return {"time": "s", **{column: variable.unit for column, variable in recorded_variables(plan).items()}}
 
 
 def connections_of(plan: Plan) -> list[ConnectionRecord]:
