@@ -10,8 +10,7 @@ from typing import Any
 from fmpy.fmi2 import FMU2Slave
 from fmpy.ssp import simulation as ssp
 
-from orchestrator.interop import masters
-from orchestrator.interop.masters import Recording, Request
+from orchestrator.interop.second_opinion import Recording, Request, run_fmpy_ssp
 
 _leave_initialization = FMU2Slave.exitInitializationMode
 _instantiate, _connections_of, _step = ssp.instantiate_fmu, ssp.get_connections, ssp.do_step
@@ -25,7 +24,7 @@ def drive(request: Request) -> Recording:
     ssp.instantiate_fmu = _remember_component
     ssp.get_connections = _remember_connections
     ssp.do_step = _step_after_exchange
-    return masters.run_fmpy_ssp(request)
+    return run_fmpy_ssp(request)
 
 
 def _remember_component(component: Any, *given: Any) -> None:

@@ -15,11 +15,12 @@ from orchestrator.cli import main
 from orchestrator.commands.interop import show
 from orchestrator.errors import WiringError
 from orchestrator.interop import second_opinion as module
-from orchestrator.interop.masters import Recording, Request
 from orchestrator.interop.second_opinion import (
     AGREEMENT,
     MASTERS,
     OtherMaster,
+    Recording,
+    Request,
     SecondOpinion,
     differences,
     second_opinion,
