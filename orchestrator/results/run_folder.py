@@ -38,7 +38,7 @@ from typing import Any
 
 from ..errors import ResultsError, ScenarioError
 from ..messages import cut
-from ..plan import Override, Value
+from ..plan import Override
 from ..safe_files import (
     LOCK_FILE,
     NEW,
@@ -50,6 +50,7 @@ from ..safe_files import (
     refuse_link,
     refuse_links_within,
 )
+from ..scenario.overrides import value_in_words
 from .file_formats import FILES, RESULTS_FILE
 
 RUN_FILE = "run.json"
@@ -293,7 +294,7 @@ def _is_name(text: str) -> bool:
 def _with_changes(stem: str, changes: Iterable[Override]) -> str:
     """Return a name followed by its overrides, shortened and with a hash where they cannot be written out."""
     overrides = list(changes)
-    values = [_text(override.plain) for override in overrides]
+    values = [value_in_words(override.plain) for override in overrides]
     of_files = [override.target.names_file for override in overrides]
     names = [re.split(r"[/\\]", v)[-1] if file else v for v, file in zip(values, of_files, strict=True)]
     readable = ",".join(
@@ -304,12 +305,6 @@ def _with_changes(stem: str, changes: Iterable[Override]) -> str:
         return readable
     exact = repr([(str(override.target), override.plain) for override in overrides])
     return f"{portable[: LONGEST - 7].rstrip('.')}~{hashlib.sha256(exact.encode()).hexdigest()[:6]}"
-
-
-def _text(value: Value) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
 LOOKS = 100

@@ -326,11 +326,15 @@ def _in_words(change: Override) -> str:
         return f"vehicle file {Path(str(value)).name}"
     if target.names_file:
         return f"{target} = {Path(str(value)).name}"
-    text = str(value).lower() if isinstance(value, bool) else str(value)
-    if isinstance(value, float):
-        text = f"{value:.10g}"
     seconds = " s" if target.is_time and not isinstance(value, str) else ""
-    return f"{target} = {text}{seconds}"
+    return f"{target} = {value_in_words(change.plain)}{seconds}"
+
+
+def value_in_words(value: Value) -> str:
+    """Return a value as in names of folders and in words, rounded."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
 def fmu_of(swap: Override) -> str:
