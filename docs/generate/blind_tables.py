@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.experiments.confidence import Bounds, bootstrap, percentile_bounds
+from orchestrator.experiments.confidence import Bounds, bootstrap, percentile_bounds, resample
 
 from .published import replaced, wrapped, write_pages
 
@@ -48,7 +48,7 @@ def published() -> dict[str, Errors]:
 
 def mean_bounds(errors: np.ndarray) -> Bounds:
     """Return the bounds of the mean over manoeuvres and seeds, both drawn in blocks."""
-    samples = bootstrap(lambda manoeuvres, seeds: errors[manoeuvres][:, seeds].mean(), errors.shape)
+    samples = bootstrap(lambda *drawn: resample(errors, *drawn).mean(axis=(1, 2)), errors.shape)
     return Bounds(*map(float, percentile_bounds(samples)))
 
 

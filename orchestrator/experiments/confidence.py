@@ -31,7 +31,7 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import cache, cached_property
 from itertools import accumulate, combinations
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,6 +41,9 @@ TAIL = 0.5 * (1.0 - CONFIDENCE)
 """Probability of each side of an interval, and of a wrong decision on one side."""
 DRAWS = 2000
 """Resamples of a bootstrap. Chosen: bounds of 95 % then repeat within a few per cent of their distance."""
+
+BATCH = 100
+"""Resamples at a time. Chosen: few calls, and no more than some megabytes."""
 
 
 class ConfidenceInterval(NamedTuple):
@@ -103,16 +106,39 @@ def share_bounds(count: int, number: int, confidence: float = CONFIDENCE) -> Bou
     return Bounds(low, high)
 
 
-def bootstrap(statistic: Callable[..., Any], sizes: Sequence[int], *, draws: int = DRAWS) -> np.ndarray:
+def bootstrap(
+    statistic: Callable[..., np.ndarray], sizes: Sequence[int], *, draws: int = DRAWS
+) -> np.ndarray:
     """Return a statistic of resamples, an array of `draws` rows; the same data give the same resamples.
 
     Args:
-        statistic: called with an array of indices for each factor, drawn with replacement.
+        statistic: called with an array of indices for each factor, drawn with replacement, a row for each
+            draw of a batch; it returns a row for each.
         sizes: the number of levels of each factor; a single one for independent numbers.
         draws: resamples.
     """
     chance = np.random.default_rng(1)
-    return np.array([statistic(*(chance.integers(n, size=n) for n in sizes)) for _ in range(draws)])
+    rows = []
+    for begin in range(0, draws, BATCH):
+        batch = range(begin, min(begin + BATCH, draws))
+        drawn = [[chance.integers(n, size=n) for n in sizes] for _ in batch]
+        rows.append(statistic(*map(np.array, zip(*drawn, strict=True))))
+    return np.concatenate(rows)
+
+
+def resample(table: np.ndarray, *drawn: np.ndarray | None) -> np.ndarray:
+    """Return resamples of a table, the first axis a row for each draw.
+
+    Args:
+        table: the numbers.
+        drawn: for each axis of the table, the indices drawn, a row for each draw; None keeps the axis.
+    """
+    indices = []
+    for axis, rows in enumerate(drawn):
+        rows = np.arange(table.shape[axis])[np.newaxis] if rows is None else rows
+        indices.append(rows.reshape(len(rows), *(-1 if k == axis else 1 for k in range(table.ndim))))
+    resampled: np.ndarray = table[tuple(indices)]
+    return resampled
 
 
 def percentile_bounds(samples: np.ndarray) -> np.ndarray:

@@ -344,7 +344,7 @@ def _resampled(scores: Sequence[EntryScore]) -> np.ndarray:
     import numpy as np
 
     passed = np.array([[cell.passed for cell in score.cells.values()] for score in scores], dtype=float)
-    return bootstrap(lambda chosen: passed[:, chosen].sum(axis=1), passed.shape[1:])
+    return bootstrap(lambda chosen: passed[:, chosen].sum(axis=-1).T, passed.shape[1:])
 
 
 def told_apart(scores: Sequence[EntryScore]) -> tuple[int, int]:

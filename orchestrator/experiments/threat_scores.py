@@ -27,7 +27,16 @@ from typing import NamedTuple
 import numpy as np
 
 from . import claim_schema
-from .confidence import DRAWS, TAIL, Bounds, bootstrap, pairs_apart, percentile_bounds, shared_places
+from .confidence import (
+    DRAWS,
+    TAIL,
+    Bounds,
+    bootstrap,
+    pairs_apart,
+    percentile_bounds,
+    resample,
+    shared_places,
+)
 from .tables import Table, column
 from .threat_runs import ThreatResult
 from .threats import REFERENCE
@@ -37,21 +46,21 @@ FEWEST = 3
 
 
 def mean_positions(positions: np.ndarray) -> np.ndarray:
-    """Return the mean over threats of the means over cars, per entry."""
+    """Return the mean over threats of the means over cars, per entry: without the last two axes."""
     known = ~np.isnan(positions)
-    number = known.sum(axis=2)
-    sums = np.where(known, positions, 0.0).sum(axis=2)
+    number = known.sum(axis=-1)
+    sums = np.where(known, positions, 0.0).sum(axis=-1)
     of_threats = np.divide(sums, number, out=np.full(number.shape, np.nan), where=number > 0)
-    means: np.ndarray = np.nanmean(of_threats, axis=1)
+    means: np.ndarray = np.nanmean(of_threats, axis=-1)
     return means
 
 
 def scores_of_positions(positions: np.ndarray, reference: int) -> np.ndarray:
-    """Return the scores of all entries; `reference`: index of no control."""
+    """Return the scores of all entries, in each draw if there are several; `reference`: index of none."""
     means = mean_positions(positions)
-    gained = means - means[reference]
-    best = gained.max()
-    scores: np.ndarray = 100.0 * gained / best if best > 0.0 else np.zeros_like(gained)
+    gained = means - means[..., [reference]]
+    best = gained.max(axis=-1, keepdims=True)
+    scores: np.ndarray = np.divide(100.0 * gained, best, out=np.zeros_like(gained), where=best > 0.0)
     return scores
 
 
@@ -59,7 +68,7 @@ def resampled_scores(positions: np.ndarray, reference: int, draws: int = DRAWS) 
     """Return the scores of all entries in draws of threats and cars; shape (draws, entries)."""
 
     def draw(threats: np.ndarray, cars: np.ndarray) -> np.ndarray:
-        return scores_of_positions(positions[:, threats][:, :, cars], reference)
+        return scores_of_positions(resample(positions, None, threats, cars), reference)
 
     return bootstrap(draw, positions.shape[1:], draws=draws)
 
@@ -264,28 +273,25 @@ def gains_and_laws(tuned: np.ndarray, authors: np.ndarray) -> GainsAndLaws:
     """
     laws, seeds = tuned.shape[:2]
 
-    def spreads(some: np.ndarray, threats: np.ndarray, cars: np.ndarray) -> list[float]:
-        of_seeds = _means_of_seeds(tuned[some][:, :, threats][:, :, :, cars])
-        own = mean_positions(authors[some][:, threats][:, :, cars])
-        means = of_seeds.mean(axis=1)
-        within = float(of_seeds.var(axis=1, ddof=1).mean())
-        between = float(means.var(ddof=1)) - within / seeds
-        of_gains = float(np.sqrt(np.mean(0.5 * (means - own) ** 2)))
-        of_laws = float(np.sqrt(max(0.0, np.var(0.5 * (means + own), ddof=1) - 0.25 * within / seeds)))
-        return [np.sqrt(max(0.0, between)), np.sqrt(within), of_gains, of_laws, of_gains - of_laws]
+    def spreads(some: np.ndarray, threats: np.ndarray, cars: np.ndarray) -> np.ndarray:
+        of_seeds = mean_positions(resample(tuned, some, None, threats, cars))
+        own = mean_positions(resample(authors, some, threats, cars))
+        means = of_seeds.mean(axis=-1)
+        within = of_seeds.var(axis=-1, ddof=1).mean(axis=-1)
+        between = means.var(axis=-1, ddof=1) - within / seeds
+        of_gains = np.sqrt((0.5 * (means - own) ** 2).mean(axis=-1))
+        variance = (0.5 * (means + own)).var(axis=-1, ddof=1) - 0.25 * within / seeds
+        of_laws = np.sqrt(np.maximum(0.0, variance))
+        spread = np.sqrt(np.maximum(0.0, between))
+        return np.stack([spread, np.sqrt(within), of_gains, of_laws, of_gains - of_laws], axis=-1)
 
     sizes = (laws, *tuned.shape[2:])
-    whole = spreads(*(np.arange(n) for n in sizes))
+    (whole,) = spreads(*(np.arange(n)[np.newaxis] for n in sizes))
     draws = percentile_bounds(bootstrap(spreads, sizes))
     of_laws, of_seeds, *of_gains = (
         Spread(float(x), Bounds(*map(float, b))) for x, b in zip(whole, draws.T, strict=True)
     )
-    return GainsAndLaws(of_laws, of_seeds, ratio_of_spreads(_means_of_seeds(tuned)), *of_gains)
-
-
-def _means_of_seeds(tuned: np.ndarray) -> np.ndarray:
-    """Return the mean position per law and seed."""
-    return mean_positions(tuned.reshape(-1, *tuned.shape[2:])).reshape(tuned.shape[:2])
+    return GainsAndLaws(of_laws, of_seeds, ratio_of_spreads(mean_positions(tuned)), *of_gains)
 
 
 def ratio_of_spreads(groups: np.ndarray) -> Spread:

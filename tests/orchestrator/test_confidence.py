@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from orchestrator.experiments.confidence import bootstrap, interval, percentile_bounds, share_bounds
+from orchestrator.experiments.confidence import bootstrap, interval, percentile_bounds, resample, share_bounds
 
 
 def test_the_interval_is_that_of_students_t_test():
@@ -63,7 +63,7 @@ def test_a_count_beyond_its_number_is_refused(count, number):
 
 def test_the_bootstrap_of_a_mean_is_as_wide_as_its_standard_error():
     numbers = np.random.default_rng(1).normal(3.0, 2.0, 50)
-    low, high = percentile_bounds(bootstrap(lambda drawn: numbers[drawn].mean(), [50]))
+    low, high = percentile_bounds(bootstrap(lambda drawn: numbers[drawn].mean(axis=1), [50]))
     assert low < numbers.mean() < high
     assert high - low == pytest.approx(2 * 1.96 * numbers.std() / math.sqrt(50), rel=0.1)
 
@@ -76,12 +76,14 @@ def test_bootstrapped_blocks_hold_the_true_mean_of_data_with_two_factors():
         rows, columns = chance.normal(size=(8, 1)), chance.normal(size=(1, 12))
         table = rows + columns + chance.normal(size=(8, 12))
 
-        def mean(i, k, table=table):
-            return table[np.ix_(i, k)].mean()
+        def mean(*drawn, table=table):
+            return resample(table, *drawn).mean(axis=(1, 2))
 
         low, high = percentile_bounds(bootstrap(mean, [8, 12], draws=300))
         blocks += low <= 0.0 <= high
-        low, high = percentile_bounds(bootstrap(lambda i, t=table: t.ravel()[i].mean(), [96], draws=300))
+        low, high = percentile_bounds(
+            bootstrap(lambda i, t=table: t.ravel()[i].mean(axis=1), [96], draws=300)
+        )
         alone += low <= 0.0 <= high
     assert blocks / 200 >= 0.9
     assert alone / 200 < 0.7
@@ -89,5 +91,5 @@ def test_bootstrapped_blocks_hold_the_true_mean_of_data_with_two_factors():
 
 def test_the_same_data_give_the_same_bounds():
     numbers = np.arange(10.0)
-    found = [percentile_bounds(bootstrap(lambda drawn: numbers[drawn].mean(), [10])) for _ in range(2)]
+    found = [percentile_bounds(bootstrap(lambda drawn: numbers[drawn].mean(axis=1), [10])) for _ in range(2)]
     assert (found[0] == found[1]).all()
