@@ -33,7 +33,6 @@ import numpy as np
 from pydantic import Field
 
 from vocabulary.signals import SIGNALS
-from vocabulary.vehicle import CAR
 
 from ..errors import ScenarioError, YawbenchError, code_of, text_of
 from ..measured.least_squares import Simulated, Window
@@ -50,7 +49,7 @@ from ..scenario.quantities import convert, gain_and_offset, measure_of
 from ..scenario.schema import Scalar, SeriesSpec
 from ..scenario.schema_validation import Instant, StrictModel, Time, validated
 from ..scenario.yaml_lines import Document
-from ..signal_names import INPUTS, SignalName, Target, match
+from ..signal_names import INPUTS, SignalName, match
 from ..workers import Pool
 from .jobs import Job, execute
 
@@ -128,6 +127,16 @@ class LoadedFit:
     def scenario(self) -> Path:
         """The scenario file."""
         return self.path.parent / self.spec.scenario
+
+    @property
+    def parts(self) -> dict[str, Sequence[FitWindow]]:
+        """Part -> its windows."""
+        return {"training": self.training, "held_out": self.held_out}
+
+    @property
+    def deciding(self) -> str:
+        """The part that decides which model is better."""
+        return "held_out" if self.held_out else "training"
 
     @property
     def settling(self) -> float:
@@ -290,17 +299,14 @@ class ScenarioModel:
         self._still = tuple(Override.of(f"{INPUTS}.{key}", 0.0, "fit") for key in self._series)
         self.base = planner.plan(planner.load(fit.scenario, self._still), fmus=fmus)
         self.followed = dict(self._followed())
-        self.step = float(self.base.step)
         self.plant = next((instance for instance in self.base.instances if instance.role == "plant"), None)
         if self.plant is None:
             raise ScenarioError(f"{fit.scenario}: has no plant to compare", code="fit-inputs")
         self.columns = {name: f"{self.plant.name}.{name}" for name in fit.errors}
         for column in self.columns.values():
             if column not in map(str, self.base.record):
-                raise ScenarioError(
-                    f"{fit.scenario}: {column} is compared, but not recorded",
-                    code="signal-unknown",
-                )
+                why = f"{fit.scenario}: {column} is compared, but not recorded"
+                raise ScenarioError(why, code="signal-unknown")
         self.identity = json.dumps([
             key_of(self.base), fit.measurement.sha256, sorted(fit.errors), [w.window.name for w in windows]
         ])  # fmt: skip
@@ -323,32 +329,6 @@ class ScenarioModel:
             simulated[number][k] = outcome.value
             self.failure = outcome.reason or self.failure
         return simulated
-
-    def value_of(self, target: Target) -> tuple[float | None, str | None]:
-        """Return the scenario's value of a target and its unit; None where it has none.
-
-        Raises:
-            ValueError: nothing in the scenario takes it.
-        """
-        name = target.variable
-        if target.kind == "fact":
-            units = {"friction": "1", "speed": "m/s"}
-            value = self.planner.load(self.fit.scenario).friction if name == "friction" else None
-            return (value if isinstance(value, float) else None), units[name]
-        having = [
-            instance
-            for instance in self.base.instances
-            if name in instance.fmu.variables and target.instance in ("", instance.name)
-        ]
-        if target.kind == "vehicle_parameter" and not having and name in CAR:
-            return None, CAR[name].unit
-        if target.kind == "input":
-            return None, None
-        if target.kind not in ("parameter", "vehicle_parameter") or not having:
-            raise ValueError(f"{target}: nothing in the scenario takes it")
-        value = having[0].parameter(name)
-        number = float(value) if isinstance(value, (int, float)) else None
-        return number, having[0].fmu.variables[name].unit
 
     def _of_window(self, fit_window: FitWindow) -> tuple[tuple[Override, ...], Fraction, Fraction]:
         """Return the overrides of a window's runs, and their start and stop time [s]."""
@@ -428,7 +408,7 @@ class ScenarioModel:
         for (name, variable), signal in self.followed.items():
             if name != instance.name:
                 continue
-            delay, offset = (values.get(f"{MEASURED}.{signal}.{of}", 0.0) for of in ("delay", "offset"))
+            delay, offset = delay_and_offset(values, signal)
             gain, shift = _conversion(signal, instance.fmu.variables[variable]) or (1.0, 0.0)
             numbers = gain * (part.signals[signal] - offset) + shift
             file = self.fit.measurement
@@ -437,6 +417,11 @@ class ScenarioModel:
             )
             constants[variable] = series[variable].first(float(begin))
         return replace(instance, series=series, constants=constants)
+
+
+def delay_and_offset(values: Mapping[str, float], signal: str) -> tuple[float, float]:
+    """Return the delay and offset of a measured signal in a set of values; 0 where they are not free."""
+    return values.get(f"{MEASURED}.{signal}.delay", 0.0), values.get(f"{MEASURED}.{signal}.offset", 0.0)
 
 
 def _conversion(signal: str, variable: Variable) -> tuple[float, float] | None:

@@ -15,11 +15,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from vocabulary.signals import SIGNALS
+from vocabulary.vehicle import CAR
 
 from ..errors import ScenarioError, code_of
 from ..measured.least_squares import (
@@ -39,12 +40,10 @@ from ..messages import hint
 from ..planner import Planner
 from ..scenario import yaml_lines
 from ..signal_names import Target
+from ..wiring.context import FACTS
 from ..workers import Pool
-from .fit import MARGIN, MEASURED, FitWindow, FreeSpec, LoadedFit, ScenarioModel, number_in
+from .fit import MARGIN, MEASURED, FitWindow, FreeSpec, LoadedFit, ScenarioModel, delay_and_offset, number_in
 from .jobs import NEEDED
-
-if TYPE_CHECKING:
-    pass
 
 PARTS = {"training": "training", "held_out": "held-out"}
 
@@ -82,10 +81,6 @@ class FitResult:
         """The models."""
         return [self.scenario, *([self.single_track] if self.single_track else [])]
 
-    def windows(self, part: str) -> Sequence[FitWindow]:
-        """Return the windows of a part."""
-        return self.fit.training if part == "training" else self.fit.held_out
-
     @cached_property
     def scores(self) -> dict[tuple[str, str, str], Score]:
         """(Title of the model, part, signal) -> score."""
@@ -101,7 +96,7 @@ class FitResult:
     def _pairs(self, model: FittedModel, part: str, name: str) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return measured and simulated values of the compared samples of each window."""
         pairs = []
-        for fit_window, signals in zip(self.windows(part), model.simulated[part], strict=True):
+        for fit_window, signals in zip(self.fit.parts[part], model.simulated[part], strict=True):
             if signals is None or name not in signals:
                 return []
             compared = fit_window.window.times >= fit_window.window.times[0] + self.fit.settling - 1e-9
@@ -118,15 +113,13 @@ class FitResult:
     @property
     def verdict(self) -> str:
         """Whether the scenario's model is better than the single track, in words."""
-        part = "held_out" if self.fit.held_out else "training"
+        part = self.fit.deciding
         if self.single_track is None:
             return f"no single track beside it: {self.without}"
         own, other = self.loss(self.scenario, part), self.loss(self.single_track, part)
         of = "mean square of differences, each over the expected"
         seen = f"on {PARTS[part]} windows: {of}, {own:.3g} against {other:.3g}"
-        if own < other:
-            return f"better than a single track with Fiala tyres {seen}"
-        return f"not better than a single track with Fiala tyres {seen}"
+        return f"{'' if own < other else 'not '}better than a single track with Fiala tyres {seen}"
 
     @property
     def data(self) -> dict[str, Any]:
@@ -209,7 +202,7 @@ def make_fit(
     with Pool(workers, preload=NEEDED) as pool:
         training, held = (
             ScenarioModel(fit, windows, planner=planner, pool=pool, fmus=fmus)
-            for windows in (fit.training, fit.held_out)
+            for windows in fit.parts.values()
         )
         parameters = free_parameters(fit, training)
         own = _fitted(fit, training, parameters, say, folder)
@@ -258,20 +251,15 @@ def _shown(
     fit: LoadedFit, values: Mapping[str, float], simulated: Mapping[str, Sequence[Simulated]]
 ) -> dict[str, Sequence[Simulated]]:
     """Return simulated signals with the delays and offsets of the measurement."""
-    windows = {"training": fit.training, "held_out": fit.held_out}
 
     def as_seen(fit_window: FitWindow, signals: Simulated) -> Simulated:
+        times = fit_window.window.times
         return signals and {
-            name: as_measured(
-                fit_window.window.times,
-                x,
-                *(values.get(f"{MEASURED}.{name}.{of}", 0.0) for of in ("delay", "offset")),
-            )
-            for name, x in signals.items()
+            name: as_measured(times, x, *delay_and_offset(values, name)) for name, x in signals.items()
         }
 
     return {
-        part: [as_seen(window, signals) for window, signals in zip(windows[part], several, strict=True)]
+        part: [as_seen(window, signals) for window, signals in zip(fit.parts[part], several, strict=True)]
         for part, several in simulated.items()
     }
 
@@ -311,20 +299,12 @@ def _single_track(
                 )  # fmt: skip
             elif parameter.kind != "run" and signal in errors:
                 own.append(parameter)
-    parts = {"training": fit.training, "held_out": fit.held_out}
-    models = {
-        part: SingleTrack([_inputs(fit, model, fit_window) for fit_window in windows], mass, front, rear)
-        for part, windows in parts.items()
-    }
-    filtered = {part: _Filtered(fit, single_track) for part, single_track in models.items()}
-    residuals = Residuals(
-        filtered["training"],
-        [fit_window.window for fit_window in fit.training],
-        own,
-        errors,
-        settling=fit.settling,
-        say=say,
-    )
+    filtered = {}
+    for part, windows in fit.parts.items():
+        inputs = [_inputs(fit, model, fit_window) for fit_window in windows]
+        filtered[part] = _Filtered(fit, SingleTrack(inputs, mass, front, rear))
+    training = [fit_window.window for fit_window in fit.training]
+    residuals = Residuals(filtered["training"], training, own, errors, settling=fit.settling, say=say)
     fitted = estimate(residuals, most_sets=fit.spec.most_sets)
     simulated = {part: single_track([fitted.values])[0] for part, single_track in filtered.items()}
     return FittedModel("single track with Fiala tyres", own, fitted, _shown(fit, fitted.values, simulated))
@@ -382,10 +362,7 @@ def _ratio(fit: LoadedFit, model: ScenarioModel) -> float:
     """
     known = fit.measurement.vehicle.get("steering_ratio")
     ratios = (instance.parameter("steering_ratio") for instance in model.base.instances)
-    ratio = known or next(
-        (float(value) for value in ratios if isinstance(value, (int, float))),
-        None,
-    )
+    ratio = known or next((float(value) for value in ratios if isinstance(value, (int, float))), None)
     if ratio is None:
         raise ValueError("the steering ratio is unknown")
     return ratio
@@ -422,7 +399,7 @@ def _parameter(
         unit = "s" if rest[0] == "delay" else SIGNALS[signal].unit
         start, kind = 0.0, "run" if signal in followed else rest[0]
     else:
-        start, unit = model.value_of(Target.parse(name))
+        start, unit = _value_of(Target.parse(name), model)
     if spec.start is not None:
         start = number_in(spec.start, unit)
     low, high = number_in(spec.low, unit), number_in(spec.high, unit)
@@ -436,3 +413,29 @@ def _parameter(
         if not prior[1] > 0.0:
             raise ValueError("prior: its deviation must be above 0")
     return Parameter(name, start, low, high, kind, signal, prior, unit or "1")  # type: ignore[arg-type]
+
+
+def _value_of(target: Target, model: ScenarioModel) -> tuple[float | None, str | None]:
+    """Return the scenario's value of a target and its unit; None where it has none.
+
+    Raises:
+        ValueError: nothing in the scenario takes it.
+    """
+    name = target.variable
+    if target.kind == "fact":
+        value = model.planner.load(model.fit.scenario).friction if name == "friction" else None
+        return (value if isinstance(value, float) else None), FACTS[name].unit
+    having = [
+        instance
+        for instance in model.base.instances
+        if name in instance.fmu.variables and target.instance in ("", instance.name)
+    ]
+    if target.kind == "vehicle_parameter" and not having and name in CAR:
+        return None, CAR[name].unit
+    if target.kind == "input":
+        return None, None
+    if target.kind not in ("parameter", "vehicle_parameter") or not having:
+        raise ValueError(f"{target}: nothing in the scenario takes it")
+    value = having[0].parameter(name)
+    number = float(value) if isinstance(value, (int, float)) else None
+    return number, having[0].fmu.variables[name].unit

@@ -54,7 +54,7 @@ def fit_page(result: FitResult) -> str:
 
 
 def _measured(result: FitResult) -> Results:
-    columns = [(w.window.times, w.window.measured) for part in PARTS for w in result.windows(part)]
+    columns = [(w.window.times, w.window.measured) for part in PARTS for w in result.fit.parts[part]]
     time, signals = _joined(columns, list(result.fit.errors))
     return MeasuredResults(Path(), time, signals, _units(signals), RunRecord())
 
@@ -63,7 +63,7 @@ def _simulated(result: FitResult, model: FittedModel) -> Results:
     columns = [
         (fit_window.window.times, signals)
         for part in PARTS
-        for fit_window, signals in zip(result.windows(part), model.simulated[part], strict=True)
+        for fit_window, signals in zip(result.fit.parts[part], model.simulated[part], strict=True)
         if signals is not None
     ]
     time, signals = _joined(columns, [name for name in result.fit.errors if name in columns[0][1]])
@@ -131,13 +131,13 @@ def score_table(result: FitResult) -> Table:
 
 def residual_tables(result: FitResult) -> list[Table]:
     """Return a table per signal of `OVER`: rms differences in its ranges, on the held-out windows."""
-    part = "held_out" if result.fit.held_out else "training"
+    part = result.fit.deciding
     return [table for name in OVER if (table := _residuals_over(result, part, name)) is not None]
 
 
 def _residuals_over(result: FitResult, part: str, over: str) -> Table | None:
     """Return the table over a signal; None if it is not measured."""
-    windows = result.windows(part)
+    windows = result.fit.parts[part]
     if any(over not in fit_window.filtered.signals for fit_window in windows):
         return None
     at = np.concatenate([
