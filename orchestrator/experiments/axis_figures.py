@@ -77,15 +77,12 @@ class Drawing:
 
     def panels(self) -> list[tuple[str, list[Case]]]:
         """Return the heading and the runs of each panel."""
-        runs = self.findings.experiment.first_cases
-        if not self.spec.panel_axis:
-            return [("", runs)]
+        axis = self.spec.panel_axis
+        if not axis:
+            return [("", self.runs)]
         return [
-            (
-                self.name_of(self.spec.panel_axis, level),
-                [r for r in runs if self.at(r, self.spec.panel_axis) == level],
-            )
-            for level in self.levels(self.spec.panel_axis)
+            (self.name_of(axis, level), [run for run in self.runs if self.at(run, axis) == level])
+            for level in self.levels(axis)
         ]
 
     def lines(self) -> Iterator[tuple[Level | None, dict[str, Any]]]:

@@ -44,6 +44,13 @@ figures:
     panels: friction
     only: {friction: [0.5]}
   - {name: names, kind: curve, metric: sideslip, x: control, lines: friction, panels: speed, scale: log}
+  - name: narrow
+    kind: curve
+    metric: sideslip
+    x: control
+    lines: speed
+    panels: friction
+    only: {control: b, speed: [36, 144]}
 """  # fmt: skip
 
 
@@ -165,6 +172,12 @@ def test_an_axis_of_names_is_drawn_in_its_order(swept):
     axes = figure(swept(), "names").axes[-1]
     assert [tick.get_text() for tick in axes.get_xticklabels()] == ["without", "with"]
     assert axes.get_yscale() == "log"
+
+
+def test_only_the_values_that_are_asked_for_are_drawn_along_x_and_as_lines(swept):
+    axes = figure(swept(), "narrow").axes[-1]
+    assert [tick.get_text() for tick in axes.get_xticklabels()] == ["with"]
+    assert [line.get_xydata().tolist() for line in axes.get_lines()] == [[[0.0, 0.25]], [[0.0, 4.0]]]
 
 
 def test_what_never_ends_is_a_cross_too(swept):
