@@ -141,11 +141,13 @@ def _is_current(recipe: Recipe, target: Path, root: Path) -> bool:
 def _built(
     names: list[str], known: Mapping[str, Recipe], out: Path, root: Path
 ) -> Iterator[tuple[str, list[Diagnostic]]]:
-    """Build components in parallel; yield each name with its errors."""
+    """Build components in parallel; yield each name with its errors, in the order of the names."""
     if len(names) < 2 or sys.platform == "win32":
         for name in names:
             yield name, errors_of(known[name], out, root)
         return
+    ended: dict[int, list[Diagnostic]] = {}
+    told = 0
     with Pool(preload=[__name__]) as pool:
         for finished in pool.each(_build_one, [(name, out, root) for name in names]):
             name = names[finished.number]
@@ -153,7 +155,10 @@ def _built(
             died = [Diagnostic("build-process-died", lost)] if finished.died else []
             if finished.error is not None:
                 raise finished.error
-            yield name, died or finished.value
+            ended[finished.number] = died or finished.value
+            while told in ended:
+                yield names[told], ended.pop(told)
+                told += 1
 
 
 def _build_one(name: str, out: Path, root: Path) -> list[Diagnostic]:

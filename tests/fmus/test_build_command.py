@@ -14,6 +14,7 @@ from fmus.build import find_recipes
 from orchestrator.commands.build import build
 from orchestrator.errors import BuildError
 from orchestrator.safe_files import claim
+from orchestrator.workers import Pool
 from tests.sentences import golden, golden_in
 
 APP = typer.Typer()
@@ -29,6 +30,19 @@ def test_it_builds_what_is_named_and_says_so_on_stderr(tmp_path):
     assert (done.exit_code, done.stdout) == (0, "")
     assert golden(done.stderr)
     assert {file.name for file in tmp_path.iterdir()} == {"controller_off.fmu", "driver_sine.fmu"}
+
+
+class Backwards(Pool):
+    """A pool whose calls end in the opposite order."""
+
+    def each(self, function, calls):
+        return reversed([*super().each(function, calls)])
+
+
+def test_it_names_what_is_built_in_the_order_asked_for_whichever_takes_longer(tmp_path, monkeypatch):
+    monkeypatch.setattr("fmus.build.Pool", Backwards)
+    done = run("controller_off", "driver_sine", "--out", tmp_path)
+    assert golden(done.stderr)
 
 
 def test_it_builds_nothing_twice_unless_forced(tmp_path):
