@@ -196,8 +196,8 @@ def write_overview(chapters: Sequence[dict[str, Any]], pages: Sequence[Path], fo
     """Write the overview of several experiments into a folder; return its path."""
     import os
 
-    from ..pages.overview_page import overview_page
     from ..pages.page_parts import PAGE, RANKING, save_page
+    from ..pages.study_page import overview_page
 
     def address(page: Path) -> str:
         return Path(os.path.relpath(page, folder)).as_posix()

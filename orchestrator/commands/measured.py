@@ -153,7 +153,7 @@ def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
     from ..experiments.fit import load_fit
     from ..experiments.fit_result import make_fit
     from ..measured.least_squares import CONVERGED
-    from ..pages.fit_page import fit_page, parameter_table, score_table
+    from ..pages.evaluation_page import fit_page, parameter_table, score_table
     from ..pages.page_parts import save_page
     from ..planner import Planner
     from ..results.run_folder import default_folder

@@ -1,14 +1,16 @@
-"""Pages of evaluations: a standard test, and a validation by measurements.
+"""Pages of evaluations: a standard test, a validation by measurements, a fit to measurements.
 
 That of a test has the verdict on every criterion with its distance to the limit; the viewer shows at first
 the runs that decide, with the instants and limits of the test. That of a validation has the verdict on every
-signal; the viewer shows its cross plot with the band.
+signal; the viewer shows its cross plot with the band. That of a fit has parameters and differences; the
+viewer shows time histories of car and models.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,7 @@ from vocabulary.signals import SIGNALS
 from ..evaluation.standard_tests import Evaluation, Limit, StandardTest, TestSeries
 from ..evaluation.trace import Trace
 from ..evaluation.validation import Validation
+from ..experiments.fit_result import PARTS, FitResult, FittedModel
 from ..experiments.tables import Table
 from ..experiments.verdict_tables import (
     conditions_table,
@@ -30,6 +33,7 @@ from ..experiments.verdict_tables import (
 )
 from ..figures.style import LabelledRun, digits_apart, shown
 from ..messages import counted, listed
+from ..metrics.expressions import MetricValue
 from ..metrics.measures import words
 from ..metrics.verdict import SYMBOLS, Status, Verdict, apart, worst
 from ..results.measurement_results import MeasuredResults
@@ -137,8 +141,7 @@ def results_of(trace: Trace) -> Results:
     """Return the recorded results of a trace; those of a measurement have its signals alone."""
     if trace.folder is not None:
         return load_results(trace.folder)
-    units = {name: SIGNALS[name].unit if name in SIGNALS else "" for name in trace.signals}
-    return Results(Path(), trace.time, dict(trace.signals), {"time": "s", **units}, RunRecord())
+    return _drawn(Results, trace.time, trace.signals)
 
 
 def validation_page(validation: Validation) -> str:
@@ -199,17 +202,16 @@ def _cross_plots(validation: Validation) -> tuple[list[LabelledRun], Settings]:
     for plot in validation.plots:
         signal, distance = f"plant.{plot.signal}", f"{plot.signal}.{DISTANCE}"
         first = len(runs)
-        units = {over: SIGNALS[validation.horizontal].unit, signal: SIGNALS[plot.signal].unit, distance: "1"}
         columns = {over: plot.over, signal: plot.values}
-        runs.append(_plotted(validation.title, Results, plot.time, columns, units))
+        runs.append(LabelledRun(validation.title, _drawn(Results, plot.time, columns)))
         for test in plot.tests:
             columns = {over: test.over, signal: test.values, distance: test.distance}
-            runs.append(_plotted(test.name, MeasuredResults, test.time, columns, units))
+            runs.append(LabelledRun(test.name, _drawn(MeasuredResults, test.time, columns)))
         x, y = plot.outline
         every = slice(None, None, 1 + x.size // OUTLINE)
         band = {over: x[every], signal: y[every]}
         bands.append(len(runs))
-        runs.append(_plotted("tolerance", Results, np.arange(float(x[every].size)), band, units))
+        runs.append(LabelledRun("tolerance", _drawn(Results, np.arange(float(x[every].size)), band)))
         title = f"{words(plot.signal)} over {words(validation.horizontal).lower()}"
         views.append(View(title, [signal, distance], range(first, len(runs)), over))
         views.append(
@@ -219,8 +221,151 @@ def _cross_plots(validation: Validation) -> tuple[list[LabelledRun], Settings]:
     return runs, Settings(views, metrics=(), limits=limits, bands=bands, largest=LARGEST)
 
 
-def _plotted(
-    label: str, kind: type[Results], time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str]
-) -> LabelledRun:
-    own = {"time": "s"} | {name: units[name] for name in columns}
-    return LabelledRun(label, kind(Path(), time, columns, own, RunRecord()))
+def _drawn(kind: type[Results], time: np.ndarray, columns: Mapping[str, np.ndarray]) -> Results:
+    """Return results that have these columns alone, with the units that their names tell."""
+    known = {name: SIGNALS.get(name.rpartition(".")[2]) for name in columns}
+    units = {"time": "s"} | {name: signal.unit if signal else "" for name, signal in known.items()}
+    return kind(Path(), time, dict(columns), units, RunRecord())
+
+
+BINS = 4
+"""Number of ranges of acceleration and speed, equal in samples. Chosen: enough to see a trend."""
+OVER = ("acceleration_y", "velocity_x")
+
+
+def fit_page(result: FitResult) -> str:
+    """Return the page of a fit as HTML."""
+    measurement, names = result.fit.measurement, list(result.fit.errors)
+    runs = [LabelledRun(measurement.car or "measured", _measured(result))]
+    runs += [
+        LabelledRun(model.title, _simulated(result, model))
+        for model in result.models
+        if all(signals is not None for part in PARTS for signals in model.simulated[part])
+    ]
+    views = [View("over time", names)]
+    if "acceleration_y" in names and len(names) > 1:
+        others = [name for name in names if name != "acceleration_y"]
+        views.append(View("over lateral acceleration", others, x="plant.acceleration_y"))
+    return document(
+        result.fit.spec.title,
+        sentence=f"{result.verdict[:1].upper()}{result.verdict[1:]}.",
+        below=" · ".join(filter(None, (measurement.title, measurement.origin))),
+        viewer=viewer(runs, Settings(views, metrics=(), largest=LARGEST), name="fit", alone=True),
+        sections=[
+            ("", [score_table(result)]),
+            ("Parameters", [*map(parameter_table, result.models)]),
+            ("Where the models differ from the car", residual_tables(result)),
+        ],
+        assets=assets(),
+    )
+
+
+def _measured(result: FitResult) -> Results:
+    columns = [(w.window.times, w.window.measured) for part in PARTS for w in result.fit.parts[part]]
+    time, signals = _joined(columns, list(result.fit.errors))
+    return _drawn(MeasuredResults, time, signals)
+
+
+def _simulated(result: FitResult, model: FittedModel) -> Results:
+    columns = [
+        (fit_window.window.times, signals)
+        for part in PARTS
+        for fit_window, signals in zip(result.fit.parts[part], model.simulated[part], strict=True)
+        if signals is not None
+    ]
+    time, signals = _joined(columns, [name for name in result.fit.errors if name in columns[0][1]])
+    return _drawn(Results, time, signals)
+
+
+def _joined(
+    windows: Sequence[tuple[np.ndarray, Mapping[str, np.ndarray]]], names: Sequence[str]
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return times and signals of windows joined, without duplicate samples; names are those of a plant."""
+    time, first = np.unique(np.concatenate([times for times, _ in windows]), return_index=True)
+    joined = {name: np.concatenate([signals[name] for _, signals in windows])[first] for name in names}
+    return time, {f"plant.{name}": values for name, values in joined.items()}
+
+
+def parameter_table(model: FittedModel) -> Table:
+    """Return the table of a model's parameters."""
+    table = Table(model.title, ["parameter", "value", "95 % interval", "start", "bounds", "prior"])
+    estimate = model.estimate
+    intervals = estimate.intervals()
+    for free in model.parameters:
+        interval = intervals[free.name]
+        words = None
+        if free.name in estimate.at_bound:
+            words = "at its bound"
+        elif interval:
+            words = f"{interval[0]:.5g} to {interval[1]:.5g}"
+        prior = free.prior and f"{free.prior[0]:.5g} ± {free.prior[1]:.3g}"
+        value = f"{estimate.values[free.name]:.6g} {free.unit if free.unit != '1' else ''}".strip()
+        table.rows.append(
+            [free.name, value, words, f"{free.start:.5g}", f"{free.low:.5g} to {free.high:.5g}", prior]
+        )
+    search = f"{estimate.sets} sets of values; {estimate.message}"
+    table.notes.append(f"condition {estimate.identifiability.condition:.3g}; {search}")
+    if estimate.covariance is None:
+        table.notes.append(f"no intervals: too few pieces of 5 s, {estimate.pieces}")
+    for first, second, shared in estimate.correlated():
+        table.notes.append(f"{first} and {second} are correlated: {shared:.2f}")
+    return table
+
+
+def score_table(result: FitResult) -> Table:
+    """Return the table of scores, training and held-out side by side."""
+    columns = [f"{what}, {words}" for words in PARTS.values() for what in ("rms", "largest", "fit")]
+    headings = ["signal", "model", *columns]
+    table = Table("Differences", headings, numbers=set(range(2, 8)))
+    for name in result.fit.errors:
+        for model in result.models:
+            row: list[Any] = [name, model.title]
+            for part in PARTS:
+                score = result.scores.get((model.title, part, name))
+                unit = SIGNALS[name].unit
+                row += (
+                    [MetricValue(score.rms, unit), MetricValue(score.largest, unit), f"{score.fit:.1f} %"]
+                    if score
+                    else [None, None, None]
+                )
+            table.rows.append(row)
+    return table
+
+
+def residual_tables(result: FitResult) -> list[Table]:
+    """Return a table per signal of `OVER`: rms differences in its ranges, on the held-out windows."""
+    part = result.fit.deciding
+    return [table for name in OVER if (table := _residuals_over(result, part, name)) is not None]
+
+
+def _residuals_over(result: FitResult, part: str, over: str) -> Table | None:
+    """Return the table over a signal; None if it is not measured."""
+    windows = result.fit.parts[part]
+    if any(over not in fit_window.filtered.signals for fit_window in windows):
+        return None
+    at = np.concatenate([
+        np.abs(np.interp(w.window.times, w.filtered.time, w.filtered.signals[over])) for w in windows
+    ])  # fmt: skip
+    edges = np.quantile(at, np.linspace(0.0, 1.0, BINS + 1))
+    unit = SIGNALS[over].unit
+    ranges = [f"{low:.3g} to {high:.3g} {unit}" for low, high in pairwise(edges)]
+    title = f"Rms differences over |{over}|, {PARTS[part]} windows"
+    table = Table(title, ["signal", "model", *ranges], numbers=range(2, 2 + BINS))
+    inside = [(at >= low) & (at <= high) for low, high in pairwise(edges)]
+    for name in result.fit.errors:
+        for model in result.models:
+            windows_of_model = model.simulated[part]
+            if any(signals is None or name not in signals for signals in windows_of_model):
+                continue
+            difference = np.concatenate([
+                signals[name] - w.window.measured[name]
+                for w, signals in zip(windows, windows_of_model, strict=True)
+                if signals is not None
+            ])  # fmt: skip
+            row: list[Any] = [name, model.title]
+            row += [
+                MetricValue(float(np.sqrt(np.mean(difference[rows] ** 2))), SIGNALS[name].unit)
+                for rows in inside
+            ]
+            table.rows.append(row)
+    return table

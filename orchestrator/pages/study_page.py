@@ -1,6 +1,7 @@
-"""The page of an experiment, a single HTML file.
+"""The page of an experiment, a single HTML file, and the overview of several, with a link to each page.
 
-It has the verdicts, runs, system, tables and parameters of the experiment, and how to repeat it.
+A page has the verdicts, runs, system, tables and parameters of the experiment, and how to repeat it; the
+overview has the verdicts of all. A click on a claim there loads its runs from a side file.
 """
 
 from __future__ import annotations
@@ -56,7 +57,21 @@ from .diagram import diagram, systems_of
 from .evaluation_page import validation_facts
 from .page_parts import FigureImage, anchor, count_kinds, fmus_of, groups_of, image_of, programs_of, render
 from .sweep_view import sweep_sentence, sweep_view, write_sides
-from .viewer import LARGEST, MOST, PANELS, Carried, Settings, View, answer_of, assets, carried, embedded
+from .viewer import (
+    DATA,
+    LARGEST,
+    MOST,
+    PANELS,
+    Carried,
+    Settings,
+    View,
+    answer_of,
+    assets,
+    carried,
+    embedded,
+    tidy_sides,
+    write_side,
+)
 
 
 def chapter(
@@ -379,3 +394,45 @@ def study_page(facts: dict[str, Any]) -> str:
         long=LONG,
         assets=assets(*scripts) if content or scripts or facts["validations"] else "",
     )
+
+
+OVERVIEW = "Yaw-stability control: what papers say, and what comes out"
+"""Title of the overview."""
+
+
+def _answer_of_all(chapters: Sequence[dict[str, Any]]) -> str:
+    """Return in a sentence how many claims of all studies hold; "" without claims."""
+    counts: Counter[str] = Counter()
+    for facts in chapters:
+        counts.update(facts["counts"])
+    if not counts:
+        return ""
+    with_claims = [facts for facts in chapters if facts["counts"]]
+    alone = sum(not facts["region"] for facts in with_claims)
+    where = f", {'all' if alone == len(with_claims) else f'{alone} of the studies'} at the chosen point only"
+    return (
+        f"Of {sum(counts.values())} claims in {counted(len(with_claims), 'study', 'studies')}, "
+        f"{in_sentence(counts)}{where if alone else ''}."
+    )
+
+
+def overview_page(
+    chapters: Sequence[dict[str, Any]], pages: Sequence[str], folder: Path, ranking: str = ""
+) -> str:
+    """Return the page on several experiments; write side files with their runs.
+
+    Args:
+        chapters: of the experiments.
+        pages: their addresses.
+        folder: of the overview.
+        ranking: address of the ranking's page; "": there is none.
+    """
+    shown = {facts["id"]: facts["content"] for facts in chapters if facts["content"]}
+    for key, content in shown.items():
+        write_side(folder, key, content)
+    tidy_sides(folder, shown.keys())
+    return render(
+        "overview.html.j2", title=OVERVIEW, chapters=[*zip(chapters, pages, strict=True)], ranking=ranking,
+        answer=_answer_of_all(chapters), folder=DATA, first=next(iter(shown), ""), frame=embedded(None, VIEW),
+        assets=assets("chooser.js"),
+    )  # fmt: skip
