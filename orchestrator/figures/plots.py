@@ -2,19 +2,21 @@
 
 A figure is a list of panels, named by what they show (see `panels`). A panel whose signal no run has is
 omitted. Angles are in degrees, speeds in km/h. Title and legend are above the panels, so that the legend
-covers no data; the line at the bottom gives the provenance.
+covers no data; the line at the bottom gives the provenance. Times in which faults act are coloured spans
+behind the lines.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import ResultsError
 from ..plan import Override
 from ..results.run_folder import RunStatus
 from ..scenario.overrides import changed, fmu_of
-from .panels import SPAN, Panel, in_legend, shown_by, spans_of
+from .panels import Panel, panels_of
 from .style import (
     NARROW,
     PANEL_LINES,
@@ -45,6 +47,74 @@ OVERVIEW = (
     "path",
 )
 """The panels of the figures in the papers."""
+
+
+FAULTY = "#F7DDC8"
+"""Colour of fault spans; pale enough for all lines and the grid."""
+SPAN: dict[str, Any] = {"color": FAULTY, "linewidth": 8.0, "linestyle": "-", "solid_capstyle": "butt"}
+"""Line style of a fault span in a legend."""
+NAMED = 4
+"""Number of faults listed in a legend; if there are more, it gives their number. Chosen: fits a legend."""
+
+
+class FaultSpan(NamedTuple):
+    """The start and end [s] of a fault, and its description."""
+
+    begin: float
+    end: float
+    label: str
+
+
+def spans_of(runs: Sequence[LabelledRun]) -> list[FaultSpan]:
+    """Return the faults of runs, each once; a fault that not all runs have names its run."""
+    labels_of: dict[FaultSpan, list[str]] = {}
+    for label, results in runs:
+        for fault in results.record.faults if results.time.size else ():
+            begin, end = fault.begin, fault.until
+            first, last = results.time[0], results.time[-1]
+            span = FaultSpan(
+                float(first if begin is None else max(begin, first)),
+                float(last if end is None else min(end, last)),
+                fault.words,
+            )
+            if span.begin < span.end:
+                labels_of.setdefault(span, []).append(label)
+    return [
+        span if len(labels) == len(runs) else span._replace(label=f"{', '.join(labels)}: {span.label}")
+        for span, labels in labels_of.items()
+    ]
+
+
+def mark(axes: Axes, spans: Sequence[FaultSpan]) -> None:
+    """Draw spans behind all lines of axes over time, without changing the limits."""
+    limits = axes.get_xlim()
+    for begin, end in dict.fromkeys((span.begin, span.end) for span in spans):
+        axes.axvspan(begin, end, facecolor=FAULTY, edgecolor="none", zorder=0)
+    axes.set_xlim(limits)
+
+
+def in_legend(spans: Sequence[FaultSpan]) -> list[str]:
+    """Return the legend entries of spans."""
+    if len(spans) > NAMED:
+        return [f"{len(spans)} faults"]
+    return [span.label for span in spans]
+
+
+def shown_by(runs: Sequence[LabelledRun], names: Sequence[str], *, whole: bool = False) -> list[Panel]:
+    """Return the panels that the names select, in order (see `panels_of`)."""
+    panels = [panel for name in names for panel in panels_of(runs, name, whole=whole)]
+    spans = spans_of(runs)
+    if not spans:
+        return panels
+    return [replace(panel, draw=_marked(panel.draw, spans)) if panel.over_time else panel for panel in panels]
+
+
+def _marked(draw: Callable[[Axes], None], spans: Sequence[FaultSpan]) -> Callable[[Axes], None]:
+    def fill(axes: Axes) -> None:
+        draw(axes)
+        mark(axes, spans)
+
+    return fill
 
 
 def draw(

@@ -40,7 +40,7 @@ from ..experiments.verdict_tables import (
     run_tables,
     verdict,
 )
-from ..figures.phase_portrait import signals_of
+from ..figures.panels import signals_of
 from ..figures.style import LabelledRun
 from ..messages import counted, listed
 from ..metrics.expressions import evaluate, metric

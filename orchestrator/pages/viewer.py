@@ -23,7 +23,7 @@ import numpy as np
 from markupsafe import Markup
 
 from ..errors import ResultsError
-from ..figures.panels import spans_of
+from ..figures.plots import spans_of
 from ..figures.style import LINES, MEASURED_LINE, LabelledRun, digits_apart, line_style, shown, shown_unit
 from ..messages import listed
 from ..metrics.expressions import MetricValue, columns_of, evaluate, metric, reference_of

@@ -19,7 +19,7 @@ from orchestrator.experiments.jobs import Job, Outcome
 from orchestrator.experiments.result_files import draw_all, write_findings
 from orchestrator.experiments.scenario_experiments import FIGURE_SPECS, comparison_table, variants
 from orchestrator.experiments.schema import ExperimentSpec
-from orchestrator.figures.panels import LabelledRun, shown_by
+from orchestrator.figures.plots import LabelledRun, shown_by
 from orchestrator.metrics.expressions import MetricValue
 from orchestrator.pages.comparison import BEST, comparison_facts, metric_table
 from tests.changed import changed

@@ -14,8 +14,7 @@ from orchestrator.commands.experiments import command_of
 from orchestrator.errors import ScenarioError, YawbenchError
 from orchestrator.experiments.load_experiment import load_experiment
 from orchestrator.fault_kinds import Fault, FaultLocation, FaultySignal
-from orchestrator.figures.panels import FAULTY, LabelledRun
-from orchestrator.figures.plots import draw
+from orchestrator.figures.plots import FAULTY, LabelledRun, draw
 from orchestrator.plan import Override
 from orchestrator.results.freshness import key_of
 from orchestrator.scenario.loader import load_scenario

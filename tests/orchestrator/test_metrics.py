@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import ScenarioError
-from orchestrator.figures.panels import LabelledRun, shown_by
+from orchestrator.figures.plots import LabelledRun, shown_by
 from orchestrator.figures.style import digits_of, shown, shown_unit
 from orchestrator.metrics import measures
 from orchestrator.metrics.expressions import AT_A_TIME, STANDARD, MetricValue, evaluate, evaluate_all, metric
