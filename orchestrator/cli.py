@@ -47,11 +47,11 @@ COMMANDS = {
     "salvage": "results",
     "export-ssp": "interop",
     "second-opinion": "interop",
-    "tyre": "vehicle_and_tyre",
+    "tyre": "vehicle",
     "measured": "measured",
-    "vehicle": "vehicle_and_tyre",
+    "vehicle": "vehicle",
     "cache": "build",
-    "schema": "schema",
+    "schema": "new",
 }
 """Command -> its module in `orchestrator.commands`; the function has the same name, `_` for `-`."""
 

@@ -1,4 +1,4 @@
-"""Write the pages that are generated from the program: `python -m docs.generate`.
+"""Write the pages and JSON Schemas that are generated from the program: `python -m docs.generate`.
 
 They are in the repository, so that links between its pages lead somewhere without a build of the docs. All
 FMUs have to be built.
@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+
+from orchestrator.commands.new import MODELS, schema_text
 
 from . import (
     blind_tables,
@@ -25,6 +27,7 @@ from . import (
 )
 
 DOCS = Path(__file__).resolve().parents[1]
+SCHEMAS = DOCS.parent / "scenarios" / "schemas"
 PAGES: dict[str, Callable[[], str]] = {
     "reference/commands.md": commands.page,
     "reference/scenario.md": schemas.scenario_page,
@@ -50,13 +53,15 @@ def text_of(path: str) -> str:
 
 
 def main() -> None:
-    """Write all pages, and the tables in others."""
+    """Write all pages, the tables in others, and the schemas."""
     for path in PAGES:
         (DOCS / path).parent.mkdir(exist_ok=True)
         (DOCS / path).write_text(text_of(path), encoding="utf-8")
     for tables in PUBLISHED:
         for page, text in tables.pages_with_tables().items():
             page.write_text(text, encoding="utf-8")
+    for kind in MODELS:
+        (SCHEMAS / f"{kind}.json").write_text(schema_text(kind), encoding="utf-8")
 
 
 if __name__ == "__main__":

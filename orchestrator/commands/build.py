@@ -13,7 +13,7 @@ import typer
 
 from ..fmu.opener import PackagedComponent
 from .options import RunOptions, plan_of_scenario, takes
-from .progress import say
+from .output import print_tables, say
 
 Components = Annotated[
     list[str] | None,
@@ -183,7 +183,6 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
     from ..fmu.opener import hidden
     from ..results.reader import found_runs
     from ..scenario import loader
-    from .progress import print_tables
 
     further = [] if place or options.fmus else _further_folders(build=options.build)
     if units:

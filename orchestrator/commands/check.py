@@ -15,7 +15,7 @@ from ..messages import counted, cut, printable
 from ..plan import DEFAULT, ValueOrigin
 from . import output
 from .options import CHANGES, RunOptions, ScenarioFile, plan_of_scenario, takes
-from .progress import print_tables, say
+from .output import print_tables, say
 
 if TYPE_CHECKING:
     from rich.console import Console

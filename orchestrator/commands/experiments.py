@@ -12,8 +12,8 @@ import typer
 
 from ..messages import counted, listed
 from . import output
-from .options import CHANGES, MAKING, RunOptions, named, takes
-from .progress import executor_of, hold, pooled, print_tables, say, say_failed, stoppable
+from .options import CHANGES, MAKING, RunOptions, executor_of, named, pooled, takes
+from .output import hold, print_tables, say, say_failed, stoppable
 
 if TYPE_CHECKING:
     from ..experiments.dry_run import Forecast, Pace
@@ -222,7 +222,6 @@ def of_files(context: typer.Context, files: Sequence[Path], options: RunOptions)
     from ..experiments.load_experiment import load_experiment
     from ..experiments.verdict_tables import all_tables, counts_of, reach, tally_words
     from ..results.run_folder import default_folder, names_of
-    from .progress import print_tables
 
     changes, out = options.changes, options.out
     experiments = [load_experiment(file, changes=changes) for file in files]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from .options import CHANGES, RunOptions, ScenarioFile, plan_of_scenario, takes
-from .progress import print_tables, say
+from .output import print_tables, say
 
 if TYPE_CHECKING:
     from ..interop.second_opinion import SecondOpinion

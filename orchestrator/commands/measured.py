@@ -10,7 +10,7 @@ import typer
 
 from . import output
 from .options import CHANGES, MAKING, RunOptions, takes
-from .progress import hold, print_tables, say, stoppable
+from .output import hold, print_tables, say, stoppable
 
 if TYPE_CHECKING:
     from ..experiments.fit_result import FitResult

@@ -1,8 +1,9 @@
-"""`yawbench new`: templates for a component of any role, a vehicle, a scenario, a study or a sweep."""
+"""`yawbench new` and `schema`: templates for files of your own, and the JSON Schemas of YAML files."""
 
 from __future__ import annotations
 
 import importlib.util
+import json
 import keyword
 import os
 import re
@@ -15,9 +16,12 @@ from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal
 
 import typer
+from pydantic import BaseModel
+from pydantic.json_schema import GenerateJsonSchema
 
 from ..errors import ScenarioError
 from ..messages import listed
+from .output import say
 
 
 def check_name(name: str, *, role: str, taken: Iterable[str]) -> None:
@@ -197,7 +201,6 @@ def write_new(files: dict[PurePosixPath, str], folder: Path, *, also: Iterable[P
 def write_schemas(files: Iterable[PurePosixPath], folder: Path) -> None:
     """Write the JSON Schemas that YAML files below `folder` name in their first line."""
     from ..safe_files import write_whole
-    from .schema import schema_text
 
     for path in files:
         if path.suffix == ".yaml":
@@ -206,7 +209,7 @@ def write_schemas(files: Iterable[PurePosixPath], folder: Path) -> None:
 
 
 def _schema_kind(path: PurePosixPath) -> str:
-    """Return the kind of a new YAML file, in the words of `schema.MODELS`."""
+    """Return the kind of a new YAML file, in the words of `MODELS`."""
     return {"study": "experiment", "sweep": "experiment"}.get(
         path.stem, "vehicle" if path.parent == VEHICLES else "scenario"
     )
@@ -238,7 +241,6 @@ def new(kind: NewKindArgument, name: NewName, language: Written = "python", out:
     from fmus.build import COMPONENTS, find_recipes
 
     from ..errors import ScenarioError
-    from .progress import say
 
     check_name(name, role=kind, taken=set(find_recipes()))
     if language == "c" and kind != "controller":
@@ -299,3 +301,69 @@ def _program(name: str) -> str:
     if not ours.exists() or (path is not None and os.path.samefile(path, ours)):
         return name
     return str(_shown(ours))
+
+
+MODELS = {
+    "scenario": "scenario.schema:ScenarioSpec",
+    "vehicle": "scenario.schema:Vehicle",
+    "experiment": "experiments.schema:ExperimentSpec",
+    "ranking": "experiments.ranking:RankingSpec",
+    "entries": "experiments.ranking:EntriesSpec",
+    "threats": "experiments.threats:ThreatsSpec",
+    "measurement": "measured.measurement:MeasurementSpec",
+    "bands": "evaluation.validation:BandsSpec",
+    "fit": "experiments.fit:FitSpec",
+}
+"""Kind of file -> module and class of the model that reads it."""
+ALSO = {"study": "experiment", "sweep": "experiment", "tuning": "experiment"}
+"""Names of commands and documents -> kind."""
+DIALECT = "http://json-schema.org/draft-07/schema#"
+"""Chosen: the latest draft that editors implement in full."""
+
+
+class _Generator(GenerateJsonSchema):
+    """Writes patterns of keys so that other keys are refused, and no titles of fields."""
+
+    def dict_schema(self, schema: Any) -> dict[str, Any]:
+        made = super().dict_schema(schema)
+        for pattern, values in made.pop("patternProperties", {}).items():
+            made |= {"propertyNames": {"pattern": pattern}, "additionalProperties": values}
+        return made
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        return False
+
+
+def model_of(kind: str) -> type[BaseModel]:
+    """Return the model that reads files of a kind."""
+    module, _, name = MODELS[kind].partition(":")
+    model: type[BaseModel] = getattr(importlib.import_module(f"..{module}", __package__), name)
+    return model
+
+
+def schema_of(kind: str) -> dict[str, Any]:
+    """Return the JSON Schema of files of a kind."""
+    made = model_of(kind).model_json_schema(schema_generator=_Generator)
+    return {"$schema": DIALECT, **made, "title": f"yawbench {kind} file"}
+
+
+def schema_text(kind: str) -> str:
+    """Return the JSON Schema of files of a kind as text."""
+    return json.dumps(schema_of(kind), indent=1, ensure_ascii=False) + "\n"
+
+
+KindName = Literal[tuple(MODELS | ALSO)]  # type: ignore[valid-type]
+Kind = Annotated[
+    KindName | None,  # type: ignore[valid-type]
+    typer.Argument(help="Kind of file; without it, all kinds are listed.", metavar="KIND"),
+]
+
+
+def schema(kind: Kind = None) -> None:
+    """Print the JSON Schema of a kind of YAML file.
+
+    An editor with a YAML language server checks and completes files whose first line is
+    `# yaml-language-server: $schema=PATH`; `yawbench new` writes it. Studies, sweeps and tunings are
+    experiments.
+    """
+    print("\n".join(MODELS) if kind is None else schema_text(ALSO.get(kind, kind)), end="\n" * (kind is None))

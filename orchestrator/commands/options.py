@@ -1,4 +1,4 @@
-"""Arguments and options shared by several subcommands, and the plan of a scenario with them applied."""
+"""Arguments and options shared by several subcommands; plans, processes and executors made with them."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from ..fault_kinds import KINDS, NO_FAULTS
 from ..results.file_formats import FORMATS
 
 if TYPE_CHECKING:
+    from ..experiments.executor import Executor
+    from ..experiments.experiment_result import Each
     from ..plan import Override, Plan
 
 
@@ -265,3 +267,38 @@ def plan_of_scenario(scenario: Path, options: RunOptions) -> Plan:
     planner = Planner(build=options.build)
     loaded = planner.load(scenario, options.changes, validate=not options.no_validate)
     return planner.plan(loaded, fmus=options.fmus, isolated=options.isolate)
+
+
+def pooled(context: typer.Context, options: RunOptions) -> Each:
+    """Return a `map` that distributes work over processes until this command ends.
+
+    Raises:
+        YawbenchError: this process may not open as many files as that needs.
+    """
+    from ..workers import Pool
+
+    return context.with_resource(Pool(options.jobs)).map
+
+
+def executor_of(
+    folder: Path, identity: str, options: RunOptions, each: Each = map, **of_jobs: Any
+) -> Executor:
+    """Return the executor of experiments in a results folder, which shows their progress on the terminal.
+
+    Args:
+        folder: locked results folder.
+        identity: of the experiments in it.
+        options: the options of the command.
+        each: `map` used to read results.
+        of_jobs: fields of all jobs in place of the options'.
+    """
+    from ..experiments.executor import Executor, runner_of
+    from ..planner import Planner
+    from .output import Terminal
+
+    runner = None if options.no_run else runner_of(options.jobs, options.scheduler)
+    planner = Planner(build=options.build)
+    fields = options.of_jobs | of_jobs
+    return Executor(
+        folder, identity, runner, planner, options.fresh, fields, each, Terminal(making=not options.no_run)
+    )

@@ -9,8 +9,8 @@ import typer
 
 from . import output
 from .experiments import command_of, print_forecasts
-from .options import MAKING, RunOptions, named, takes
-from .progress import executor_of, hold, pooled, print_tables, say, stoppable
+from .options import MAKING, RunOptions, executor_of, named, pooled, takes
+from .output import hold, print_tables, say, stoppable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from .options import CHANGES, MAKING, RunOptions, takes
+from .output import reported, say, stoppable
 
 if TYPE_CHECKING:
     from ..results.reader import Results
@@ -49,7 +50,6 @@ def recorded(sources: Sequence[Path], options: RunOptions) -> list[Path]:
     from ..results.run_folder import default_folder
     from ..scenario import loader
     from ..scenario.loader import MEASUREMENT
-    from .progress import reported, say, stoppable
 
     sources = [path if os.path.exists(path) else loader.named(path) or path for path in sources]
     files = [path for path in sources if path.suffix in loader.ENDINGS and not os.path.isdir(path)]
@@ -285,10 +285,9 @@ def plot(
     import matplotlib
 
     from ..experiments.scenario_experiments import FIGURES
-    from ..figures.panels import check_panels, shown_by
-    from ..figures.plots import OVERVIEW, draw, size_of_style
+    from ..figures.panels import check_panels
+    from ..figures.plots import OVERVIEW, draw, shown_by, size_of_style
     from ..figures.style import KINDS, LabelledRun, save
-    from .progress import say
 
     settings = _settings(style, size)
     _check_output(options.out, page, format, bool(settings))
@@ -369,7 +368,6 @@ def write_view(
     from ..figures.style import LabelledRun
     from ..pages.page_parts import save_page
     from ..pages.viewer import SETTINGS, Settings, View, page
-    from .progress import say
 
     read = read_runs(folders, start)
     runs = [LabelledRun(name, results) for name, results in zip(labels, read, strict=True)]
@@ -410,7 +408,6 @@ def serve(
     from ..errors import ResultsError
     from ..pages.server import ResultsServer
     from ..pages.sliders import Bench
-    from .progress import say
 
     with closing(Bench(build=options.build)) as bench:
         try:
@@ -438,7 +435,6 @@ def salvage(folders: Folders) -> None:
     """
     from ..messages import counted
     from ..results.reader import lost_format, salvage
-    from .progress import say
 
     for folder in folders:
         lost = lost_format(folder)

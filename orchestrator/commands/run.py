@@ -14,8 +14,8 @@ from ..coupling_algorithms import ALGORITHMS
 from ..messages import hint, listed, printable
 from . import output
 from .experiments import chapter_of, command_of, conduct, data_of, say_page, write_page
-from .options import CHANGES, MAKING, RunOptions, ScenarioFile, plan_of_scenario, takes
-from .progress import hold, pooled, print_tables, say, shows_bars
+from .options import CHANGES, MAKING, RunOptions, ScenarioFile, plan_of_scenario, pooled, takes
+from .output import hold, print_tables, say, shows_bars
 from .results import MeasuredFrom, MeasuredRuns, distinct, start_of, with_segments
 
 if TYPE_CHECKING:
@@ -108,7 +108,6 @@ def run(
         from ..metrics.expressions import columns_for, evaluate_all
         from ..metrics.measures import si
         from ..results.reader import load_results
-        from .progress import print_tables
 
         needed = load_results(folder, only=lambda recorded: columns_for(recorded, metrics))
         print_tables([metrics_of_run(needed, metrics)])

@@ -15,8 +15,8 @@ import typer
 from ..evaluation.standard_tests import DRIVEN, TESTS, Evaluation, StandardTest, TestSeries
 from ..metrics.verdict import NotJudged
 from . import output
-from .options import CHANGES, MAKING, RunOptions, takes
-from .progress import executor_of, hold, say, stoppable
+from .options import CHANGES, MAKING, RunOptions, executor_of, takes
+from .output import hold, print_tables, say, stoppable
 
 if TYPE_CHECKING:
     from ..evaluation.trace import Trace
@@ -205,7 +205,6 @@ def evaluate(
     from ..evaluation.trace import trace_of
     from ..results.measurement_results import load_run
     from ..results.run_folder import below_results
-    from .progress import say
     from .results import distinct, folder_of_all
 
     chosen = TESTS[test]
@@ -250,7 +249,6 @@ class EvaluatedRuns:
         from ..pages.evaluation_page import evaluation_page
         from ..pages.page_parts import save_page
         from ..safe_files import write_whole
-        from .progress import print_tables, say
 
         drawn = self._draw(each=each, together=together)
         data = {
@@ -309,7 +307,6 @@ def _runs(source: Path) -> list[Path]:
     from ..results.measurement_results import segments_of
     from ..results.reader import found_runs
     from ..results.run_folder import RunStatus
-    from .progress import say
 
     if not source.is_dir():
         return segments_of(source)
@@ -350,7 +347,6 @@ def _angle(text: str | None, slow_steer: list[Path] | None, test: StandardTest) 
     from ..evaluation.trace import trace_of
     from ..messages import counted
     from ..results.measurement_results import load_run
-    from .progress import say
 
     if text and slow_steer:
         raise ScenarioError("--angle and --slow-steer are mutually exclusive", code="option-invalid")

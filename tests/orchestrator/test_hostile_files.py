@@ -12,7 +12,7 @@ import pytest
 from orchestrator import safe_files
 from orchestrator.cli import main
 from orchestrator.commands.check import show
-from orchestrator.commands.progress import print_tables, say
+from orchestrator.commands.output import print_tables, say
 from orchestrator.errors import Diagnostic, ScenarioError, YawbenchError
 from orchestrator.experiments.claim_schema import parse
 from orchestrator.experiments.experiment import LoadedExperiment

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from orchestrator.commands import progress
+from orchestrator.commands import output
 from tests.commands import status_of
 
 from .test_batch_commands import SCENARIO, STUDY
@@ -18,7 +18,7 @@ UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_
 @pytest.fixture
 def silence(monkeypatch):
     """A silence of 50 ms counts as long."""
-    monkeypatch.setattr(progress, "SILENCE", 0.05)
+    monkeypatch.setattr(output, "SILENCE", 0.05)
 
 
 def lines_of(capsys, enough: int) -> list[str]:
@@ -32,7 +32,7 @@ def lines_of(capsys, enough: int) -> list[str]:
 
 
 def test_a_silent_command_says_that_it_is_running(silence, capsys):
-    with progress._LOG.watched():
+    with output._LOG.watched():
         first, second = lines_of(capsys, 2)[:2]
     assert first.startswith("still running, ")
     assert second.endswith(" s so far")
@@ -41,37 +41,37 @@ def test_a_silent_command_says_that_it_is_running(silence, capsys):
 
 
 def test_it_says_which_work_how_far_and_how_much_is_left(silence, capsys):
-    with progress._LOG.watched(), progress.bar("runs", 40, 10) as report:
+    with output._LOG.watched(), output.bar("runs", 40, 10) as report:
         report(11)
         line = lines_of(capsys, 1)[0]
         assert line.startswith("runs: [11/40] ")
         assert " s left, " in line
-    assert progress._LOG.progress is None
+    assert output._LOG.progress is None
 
 
 def test_planning_is_told_too_though_it_prints_nothing_else(silence, capsys):
-    with progress._LOG.watched(), progress.bar("planning", 300, quiet=True) as report:
+    with output._LOG.watched(), output.bar("planning", 300, quiet=True) as report:
         report(30)
         assert lines_of(capsys, 1)[0].startswith("planning: [ 30/300] ")
 
 
 def test_no_line_is_added_while_others_are_printed(monkeypatch, capsys):
-    monkeypatch.setattr(progress, "SILENCE", 5.0)
-    with progress._LOG.watched():
+    monkeypatch.setattr(output, "SILENCE", 5.0)
+    with output._LOG.watched():
         for number in range(20):
-            progress.say(f"line {number}")
+            output.say(f"line {number}")
     assert capsys.readouterr().err.splitlines() == [f"line {number}" for number in range(20)]
 
 
 def test_every_campaign_holds_its_folder_and_so_is_watched(monkeypatch, tmp_path, fmus, capsys):
     watched = []
-    whole = progress._Log.watched
+    whole = output._Log.watched
 
     def counting(log):
         watched.append(log)
         return whole(log)
 
-    monkeypatch.setattr(progress._Log, "watched", counting)
+    monkeypatch.setattr(output._Log, "watched", counting)
     (tmp_path / "half.yaml").write_text(SCENARIO)
     (tmp_path / "study.yaml").write_text(STUDY)
     assert status_of("study", tmp_path / "study.yaml", "--fmus", fmus, "--out", tmp_path / "out") == 0

@@ -15,8 +15,7 @@ import jsonschema
 import pytest
 
 from orchestrator.cli import main
-from orchestrator.commands.new import begin
-from orchestrator.commands.schema import FOLDER, MODELS, model_of, schema_of, schema_text
+from orchestrator.commands.new import MODELS, begin, model_of, schema_of, schema_text
 from orchestrator.experiments import fit, ranking, threats
 from orchestrator.measured import measurement
 from orchestrator.scenario import yaml_lines
@@ -61,9 +60,9 @@ def accepted(kind: str, data: Any) -> bool:
 @pytest.mark.parametrize("kind", MODELS)
 def test_the_schemas_in_the_package_are_those_of_the_models(kind):
     jsonschema.Draft7Validator.check_schema(schema_of(kind))
-    file = FOLDER / f"{kind}.json"
+    file = SCENARIOS / "schemas" / f"{kind}.json"
     written = file.read_text(encoding="utf-8")
-    assert written == schema_text(kind), "python -m orchestrator.commands.schema writes them anew"
+    assert written == schema_text(kind), "python -m docs.generate writes them anew"
 
 
 def test_every_file_of_the_project_is_valid():

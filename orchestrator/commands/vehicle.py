@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from .options import RunOptions, takes
+from .output import print_tables, save_figure, say
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -66,7 +67,6 @@ def vehicle(
     from ..scenario.schema import Vehicle
     from ..scenario.schema_validation import validated
     from ..wiring.suspicious_values import suspicious_vehicle
-    from .progress import print_tables, save_figure, say
 
     file = loader.find(file, "a vehicle file")
     document = yaml_lines.read(file, what="vehicle file")
@@ -170,7 +170,6 @@ def tyre(
     """
     from ..results.run_folder import below_results
     from ..tyre_stand import draw_tyre, put_on_stand
-    from .progress import save_figure, say
 
     stand = put_on_stand(source, friction=friction, fmus=options.fmus, build=options.build)
     name, fmu = Path(source).name, stand.instance.fmu
