@@ -284,7 +284,8 @@ class Viewer {
     const [low, high] = this.whole();
     if (span && !(span[1] - span[0] > 1e-9 * Math.max(Math.abs(low), Math.abs(high), 1))) return;
     this.state.span = span && (span[0] > low || span[1] < high) ? span : null;
-    this.redraw();
+    for (const panel of this.panels) panel.zoom();
+    this.moveCursor();
   }
 
   zoom(factor, around) {

@@ -182,6 +182,12 @@ class Panel {
     this.tabulate(factor);
   }
 
+  // Draw the span anew; what the panel has beside it stays.
+  zoom() {
+    const [min, max] = this.viewer.span();
+    this.plot?.setScale('x', {min, max});
+  }
+
   // Vertical limits: all values within the horizontal span, and some room.
   heights(shown, factor) {
     const [from, to] = this.viewer.span();
