@@ -43,6 +43,7 @@ test-all: $(READY_TO_TEST) fmus
 
 bench: $(READY_TO_TEST) fmus
 	$(BIN)/python -m tests.bench
+	$(BIN)/python -m tests.bench_pages
 
 lint: $(READY_TO_TEST)
 	$(BIN)/ruff check .

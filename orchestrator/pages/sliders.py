@@ -2,7 +2,8 @@
 
 The page states a scenario and its changes; the bench plans the run, makes it in a worker process that keeps
 its FMUs open, and returns the viewer of this run with the earlier ones as ghosts. Runs are kept by their
-keys, so that a slider that returns to a position shows its run at once.
+keys, so that a slider that returns to a position shows its run at once. The run that a page will ask for
+first is begun when the page is asked for, while the browser still loads it.
 """
 
 from __future__ import annotations
@@ -49,6 +50,8 @@ SHOWN = ("mass", "cg_height")
 """Quantities of the car with a slider at first, besides facts and parameters of the driver."""
 FIRST = 6
 """Number of sliders at first; chosen: they fit above the fold."""
+AHEAD = ""
+"""Name in place of a page's, of runs that no page has asked for yet."""
 
 
 class Superseded(YawbenchError):
@@ -192,6 +195,7 @@ class Bench:
         self._pool = Pool(1, preload=NEEDED, lasting=LASTING)
         self._closing = StopFlag()
         self._latest: dict[str, StopFlag] = {}
+        self._key_ahead = ""  # of the run that is made before its page asks for it
         self._paths: dict[str, Path] = {}  # of scenarios, by name: finding one reads all
         self._kept: OrderedDict[str, tuple[Results, PackedRun]] = OrderedDict()
         threading.Thread(target=self._warm, daemon=True).start()
@@ -213,9 +217,11 @@ class Bench:
             YawbenchError: the scenario or an FMU is wrong.
         """
         path = self._scenario(scenario)
+        job = Job(scenario, path, Path())
         with self._planning:
-            loaded, plan = planned(Job(scenario, path, Path()), self._planner)
+            loaded, plan = planned(job, self._planner)
             archives = self._planner.opener.names(find_folder(path, opener=self._planner.opener))
+        threading.Thread(target=self._make_ahead, args=(replace(job, plan=plan),), daemon=True).start()
         knobs = knobs_of(loaded, plan)
         swaps = [
             (instance, choices)
@@ -275,14 +281,25 @@ class Bench:
         self._kept.move_to_end(job.key)
         return job.key, [str(warning) for warning in self._kept[job.key][0].record.course_warnings]
 
+    def _make_ahead(self, job: Job) -> None:
+        """Make the run that a page shows first; what is wrong with it is told when the page asks for it."""
+        stop, earlier = StopFlag(), self._latest.get(AHEAD)
+        job = keyed(job)
+        self._latest[AHEAD], self._key_ahead = stop, job.key
+        with suppress(YawbenchError):
+            self._make(job, AHEAD, stop, earlier)
+
     def _make(self, job: Job, page: str, stop: StopFlag, earlier: StopFlag | None) -> None:
-        """Make a run when it is its turn, and keep it."""
+        """Make a run when it is its turn, unless it has been made by then, and keep it."""
         if not self._turn.acquire(timeout=PATIENCE):
-            if earlier:
-                earlier.request()
+            ahead = self._latest.get(AHEAD) if self._key_ahead != job.key else None
+            for other in filter(None, (earlier, ahead)):
+                other.request()
             self._turn.acquire()
         try:
-            if self._latest.get(page) is not stop or self._closing.requested:
+            if job.key in self._kept:
+                return
+            if self._latest.get(page) is not stop or stop.requested or self._closing.requested:
                 raise Superseded("a later run has taken the place of this one", code="run-superseded")
             (outcome,) = execute([job], run=recorded, pool=self._pool, stop=stop)
         except Interrupted:

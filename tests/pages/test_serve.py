@@ -14,15 +14,19 @@ import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from orchestrator.experiments.jobs import Job, planned
 from orchestrator.interrupts import StopFlag
 from orchestrator.pages.server import ResultsServer
 from orchestrator.pages.sliders import Bench, Superseded, Wanted
 from orchestrator.pages.viewer import page
+from orchestrator.scenario.loader import find
+from orchestrator.scenario.overrides import read_changes
 from tests.orchestrator.recorded import write
 from tests.sentences import golden
 from vocabulary.vehicle import CAR
@@ -213,6 +217,35 @@ def test_runs_are_viewed_together(server):
 
 
 # ---- the bench ----
+
+
+def kept_ahead(bench: Bench) -> str:
+    """Return the key of the run that is made before its page asks for it, when it is kept."""
+    while not (bench._key_ahead and bench._key_ahead in bench._kept):
+        time.sleep(0.01)
+    return bench._key_ahead
+
+
+def test_the_first_run_of_a_page_is_made_before_the_page_asks_for_it():
+    bench = Bench()
+    bench.page(SCENARIO, [SCENARIO])
+    made = bench._kept[kept_ahead(bench)]
+    key, _ = bench.run(Wanted("p", "", SCENARIO))
+    bench.close()
+    assert bench._kept[key] is made
+
+
+def test_a_run_ahead_makes_way_for_another_that_is_asked_for():
+    bench = Bench()
+    long = Job("long", find(SCENARIO, "a scenario"), Path(), read_changes((), ("stop_time=2000",), ()))
+    thread = threading.Thread(target=bench._make_ahead, args=(replace(long, plan=planned(long)[1]),))
+    thread.start()
+    while not bench._turn.locked() and thread.is_alive():
+        time.sleep(0.01)
+    key, _ = bench.run(Wanted("p", "", SCENARIO, (BRIEF,)))
+    bench.close()
+    thread.join()
+    assert list(bench._kept) == [key]
 
 
 def test_a_run_has_the_samples_that_the_command_records(server):

@@ -1,0 +1,155 @@
+"""Times and sizes of pages in a browser: `make bench`, or `python -m tests.bench_pages`.
+
+Prints, and asserts nothing: times depend on the machine and on who else uses it. Every time is the best of
+several, followed by the median. The page is that of a comparison of four runs of paper A; a bench page of
+`yawbench serve` has sliders for the same scenario.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+
+import pytest
+
+from orchestrator.pages.page_parts import PAGE
+from orchestrator.pages.server import ResultsServer
+from orchestrator.pages.sliders import Bench
+
+from .commands import status_of
+from .pages.browser import Browser, start
+from .pages.flaws import size_without_samples
+
+SCENARIO = "fnn_sideslip/25mps"
+CONTROLLERS = "controller_off,controller_fnn,controller_fuzzy_sideslip,controller_fuzzy_pid"
+LOADS, MOVES = 5, 20
+"""Repeats of what loads a page, and of what the reader does on it."""
+PAINT = """
+const afterPaint = (tell) => {
+  const {port1, port2} = new MessageChannel();
+  port1.onmessage = tell;
+  port2.postMessage(0);
+};
+"""
+"""Script that calls a function when the current frame has been painted."""
+PAINTED = f"""{PAINT}
+const look = () => {{
+  const panel = document.querySelector('.yv')?.viewer?.panels[0];
+  if (panel?.plot) afterPaint(() => {{ window.painted = performance.now(); }});
+  else requestAnimationFrame(look);
+}};
+requestAnimationFrame(look);
+"""
+"""Script that notes when the first curve of a page has been painted [ms from the request for the page]."""
+FRAMES = f"""{PAINT}
+const [count, action, done] = arguments;
+const times = [];
+const act = new Function('viewer', 'k', action);
+const frame = () => requestAnimationFrame(() => {{
+  const began = performance.now();
+  act(document.querySelector('.yv').viewer, times.length);
+  afterPaint(() => {{
+    times.push(performance.now() - began);
+    if (times.length < count) frame(); else done(times);
+  }});
+}});
+frame();
+"""
+"""Script that acts at the beginning of frames, and returns how long each took until it was painted [ms]."""
+ZOOM = "viewer.zoomTo(k % 2 ? null : [2 + 0.01 * k, 4])"
+CURSOR = "viewer.state.time = 1 + 0.3 * (k % 20); viewer.moveCursor()"
+
+
+def line(what: str, times: Sequence[float], most: str) -> None:
+    """Print the best and the median of times [ms], and what the best is to be at most."""
+    print(f"  {what:62s}{min(times):7.0f}{median(times):9.0f}   {most}", flush=True)
+
+
+def comparison(browser: Browser, folder: Path) -> None:
+    """Print size and times of the page of a comparison of four runs."""
+    status_of("compare", SCENARIO, "--swap", f"controller={CONTROLLERS}", "--out", folder)
+    page = folder / PAGE
+    first = []
+    for _ in range(LOADS):
+        browser.open(page)
+        browser.wait_for("window.painted")
+        first.append(browser.run("return window.painted"))
+    browser.wait_for("document.querySelector('.yv').classList.contains('yv-ready')")
+    zoom, cursor = (browser.driver.execute_async_script(FRAMES, MOVES, action) for action in (ZOOM, CURSOR))
+    line("comparison of 4 runs: first curve", first, "600")
+    line("zoom of all panels", zoom, "33")
+    line("cursor in all panels and on the road", cursor, "16")
+    html = page.read_text(encoding="utf-8")
+    sizes = len(html.encode()) / 1000, size_without_samples(html) / 1000
+    print(f"  its page: {sizes[0]:.0f} kB (at most 1200), without samples {sizes[1]:.0f} kB (at most 250)")
+
+
+@contextmanager
+def served() -> Iterator[ResultsServer]:
+    """Serve an empty folder."""
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        closing(Bench()) as bench,
+        ResultsServer(Path(folder), bench) as server,
+    ):
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield server
+        server.shutdown()
+        thread.join()
+
+
+def sliders(browser: Browser) -> None:
+    """Print the times of the bench with sliders: each first curve is that of a server of its own."""
+    shown, whole, moves = [], [], []
+    for _ in range(LOADS):
+        with served() as server:
+            began = perf_counter()
+            browser.driver.get(f"{server.address}bench?scenario={SCENARIO}")
+            browser.wait_for("document.querySelector('form.bench').dataset.shown")
+            whole.append(1000 * (perf_counter() - began))
+            shown.append(shown_after(browser))
+            for k in range(MOVES // LOADS):
+                browser.run(
+                    "const form = document.querySelector('form.bench'); delete form.dataset.shown;"
+                    "const slider = form.querySelector('input[type=range]');"
+                    "slider.value = Number(slider.value) * (1 - 0.02 * (1 + arguments[0]));"
+                    "slider.dispatchEvent(new Event('input'));",
+                    k,
+                )
+                browser.wait_for("document.querySelector('form.bench').dataset.shown")
+                moves.append(shown_after(browser))
+    line("bench with sliders: first curve, from the request for the run", shown, "300")
+    line("first curve, from the request for the page", whole, "")
+    line("curves after a move of a slider", moves, "")
+
+
+def shown_after(browser: Browser) -> float:
+    """Return after how many ms the latest run of a bench page was shown."""
+    return float(browser.run("return document.querySelector('form.bench').dataset.shown"))
+
+
+def main() -> None:
+    """Print all times and sizes, or why there are none."""
+    try:
+        browser = start()
+    except pytest.skip.Exception as why:
+        print(f"No times of pages: {why}")
+        return
+    try:
+        browser.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": PAINTED})
+        print(f"  {'pages in Chromium, ms':62s}{'best':>7s}{'median':>9s}   at most")
+        with tempfile.TemporaryDirectory() as folder:
+            comparison(browser, Path(folder))
+        sliders(browser)
+    finally:
+        browser.driver.quit()
+
+
+if __name__ == "__main__":
+    main()
