@@ -364,20 +364,13 @@ def write_view(
         ResultsError: a run cannot be read, or the page cannot be written.
     """
     from ..errors import ResultsError
-    from ..figures.plots import changes_of
     from ..figures.style import LabelledRun
     from ..pages.page_parts import save_page
     from ..pages.viewer import SETTINGS, Settings, View, page
 
     read = read_runs(folders, start)
     runs = [LabelledRun(name, results) for name, results in zip(labels, read, strict=True)]
-    titles = [run.results.record.title or run.label for run in runs]
-    changed = changes_of(runs)
-    settings = Settings((View(panels=panels),)) if panels else SETTINGS
-    if len(runs) == 1:
-        text = page(runs, settings, title=titles[0], changed=changed)
-    else:
-        text = page(runs, settings, below="; ".join(dict.fromkeys(titles)), changed=changed)
+    text = page(runs, Settings((View(panels=panels),)) if panels else SETTINGS)
     file = out or folder_of_all(folders) / "view.html"
     try:
         save_page(file, text, named=out is not None)

@@ -30,7 +30,6 @@ from pathlib import Path
 from urllib.parse import parse_qs, quote, unquote, urlsplit
 
 from ..errors import ResultsError, YawbenchError
-from ..figures.plots import changes_of
 from ..figures.style import LabelledRun
 from ..messages import printable
 from ..results.file_formats import FILES
@@ -219,12 +218,8 @@ class Request(BaseHTTPRequestHandler):
         paths = query.get("run", [])
         if not paths:
             raise Refused(HTTPStatus.UNPROCESSABLE_ENTITY, "choose a run")
-        loaded = [load_results(run_folder(self.server.folder, path)) for path in paths]
-        titles = dict.fromkeys(
-            results.record.title or path for path, results in zip(paths, loaded, strict=True)
-        )
-        runs = [LabelledRun(path, results) for path, results in zip(paths, loaded, strict=True)]
-        self._send_own(page(runs, title="; ".join(titles), below=", ".join(paths), changed=changes_of(runs)))
+        runs = [LabelledRun(path, load_results(run_folder(self.server.folder, path))) for path in paths]
+        self._send_own(page(runs))
 
     def _bench(self, rest: str, query: Query) -> None:
         """Send the bench of a scenario."""

@@ -23,7 +23,7 @@ import numpy as np
 from markupsafe import Markup
 
 from ..errors import ResultsError
-from ..figures.plots import spans_of
+from ..figures.plots import changes_of, spans_of
 from ..figures.style import LINES, MEASURED_LINE, LabelledRun, digits_apart, line_style, shown, shown_unit
 from ..messages import listed
 from ..metrics.expressions import MetricValue, columns_of, evaluate, metric, reference_of
@@ -247,27 +247,21 @@ def without_comments(script: str) -> str:
     return re.sub(r"^[ \t]*(?://.*)?\n|^[ \t]+|[ \t]+//\s[^'\"`\n]*$", "", script, flags=re.MULTILINE)
 
 
-def page(
-    runs: Sequence[LabelledRun],
-    settings: Settings = SETTINGS,
-    *,
-    title: str = "",
-    below: str = "",
-    changed: str = "",
-) -> str:
+def page(runs: Sequence[LabelledRun], settings: Settings = SETTINGS, *, title: str = "") -> str:
     """Return a viewer as a page.
 
     Args:
         runs, settings: see `viewer`.
-        title: of the page; default: the labels, of many runs the first.
-        below: a line under the title.
-        changed: overrides of the scenario that the title names.
+        title: of the page; default: the scenario's title of a single run, else the labels, of many runs the
+            first.
     """
+    titles = list(dict.fromkeys(filter(None, (run.results.record.title for run in runs))))
+    alone = titles[0] if titles and len(runs) == 1 else ""
     return document(
-        title or _title(runs),
+        title or alone or _title(runs),
         sentence=answer_of(runs),
-        below=below,
-        changed=changed,
+        below="" if alone else "; ".join(titles),
+        changed=changes_of(runs),
         viewer=viewer(runs, settings, name="run", alone=True),
         assets=assets(),
     )
