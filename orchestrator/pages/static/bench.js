@@ -72,20 +72,14 @@ class Bench {
     const {knobs} = this.facts;
     this.find('sliders').replaceChildren(...[...this.values].map(([target, value]) => {
       const {unit, low, high, step, says, usual} = knobs[target];
-      const holder = document.createElement('div');
+      const holder = made('div', '', {className: 'knob'});
       const id = `knob-${target.replace(/\W/g, '-')}`;
-      holder.className = 'knob';
-      holder.innerHTML = '<label></label><input type="range"><input type="number" step="any"><small class="quiet"></small>';
-      const [label, slider, number, range] = holder.children;
-      label.textContent = target;
-      label.title = says;
-      label.htmlFor = id;
-      slider.id = id;
-      Object.assign(slider, {min: low, max: high, step: 'any', value});
-      Object.assign(number, {value: Number(value.toPrecision(6))});
+      const slider = made('input', '', {type: 'range', id, min: low, max: high, step: 'any', value});
+      const number = made('input', '', {type: 'number', step: 'any', value: Number(value.toPrecision(6))});
+      const range = made('small', '', {className: 'quiet', title: usual ? 'usual range' : ''});
+      holder.append(made('label', target, {title: says, htmlFor: id}), slider, number, range);
       number.setAttribute('aria-label', `${target}${unit ? ` in ${unit}` : ''}`);
       range.textContent = [...(usual ? [`${Number(low.toPrecision(3))} to ${Number(high.toPrecision(3))}`] : []), unit].join(' ').trim();
-      range.title = usual ? 'usual range' : '';
       slider.addEventListener('input', () => {
         const moved = Math.round((Number(slider.value) - low) / step) * step + low;
         number.value = Number(moved.toPrecision(6));
@@ -185,9 +179,7 @@ class Bench {
 
   async show(html) {
     const place = this.find('place');
-    const holder = document.createElement('div');
-    holder.innerHTML = html;
-    const root = holder.querySelector('.yv');
+    const root = made('div', '', {innerHTML: html}).querySelector('.yv');
     const earlier = place.querySelector('.yv');
     if (earlier) {
       earlier.viewer?.remove();

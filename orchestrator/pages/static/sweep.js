@@ -12,8 +12,9 @@ const BESIDE_RUNS = 7; // runs opened with a point: as many as there are colours
 const escaped = (text) => String(text).replace(/[&<>"]/g, (one) => `&#${one.charCodeAt(0)};`);
 const signed = (text) => text.replace('-', '−');
 
-class Sweep {
+class Sweep extends InAddress {
   constructor(root) {
+    super();
     Object.assign(this, {root, key: root.id, find: (name) => root.querySelector('.ys-' + name)});
     const data = this.data = JSON.parse(root.querySelector(':scope > script').textContent);
     this.count = data.status.length;
@@ -60,35 +61,15 @@ class Sweep {
     return keys.slice(row * length, (row + 1) * length).trim();
   }
 
-  remember() {
-    const plain = this.initial();
-    const words = new URLSearchParams();
-    for (const [name, value] of Object.entries(this.state)) {
-      if (JSON.stringify(value) !== JSON.stringify(plain[name])) words.set(name, JSON.stringify(value));
-    }
-    this.written = writeAddress(this.key, words);
-  }
-
-  restore() {
-    if (location.hash === this.written) return false;
-    const own = readAddress(this.key);
-    if (!own) return false;
-    const state = this.initial();
+  kinds() {
     const isAxis = (v) => v === '' || Boolean(this.axis(v));
-    const kinds = {
+    return {
       metric: (v) => this.data.metrics.some((one) => one.name === v), limit: (v) => v === null || Number.isFinite(v),
       x: isAxis, y: isAxis, panel: isAxis,
       fixed: (v) => v && Object.entries(v).every(([name, k]) => this.axis(name)?.words[k] !== undefined),
       brush: (v) => v && Object.entries(v).every(([id, ends]) => this.dim(id) && Array.isArray(ends) && ends.length === 2 && ends.every(Number.isFinite)),
       open: (v) => Array.isArray(v) && v.every((row) => Number.isInteger(row) && row >= 0 && row < this.count),
     };
-    for (const [name, text] of own) {
-      let value;
-      try { value = JSON.parse(text); } catch { continue; }
-      if (Object.hasOwn(kinds, name) && kinds[name](value)) state[name] = value;
-    }
-    this.state = state;
-    return true;
   }
 
   dim(id) { return this.dims.find((one) => one.id === id); }
@@ -170,8 +151,8 @@ class Sweep {
       find('limit').setAttribute('aria-valuetext', state.limit === null ? 'no limit' : this.text(state.limit, metric));
     }
     const selects = [this.axis(state.panel), ...this.others(state)].filter(Boolean).map((dim) => {
-      const label = Object.assign(document.createElement('label'), {textContent: `${dim.label} `});
-      const select = document.createElement('select');
+      const label = made('label', `${dim.label} `);
+      const select = made('select');
       select.dataset.axis = dim.id;
       select.append(new Option(dim.id === state.panel ? 'all' : 'mean', ''), ...dim.words.map((word, k) => new Option(word, k)));
       select.value = state.fixed[dim.id] ?? '';
@@ -561,7 +542,6 @@ class Sweep {
   }
 
   csv() {
-    const quoted = (text) => `"${String(text ?? '').replaceAll('"', '""')}"`;
     const {data} = this;
     const head = ['run', ...this.dims.map((dim) => `${dim.discrete ? dim.id : dim.name}${dim.unit ? ` [${dim.unit}]` : ''}`), 'status', 'key'];
     const lines = this.visible.map((row) => [row + 1, ...this.dims.map((dim) => (dim.discrete && !dim.numbers ? dim.words[dim.level(row)] : dim.at(row) ?? '')), data.statuses[data.status[row]], this.sideKey(row)]);
@@ -590,8 +570,8 @@ class Sweep {
     const kept = open.filter((row) => this.data.sides[row]);
     remark.replaceChildren();
     for (const row of open.filter((one) => !this.data.sides[one])) {
-      const words = Object.assign(document.createElement('p'), {textContent: `Results of run ${row + 1} are not kept (keep: all, or --keep, keeps those of all runs). This makes the run:`});
-      remark.append(words, Object.assign(document.createElement('pre'), {textContent: this.command(row)}));
+      const words = `Results of run ${row + 1} are not kept (keep: all, or --keep, keeps those of all runs). This makes the run:`;
+      remark.append(made('p', words), made('pre', this.command(row)));
     }
     if (!kept.length) { clearViewer(this.find('run')); return; }
     try {
@@ -599,7 +579,7 @@ class Sweep {
       if (this.state.open === open) await showSides(this.find('run'), contents);
     } catch (error) {
       if (this.state.open !== open) return;
-      remark.append(Object.assign(document.createElement('p'), {textContent: `${error.message}: it belongs beside this page.`}));
+      remark.append(made('p', `${error.message}: it belongs beside this page.`));
     }
   }
 }

@@ -40,8 +40,39 @@ function headingLevel(place) {
   return last ? Number(last.getAttribute('aria-level') ?? last.tagName[1]) + 1 : 2;
 }
 
-class Viewer {
+// A part of the page whose state is in the address under its `key`. `initial()` returns the state without one;
+// `kinds()`, by name, what tells whether a value can be taken over.
+class InAddress {
+  remember(plain = this.initial()) {
+    const words = new URLSearchParams();
+    for (const [name, value] of Object.entries(this.state)) {
+      if (JSON.stringify(value) === JSON.stringify(plain[name])) continue;
+      words.set(name, JSON.stringify(name === 'time' ? Number(value.toFixed(6)) : value));
+    }
+    this.written = writeAddress(this.key, words);
+  }
+
+  // Take over what the address says; return whether it says anything about this part.
+  restore() {
+    const own = location.hash === this.written ? null : readAddress(this.key);
+    if (!own) return false;
+    const [state, kinds] = [this.initial(), this.kinds()];
+    for (const [name, text] of own) {
+      let value;
+      try { value = JSON.parse(text); } catch { continue; }
+      if (Object.hasOwn(kinds, name) && kinds[name](value)) Object.assign(state, {[name]: value}, this.implied(name, value));
+    }
+    this.state = state;
+    return true;
+  }
+
+  // What a value of the address sets besides itself.
+  implied() { return {}; }
+}
+
+class Viewer extends InAddress {
   constructor(root, data, runs) {
+    super();
     Object.assign(this, {root, data, runs});
     this.find = (name) => root.querySelector('.yv-' + name);
     this.key = root.id;
@@ -94,11 +125,6 @@ class Viewer {
   fill() {
     const {data, find, key} = this;
     const several = data.runs.length > 1;
-    const made = (tag, text = '', attributes = {}) => {
-      const element = Object.assign(document.createElement(tag), attributes);
-      element.append(text);
-      return element;
-    };
     const head = find('runs').tHead.rows[0];
     if (several) head.append(made('th', 'baseline', {scope: 'col', id: `${key}-baseline`}));
     const measured = data.runs.some((run) => run.dash);
@@ -106,7 +132,7 @@ class Viewer {
     for (const [title] of data.metrics) head.append(made('th', title, {scope: 'col', className: 'yv-metric'}));
     this.rowOf = (k) => {
       const run = data.runs[k];
-      const row = document.createElement('tr');
+      const row = made('tr');
       row.dataset.run = k;
       const label = made('label', made('input', '', {type: 'checkbox', className: 'yv-show'}));
       label.append(' ', made('span', '', {className: 'yv-swatch'}), ' ', made('span', run.label, {id: `${key}-run-${k}`}));
@@ -155,26 +181,11 @@ class Viewer {
 
   // ---- the address ----
 
-  remember() {
-    const {state} = this;
-    const plain = {...this.initial(), ...this.viewed(state.view)};
-    const words = new URLSearchParams();
-    const same = (one, other) => JSON.stringify(one) === JSON.stringify(other);
-    for (const [name, value] of Object.entries(state)) {
-      if (same(value, plain[name])) continue;
-      words.set(name, name === 'time' ? String(Number(value.toFixed(6))) : JSON.stringify(value));
-    }
-    this.written = writeAddress(this.key, words);
-  }
+  remember() { super.remember({...this.initial(), ...this.viewed(this.state.view)}); }
 
-  // Take over what the address says; return whether it says anything about this viewer.
-  restore() {
-    if (location.hash === this.written) return false;
-    const own = readAddress(this.key);
-    if (!own) return false;
-    const state = this.initial();
+  kinds() {
     const isRun = (v) => Number.isInteger(v) && v in this.runs;
-    const kinds = {
+    return {
       view: (v) => Number.isInteger(v) && v in this.data.views,
       shown: (v) => Array.isArray(v) && v.every(isRun),
       baseline: isRun,
@@ -185,16 +196,9 @@ class Viewer {
       near: (v) => v >= ZOOM[0] && v <= ZOOM[1],
       offsets: (v) => v && typeof v === 'object' && !Array.isArray(v) && Object.values(v).every(Number.isFinite),
     };
-    for (const [name, text] of own) {
-      let value;
-      try { value = JSON.parse(text); } catch { continue; }
-      if (!Object.hasOwn(kinds, name) || !kinds[name](value)) continue;
-      state[name] = value;
-      if (name === 'view') Object.assign(state, this.viewed(value));
-    }
-    this.state = state;
-    return true;
   }
+
+  implied(name, value) { return name === 'view' ? this.viewed(value) : {}; }
 
   // ---- runs ----
 
@@ -532,7 +536,6 @@ class Viewer {
     const names = [...new Set(this.panels.flatMap((panel) => panel.signals))];
     const shown = this.runs.filter((run) => this.shows(run));
     const lines = [];
-    const quoted = (text) => `"${String(text).replaceAll('"', '""')}"`;
     lines.push(['run', 'time [s]', ...names.map((name) => `${name} [${this.meaning(name).si || '1'}]`)].map(quoted).join(','));
     for (const run of shown) {
       const columns = names.map((name) => (run.has(name) ? run.column(name) : null));
@@ -547,7 +550,7 @@ class Viewer {
 
   picture() {
     const ratio = this.panels[0] ? this.panels[0].plot.ctx.canvas.width / this.panels[0].plot.width : 1;
-    const sheet = document.createElement('canvas');
+    const sheet = made('canvas');
     const sizes = this.panels.map((panel) => panel.plot.ctx.canvas);
     const head = 22 * ratio;
     const legend = 24 * ratio;
@@ -582,8 +585,11 @@ class Viewer {
   }
 }
 
+// A cell of a CSV file.
+function quoted(text) { return `"${String(text ?? '').replaceAll('"', '""')}"`; }
+
 function saveFile(blob, name) {
-  const link = Object.assign(document.createElement('a'), {href: URL.createObjectURL(blob), download: name});
+  const link = made('a', '', {href: URL.createObjectURL(blob), download: name});
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }

@@ -6,6 +6,13 @@ function ready(start) {
   else queueMicrotask(start);
 }
 
+// An element with a text, or another element, in it, and properties.
+function made(tag, content = '', properties = {}) {
+  const element = Object.assign(document.createElement(tag), properties);
+  if (content !== '') element.append(content);
+  return element;
+}
+
 const WHEELS = ['fl', 'fr', 'rl', 'rr'];
 
 async function inflate(text) {

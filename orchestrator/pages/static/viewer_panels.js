@@ -100,9 +100,7 @@ class Panel {
 
   build() {
     const {viewer} = this;
-    const root = document.createElement('div');
-    root.className = 'yv-panel';
-    root.setAttribute('role', 'group');
+    const root = made('div', '', {className: 'yv-panel', role: 'group'});
     const {label, unit} = this.meaning;
     root.setAttribute('aria-label', label);
     root.innerHTML = '<header><h4></h4><small></small><output></output><button type="button">✕</button></header>'
@@ -168,12 +166,10 @@ class Panel {
     this.chart.replaceChildren();
     this.plot = new viewer.Plot(options, [ends, ...shown.map(() => [0, 0])], this.chart);
     this.plot.root.setAttribute('aria-hidden', 'true');
-    this.pointer = document.createElement('div');
-    this.pointer.className = 'yv-pointer';
+    this.pointer = made('div', '', {className: 'yv-pointer'});
     this.plot.over.append(this.pointer);
     this.dots = shown.map(({run, reference}) => {
-      const dot = document.createElement('i');
-      dot.className = 'yv-dot';
+      const dot = made('i', '', {className: 'yv-dot'});
       dot.style.background = reference ? theme.pale : viewer.colour(run);
       this.plot.over.append(dot);
       return dot;
@@ -319,24 +315,15 @@ class Panel {
     const words = [];
     for (const {run, name, values, reference} of this.shown) {
       const row = this.body.insertRow();
-      const head = document.createElement('th');
-      head.scope = 'row';
-      head.innerHTML = viewer.swatch(run, reference);
-      const hidden = document.createElement('span');
-      hidden.className = 'yv-hidden';
-      hidden.textContent = reference ? `reference, ${name} of ${run.label}` : run.label;
-      head.append(hidden);
-      head.title = hidden.textContent;
+      const title = reference ? `reference, ${name} of ${run.label}` : run.label;
+      const head = made('th', '', {scope: 'row', title, innerHTML: viewer.swatch(run, reference)});
+      head.append(made('span', title, {className: 'yv-hidden'}));
       row.append(head);
       this.cells.push(row.insertCell());
       const [low, high] = extremes(values);
       const texts = low <= high ? [low, high].map((one) => digitsOf(one * factor, CURSOR_DIGITS)) : ['no number', 'no number'];
-      for (const one of texts) {
-        const cell = row.insertCell();
-        cell.className = 'yv-hidden';
-        cell.textContent = one;
-      }
-      words.push(`${hidden.textContent}: ${texts.join(' to ')}`);
+      row.append(...texts.map((one) => made('td', one, {className: 'yv-hidden'})));
+      words.push(`${title}: ${texts.join(' to ')}`);
     }
     this.sentence.textContent = words.length ? `${words.join('; ')} ${this.meaning.unit}.` : 'No shown run has recorded it.';
     this.tellTolerance();

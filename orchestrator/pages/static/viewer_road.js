@@ -146,17 +146,12 @@ class Road {
     }
     this.shown = this.cars.filter((run) => viewer.shows(run));
     this.closeUps.replaceChildren(...this.shown.map((run) => {
-      const figure = document.createElement('figure');
-      figure.innerHTML = '<canvas role="img"></canvas><figcaption></figcaption>';
-      figure.firstChild.setAttribute('aria-label', `Tyre forces of ${run.label}`);
-      figure.lastChild.innerHTML = viewer.swatch(run);
-      figure.lastChild.append(` ${run.label}`);
+      const figure = made('figure', made('canvas', '', {role: 'img', ariaLabel: `Tyre forces of ${run.label}`}));
+      const caption = made('figcaption', '', {innerHTML: viewer.swatch(run)});
+      caption.append(` ${run.label}`);
       const early = run.notes.length || run.end > viewer.ends()[1] - 1e-6 ? [] : [`ends at ${run.end.toFixed(2)} s`];
-      for (const note of [...run.notes, ...early]) {
-        const line = document.createElement('em');
-        line.textContent = note;
-        figure.lastChild.append(document.createElement('br'), line);
-      }
+      for (const note of [...run.notes, ...early]) caption.append(made('br'), made('em', note));
+      figure.append(caption);
       return figure;
     }));
     const chosen = String(viewer.state.camera);

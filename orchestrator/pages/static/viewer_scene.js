@@ -30,32 +30,35 @@ function look(view, runs, states, width, height) {
   return {x: (xs[0] + xs[1]) / 2, y: (ys[0] + ys[1]) / 2, scale: Math.min(usual, fits)};
 }
 
+// Round numbers within a half width of a middle: where lines of the grid are.
+function gridLines(middle, half, scale) {
+  const step = round(Math.max(110 / scale, 1));
+  const first = Math.ceil((middle - half) / step);
+  const last = Math.floor((middle + half) / step);
+  return Array.from({length: last - first + 1}, (_, k) => (first + k) * step);
+}
+
 function grid(c, eye, width, height) {
-  const step = round(Math.max(110 / eye.scale, 1));
   const across = width / 2 / eye.scale;
   const up = height / 2 / eye.scale;
-  const px = 1 / eye.scale;
   c.beginPath();
-  for (let x = Math.ceil((eye.x - across) / step) * step; x <= eye.x + across; x += step) {
+  for (const x of gridLines(eye.x, across, eye.scale)) {
     c.moveTo(x, eye.y - up);
     c.lineTo(x, eye.y + up);
   }
-  for (let y = Math.ceil((eye.y - up) / step) * step; y <= eye.y + up; y += step) {
+  for (const y of gridLines(eye.y, up, eye.scale)) {
     c.moveTo(eye.x - across, y);
     c.lineTo(eye.x + across, y);
   }
-  stroke(c, LINE, 1, px);
-  return step;
+  stroke(c, LINE, 1, 1 / eye.scale);
 }
 
-function gridWords(c, eye, step, width, height) {
-  const across = width / 2 / eye.scale;
-  const up = height / 2 / eye.scale;
-  for (let x = Math.ceil((eye.x - across) / step) * step; x <= eye.x + across; x += step) {
+function gridWords(c, eye, width, height) {
+  for (const x of gridLines(eye.x, width / 2 / eye.scale, eye.scale)) {
     const at = width / 2 + (x - eye.x) * eye.scale;
     if (at > 60 && at < width - 24) text(c, `${decimal(x, 0)} m`, at, height - 10, {align: 'center', size: 11});
   }
-  for (let y = Math.ceil((eye.y - up) / step) * step; y <= eye.y + up; y += step) {
+  for (const y of gridLines(eye.y, height / 2 / eye.scale, eye.scale)) {
     const at = height / 2 - (y - eye.y) * eye.scale;
     if (at > 14 && at < height - 24) text(c, `${decimal(y, 0)} m`, 6, at, {size: 11});
   }
@@ -100,7 +103,7 @@ function drawScene(canvas, density, runs, states, view, scale) {
   c.scale(eye.scale, -eye.scale);
   c.translate(-eye.x, -eye.y);
   for (const run of runs) ground(c, run);
-  const step = grid(c, eye, width, height);
+  grid(c, eye, width, height);
   const seen = new Set();
   for (const run of runs) {
     const same = JSON.stringify(run.lanes);
@@ -133,7 +136,7 @@ function drawScene(canvas, density, runs, states, view, scale) {
     c.restore();
   });
   c.restore();
-  gridWords(c, eye, step, width, height);
+  gridWords(c, eye, width, height);
   runs.forEach((run, i) => {
     const at = [width / 2 + (states[i].x - eye.x) * eye.scale, height / 2 - (states[i].y - eye.y) * eye.scale];
     states[i].screen = at;

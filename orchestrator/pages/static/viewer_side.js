@@ -9,7 +9,7 @@ function loadSide(folder, key) {
   if (!sides.has(key)) {
     sides.set(key, new Promise((resolve, reject) => {
       arriving.set(key, resolve);
-      const script = Object.assign(document.createElement('script'), {src: `${folder}/${key}.js`});
+      const script = made('script', '', {src: `${folder}/${key}.js`});
       script.addEventListener('error', () => { sides.delete(key); reject(new Error(`${script.getAttribute('src')} is missing`)); });
       document.head.append(script);
     }));
