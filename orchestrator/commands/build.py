@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from ..errors import ModelDescriptionError
 from ..fmu.opener import PackagedComponent
 from .options import RunOptions, plan_of_scenario, takes
 from .output import print_tables, say
@@ -233,7 +234,6 @@ def _folder_of_fmus(folder: Path | None) -> Path:
     from fmus.build import build_all
     from fmus.rebuild_stale import build_folder
 
-    from ..errors import ModelDescriptionError
     from ..fmu.opener import HOME, Opener, find_folder
 
     if folder is None:

@@ -11,7 +11,8 @@ import typer
 
 from vocabulary.wheels import WHEELS, wheels
 
-from ..messages import counted, cut, printable
+from ..errors import Diagnostic, YawbenchError
+from ..messages import counted, cut, fold, fold_wires, printable, star
 from ..plan import DEFAULT, ValueOrigin
 from . import output
 from .options import CHANGES, RunOptions, ScenarioFile, plan_of_scenario, takes
@@ -20,7 +21,6 @@ from .output import print_tables, say
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..errors import Diagnostic
     from ..plan import Instance, Plan, Value, Wire
 
 All = Annotated[bool, typer.Option("--all", help="Show every value, including the FMUs' defaults.")]
@@ -173,8 +173,6 @@ def _unit_rows(plan: Plan) -> Iterable[Sequence[str]]:
 
 def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
     """Return a row for every value with its origin, and the number of defaults not shown."""
-    from ..messages import fold
-
     files = plan.scenario.get("tyre_files", {})
     of_tyres = {axle: ValueOrigin("file", Path(file["file"]).name) for axle, file in files.items()}
     sources: dict[tuple[str, str, str], str] = {}
@@ -242,7 +240,6 @@ def _derived(plan: Plan) -> Iterable[Sequence[str]]:
 
 def _beside_tyres(plan: Plan) -> Iterable[Sequence[str]]:
     """Yield the deviation of stiffnesses stated for the axles from those of the scenario's tyres."""
-    from ..errors import YawbenchError
     from ..tyre_stand import cornering_stiffness
     from ..wiring.make_plan import TYRE_FORCES
     from ..wiring.parameters import STATIC_LOADS, STIFFNESSES, known_car
@@ -295,7 +292,6 @@ def _shown(value: Value | None, measure: str | None) -> str:
 
 def _wire_rows(plan: Plan) -> Iterable[tuple[str, str, str, str]]:
     """Yield source, target, the control side's view of the source (truth, measured, estimated), variables."""
-    from ..messages import fold_wires, star
     from ..wiring.suspicious_values import seen_as
 
     instances = {instance.name: instance.fmu.variables for instance in plan.instances}
@@ -322,7 +318,6 @@ def _delayed_rows(plan: Plan) -> Iterable[Sequence[str]]:
 
 
 def _fault_rows(plan: Plan) -> Iterable[Sequence[str]]:
-    from ..messages import fold
     from ..results.freshness import faults_of
 
     for fault in faults_of(plan):
@@ -344,7 +339,6 @@ def _grouped(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
 
 
 def _order_rows(plan: Plan, direct: Iterable[Wire]) -> Iterable[Sequence[str]]:
-    from ..messages import fold
 
     before = _grouped((w.target, w) for w in direct if not _is_backward(w, plan))
     for instance in plan.instances:
@@ -354,7 +348,6 @@ def _order_rows(plan: Plan, direct: Iterable[Wire]) -> Iterable[Sequence[str]]:
 
 
 def _backward_rows(plan: Plan, direct: Iterable[Wire]) -> Iterable[Sequence[str]]:
-    from ..messages import fold
 
     backward = _grouped(((w.source, w.target), w) for w in direct if _is_backward(w, plan))
     for (source, target), wires in backward.items():

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..errors import ScenarioError, YawbenchError
 from ..messages import counted, listed
 from . import output
 from .options import CHANGES, MAKING, RunOptions, executor_of, named, pooled, takes
@@ -46,7 +47,6 @@ def conduct(
 
 def concluded(experiment: LoadedExperiment, execute: Executor, options: RunOptions) -> ExperimentResult:
     """Return the result of an experiment, drawn and written; see `conduct`."""
-    from ..errors import YawbenchError
     from ..experiments.experiment_result import judge_results, kept_cases
     from ..experiments.result_files import draw_all, write_findings
     from ..scenario.overrides import changed
@@ -218,7 +218,6 @@ def of_files(context: typer.Context, files: Sequence[Path], options: RunOptions)
     """
     import os
 
-    from ..errors import ScenarioError
     from ..experiments.load_experiment import load_experiment
     from ..experiments.verdict_tables import all_tables, counts_of, reach, tally_words
     from ..results.run_folder import default_folder, names_of

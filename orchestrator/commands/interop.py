@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from ..errors import ScenarioError, SimulationError
+from ..messages import counted, fold, hint, listed, printable
 from .options import CHANGES, RunOptions, ScenarioFile, plan_of_scenario, takes
 from .output import print_tables, say
 
@@ -35,9 +37,7 @@ def second_opinion(
     Compares every signal, and the time per step. Exit status 1 if libcosim or Ecos disagrees: their
     algorithm is `jacobi`.
     """
-    from ..errors import ScenarioError, SimulationError
     from ..interop.second_opinion import MASTERS, second_opinion
-    from ..messages import hint
     from ..scenario.overrides import changed
 
     known = {program.title.lower(): program for program in MASTERS}
@@ -87,7 +87,6 @@ def _faults_of(plan: Plan) -> str:
 def show(opinions: list[SecondOpinion]) -> None:
     """Print the differences by signal, the times per step, and notes."""
     from ..experiments.tables import Table
-    from ..messages import printable
 
     comparable = [opinion for opinion in opinions if not opinion.problem]
     if comparable:
@@ -113,8 +112,6 @@ def show(opinions: list[SecondOpinion]) -> None:
 
 def _show_still(opinion: SecondOpinion) -> None:
     """Print which signals are constant during the run: their agreement is not evidence."""
-    from ..messages import counted, fold, listed, printable
-
     if opinion.differences and len(opinion.still) == len(opinion.differences):
         print("No signal changes during the run, so its agreement is not evidence: let it last longer.")
     elif opinion.still:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from ..errors import ScenarioError
 from . import output
 from .options import CHANGES, MAKING, RunOptions, takes
 from .output import hold, print_tables, say, stoppable
@@ -118,7 +119,6 @@ def draw_measurement(file: Path, measurement: Measurement, out: Path) -> None:
         ScenarioError: the format is unknown.
         ResultsError: the figure cannot be written.
     """
-    from ..errors import ScenarioError
     from ..figures.plots import draw
     from ..figures.style import KINDS, LabelledRun, save
     from ..results.measurement_results import filtered_alike, measured_results, segments_of

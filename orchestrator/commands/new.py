@@ -240,8 +240,6 @@ def new(kind: NewKindArgument, name: NewName, language: Written = "python", out:
     """
     from fmus.build import COMPONENTS, find_recipes
 
-    from ..errors import ScenarioError
-
     check_name(name, role=kind, taken=set(find_recipes()))
     if language == "c" and kind != "controller":
         raise ScenarioError("--language c: only available for controllers", code="name-invalid")

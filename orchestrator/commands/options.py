@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..errors import ScenarioError
 from ..fault_kinds import KINDS, NO_FAULTS
 from ..results.file_formats import FORMATS
 
@@ -172,7 +173,6 @@ class RunOptions:
     ] = False
 
     def __post_init__(self) -> None:
-        from ..errors import ScenarioError
 
         if self.fresh and self.no_run:
             raise ScenarioError("--fresh and --no-run are mutually exclusive", code="option-invalid")
@@ -204,8 +204,6 @@ class RunOptions:
     @functools.cached_property
     def limit(self) -> float | None:
         """Time limit of an FMU call [s]; None if instances are not isolated."""
-        from ..errors import ScenarioError
-
         limit = self.call_limit
         if not self.isolate:
             if limit is not None:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..errors import ResultsError, ScenarioError
+from ..messages import hint
 from . import output
 from .experiments import command_of, print_forecasts
 from .options import MAKING, RunOptions, executor_of, named, pooled, takes
@@ -104,8 +106,6 @@ def rank(
 
 
 def _check(option: str, what: str, names: Sequence[str], known: Mapping[str, Any]) -> None:
-    from ..errors import ScenarioError
-    from ..messages import hint
 
     for name in names:
         if name not in known:
@@ -162,7 +162,6 @@ def _rank_by_threats(
 
 def _entry(text: str) -> tuple[str, EntrySpec]:
     """Return the name and the entry of a controller given on the command line."""
-    from ..errors import ScenarioError
     from ..experiments.ranking import CONTROLLER, EntrySpec
     from ..fault_kinds import FaultList
     from ..scenario.overrides import is_path, swap_of
@@ -184,7 +183,6 @@ def _entry(text: str) -> tuple[str, EntrySpec]:
 
 def _write(ranked: RankingResult, folder: Path, command: str, each: Each) -> None:
     """Draw the figures, write tables, page and side files, and print where the page is."""
-    from ..errors import ResultsError
     from ..experiments.experiment import FIGURES
     from ..experiments.ranking_tables import (
         columns_of_cells,

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from ..errors import ResultsError, ScenarioError
+from ..messages import counted, listed
 from .options import CHANGES, MAKING, RunOptions, takes
 from .output import reported, say, stoppable
 
@@ -41,7 +43,6 @@ def recorded(sources: Sequence[Path], options: RunOptions) -> list[Path]:
     Raises:
         ScenarioError: a scenario or an option is invalid.
     """
-    from ..errors import ScenarioError
     from ..experiments.jobs import Job, execute, ready
     from ..fmu.opener import stale_fmus
     from ..planner import Planner
@@ -99,9 +100,6 @@ def labels_of(folders: Sequence[Path], labels: Sequence[str] | None) -> list[str
     Raises:
         ScenarioError: the numbers of labels and folders differ.
     """
-    from ..errors import ScenarioError
-    from ..messages import counted
-
     if labels and len(labels) != len(folders):
         counts = f"{counted(len(labels), 'label')}, {counted(len(folders), 'folder')}"
         raise ScenarioError(f"--label: give one label per results folder (got {counts})")
@@ -142,7 +140,6 @@ def start_of(begin: str) -> float:
     Raises:
         ScenarioError: it is malformed.
     """
-    from ..errors import ScenarioError
     from ..scenario.quantities import convert
 
     try:
@@ -218,7 +215,6 @@ def _settings(style: str | None, size: str | None) -> Any:
     Raises:
         ScenarioError: the size is malformed.
     """
-    from ..errors import ScenarioError
     from ..figures.style import STYLES
 
     settings = dict(STYLES[style]) if style else {}
@@ -242,9 +238,7 @@ def _check_output(out: Path | None, page: bool, format: str | None, published: b
     """
     from matplotlib.backend_bases import FigureCanvasBase
 
-    from ..errors import ScenarioError
     from ..figures.style import KINDS
-    from ..messages import listed
 
     kind = out.suffix[1:].lower() if out else ""
     others = {"html", "gif", "bmp", *FigureCanvasBase.get_supported_filetypes()} - KINDS.keys()
@@ -363,7 +357,6 @@ def write_view(
     Raises:
         ResultsError: a run cannot be read, or the page cannot be written.
     """
-    from ..errors import ResultsError
     from ..figures.style import LabelledRun
     from ..pages.page_parts import save_page
     from ..pages.viewer import SETTINGS, Settings, View, page
@@ -398,7 +391,6 @@ def serve(
     import webbrowser
     from contextlib import closing
 
-    from ..errors import ResultsError
     from ..pages.server import ResultsServer
     from ..pages.sliders import Bench
 
@@ -426,7 +418,6 @@ def salvage(folders: Folders) -> None:
     "died"; if the folder has results of an earlier run, which become readable again, they go to failed/
     instead. Incomplete Parquet and MDF files cannot be recovered.
     """
-    from ..messages import counted
     from ..results.reader import lost_format, salvage
 
     for folder in folders:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..coupling_algorithms import ALGORITHMS
+from ..errors import Diagnostic, ScenarioError, SimulationError, warnings_in
 from ..messages import hint, listed, printable
 from . import output
 from .experiments import chapter_of, command_of, conduct, data_of, say_page, write_page
@@ -19,7 +20,6 @@ from .output import hold, print_tables, say, shows_bars
 from .results import MeasuredFrom, MeasuredRuns, distinct, start_of, with_segments
 
 if TYPE_CHECKING:
-    from ..errors import Diagnostic
     from ..figures.style import LabelledRun
 
 
@@ -54,7 +54,6 @@ def run(
     appended to the name. They replace those of an earlier run, but a failed run never replaces a
     completed one: its results go to failed/ in that folder.
     """
-    from ..errors import ScenarioError, SimulationError
     from ..master.compiled_loop import slower_because
     from ..master.isolation import opener_of
     from ..master.process_state import STATUS, WARNING
@@ -118,7 +117,6 @@ def run(
 
 
 def _say_warnings(diagnostics: Iterable[Diagnostic]) -> None:
-    from ..errors import warnings_in
 
     diagnostics = [*diagnostics]
     output.note(diagnostics)
@@ -255,7 +253,6 @@ def converge(
     """
     from dataclasses import replace
 
-    from ..errors import ScenarioError
     from ..experiments.scenario_experiments import (
         columns_of,
         convergence_figure,

@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from ..errors import ResultsError, ScenarioError
 from ..evaluation.standard_tests import DRIVEN, TESTS, Evaluation, StandardTest, TestSeries
+from ..messages import counted
 from ..metrics.verdict import NotJudged
 from . import output
 from .options import CHANGES, MAKING, RunOptions, executor_of, takes
@@ -84,7 +86,6 @@ def drive(
     Without --out, results go to results/<folder of the scenario>/<its name>_series. An interrupted series
     is resumed; finished runs are not repeated.
     """
-    from ..errors import ScenarioError
     from ..experiments.scenario_experiments import TestDriver
     from ..results.run_folder import default_folder
     from ..scenario import loader
@@ -122,7 +123,6 @@ def _angle_driven(scenario: Path, changes: Sequence[Override], execute: Executor
         ResultsError: the runs do not determine it.
         typer.Exit: a run failed.
     """
-    from ..errors import ResultsError
     from ..evaluation.steering_tests import characteristic_angle
     from ..experiments.scenario_experiments import TestDriver, slow_steer_runs
 
@@ -245,7 +245,6 @@ class EvaluatedRuns:
             together: write figures into the folder instead of next to the results.
         """
         from ..experiments.verdict_tables import run_table, runs_table
-        from ..messages import counted
         from ..pages.evaluation_page import evaluation_page
         from ..pages.page_parts import save_page
         from ..safe_files import write_whole
@@ -291,8 +290,6 @@ class EvaluatedRuns:
 
 def _refuse_mapping(mapping: Path, sources: Sequence[Path], test: str) -> None:
     """Raise ScenarioError with what replaces the option `--signals`."""
-    from ..errors import ScenarioError
-
     files = ", ".join(os.path.relpath(source, mapping.parent) for source in sources)
     raise ScenarioError(
         f"--signals is replaced by measurement files: add 'files: [{files}]' to {mapping}, put mass and "
@@ -303,7 +300,6 @@ def _refuse_mapping(mapping: Path, sources: Sequence[Path], test: str) -> None:
 
 def _runs(source: Path) -> list[Path]:
     """Return the folders of the runs in and below a folder, or the segments of a measurement file."""
-    from ..errors import ResultsError
     from ..results.measurement_results import segments_of
     from ..results.reader import found_runs
     from ..results.run_folder import RunStatus
@@ -326,7 +322,6 @@ def angle_of(text: str | None) -> float | None:
     Raises:
         ScenarioError: the text is not an angle between 0 and 360 degrees.
     """
-    from ..errors import ScenarioError
     from ..scenario.quantities import convert
 
     if text is None:
@@ -342,10 +337,8 @@ def angle_of(text: str | None) -> float | None:
 
 def _angle(text: str | None, slow_steer: list[Path] | None, test: StandardTest) -> float | None:
     """Return A [rad], None if it is neither given nor needed."""
-    from ..errors import ResultsError, ScenarioError
     from ..evaluation.steering_tests import characteristic_angle, evaluate_slow_steer
     from ..evaluation.trace import trace_of
-    from ..messages import counted
     from ..results.measurement_results import load_run
 
     if text and slow_steer:
