@@ -241,13 +241,9 @@ class Request(BaseHTTPRequestHandler):
         if not length.isdecimal() or int(length) > REQUEST:
             self.close_connection = True
             raise Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "the request is too large")
-        try:
-            request = json.loads(self.rfile.read(int(length)))
-        except (ValueError, RecursionError):
-            request = None
-        wanted, earlier = wanted_of(request)
+        wanted = wanted_of(self.rfile.read(int(length)))
         key, made = self.server.bench.run(wanted)
-        html = self.server.bench.viewer([(key, wanted.label), *earlier])
+        html = self.server.bench.viewer([(key, wanted.label), *wanted.earlier])
         answer = {
             "key": key, "html": html, "command": wanted.command, "warnings": made,
             "milliseconds": round(1000 * (time.perf_counter() - began)),

@@ -13,11 +13,11 @@ import threading
 from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass as checked
 
 from vocabulary.vehicle import CAR
 
@@ -155,7 +155,7 @@ def shown_first(knobs: Sequence[Knob], plan: Plan) -> list[str]:
     return [target for target in wanted if target in known][:FIRST]
 
 
-@dataclass(frozen=True)
+@checked(frozen=True, config=ConfigDict(extra="forbid", strict=True))
 class Wanted:
     """A run that a page asks for.
 
@@ -164,6 +164,7 @@ class Wanted:
         label: in the viewer.
         scenario: by name or path.
         settings, swaps, faults: as `--set`, `--swap` and `--fault` take them.
+        earlier: (key, label) of earlier runs to show beside it.
     """
 
     page: str
@@ -172,6 +173,7 @@ class Wanted:
     settings: tuple[str, ...] = ()
     swaps: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
+    earlier: tuple[tuple[str, str], ...] = ()
 
     @property
     def command(self) -> str:
@@ -231,14 +233,8 @@ class Bench:
         data = {
             "scenario": scenario,
             "shown": shown_first(knobs, plan),
-            "knobs": {
-                knob.target: {
-                    "unit": knob.unit, "value": knob.value, "low": knob.low, "high": knob.high,
-                    "step": knob.step, "says": knob.says, "usual": knob.usual,
-                }
-                for knob in knobs
-            },
-        }  # fmt: skip
+            "knobs": {knob.target: asdict(knob) | {"step": knob.step} for knob in knobs},
+        }
         return render(
             "bench.html.j2", title=plan.title or scenario, scenario=scenario, data=data, knobs=knobs,
             swaps=swaps, others=others,
@@ -250,10 +246,11 @@ class Bench:
         """Return the scenario of a name; a path is refused."""
         if name not in self._paths:
             known = loader.names("a scenario")
-            if name not in known:
+            path = loader.named(name) if name in known else None
+            if path is None:
                 others = hint(name, known, lead="by name there are")
                 raise ScenarioError(f"there is no scenario {short(name)}{others}", code="scenario-unknown")
-            self._paths[name] = loader.find(name, "a scenario")
+            self._paths[name] = path
         return self._paths[name]
 
     def run(self, wanted: Wanted) -> tuple[str, list[str]]:
@@ -338,33 +335,15 @@ def _alternatives(instance: Instance, archives: Sequence[str]) -> list[str]:
     return sorted({instance.fmu.name, *(name for name in archives if name.startswith(f"{instance.role}_"))})
 
 
-def wanted_of(data: Any) -> tuple[Wanted, list[tuple[str, str]]]:
-    """Return the run that a request describes, and (key, label) of the earlier ones to show beside it.
+def wanted_of(request: bytes) -> Wanted:
+    """Return the run that a page's request describes.
 
     Raises:
         ScenarioError: the request is malformed.
     """
     try:
-        return _Request.model_validate(data).wanted
+        return TypeAdapter(Wanted).validate_json(request)
     except ValidationError:
         raise ScenarioError(
             "the request for a run is not one of the bench's page", code="value-invalid"
         ) from None
-
-
-class _Request(BaseModel, extra="forbid", strict=True):
-    """A request for a run, as the page sends it."""
-
-    page: str
-    label: str
-    scenario: str
-    settings: list[str]
-    swaps: list[str]
-    faults: list[str]
-    earlier: list[list[str]]
-
-    @property
-    def wanted(self) -> tuple[Wanted, list[tuple[str, str]]]:
-        changes = map(tuple, (self.settings, self.swaps, self.faults))
-        earlier = [(pair[0], pair[1]) for pair in self.earlier if len(pair) == 2]
-        return Wanted(self.page, self.label, self.scenario, *changes), earlier
