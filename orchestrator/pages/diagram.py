@@ -7,7 +7,7 @@ diagram may cover several runs with the same instances; a block then lists all F
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -79,7 +79,7 @@ PAD = 7
 ARROW = 7
 """Length of an arrowhead [px]."""
 
-BLOCK = {"rx": 5, "fill": "#eef4fa", "stroke": "#0072B2", "stroke_width": 1.6}
+BLOCK: dict[str, Any] = {"rx": 5, "fill": "#eef4fa", "stroke": "#0072B2", "stroke_width": 1.6}
 
 DiagramParts = list[Markup]
 
@@ -118,16 +118,6 @@ def _places(points: Sequence[tuple[float, float]]) -> str:
     return " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
 
 
-def _box(x: float, y: float, width: float, height: float, look: Mapping[str, Any]) -> Markup:
-    return _tag("rect", x=x, y=y, width=width, height=height, **look)
-
-
-def _svg(width: float, height: float, title: str, parts: DiagramParts) -> Markup:
-    frame = {"viewBox": f"0 0 {width:.0f} {height:.0f}", "style": f"max-width:{width:.0f}px"}
-    about = {"role": "img", "aria_label": title, "font_family": "system-ui, sans-serif"}
-    return _tag("svg", Markup("\n").join(parts), **frame, **about)
-
-
 COLUMN = 372
 """Width of a diagram [px]; chosen: a phone's 400 less its margins."""
 LANE = 11
@@ -154,7 +144,7 @@ def diagram(system: SystemDiagram, title: str) -> Markup:
             rows = textwrap.wrap(line, characters, subsequent_indent="  ", break_on_hyphens=False)
             content += [(row, SIGNAL, {}, source if k == 0 else "") for k, row in enumerate(rows)]
         height = 2 * PAD + sum(LEADING * size for _, size, _, _ in content)
-        drawn.append(_box(1, y, right - 1, height, BLOCK))
+        drawn.append(_tag("rect", x=1, y=y, width=right - 1, height=height, **BLOCK))
         leaves[block.name] = y + PAD + 0.6 * NAME
         line_y = y + PAD
         for text, size, look, source in content:
@@ -175,4 +165,6 @@ def diagram(system: SystemDiagram, title: str) -> Markup:
         for end in enters[name]:
             lines.append(_line([(x, end), (right + ARROW - 1, end)], colour, 1.3))
             lines.append(_arrow(right + 0.8, end, -1, 0, colour))
-    return _svg(COLUMN, y - 11, title, lines + drawn)
+    frame = {"viewBox": f"0 0 {COLUMN} {y - 11:.0f}", "style": f"max-width:{COLUMN}px"}
+    about = {"role": "img", "aria_label": title, "font_family": "system-ui, sans-serif"}
+    return _tag("svg", Markup("\n").join(lines + drawn), **frame, **about)

@@ -162,15 +162,8 @@ def _axes(findings: ExperimentResult) -> Iterator[tuple[dict[str, Any], list[int
     if len(experiment.runs) > 1:
         runs = [*experiment.runs]
         labels = [run.row or run.label or run.name for run in experiment.runs.values()]
-        about: dict[str, Any] = {
-            "name": RUN,
-            "label": "run",
-            "unit": "",
-            "words": labels,
-            "numbers": None,
-            "log": False,
-        }
-        yield about, [runs.index(case.run.name) for case in experiment.cases]
+        about: dict[str, Any] = {"name": RUN, "label": "run", "words": labels, "unit": "", "numbers": None}
+        yield about | {"log": False}, [runs.index(case.run.name) for case in experiment.cases]
     for k, (name, axis) in enumerate(findings.spec.axes.items()):
         every = dict.fromkeys(point[k] for point in experiment.points)
         levels = sorted(every, key=_number) if axis.numeric else [*every]
@@ -243,10 +236,7 @@ def _chosen(findings: ExperimentResult) -> dict[str, Any]:
         if key in spec.metrics and key not in limits and not isinstance(bound, MetricReference):
             unit = findings.unit(key)
             factor = shown_unit(unit)[1]
-            limits[key] = {
-                "bound": float(f"{si_number(bound, unit) * factor:.{DIGITS}g}"),
-                "at_most": at_most,
-            }
+            limits[key] = {"bound": _rounded(si_number(bound, unit) * factor), "at_most": at_most}
     drawn = next((figure for figure in spec.figures if figure.kind == "map"), None)
     named = [RUN] * (len(findings.experiment.runs) > 1) + [*spec.axes]
     names = sorted(named, key=lambda k: k == RUN or not spec.axes[k].numeric or spec.axes[k].repeats)

@@ -165,6 +165,13 @@ def _of_threat(result: ThreatResult, setting: str, threat: str, entry: str) -> l
     return [result.survived[place] for place in places if place in result.survived]
 
 
+def _levels_on_cars(result: ThreatResult, setting: str, threat: str, entry: str) -> list[str]:
+    """Return the levels that an entry survives, a car each."""
+    spec = result.threats.spec.threats[threat]
+    levels = _of_threat(result, setting, threat, entry)
+    return [level_text(spec, level.position, level.end) for level in levels]
+
+
 def car_tables(result: ThreatResult, entries: Sequence[str]) -> list[Table]:
     """Return a table of levels per threat: an entry per row, a car per column."""
     threats, titles, tables = result.threats, titles_of(result), []
@@ -174,10 +181,7 @@ def car_tables(result: ThreatResult, entries: Sequence[str]) -> list[Table]:
         heading = f"{spec.title}{f' [{spec.unit}]' if spec.unit else ''}"
         table = Table(heading, ["controller", *cars], numbers=range(1, len(cars) + 1))
         for entry in entries:
-            levels = (result.survived[SearchPlace(threats.main, name, car, entry)] for car in cars)
-            table.rows.append(
-                [titles[entry], *(level_text(spec, level.position, level.end) for level in levels)]
-            )
+            table.rows.append([titles[entry], *_levels_on_cars(result, threats.main, name, entry)])
         tables.append(table)
     return tables
 
@@ -295,10 +299,7 @@ def _of_lane_change(result: ThreatResult, setting: str) -> Discipline:
     threats = result.threats
     name, cars = threats.threats_in(setting)[0], threats.cars_in(setting)
     spec = threats.spec.threats[name]
-    cells = {}
-    for entry in result.complete[setting]:
-        levels = (result.survived[SearchPlace(setting, name, car, entry)] for car in cars)
-        cells[entry] = [level_text(spec, level.position, level.end) for level in levels]
+    cells = {entry: _levels_on_cars(result, setting, name, entry) for entry in result.complete[setting]}
     headings, title = [f"{car} [{spec.unit}]" for car in cars], threats.spec.settings[setting].title
     return Discipline(title, scored(result, setting), cells, headings, "More is better.")
 

@@ -559,25 +559,17 @@ class Viewer extends InAddress {
     const c = sheet.getContext('2d');
     c.fillStyle = this.theme.ground;
     c.fillRect(0, 0, sheet.width, sheet.height);
-    c.font = `${13 * ratio}px system-ui, sans-serif`;
-    c.textBaseline = 'middle';
+    const words = {colour: this.theme.ink, size: 13 * ratio, halo: false};
     let x = 8 * ratio;
     for (const run of this.runs.filter((one) => this.shows(one))) {
-      c.strokeStyle = this.colour(run);
-      c.lineWidth = 2.2 * ratio;
-      c.setLineDash(this.dash(run).map((part) => 2.2 * ratio * part));
-      c.beginPath();
-      c.moveTo(x, legend / 2);
-      c.lineTo(x + 30 * ratio, legend / 2);
-      c.stroke();
-      c.fillStyle = this.theme.ink;
-      c.fillText(run.label, x + 36 * ratio, legend / 2);
+      polyline(c, [x, x + 30 * ratio], [legend / 2, legend / 2]);
+      stroke(c, this.colour(run), 2.2, ratio, this.dash(run));
+      text(c, run.label, x + 36 * ratio, legend / 2, words);
       x += 56 * ratio + c.measureText(run.label).width;
     }
     let y = legend;
     for (const [k, panel] of this.panels.entries()) {
-      c.fillStyle = this.theme.ink;
-      c.fillText(panel.root.querySelector('h4').textContent, 8 * ratio, y + head / 2);
+      text(c, panel.root.querySelector('h4').textContent, 8 * ratio, y + head / 2, words);
       c.drawImage(sizes[k], 0, y + head);
       y += head + sizes[k].height;
     }

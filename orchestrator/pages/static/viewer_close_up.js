@@ -44,13 +44,10 @@ function drawCloseUp(canvas, density, run, number, state, scale, strongest) {
 // The car's axis, and beside it where the centre of mass moves: the sideslip angle lies between.
 function motion(c, state, car, run, px) {
   const length = 0.85 * car.front_axle;
-  c.beginPath();
-  c.moveTo(-0.3, 0);
-  c.lineTo(length, 0);
+  polyline(c, [-0.3, length], [0, 0]);
   stroke(c, QUIET, 1, px, [4, 3]);
   arrow(c, 0, 0, length * Math.cos(state.sideslip), length * Math.sin(state.sideslip), run.colour, 2, px);
-  c.beginPath();
-  c.arc(0, 0, 3 * px, 0, 2 * Math.PI);
+  circle(c, 0, 0, 3 * px);
   c.fillStyle = run.colour;
   c.fill();
 }
@@ -67,10 +64,5 @@ function moment(c, share, px) {
   const side = Math.sign(sweep);
   const [x, y] = [radius * Math.cos(to), radius * Math.sin(to)];
   const [tx, ty] = [-Math.sin(to) * side * 9 * px, Math.cos(to) * side * 9 * px];
-  c.beginPath();
-  c.moveTo(x + tx, y + ty);
-  c.lineTo(x - ty * 0.6, y + tx * 0.6);
-  c.lineTo(x + ty * 0.6, y - tx * 0.6);
-  c.fillStyle = QUIET;
-  c.fill();
+  filled(c, QUIET, [[x + tx, y + ty], [x - ty * 0.6, y + tx * 0.6], [x + ty * 0.6, y - tx * 0.6]]);
 }

@@ -24,11 +24,24 @@ function surface(canvas, density) {
   return {context, width, height};
 }
 
-function polyline(c, xs, ys, first, last) {
+// Begin a path through points, up to the last one.
+function polyline(c, xs, ys, last = xs.length - 1) {
   c.beginPath();
-  for (let i = first; i <= last; i++) {
-    if (i === first) c.moveTo(xs[i], ys[i]); else c.lineTo(xs[i], ys[i]);
-  }
+  for (let i = 0; i <= last; i++) c.lineTo(xs[i], ys[i]);
+}
+
+// Fill a polygon.
+function filled(c, colour, points) {
+  c.beginPath();
+  for (const [x, y] of points) c.lineTo(x, y);
+  c.fillStyle = colour;
+  c.fill();
+}
+
+// Begin a path around a point.
+function circle(c, x, y, radius) {
+  c.beginPath();
+  c.arc(x, y, radius, 0, 2 * Math.PI);
 }
 
 function stroke(c, colour, width, px, dash = []) {
@@ -45,17 +58,10 @@ function arrow(c, x, y, dx, dy, colour, width, px) {
   const head = Math.min(4.5 * width * px, 0.6 * length);
   const [ux, uy] = [dx / length, dy / length];
   const [bx, by] = [x + dx - ux * head, y + dy - uy * head];
-  c.beginPath();
-  c.moveTo(x, y);
-  c.lineTo(bx, by);
+  const [wx, wy] = [-uy * head * 0.45, ux * head * 0.45];
+  polyline(c, [x, bx], [y, by]);
   stroke(c, colour, width, px);
-  c.beginPath();
-  c.moveTo(x + dx, y + dy);
-  c.lineTo(bx - uy * head * 0.45, by + ux * head * 0.45);
-  c.lineTo(bx + uy * head * 0.45, by - ux * head * 0.45);
-  c.closePath();
-  c.fillStyle = colour;
-  c.fill();
+  filled(c, colour, [[x + dx, y + dy], [bx + wx, by + wy], [bx - wx, by - wy]]);
 }
 
 // Outline with rounded corners, a windscreen towards the front.
@@ -99,8 +105,7 @@ function circles(c, run, state, scale, px) {
   for (const [name, [x, y]] of Object.entries(wheelsOf(run.car))) {
     const radius = state['grip_' + name] * scale;
     if (!(radius > 0)) continue;
-    c.beginPath();
-    c.arc(x, y, radius, 0, 2 * Math.PI);
+    circle(c, x, y, radius);
     stroke(c, QUIET, 1, px);
   }
 }
@@ -127,11 +132,7 @@ function text(c, words, x, y, {align = 'left', colour = QUIET, size = 12, halo =
 
 // A bar of a round length with its words, its left end at x, y.
 function bar(c, x, y, length, words) {
-  c.beginPath();
-  c.moveTo(x, y - 4);
-  c.lineTo(x, y);
-  c.lineTo(x + length, y);
-  c.lineTo(x + length, y - 4);
+  polyline(c, [x, x, x + length, x + length], [y - 4, y, y, y - 4]);
   stroke(c, GROUND, 5, 1);
   stroke(c, INK, 1.5, 1);
   text(c, words, x + length + 6, y - 2, {colour: INK});

@@ -226,14 +226,9 @@ class Panel {
     ctx.strokeStyle = viewer.theme.mark;
     ctx.setLineDash([4 * ratio, 3 * ratio]);
     ctx.beginPath();
-    for (const [name, bound] of viewer.data.limits) {
-      if (!this.signals.includes(name) || viewer.state.difference) continue;
-      const y = u.valToPos(bound * factor, 'y', true);
-      ctx.moveTo(bbox.left, y);
-      ctx.lineTo(bbox.left + bbox.width, y);
-    }
     const tolerance = this.tolerance();
-    for (const bound of tolerance > 0 ? [tolerance, -tolerance] : []) {
+    const limits = viewer.data.limits.filter(([name]) => this.signals.includes(name) && !viewer.state.difference);
+    for (const bound of [...limits.map(([, limit]) => limit), ...(tolerance > 0 ? [tolerance, -tolerance] : [])]) {
       const y = u.valToPos(bound * factor, 'y', true);
       if (y < bbox.top || y > bbox.top + bbox.height) continue;
       ctx.moveTo(bbox.left, y);

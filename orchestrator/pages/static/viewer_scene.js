@@ -68,10 +68,7 @@ function gridWords(c, eye, width, height) {
 function ground(c, run) {
   for (const [friction, corners] of run.ground) {
     const less = 1 - Math.min(friction, 1);
-    c.fillStyle = `rgb(${255 - 135 * less}, ${255 - 75 * less}, ${255 - 25 * less})`;
-    c.beginPath();
-    for (const [x, y] of corners) c.lineTo(x, y);
-    c.fill();
+    filled(c, `rgb(${255 - 135 * less}, ${255 - 75 * less}, ${255 - 25 * less})`, corners);
   }
 }
 
@@ -85,8 +82,7 @@ function lanes(c, run, px, onGround) {
     for (let i = 0; i <= pieces; i++) {
       const x = start + (i * (end - start)) / pieces;
       for (const [y, out] of [[left, 1], [right, -1]]) {
-        c.beginPath();
-        c.arc(x, y + out * size, size, 0, 2 * Math.PI);
+        circle(c, x, y + out * size, size);
         c.fill();
       }
     }
@@ -111,17 +107,17 @@ function drawScene(canvas, density, runs, states, view, scale) {
     seen.add(same);
     lanes(c, run, px, runs.some((one) => one.ground.length));
     if ('path_y' in run.channels) {
-      polyline(c, run.channels.x, run.channels.path_y, 0, run.channels.x.length - 1);
+      polyline(c, run.channels.x, run.channels.path_y);
       stroke(c, QUIET, 1, px, [5, 4]);
     }
   }
   runs.forEach((run, i) => {
     const {x, y} = run.channels;
-    polyline(c, x, y, 0, x.length - 1);
+    polyline(c, x, y);
     c.globalAlpha = 0.3;
     stroke(c, run.colour, 1.2, px, run.dash);
     c.globalAlpha = 1;
-    polyline(c, x, y, 0, states[i].index);
+    polyline(c, x, y, states[i].index);
     c.lineTo(states[i].x, states[i].y);
     stroke(c, run.colour, 2, px, run.dash);
   });
@@ -156,8 +152,7 @@ function marker(c, run, number, [x, y], eye, width, height, state) {
     text(c, `${away.toFixed(0)} m`, inX + (right ? -32 : 32), inY + (inY > height / 2 ? -16 : 16),
       {align: right ? 'right' : 'left', colour: run.colour});
   } else if (eye.scale < 4) {
-    c.beginPath();
-    c.arc(x, y, 5, 0, 2 * Math.PI);
+    circle(c, x, y, 5);
     c.fillStyle = number === 0 ? run.colour : GROUND;
     c.fill();
     stroke(c, run.colour, 2, 1);
