@@ -201,10 +201,10 @@ STEADY = 0.03
 
 
 @evaluation
-def evaluate_turn(judged: Evaluation, trace: Trace, action: float | None = None) -> None:
-    """Evaluate braking or lifting off in a turn, 1 s after `action` [s]; default: as recorded."""
+def evaluate_turn(judged: Evaluation, trace: Trace) -> None:
+    """Evaluate braking or lifting off in a turn, 1 s after the pedals change."""
     t, v, r, a_y = trace.time, trace["velocity_x"], trace["yaw_rate"], trace["acceleration_y"]
-    now = trace.parameter("action_time", "when the pedals change") if action is None else action
+    now = trace.parameter("action_time", "when the pedals change")
     before = (t >= now - BEFORE_ACTION) & (t <= now)
     if now - BEFORE_ACTION < t[0] or now + AFTER_ACTION > t[-1] or np.count_nonzero(before) < 5:
         raise NotJudged(

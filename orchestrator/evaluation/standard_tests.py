@@ -172,17 +172,13 @@ class SeriesDriver(Protocol):
     def make(self, runs: Sequence[SeriesRun]) -> list[Evaluation]:
         """Make runs that have no results yet; return the evaluations of those that can be judged."""
 
-    def search_highest(
-        self,
-        passes: Callable[[float], bool],
-        *,
-        first: float,
-        step: float,
-        resolution: float,
-        least: float,
-        most: float,
-    ) -> None:
-        """Search the highest value that passes: from `first` in steps, then by bisection."""  # fmt: skip
+    def search_highest(self, passes: Callable[[float], bool], **bounds: float) -> None:
+        """Search the highest value that passes: in a `step` from the `first`, then by halves.
+
+        Args:
+            passes: whether a value does.
+            bounds: `first`, `step`, `resolution` at the end, `least` and `most`.
+        """
 
 
 @dataclass(frozen=True)

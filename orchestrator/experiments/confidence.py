@@ -26,7 +26,7 @@ E. S. Pearson, The use of confidence or fiducial limits illustrated in the case 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache, cached_property
@@ -222,13 +222,6 @@ class SequentialTest:
             return Decision.OPEN
         low, high = self.boundaries[self.looks.index(number)]
         return Decision.BELOW if count <= low else Decision.ABOVE if count >= high else Decision.OPEN
-
-    def stop(self, outcomes: Iterable[bool]) -> int | None:
-        """Return the number of points after which to stop; None if there are too few to tell."""
-        for number, count in enumerate(accumulate(map(int, outcomes)), start=1):
-            if number == self.looks[-1] or self.decision(count, number) is not Decision.OPEN:
-                return number
-        return None
 
     def bounds(self, count: int, number: int) -> Bounds:
         """Return the interval of the share after a count that has crossed no boundary at earlier looks.

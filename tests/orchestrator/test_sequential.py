@@ -41,9 +41,15 @@ def cells(found: Counter[Decision]) -> list[str]:
     return [str(found[decision]) for decision in (Decision.BELOW, Decision.ABOVE, Decision.OPEN)]
 
 
+def stop(outcomes: np.ndarray) -> int:
+    """Return the number of points after which a claim is decided, or all looks are spent."""
+    counts = np.cumsum(outcomes)
+    decided_at = (look for look in TEST.looks if TEST.decision(int(counts[look - 1]), look) != Decision.OPEN)
+    return next(decided_at, TEST.looks[-1])
+
+
 def decided(outcomes: np.ndarray) -> Decision:
-    number = TEST.stop(outcomes)
-    assert number is not None
+    number = stop(outcomes)
     return TEST.decision(int(outcomes[:number].sum()), number)
 
 
@@ -73,7 +79,7 @@ def test_claims_far_from_the_limit_are_decided_early():
     chance = np.random.default_rng(3)
 
     def numbers(share: float) -> list[int]:
-        return [TEST.stop(one) for one in chance.random((200, TEST.looks[-1])) < share]
+        return [stop(one) for one in chance.random((200, TEST.looks[-1])) < share]
 
     assert set(numbers(0.0)) == {48}  # 0.9**48 is below what may be spent there, 0.9**32 is not
     assert np.mean(numbers(0.5)) < 25
@@ -101,7 +107,7 @@ def test_the_interval_agrees_with_the_decision_and_has_its_confidence():
     chance, share = np.random.default_rng(5), 0.08
     missed = 0
     for outcomes in chance.random((2000, TEST.looks[-1])) < share:
-        number = TEST.stop(outcomes)
+        number = stop(outcomes)
         low, high = TEST.bounds(int(outcomes[:number].sum()), number)
         missed += not low <= share <= high
     assert missed <= 0.05 * 2000

@@ -234,7 +234,7 @@ def test_a_braked_turn_gives_the_ratios_of_its_closed_form(sampling):
     assert judged["a_y_ratio"] == pytest.approx(1.0 + 0.6 * exp(-1.0), rel=1e-3)
     assert judged["sideslip"] == pytest.approx(-np.radians(1.0), rel=1e-3)
     assert golden(str(evaluate_turn(Trace("turn", t, signals, facts={})).diagnostics[0]))
-    (unsteady,) = evaluate_turn(Trace("turn", t, signals), action=9.6).diagnostics
+    (unsteady,) = evaluate_turn(Trace("turn", t, signals, facts={"action_time": 9.6})).diagnostics
     assert unsteady.code == "test-not-judged" and "not steady" in str(unsteady)
     steered = signals | {"steering_wheel_angle": np.full_like(t, 0.5)}
     (why,) = map(str, evaluate_turn(Trace("turn", t, steered, facts={"action_time": 9.0})).diagnostics)
