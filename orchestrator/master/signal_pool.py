@@ -10,10 +10,10 @@ and are coupled as these are.
 
 Faults disturb an instance's outputs after they are read, or its inputs before they are set. An output is
 disturbed as of the time of its sample, so all receivers and the results get the same faulty value. An input
-is disturbed as of the time that it is taken for (see `coupling`), after the coupling has combined several
-samples into one value. At initialization both are disturbed as of the start, however many passes it takes:
-calling a fault twice for the same time discards its first observation. What each kind does to a value is in
-`fault_kinds`.
+is disturbed as of the time that it is taken for (see `coupling_algorithms`), after the coupling has combined
+several samples into one value. At initialization both are disturbed as of the start, however many passes it
+takes: calling a fault twice for the same time discards its first observation. What each kind does to a value
+is in `fault_kinds`.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ class InstanceSlot:
         return bool(outputs) and all(v.discrete for v in outputs)
 
     def direct(self, variable: Variable) -> bool:
-        """Return whether an input is needed at the end of the step (see `coupling`)."""
+        """Return whether an input is needed at the end of the step (see `coupling_algorithms`)."""
         if variable.discrete or self.sampled:
             return True
         outputs = self.instance.fmu.of("output")

@@ -69,7 +69,7 @@ def simulate(
         out: folder of the results; made if it does not exist.
         progress: called with the number of communication points done and their total.
         opener: creates the instances; tests pass their own.
-        format: of the results, one of `results.formats.FILES`.
+        format: of the results, one of `results.file_formats.FILES`.
         apart: step the instances in a child process where that is possible (see `child_run`): even if it
             crashes, the run ends with an error message and the results so far.
 

@@ -7,7 +7,7 @@ multiple of the instances' periods, so there is one program per phase of that cy
 Inputs that follow a time series are part of the program. A series is known at all times, so nothing has to
 be extrapolated: `jacobi` takes its value at the beginning of an instance's step, `gauss_seidel` at its end,
 `extrapolated` in the middle of the step for an input that enters an integration and at the end for any
-other (see `coupling`).
+other (see `coupling_algorithms`).
 """
 
 from __future__ import annotations

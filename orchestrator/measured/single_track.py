@@ -92,7 +92,7 @@ class SingleTrack:
     rear: float
 
     def __call__(self, sets: Sequence[Mapping[str, float]]) -> list[list[Simulated]]:
-        """Simulate all windows for sets of values, those of equal length at once; see `estimate.Model`."""
+        """Simulate all windows for sets of values, those of equal length at once; see `Model`."""
         by_grid: dict[tuple[int, float], list[int]] = {}
         for i, inputs in enumerate(self.windows):
             times = inputs.window.times

@@ -84,7 +84,7 @@ class _Sink:
 
 
 class ParquetFile:
-    """A Parquet file of results (see `formats.ResultsSource`)."""
+    """A Parquet file of results (see `file_formats.ResultsSource`)."""
 
     def __init__(self, path: Path, texts: Sequence[str] | None = None) -> None:
         import pyarrow.parquet as pq
@@ -132,7 +132,7 @@ def _samples(array: np.ndarray) -> np.ndarray:
 
 
 class MdfFile:
-    """An MDF file of results with one channel group (see `formats.ResultsSource`).
+    """An MDF file of results with one channel group (see `file_formats.ResultsSource`).
 
     Raises:
         ResultsError: asammdf is not installed.

@@ -1,9 +1,9 @@
 """Recorders: of results.csv and run.json, in memory, and the base classes of those of other formats.
 
-Both files are written under temporary names and renamed together at the end (see `folder`), so a folder has
-either the earlier results or the new ones; the folder is locked while a run writes. Rows are written in
-blocks during the run: whatever ends it, the rows recorded so far stay. Numbers are written so that reading
-them gives the same bits.
+Both files are written under temporary names and renamed together at the end (see `run_folder`), so a
+folder has either the earlier results or the new ones; the folder is locked while a run writes. Rows are
+written in blocks during the run: whatever ends it, the rows recorded so far stay. Numbers are written so that
+reading them gives the same bits.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ the start value of an input in its FMU is never used silently.
 
 Units of measurement are compatible if they have the same dimension, and the wire converts; where an FMU
 declares no unit, nothing can be checked and a note says so. Types must be equal or convert without loss
-(`compatibility`), and an enumeration's items must all be among those of the enumeration that it feeds, with
+(`connections`), and an enumeration's items must all be among those of the enumeration that it feeds, with
 the same numbers.
 """
 
