@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from orchestrator.experiments.confidence import Bounds
 from orchestrator.experiments.load_experiment import found_studies, load_experiment
-from orchestrator.experiments.verdict_tables import (
+from orchestrator.experiments.result_tables import (
     FAILS,
     HOLDS,
     NO_FLIP,

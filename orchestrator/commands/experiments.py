@@ -219,7 +219,7 @@ def of_files(context: typer.Context, files: Sequence[Path], options: RunOptions)
     import os
 
     from ..experiments.load_experiment import load_experiment
-    from ..experiments.verdict_tables import all_tables, counts_of, reach, tally_words
+    from ..experiments.result_tables import all_tables, counts_of, reach, tally_words
     from ..results.run_folder import default_folder, names_of
 
     changes, out = options.changes, options.out

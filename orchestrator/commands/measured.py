@@ -240,7 +240,7 @@ def validate(
     import json
 
     from ..evaluation.validation import compare_run, load_bands
-    from ..experiments.verdict_tables import conditions_table, validation_table
+    from ..experiments.result_tables import conditions_table, validation_table
     from ..figures.style import save
     from ..measured.measurement import load_measurement
     from ..pages.evaluation_page import validation_page

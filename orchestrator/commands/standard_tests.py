@@ -244,7 +244,7 @@ class EvaluatedRuns:
             each: draw every run, too.
             together: write figures into the folder instead of next to the results.
         """
-        from ..experiments.verdict_tables import run_table, runs_table
+        from ..experiments.result_tables import run_table, runs_table
         from ..pages.evaluation_page import evaluation_page
         from ..pages.page_parts import save_page
         from ..safe_files import write_whole

@@ -55,7 +55,6 @@ class RegionRuns:
 
     def __init__(self, planned: PlannedExperiment) -> None:
         assert planned.experiment.spec.region is not None
-        self.planned = planned
         self.experiment: LoadedExperiment = planned.experiment
         self.open_values = planned.experiment.spec.region.open_values
         self.plans = {job.label: job.plan for job in planned.jobs if job.plan is not None}

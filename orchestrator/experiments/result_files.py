@@ -30,9 +30,9 @@ from .claim_schema import si_number, text_of
 from .claims import ClaimResult, Region
 from .experiment import FIGURES
 from .experiment_result import Each, ExperimentResult, limits_of
+from .result_tables import heading, verdict
 from .schema import FigureSpec
 from .tables import Table, column, to_csv
-from .verdict_tables import heading, verdict
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -23,14 +23,14 @@ from ..evaluation.standard_tests import Evaluation, Limit, StandardTest, TestSer
 from ..evaluation.trace import Trace
 from ..evaluation.validation import Validation
 from ..experiments.fit_result import PARTS, FitResult, FittedModel
-from ..experiments.tables import Table
-from ..experiments.verdict_tables import (
+from ..experiments.result_tables import (
     conditions_table,
     margin_words,
     run_table,
     runs_table,
     validation_table,
 )
+from ..experiments.tables import Table
 from ..figures.style import LabelledRun, digits_apart, shown
 from ..messages import counted, listed
 from ..metrics.expressions import MetricValue

@@ -27,8 +27,8 @@ from markupsafe import Markup
 
 from vocabulary.wheels import WHEEL_NAMES, WHEELS
 
+from ..experiments.result_tables import FAILS, HOLDS, NOT_JUDGED, SENSITIVE, UNDECIDED
 from ..experiments.tables import Table
-from ..experiments.verdict_tables import FAILS, HOLDS, NOT_JUDGED, SENSITIVE, UNDECIDED
 from ..messages import fold, printable
 from ..metrics.verdict import Status
 from ..plan import (

@@ -20,9 +20,7 @@ from ..experiments.experiment_result import Each, ExperimentResult
 from ..experiments.jobs import Job
 from ..experiments.open_value_regions import runs_of as runs_of_claim
 from ..experiments.result_files import runs_of, title_of
-from ..experiments.schema import FigureSpec
-from ..experiments.tables import Cell, Table
-from ..experiments.verdict_tables import (
+from ..experiments.result_tables import (
     FAILS,
     HOLDS,
     NOT_JUDGED,
@@ -40,6 +38,8 @@ from ..experiments.verdict_tables import (
     run_tables,
     verdict,
 )
+from ..experiments.schema import FigureSpec
+from ..experiments.tables import Cell, Table
 from ..figures.panels import signals_of
 from ..figures.style import LabelledRun
 from ..messages import counted, listed

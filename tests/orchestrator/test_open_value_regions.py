@@ -20,7 +20,7 @@ from orchestrator.experiments.experiment_result import ExperimentResult
 from orchestrator.experiments.jobs import MeasuredRun
 from orchestrator.experiments.load_experiment import load_experiment
 from orchestrator.experiments.open_value_regions import judge_region, next_jobs, plan_region, runs_of
-from orchestrator.experiments.verdict_tables import region_words, verdict
+from orchestrator.experiments.result_tables import region_words, verdict
 from orchestrator.metrics.expressions import MetricValue
 from orchestrator.metrics.verdict import Status, Verdict, compare, not_judged, worst
 from orchestrator.planner import Planner

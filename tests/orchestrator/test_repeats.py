@@ -16,7 +16,7 @@ from orchestrator.experiments.experiment_result import judge_records
 from orchestrator.experiments.jobs import run_job
 from orchestrator.experiments.load_experiment import load_experiment
 from orchestrator.experiments.result_files import draw_over_axes
-from orchestrator.experiments.verdict_tables import limit_tables, run_tables, verdict
+from orchestrator.experiments.result_tables import limit_tables, run_tables, verdict
 from orchestrator.figures.style import shown
 from orchestrator.metrics.expressions import MetricValue
 from orchestrator.pages.study_page import study_page

@@ -21,8 +21,8 @@ from orchestrator.experiments.experiment_result import judge_results
 from orchestrator.experiments.jobs import Job, Outcome
 from orchestrator.experiments.load_experiment import load_experiment
 from orchestrator.experiments.result_files import draw_all, draw_over_axes, write_findings
+from orchestrator.experiments.result_tables import claim_tables, derived_tables, run_tables, share
 from orchestrator.experiments.tables import Table, for_terminal
-from orchestrator.experiments.verdict_tables import claim_tables, derived_tables, run_tables, share
 from orchestrator.figures.style import shown
 from orchestrator.metrics.expressions import MetricValue
 from orchestrator.pages.study_page import chapter, study_page, viewer_of

@@ -14,7 +14,7 @@ from orchestrator.evaluation.validation import BANDS, Tolerance, load_bands
 from orchestrator.experiments.experiment_result import judge_results
 from orchestrator.experiments.load_experiment import load_experiment
 from orchestrator.experiments.result_files import record_of
-from orchestrator.experiments.verdict_tables import all_tables
+from orchestrator.experiments.result_tables import all_tables
 from tests.commands import status_of
 from tests.sentences import golden
 

@@ -15,7 +15,7 @@ from lxml import html
 from orchestrator.cli import main
 from orchestrator.errors import ScenarioError
 from orchestrator.experiments.load_experiment import found_studies, load_experiment
-from orchestrator.experiments.verdict_tables import share
+from orchestrator.experiments.result_tables import share
 from orchestrator.pages.page_parts import with_minus
 from tests.orchestrator.recorded import record_text
 from tests.sentences import golden, golden_in, refused

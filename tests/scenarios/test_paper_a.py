@@ -9,7 +9,7 @@ import pytest
 import yawbench as yb
 from orchestrator.experiments.experiment_result import judge_results
 from orchestrator.experiments.load_experiment import load_experiment
-from orchestrator.experiments.verdict_tables import run_tables
+from orchestrator.experiments.result_tables import run_tables
 from orchestrator.figures.style import shown
 from tests.studies import check_figures, judge_all, judge_some, verdicts
 from tests.verdicts import recorded

@@ -9,7 +9,7 @@ import pytest
 
 from orchestrator.experiments.journal import FILE as JOURNAL
 from orchestrator.experiments.load_experiment import load_experiment
-from orchestrator.experiments.verdict_tables import FAILS, HOLDS
+from orchestrator.experiments.result_tables import FAILS, HOLDS
 from orchestrator.results.run_folder import default_folder
 from tests.checkout import ROOT
 from tests.evidence import RECORD
