@@ -147,7 +147,7 @@ def _built(
             yield name, errors_of(known[name], out, root)
         return
     ended: dict[int, list[Diagnostic]] = {}
-    told = 0
+    due = 0
     with Pool(preload=[__name__]) as pool:
         for finished in pool.each(_build_one, [(name, out, root) for name in names]):
             name = names[finished.number]
@@ -156,9 +156,9 @@ def _built(
             if finished.error is not None:
                 raise finished.error
             ended[finished.number] = died or finished.value
-            while told in ended:
-                yield names[told], ended.pop(told)
-                told += 1
+            while due in ended:
+                yield names[due], ended.pop(due)
+                due += 1
 
 
 def _build_one(name: str, out: Path, root: Path) -> list[Diagnostic]:
