@@ -13,7 +13,7 @@ from ..metrics.expressions import MetricValue
 from .jobs import STEP_TIME
 from .ranking_scores import Digits, EntryScore, RankedRun, RankedState, RankingCell, deciding_digits
 from .tables import Cell, Column, Table, column
-from .threat_scores import ComparedGains, GainsAndLaws
+from .threat_scores import ComparedGains, GainsAndLaws, Spread
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -347,20 +347,15 @@ def gains_table(result: ThreatResult, compared: ComparedGains) -> Table:
         "between laws, means of both gains": [gains.between for gains in compared.groups.values()],
         "the third less the fourth": [gains.difference for gains in compared.groups.values()],
     }
-    rows = []
-    for words, spreads in parts.items():
-        cells = []
-        for spread in spreads:
-            low, high = (100 * x for x in spread.bounds)
-            cells += [f"{100 * spread.value:.1f}", f"{low:.1f} to {high:.1f}"]
-        rows.append([words, *cells])
-    ratios = []
-    for gains in compared.groups.values():
-        ratios += [
-            f"{gains.ratio.value:.1f}",
-            f"{gains.ratio.bounds.low:.1f} to {gains.ratio.bounds.high:.1f}",
-        ]
-    rows.append(["ratio of the first to the second", *ratios])
+
+    def cells(spreads: Sequence[Spread], factor: float = 1.0) -> list[str]:
+        """Return the value and the interval of each spread."""
+        numbers = [[factor * x for x in (spread.value, *spread.bounds)] for spread in spreads]
+        return [text for x, low, high in numbers for text in (f"{x:.1f}", f"{low:.1f} to {high:.1f}")]
+
+    rows = [[words, *cells(spreads, 100.0)] for words, spreads in parts.items()]
+    ratios = [gains.ratio for gains in compared.groups.values()]
+    rows.append(["ratio of the first to the second", *cells(ratios)])
     headings = ["standard deviation of the mean level, % of a range"]
     for title in compared.groups:
         headings += [title, "95 % interval"]
