@@ -227,8 +227,11 @@ STEP_SHARE = 0.9
 """Fraction of the steady value at which the response time ends."""
 SETTLED = 0.02
 """Largest range of a steady signal, relative to its mean; chosen."""
-STEP_RESPONSES = {"yaw_rate": ("yaw rate", "rad/s"), "acceleration_y": ("lateral acceleration", "m/s2")}
-_GAINS = {"yaw_rate": "1/s", "acceleration_y": "m/(s2.rad)"}
+RESPONSES = {
+    "yaw_rate": ("yaw rate", "rad/s", "1/s"),
+    "acceleration_y": ("lateral acceleration", "m/s2", "m/(s2.rad)"),
+}
+"""Signal -> its words, its unit, and that of its gain over the hand wheel."""
 
 
 @evaluation
@@ -246,19 +249,17 @@ def evaluate_step(judged: Evaluation, trace: Trace) -> None:
     zero = first_crossing(t, side * (hand - hand[0]), 0.5 * abs(step), float(t[0]))
     if zero is None or np.ptp(hand[end]) > SETTLED * abs(step):
         raise NotJudged("the hand wheel is still turned at the end of the record")
-    for key, (name, _) in STEP_RESPONSES.items():
+    for key, (name, *_) in RESPONSES.items():
         refuse_opposed(hand - hand[0], trace[key] - trace[key][0], name)
     judged.add("step", "final hand-wheel angle", step, "rad")
     judged.add("zero", "time zero", zero, "s", "half of the final hand-wheel angle")
     if "velocity_x" in trace:
         judged.add("speed", "speed at time zero", at(t, trace["velocity_x"], zero), "m/s")
-    for key, (name, unit) in STEP_RESPONSES.items():
+    for key, (name, unit, of_gain) in RESPONSES.items():
         x = side * (trace[key] - trace[key][0])
         steady = float(x[end].mean())
         judged.add(f"{key}_steady", f"steady {name}", side * steady, unit, f"mean over the last {STEADY:g} s")
-        judged.add(
-            f"{key}_gain", f"gain of the {name}", steady / abs(step), _GAINS[key], "over the hand wheel"
-        )
+        judged.add(f"{key}_gain", f"gain of the {name}", steady / abs(step), of_gain, "over the hand wheel")
         if np.ptp(x[end]) > SETTLED * abs(steady):
             judged.report(
                 "response-not-steady",
@@ -287,7 +288,6 @@ GRID = np.arange(0.2, 3.001, 0.02)
 HALF_BAND = 0.05
 LEAST = 0.01
 """Power of the hand wheel, relative to its largest, below which a frequency is left out."""
-SWEEP_RESPONSES = {"yaw_rate": ("yaw rate", "1/s"), "acceleration_y": ("lateral acceleration", "m/(s2.rad)")}
 
 
 def response(trace: Trace, answer: str) -> np.ndarray:
@@ -312,13 +312,11 @@ def response(trace: Trace, answer: str) -> np.ndarray:
 @evaluation
 def evaluate_sweep(judged: Evaluation, trace: Trace) -> None:
     """Evaluate a frequency sweep: gains, phases, largest gain and bandwidth."""
-    responses = {key: response(trace, key) for key in SWEEP_RESPONSES}
-    for key, (name, _) in SWEEP_RESPONSES.items():
-        if (
-            responses[key][0].real < 0.0
-        ):  # lags by more than a quarter period at 0.2 Hz, or has the wrong sign
+    responses = {key: response(trace, key) for key in RESPONSES}
+    for key, (name, *_) in RESPONSES.items():
+        if responses[key][0].real < 0.0:  # lags by over a quarter period at 0.2 Hz, or has the wrong sign
             raise opposed(name)
-    for key, (name, unit) in SWEEP_RESPONSES.items():
+    for key, (name, _, unit) in RESPONSES.items():
         values = responses[key]
         gain, phase = np.abs(values), np.angle(values)
         for f in FREQUENCIES:

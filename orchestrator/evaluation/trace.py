@@ -172,12 +172,8 @@ def trace_of(results: Results, label: str = "") -> Trace:
         for instance in (*parameters, *best)
         for name, value in parameters.get(instance, {}).items()
     }
-    masses = [
-        parameters[instance]["mass"]
-        for instance in results.instances_of_role("plant")
-        if "mass" in parameters.get(instance, {})
-    ]
-    mass = masses[-1] if masses else None
+    plants = [parameters.get(instance, {}) for instance in results.instances_of_role("plant")]
+    mass = next((values["mass"] for values in reversed(plants) if "mass" in values), None)
     return Trace(
         label or str(results.folder),
         results.time,
