@@ -18,6 +18,7 @@ import zlib
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from typing import Any, Literal
 
 import numpy as np
@@ -100,8 +101,7 @@ def pack(runs: Sequence[Results], *, raw: bool = False) -> list[PackedRun]:
             compress, and the page reads them at once.
     """
     ranges = _ranges(runs)
-    close = [_close(run, [other for other in runs if other is not run], ranges) for run in runs]
-    return [_packed(run, ranges, fine, raw) for run, fine in zip(runs, close, strict=True)]
+    return [_packed(run, ranges, fine, raw) for run, fine in zip(runs, _close(runs, ranges), strict=True)]
 
 
 def is_numeric(values: np.ndarray) -> bool:
@@ -124,18 +124,26 @@ def _ranges(runs: Sequence[Results]) -> dict[str, tuple[float, float]]:
     return ranges
 
 
-def _close(run: Results, others: Sequence[Results], ranges: dict[str, tuple[float, float]]) -> set[str]:
-    """Return the columns in which another run differs from a run, but by less than `CLOSE` of the range."""
-    close: set[str] = set()
-    for other in others:
-        if other.time.size != run.time.size:
+def _close(runs: Sequence[Results], ranges: dict[str, tuple[float, float]]) -> list[set[str]]:
+    """Return, for each run, the columns in which another of its length differs, but by less than `CLOSE` of
+    the range."""
+    close: list[set[str]] = [set() for _ in runs]
+    of_length: dict[int, list[int]] = {}
+    for i, run in enumerate(runs):
+        of_length.setdefault(run.time.size, []).append(i)
+    for alike, (name, (low, high)) in product(of_length.values(), ranges.items()):
+        having = [i for i in alike if name in runs[i].columns]
+        if len(having) < 2 or high <= low:
             continue
-        for name in run.columns.keys() & other.columns.keys() & ranges.keys() - close:
-            low, high = ranges[name]
+        columns = np.array([np.asarray(runs[i].columns[name], float) for i in having])
+        for k in range(len(having) - 1):
             with np.errstate(invalid="ignore"):
-                apart = np.abs(np.asarray(other.columns[name], float) - np.asarray(run.columns[name], float))
-            if 0.0 < np.max(apart, initial=0.0, where=np.isfinite(apart)) < CLOSE * (high - low):
-                close.add(name)
+                apart = np.abs(columns[k + 1 :] - columns[k])
+            apart[~np.isfinite(apart)] = 0.0
+            most = apart.max(axis=1, initial=0.0)
+            near = np.flatnonzero((most > 0.0) & (most < CLOSE * (high - low)))
+            for j in (k, *(k + 1 + near)) if near.size else ():
+                close[having[j]].add(name)
     return close
 
 
