@@ -29,13 +29,15 @@ TRUTH = {
 }  # fmt: skip
 ERRORS = {"yaw_rate": np.radians(0.1), "acceleration_y": 0.05}
 RATE = 50.0
+RATIO = 16.0
+"""Steering ratio."""
 LONG = 8.0
 """Duration of the sweep [s]."""
 
 
 @dataclass(frozen=True)
 class Car:
-    """A single track whose mass may be free.
+    """A single track whose mass may be free, and its steering ratio, as its hand wheel is measured.
 
     Attributes:
         fixed: values in place of those of the truth.
@@ -45,10 +47,16 @@ class Car:
     fixed: Mapping[str, float] = field(default_factory=dict)
 
     def __call__(self, sets: Sequence[Mapping[str, float]]) -> list[list[Any]]:
-        found = []
-        for values in sets:
-            car = SingleTrack(self.windows, values.get("mass", TRUTH["mass"]), 1.3, 1.5)
-            found += car([TRUTH | dict(self.fixed) | dict(values)])
+        alike: dict[tuple[float, float], list[int]] = {}
+        for k, values in enumerate(sets):
+            car = values.get("mass", TRUTH["mass"]), values.get("steering_ratio", RATIO)
+            alike.setdefault(car, []).append(k)
+        found: list[Any] = [None] * len(sets)
+        for (mass, ratio), places in alike.items():
+            windows = [replace(one, steer_angle=RATIO / ratio * one.steer_angle) for one in self.windows]
+            whole = [TRUTH | dict(self.fixed) | dict(sets[k]) for k in places]
+            for k, signals in zip(places, SingleTrack(windows, mass, 1.3, 1.5)(whole), strict=True):
+                found[k] = signals
         return found
 
 
@@ -118,7 +126,6 @@ LINEAR = ("stiffness_front", "stiffness_rear", "yaw_inertia")
 PEAKS = ("friction_front", "friction_rear")
 POOR = {"yaw_rate": np.radians(0.3), "acceleration_y": 0.2}
 """Noise of poor sensors; that of production sensors is `ERRORS`."""
-RATIO = 16.0
 MANOEUVRES: dict[str, Any] = {
     "sweep": lambda: measured(sweep, [27.8], LONG),
     "two steps": lambda: [*measured(step, [27.8], 5.0), *measured(lambda t: -step(t), [27.8], 5.0)],
@@ -128,20 +135,6 @@ MANOEUVRES: dict[str, Any] = {
         for window in measured(dwell(amplitude), [22.2], 4.0)
     ],
 }
-
-
-@dataclass(frozen=True)
-class SteeredCar(Car):
-    """A car whose steering ratio may be free; its hand wheel is measured."""
-
-    def __call__(self, sets: Sequence[Mapping[str, float]]) -> list[list[Any]]:
-        found = []
-        for values in sets:
-            gain = RATIO / values.get("steering_ratio", RATIO)
-            windows = [replace(window, steer_angle=gain * window.steer_angle) for window in self.windows]
-            own = {name: value for name, value in values.items() if name != "steering_ratio"}
-            found += Car(windows)([own])
-        return found
 
 
 @pytest.mark.sampled(2)
@@ -161,7 +154,7 @@ def test_parameters_are_found_from_noisy_manoeuvres(manoeuvre, names, noise, fre
     windows = with_noise(MANOEUVRES[manoeuvre](), noise, 0)
     ratio = [Parameter("steering_ratio", 1.1 * RATIO, 10.0, 25.0)] if free_ratio else []
     residuals = Residuals(
-        SteeredCar(windows),
+        Car(windows),
         [one.window for one in windows],
         [*off(*names), *ratio],
         noise,
