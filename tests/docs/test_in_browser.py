@@ -6,7 +6,7 @@ import pytest
 
 from tests.checkout import ROOT
 from tests.pages.browser import DESK, PHONE
-from tests.pages.conftest import chromium  # noqa: F401  a fixture
+from tests.pages.conftest import chromium, window  # noqa: F401  fixtures
 
 pytestmark = pytest.mark.exhaustive
 

@@ -5,7 +5,11 @@ from __future__ import annotations
 import functools
 import re
 from importlib.resources import files
+from itertools import product
 from pathlib import Path
+
+import pytest
+from _pytest.mark import ParameterSet
 
 from .browser import Browser
 
@@ -99,10 +103,26 @@ axe.run(document, {resultTypes: ['violations']}).then(({violations}) => done(vio
 """Runs axe-core. A link whose fragment holds the state of a view, #view?shown=[0], is no link to skip to."""
 
 
-def inaccessible(chromium: Browser) -> list[str]:
-    """Return what axe-core finds on the page that is open, in light and in dark colours."""
+COLOURS = ("dark", "light")
+
+
+def looks(*widths: int) -> list[ParameterSet]:
+    """Return all pairs of a width and of a page's colours, for tests of its accessibility.
+
+    Of the first tier are the first width in dark colours and the last in light ones: axe-core takes seconds,
+    the layout does not depend on the colours, nor do these depend on the width.
+    """
+    first = {(widths[0], COLOURS[0]), (widths[-1], COLOURS[-1])}
+    return [
+        pytest.param(*look, marks=() if look in first else pytest.mark.exhaustive)
+        for look in product(widths, COLOURS)
+    ]
+
+
+def inaccessible(chromium: Browser, *colours: str) -> list[str]:
+    """Return what axe-core finds on the page that is open, in the named colours, by default in all."""
     found = []
-    for scheme in ("dark", "light"):
+    for scheme in colours or COLOURS:
         wish = {"name": "prefers-color-scheme", "value": scheme}
         calm = {"name": "prefers-reduced-motion", "value": "reduce"}
         chromium.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": [wish, calm]})
@@ -167,10 +187,10 @@ def check_budgets(chromium: Browser, page: Path) -> None:
     assert size_without_samples(page.read_text(encoding="utf-8")) < 250_000
 
 
-def check_whole(chromium: Browser, page: Path, width: int) -> None:
+def check_whole(chromium: Browser, page: Path, width: int, colours: str) -> None:
     """Open a page with everything unfolded: it has no flaws, and stays within the budget without samples."""
     chromium.open(page, width=width)
     open_all(chromium)
     assert flaws(chromium) == []
-    assert inaccessible(chromium) == []
+    assert inaccessible(chromium, colours) == []
     check_budgets(chromium, page)

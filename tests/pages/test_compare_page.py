@@ -12,7 +12,7 @@ from tests.fmu_copies import put_fmus
 from tests.sentences import golden, golden_in
 
 from .browser import DESK, PHONE
-from .flaws import check_whole, flaws, open_all
+from .flaws import check_whole, flaws, looks, open_all
 from .made_up import data_in, unpacked
 
 ROOT = Path(__file__).parents[2]
@@ -81,12 +81,11 @@ def test_it_shows_the_system_its_parameters_and_how_to_repeat_it(tree):
     assert golden(command)
 
 
-@pytest.mark.parametrize("width", [PHONE, 768, DESK])
-@pytest.mark.sampled(2)
-def test_nothing_is_cut_overlapping_or_empty_at_any_width(chromium, page, width):
+@pytest.mark.parametrize(("width", "colours"), looks(PHONE, 768, DESK))
+def test_nothing_is_cut_overlapping_or_empty_at_any_width(chromium, page, width, colours):
     chromium.open(page, width=width)
     assert flaws(chromium) == []
-    check_whole(chromium, page, width)
+    check_whole(chromium, page, width, colours)
 
 
 def test_the_page_of_four_runs_of_eight_seconds_keeps_its_budget(tmp_path, fmus):

@@ -17,7 +17,7 @@ from orchestrator.pages.page_parts import save_page
 from tests.orchestrator.recorded import write
 
 from .browser import DESK, PHONE, Browser
-from .flaws import check_whole
+from .flaws import check_whole, looks
 from .made_up import data_in, whole_car
 
 TEST = TESTS["sine-with-dwell"]
@@ -100,9 +100,9 @@ def test_a_test_without_criteria_has_its_quantities(traces):
     assert "The test has no criteria." in page and "yaw-rate gain" in page
 
 
-@pytest.mark.parametrize("width", [DESK, PHONE])
-def test_the_page_has_no_flaws(chromium: Browser, traces, tmp_path: Path, width: int):
+@pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK))
+def test_the_page_has_no_flaws(chromium: Browser, traces, tmp_path: Path, width: int, colours: str):
     file = tmp_path / "evaluation.html"
     runs = [judged("slow", 0.1, 2.0), judged("fast", 0.42)]
     save_page(file, evaluation_page(TEST, traces, runs, None))
-    check_whole(chromium, file, width)
+    check_whole(chromium, file, width, colours)

@@ -14,7 +14,7 @@ from orchestrator.figures.style import shown
 from tests.orchestrator.test_fit import TRUTH, folder, run
 
 from .browser import DESK, PHONE, Browser
-from .flaws import check_whole
+from .flaws import check_whole, looks
 from .made_up import data_in, unpacked
 
 VIEWER = "const viewer = document.querySelector('.yv').viewer;"
@@ -73,6 +73,6 @@ def test_its_views_are_histories_and_cross_plots_of_the_car_and_both_models(page
     assert data["runs"][0]["label"] == "made up" and len(data["runs"]) == 3
 
 
-@pytest.mark.parametrize("width", [PHONE, DESK])
-def test_the_page_has_no_flaws_and_stays_within_its_budget(chromium: Browser, page, width):
-    check_whole(chromium, page, width)
+@pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK))
+def test_the_page_has_no_flaws_and_stays_within_its_budget(chromium: Browser, page, width, colours):
+    check_whole(chromium, page, width, colours)

@@ -14,7 +14,7 @@ from orchestrator.pages.ranking_page import result_of_threats
 from tests.orchestrator.test_ranking import SMALL
 
 from .browser import DESK, HELD, PHONE, Browser
-from .flaws import inaccessible
+from .flaws import inaccessible, looks
 from .made_up import unpacked
 from .test_sweep_page import MOST_ELEMENTS
 
@@ -32,14 +32,16 @@ def page(tmp_path_factory) -> Path:
     return folder / "out" / "report.html"
 
 
-@pytest.mark.parametrize("width", [PHONE, DESK])
-def test_the_first_cell_is_open_and_all_of_it_can_be_read_by_everyone(chromium: Browser, page, width):
+@pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK))
+def test_the_first_cell_is_open_and_all_of_it_can_be_read_by_everyone(
+    chromium: Browser, page, width, colours
+):
     chromium.open(page, width=width)
     chromium.wait_for("document.querySelector('.chosen .yv-ready')")
     assert chromium.console() == []
     assert chromium.overflow() <= 0
     assert chromium.run("return document.querySelectorAll('main').length") == 1
-    assert inaccessible(chromium) == []
+    assert inaccessible(chromium, colours) == []
 
 
 def test_the_whole_ranking_would_keep_its_budgets(chromium: Browser, page):

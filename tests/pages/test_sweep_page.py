@@ -14,7 +14,7 @@ from orchestrator.cli import main
 from orchestrator.results.reader import load_results
 
 from .browser import DESK, HELD, PHONE, Browser
-from .flaws import SCREENS, check_first_screen, inaccessible
+from .flaws import SCREENS, check_first_screen, inaccessible, looks
 from .made_up import HALF_A_CAR
 
 UNITS = ("driver_sine", "reference_single_track")
@@ -59,8 +59,8 @@ def anchor_of(chromium: Browser) -> str:
     return chromium.run(VIEW + "return view.key")
 
 
-@pytest.mark.parametrize("width", [PHONE, DESK])
-def test_the_page_is_drawn_at_every_width_within_its_budgets(chromium, sweep, width):
+@pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK))
+def test_the_page_is_drawn_at_every_width_within_its_budgets(chromium, sweep, width, colours):
     opened(chromium, sweep.page, width=width)
     assert chromium.console() == []
     assert chromium.requests() == []
@@ -69,7 +69,7 @@ def test_the_page_is_drawn_at_every_width_within_its_budgets(chromium, sweep, wi
     assert sweep.page.stat().st_size < 500_000
     chromium.run(VIEW + "view.open(view.data.sides.indexOf(true))")
     chromium.wait_for("document.querySelector('.ys-run .yv-ready')")
-    assert inaccessible(chromium) == []
+    assert inaccessible(chromium, colours) == []
 
 
 @pytest.mark.parametrize(("width", "height"), SCREENS)

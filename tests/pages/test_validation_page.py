@@ -23,7 +23,7 @@ from tests.orchestrator.recorded import write as write_run
 from tests.orchestrator.test_validation import line, write, write_study
 
 from .browser import DESK, PHONE, Browser
-from .flaws import check_whole, flaws, inaccessible
+from .flaws import check_whole, flaws, inaccessible, looks
 from .made_up import data_in, unpacked, whole_car
 
 VIEWER = "const viewer = document.querySelector('.yv').viewer;"
@@ -138,9 +138,9 @@ def test_the_band_is_filled_behind_the_points(chromium: Browser, page):
     assert chromium.run(lines) == 5 * [False]  # a band has no times
 
 
-@pytest.mark.parametrize("width", [PHONE, DESK])
-def test_the_page_has_no_flaws_and_stays_within_its_budget(chromium: Browser, page, width):
-    check_whole(chromium, page, width)
+@pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK))
+def test_the_page_has_no_flaws_and_stays_within_its_budget(chromium: Browser, page, width, colours):
+    check_whole(chromium, page, width, colours)
 
 
 def test_validate_writes_the_page_when_asked(made, tmp_path, capsys):
@@ -153,8 +153,8 @@ def test_validate_writes_the_page_when_asked(made, tmp_path, capsys):
     assert "tolerance" in (tmp_path / "out/validation.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("width", [PHONE, DESK])
-def test_a_study_has_a_chapter_on_its_validations(chromium: Browser, tmp_path, width):
+@pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK))
+def test_a_study_has_a_chapter_on_its_validations(chromium: Browser, tmp_path, width, colours):
     write_study(tmp_path, more_bands="steer_angle: {offset: 0.5 deg, gain: 0}, ")
     run = whole_car()
     wheel = "driver.steering_wheel_angle"
@@ -172,4 +172,4 @@ def test_a_study_has_a_chapter_on_its_validations(chromium: Browser, tmp_path, w
     assert {near.source, far.source} == {"chosen", near.source}
     chromium.open(page, width=width)
     assert flaws(chromium) == []
-    assert inaccessible(chromium) == []
+    assert inaccessible(chromium, colours) == []

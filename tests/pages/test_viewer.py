@@ -38,7 +38,7 @@ from vocabulary.lane_change import lanes_of
 from vocabulary.wheels import WHEELS
 
 from .browser import DESK, PHONE, Browser
-from .flaws import inaccessible, size_without_samples
+from .flaws import inaccessible, looks, size_without_samples
 from .made_up import MU, SIZES, data_in, whole_car, without
 
 VIEWER = "const viewer = document.querySelector('.yv').viewer;"
@@ -295,10 +295,10 @@ def test_the_page_is_drawn_at_every_width_without_complaint(chromium, two, width
     assert chromium.run("return document.querySelectorAll('*').length") <= 2000
 
 
-@pytest.mark.parametrize("width", [390, DESK])
-def test_the_page_can_be_read_by_everyone(chromium, two, width):
+@pytest.mark.parametrize(("width", "colours"), looks(390, DESK))
+def test_the_page_can_be_read_by_everyone(chromium, two, width, colours):
     opened(chromium, two, width=width)
-    assert inaccessible(chromium) == []
+    assert inaccessible(chromium, colours) == []
 
 
 def test_the_page_begins_with_what_the_runs_came_to(tmp_path):
