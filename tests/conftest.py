@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.workers import default_workers
 from tests.commands import status_of
 from tests.fmu_copies import put_fmus
 
@@ -28,6 +29,12 @@ LONGEST_FIRST = (
 gc.set_threshold(50_000, 20, 20)
 """Python looks for garbage less often: thousands of tests keep much, and leave little."""
 gc.disable()  # until all tests are collected
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Return the number of workers for `-n auto`: one more than cores, as tests wait for processes."""
+    return default_workers() + 1
 
 
 def pytest_collection_finish() -> None:

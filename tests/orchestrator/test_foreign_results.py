@@ -85,7 +85,7 @@ MAKES = {
 READS: dict[str, tuple[str, ...]] = {
     "list": ("list", "runs", "."),
     "diff": ("diff", "theirs", "good"),
-    "plot": ("plot", "theirs"),
+    "plot": ("plot", "theirs", "--panel", "yaw_rate"),
     "animate": ("animate", "theirs"),
     "animate two": ("animate", "theirs", "good"),
     "evaluate": ("evaluate", "step-steer", "theirs"),
@@ -287,7 +287,7 @@ def test_what_a_dead_run_left_is_shown_and_neither_removed_nor_moved(work, home,
 
 def test_a_link_is_replaced_by_the_figure_and_its_target_left_alone(work, home, yawbench):
     _products_are_links(work / "theirs", home)
-    assert yawbench("plot", "theirs")[0] == 0
+    assert yawbench("plot", "theirs", "--panel", "yaw_rate")[0] == 0
     assert yawbench("animate", "theirs")[0] == 0
     assert (home / "precious").read_text() == "own\n"
     for name in ("overview.svg", "overview.png", "view.html"):
