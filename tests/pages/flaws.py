@@ -150,6 +150,33 @@ def flaws(chromium: Browser) -> list[str]:
     return found + chromium.driver.execute_async_script(EMPTY)
 
 
+PAPER = 703
+"""Width of the text on A4 paper in CSS pixels: 210 mm without the margins of `@page`."""
+IN_PRINT = """
+const cut = [...document.querySelectorAll('main *')].filter((e) => {
+  const {width, right} = e.getBoundingClientRect();
+  return width > 2 && right > arguments[0] + 1 && e.checkVisibility() && !e.closest('.yv-hidden, svg');
+}).map((e) => `${e.tagName} ${e.className}: ${e.textContent.trim().slice(0, 40)}`);
+const viewers = [...document.querySelectorAll('.yv')].filter(({viewer}) => viewer);
+const dark = viewers.filter(({viewer}) => viewer.theme.ground !== '#fff');
+return [...cut.slice(0, 9), ...dark.map((e) => `drawn in dark colours: ${e.id}`)];
+"""
+
+
+def flaws_in_print(chromium: Browser) -> list[str]:
+    """Return what paper would not show of the page that is open, for a reader who prefers dark colours."""
+    wish = {"name": "prefers-color-scheme", "value": "dark"}
+    chromium.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": [wish]})
+    chromium.run("dispatchEvent(new Event('beforeprint'))")
+    size = {"width": PAPER, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+    chromium.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    chromium.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print", "features": [wish]})
+    found = chromium.run(IN_PRINT, PAPER)
+    chromium.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": []})
+    chromium.run("dispatchEvent(new Event('afterprint'))")
+    return found
+
+
 def open_all(chromium: Browser) -> None:
     """Unfold everything that unfolds."""
     chromium.run("document.querySelectorAll('details').forEach((one) => { one.open = true; });")
@@ -194,3 +221,4 @@ def check_whole(chromium: Browser, page: Path, width: int, colours: str) -> None
     assert flaws(chromium) == []
     assert inaccessible(chromium, colours) == []
     check_budgets(chromium, page)
+    assert flaws_in_print(chromium) == []
