@@ -31,7 +31,8 @@ from ..experiments.result_tables import (
     validation_table,
 )
 from ..experiments.tables import Table
-from ..figures.style import LabelledRun, digits_apart, shown
+from ..figures.style import LabelledRun, digits_apart, shown, shown_unit
+from ..measured.least_squares import LEAST_PIECES
 from ..messages import counted, listed
 from ..metrics.expressions import MetricValue
 from ..metrics.measures import words
@@ -299,14 +300,16 @@ def parameter_table(model: FittedModel) -> Table:
         elif interval:
             words = f"{interval[0]:.5g} to {interval[1]:.5g}"
         prior = free.prior and f"{free.prior[0]:.5g} ± {free.prior[1]:.3g}"
-        value = f"{estimate.values[free.name]:.6g} {free.unit if free.unit != '1' else ''}".strip()
+        unit = free.unit.replace(".", "·") if free.unit != "1" else ""
+        value = f"{estimate.values[free.name]:.6g} {unit}".strip()
         table.rows.append(
             [free.name, value, words, f"{free.start:.5g}", f"{free.low:.5g} to {free.high:.5g}", prior]
         )
     search = f"{estimate.sets} sets of values; {estimate.message}"
     table.notes.append(f"condition {estimate.identifiability.condition:.3g}; {search}")
     if estimate.covariance is None:
-        table.notes.append(f"no intervals: too few pieces of 5 s, {estimate.pieces}")
+        pieces = counted(estimate.pieces, "piece")
+        table.notes.append(f"no intervals: {pieces} of 5 s, fewer than {LEAST_PIECES}")
     for first, second, shared in estimate.correlated():
         table.notes.append(f"{first} and {second} are correlated: {shared:.2f}")
     return table
@@ -339,7 +342,7 @@ def residual_tables(result: FitResult) -> list[Table]:
 
 
 def _residuals_over(result: FitResult, part: str, over: str) -> Table | None:
-    """Return the table over a signal; None if it is not measured."""
+    """Return the table over a signal; None if it is not measured, or its ranges read alike."""
     windows = result.fit.parts[part]
     if any(over not in fit_window.filtered.signals for fit_window in windows):
         return None
@@ -347,8 +350,11 @@ def _residuals_over(result: FitResult, part: str, over: str) -> Table | None:
         np.abs(np.interp(w.window.times, w.filtered.time, w.filtered.signals[over])) for w in windows
     ])  # fmt: skip
     edges = np.quantile(at, np.linspace(0.0, 1.0, BINS + 1))
-    unit = SIGNALS[over].unit
-    ranges = [f"{low:.3g} to {high:.3g} {unit}" for low, high in pairwise(edges)]
+    unit, factor = shown_unit(SIGNALS[over].unit)
+    ends = [f"{factor * edge:.3g}" for edge in edges]
+    if len({*ends}) < len(ends):
+        return None
+    ranges = [f"{low} to {high} {unit}" for low, high in pairwise(ends)]
     title = f"Rms differences over |{over}|, {PARTS[part]} windows"
     table = Table(title, ["signal", "model", *ranges], numbers=range(2, 2 + BINS))
     inside = [(at >= low) & (at <= high) for low, high in pairwise(edges)]

@@ -17,7 +17,7 @@ from orchestrator.pages.page_parts import save_page
 from tests.orchestrator.recorded import write
 
 from .browser import DESK, PHONE, Browser
-from .flaws import check_whole, looks
+from .flaws import check_first_screen, check_whole, looks
 from .made_up import data_in, whole_car
 
 TEST = TESTS["sine-with-dwell"]
@@ -106,3 +106,4 @@ def test_the_page_has_no_flaws(chromium: Browser, traces, tmp_path: Path, width:
     runs = [judged("slow", 0.1, 2.0), judged("fast", 0.42)]
     save_page(file, evaluation_page(TEST, traces, runs, None))
     check_whole(chromium, file, width, colours)
+    check_first_screen(chromium, file, width, 844)

@@ -43,6 +43,11 @@ def test_every_number_of_its_tables_is_that_of_the_file(page):
             assert cells == texts
     assert len(tables[0].cssselect("tbody tr")) == len(TRUTH)
     said = tree.xpath("string(//p[@class='said'])")
+    assert tables[0].getnext().text_content().count("no intervals: 1 piece of 5 s, fewer than 5") == 1
+    assert "kg·m2" in tables[0].text_content()
+    assert [table.findtext("caption") for table in tables[2:]] == [  # its speed is the same all the time
+        "Rms differences over |acceleration_y|, held-out windows"
+    ]
     assert said[:1].lower() + said[1:].rstrip(".") == data["verdict"]
 
 

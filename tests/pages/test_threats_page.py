@@ -15,7 +15,7 @@ from orchestrator.pages.page_parts import save_page
 from orchestrator.pages.threats_page import compared_settings, threats_page
 
 from .browser import DESK, Browser
-from .flaws import inaccessible, looks, open_all
+from .flaws import flaws_in_print, inaccessible, looks, open_all
 from .made_up import unpacked
 from .test_sweep_page import MOST_ELEMENTS
 
@@ -43,6 +43,7 @@ def test_it_keeps_its_budget_and_can_be_read_by_everyone(chromium: Browser, page
     open_all(chromium)
     chromium.wait_for("!document.querySelector('details > template')")
     assert inaccessible(chromium, colours) == []
+    assert flaws_in_print(chromium) == []
     assert chromium.console() == []
     assert chromium.requests() == []
 
@@ -54,6 +55,7 @@ def test_every_level_is_on_the_page_and_counts_are_those_of_its_tables(published
     assert len(settings) == len(compared_settings(published)) > 0
     folded = tree.xpath("//h2[@id='cars']/following-sibling::details/template//table")
     assert len(folded) == len(published.threats.threats_in(published.threats.main))
+    assert not [table.findtext("caption") for table in folded if table.find("caption") is not None]
     assert all(len(table.xpath("tbody/tr")) == len(entries) for table in folded)
     scores = scored(published)
     first = sum(score.place == 1 for score in scores.scores)

@@ -128,6 +128,8 @@ def test_the_band_is_filled_behind_the_points(chromium: Browser, page):
     chromium.wait_for("document.querySelector('.yv-ready')")
     lines = VIEWER + "return viewer.panels[0].shown.map(({run}) => Boolean(run.band))"
     assert chromium.run(lines) == [True] + 5 * [False]
+    values = chromium.run(VIEWER + "return viewer.panels[0].cells.map((one) => one.textContent)")
+    assert [value == "–" for value in values] == [True] + 5 * [False]  # an outline has two values, or none
     filled = chromium.run(
         VIEWER + "const {plot} = viewer.panels[0]; const {ctx} = plot;"
         "const x = plot.valToPos(3, 'x', true); const y = plot.valToPos(3 * 18 / Math.PI + 4.5, 'y', true);"

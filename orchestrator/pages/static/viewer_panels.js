@@ -285,7 +285,7 @@ class Panel {
     this.shown.forEach((line, k) => {
       const [row, part] = place(line.run.shifted, time);
       const at = part > 0.5 ? row + 1 : row;
-      const inside = time >= line.run.shifted[0] - 1e-9 && time <= line.run.shifted[line.run.rows - 1] + 1e-9;
+      const inside = !line.run.band && time >= line.run.shifted[0] - 1e-9 && time <= line.run.shifted[line.run.rows - 1] + 1e-9;
       const value = inside ? line.values[at] * factor : NaN;
       const x = this.plot.valToPos(line.xs[at], 'x');
       const y = this.plot.valToPos(value, 'y');
