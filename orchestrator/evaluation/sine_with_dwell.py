@@ -413,7 +413,7 @@ def _over_runs(criterion: str, runs: Sequence[Evaluation], missing: Sequence[flo
     deciding = worst(verdicts)
     if deciding and deciding.holds is False:
         failed = [run for run in runs if criterion in run.criteria and run.criteria[criterion].holds is False]
-        return replace(deciding, why=f"{len(failed)} of {len(verdicts)} runs fail, {_failures(failed)}")
+        return replace(deciding, why=f"{len(failed)} of {len(verdicts)} runs fail: {_failures(failed)}")
     if reasons := [verdict.why for verdict in verdicts if verdict.holds is None]:
         return not_judged(f"{len(reasons)} of {len(verdicts)} runs are not judged: {reasons[0]}")
     if missing:
@@ -436,5 +436,5 @@ def _failures(runs: Sequence[Evaluation]) -> str:
     for name, side in (("left first", 1.0), ("right first", -1.0)):
         failed = [math.degrees(abs(_amplitude(run))) for run in runs if side * _amplitude(run) > 0]
         if failed:
-            words.append(f"{name}: {len(failed)}, the smallest of {min(failed):.1f} degrees")
+            words.append(f"{name} {len(failed)}, the smallest at {min(failed):.1f} degrees")
     return "; ".join(words)

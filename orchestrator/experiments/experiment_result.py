@@ -390,7 +390,7 @@ def limit_table(findings: ExperimentResult, name: str) -> Table:
     assert planned is not None
     limits = limits_of(findings, spec)
     others = [axis if axis == RUN else f"{axis}{planned.axis_unit(axis)}" for axis in limits[0].others]
-    title, headings = f"{spec.says}{planned.axis_unit(spec.of)}", [*others, "up to", "not any more at"]
+    title, headings = f"{spec.says}{planned.axis_unit(spec.of)}", [*others, "up to", "no longer at"]
     table = Table(title, headings, numbers={len(others), len(others) + 1})
     for limit in limits:
         words: list[Cell] = [level.words for level in limit.others.values()]
