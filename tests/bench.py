@@ -4,6 +4,7 @@ Prints, and asserts nothing: times depend on the machine and on who else uses it
 several runs, which is the one least disturbed, if nothing else is said. First comes a table of ratios, each
 of two things measured in turn, beside what they are to be at most; `--long` adds what takes minutes. Then,
 for every scenario, what the instances cost in the loop in Python, and what other masters take.
+`tests.bench_pages` measures pages.
 """
 
 from __future__ import annotations
