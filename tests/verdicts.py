@@ -9,10 +9,12 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
 from orchestrator.experiments.confidence import Bounds
+from orchestrator.experiments.experiment import LoadedExperiment
 from orchestrator.experiments.load_experiment import found_studies, load_experiment
 from orchestrator.experiments.result_tables import (
     FAILS,
@@ -57,10 +59,11 @@ class Row(NamedTuple):
     flip: str
 
 
-def studies() -> dict[str, Path]:
-    """Return title -> file of all studies with a region, in the order of the report."""
-    found = {file: load_experiment(file).spec for file in found_studies(ROOT / "scenarios")}
-    return {spec.title: file for file, spec in found.items() if spec.region}
+@cache
+def studies() -> dict[str, LoadedExperiment]:
+    """Return all studies with a region, by title, in the order of the report."""
+    found = map(load_experiment, found_studies(ROOT / "scenarios"))
+    return {study.spec.title: study for study in found if study.spec.region}
 
 
 def rows_of(file: Path) -> list[Row]:
@@ -98,15 +101,14 @@ def recorded() -> dict[str, list[Row]]:
 
 def page(found: Mapping[str, list[Row]]) -> str:
     """Return the page."""
-    files = studies()
     parts = [HEAD, _lines(("study", "claims", *KINDS), summary(found))]
     for title, rows in found.items():
-        spec = load_experiment(files[title]).spec
-        assert spec.region
-        where = files[title].relative_to(ROOT)
+        study = studies()[title]
+        region, where = study.spec.region, study.path.relative_to(ROOT)
+        assert region
         parts.append(
-            f"## {title}\n\n`yawbench study {where}`; {spec.region.points} to {spec.region.most} points over "
-            f"{listed(spec.region.open_values, last='and')}.\n"
+            f"## {title}\n\n`yawbench study {where}`; {region.points} to {region.most} points over "
+            f"{listed(region.open_values, last='and')}.\n"
         )
         parts.append(_lines(("the paper says", "verdict", "margin", "region", "nearest flip"), rows))
     return "\n".join(parts)

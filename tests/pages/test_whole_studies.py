@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from orchestrator.cli import main
-from orchestrator.experiments.load_experiment import found_studies
+from orchestrator.scenario.loader import files
 
 from .flaws import SCREENS, check_budgets, check_first_screen
 
 pytestmark = pytest.mark.exhaustive
 
-STUDIES = found_studies(Path(__file__).parents[2] / "scenarios")
+STUDIES = [path for path, _ in files(Path(__file__).parents[2] / "scenarios", ["a study file"], depth=2)]
 
 
 @pytest.mark.parametrize("study", STUDIES, ids=lambda file: f"{file.parent.name}-{file.stem}")

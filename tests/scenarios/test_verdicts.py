@@ -41,10 +41,10 @@ def test_the_page_tells_what_becomes_of_every_claim_over_the_region(name, tmp_pa
 
 def test_the_page_has_every_claim_of_every_study_and_sums_them_up():
     found = recorded()
-    assert {title: file.relative_to(ROOT / "scenarios").with_suffix("").as_posix()
-            for title, file in studies().items()} == dict(zip(found, FILES, strict=True))  # fmt: skip
-    for title, file in studies().items():
-        assert [row.says for row in found[title]] == [one.says for one in load_experiment(file).spec.claims]
+    assert {title: study.path.relative_to(ROOT / "scenarios").with_suffix("").as_posix()
+            for title, study in studies().items()} == dict(zip(found, FILES, strict=True))  # fmt: skip
+    for title, study in studies().items():
+        assert [row.says for row in found[title]] == [one.says for one in study.spec.claims]
     assert FILE.read_text(encoding="utf-8") == page(found)
 
 
