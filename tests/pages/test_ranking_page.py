@@ -43,6 +43,15 @@ def test_the_first_cell_is_open_and_all_of_it_can_be_read_by_everyone(
     assert chromium.run("return document.querySelectorAll('main').length") == 1
     assert inaccessible(chromium, colours) == []
     assert flaws_in_print(chromium) == []
+    chromium.open(page, width=width)
+    chromium.wait_for("document.querySelector('.chosen .yv-ready')")
+    chromium.run("document.querySelector(\"td.cell a[href$='none-in-low']\").click()")
+    chromium.wait_for("document.querySelector('.ranking').dataset.shown === 'none-in-low'")
+    top, bar = chromium.run(
+        "const box = (name) => document.querySelector(name).getBoundingClientRect();"
+        "return [box('.chosen h2').top, box('nav.top').bottom]"
+    )
+    assert top >= bar  # the heading of what was chosen is not behind the links at the top
 
 
 def test_the_whole_ranking_would_keep_its_budgets(chromium: Browser, page):

@@ -110,8 +110,9 @@ class Sweep extends InAddress {
   }
 
   title(row) {
-    const value = this.metric ? `: ${this.metric.label} ${this.text(this.metric.at(row), this.metric)}` : '';
-    return `Run ${row + 1}, ${this.words(row)}${value}${this.within(row) ? '' : ', beyond the limit'}`;
+    const value = this.metric ? this.metric.at(row) : null;
+    const said = this.metric ? `: ${this.metric.label} ${this.text(value, this.metric)}` : '';
+    return `Run ${row + 1}, ${this.words(row)}${said}${value === null || this.within(row) ? '' : ', beyond the limit'}`;
   }
 
   told(row) {
