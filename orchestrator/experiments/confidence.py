@@ -29,7 +29,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from itertools import accumulate, combinations
 from typing import NamedTuple
 
@@ -117,13 +117,20 @@ def bootstrap(
         sizes: the number of levels of each factor; a single one for independent numbers.
         draws: resamples.
     """
+    drawn = _drawn(tuple(sizes), draws)
+    batches = range(0, draws, BATCH)
+    return np.concatenate([statistic(*(rows[k : k + BATCH] for rows in drawn)) for k in batches])
+
+
+@lru_cache(maxsize=8)
+def _drawn(sizes: tuple[int, ...], draws: int) -> list[np.ndarray]:
+    """Return the indices drawn of each factor, a row for each draw."""
     chance = np.random.default_rng(1)
-    rows = []
-    for begin in range(0, draws, BATCH):
-        batch = range(begin, min(begin + BATCH, draws))
-        drawn = [[chance.integers(n, size=n) for n in sizes] for _ in batch]
-        rows.append(statistic(*map(np.array, zip(*drawn, strict=True))))
-    return np.concatenate(rows)
+    rows = [[chance.integers(n, size=n) for n in sizes] for _ in range(draws)]
+    drawn = [np.array(factor) for factor in zip(*rows, strict=True)]
+    for factor in drawn:
+        factor.flags.writeable = False
+    return drawn
 
 
 def resample(table: np.ndarray, *drawn: np.ndarray | None) -> np.ndarray:
