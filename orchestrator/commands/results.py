@@ -418,7 +418,7 @@ def salvage(folders: Folders) -> None:
     "died"; if the folder has results of an earlier run, which become readable again, they go to failed/
     instead. Incomplete Parquet and MDF files cannot be recovered.
     """
-    from ..results.reader import lost_format, salvage
+    from ..results.salvage import lost_format, salvage
 
     for folder in folders:
         lost = lost_format(folder)

@@ -1,4 +1,4 @@
-"""Reader of recorded runs: `Results` of one folder, all runs below a folder; salvage of dead runs.
+"""Reader of recorded runs: `Results` of one folder, all runs below a folder.
 
 `thinned` drops rows of long results while they are read, for figures. In each stretch of rows it keeps the
 first, the last and those in which a column, or the distance of a signal from its reference, is smallest or
@@ -17,25 +17,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ..cache import KEY, checksum
+from ..cache import checksum
 from ..errors import ResultsError
 from ..messages import fold, listed, short
-from ..safe_files import check_regular, open_own, reads, reason, write_whole
+from ..safe_files import check_regular, reads, reason
 from ..scenario.quantities import conversion, measure_of
 from ..signal_names import SignalName
-from .file_formats import FILES, FORMATS, RESULTS_FILE, CsvFile, ResultsSource, load_class
-from .run_folder import (
-    PART,
-    RUN_FILE,
-    FolderLock,
-    RunStatus,
-    is_dead,
-    is_final,
-    is_regular,
-    put_in_place,
-    tidy,
-    unfinished,
-)
+from .file_formats import FILES, FORMATS, ResultsSource, load_class
+from .run_folder import PART, RUN_FILE, RunStatus, is_dead, unfinished
 from .run_record import ConnectionRecord, RunRecord, check_record, load_record, warn_if_unchecked
 
 
@@ -371,73 +360,3 @@ def _joined(blocks: Iterable[list[np.ndarray]], columns: int) -> list[np.ndarray
         for part in parts:
             part[k] = np.empty(0)  # free the parts, else a long run would need twice the memory
     return arrays
-
-
-WHY = "the process of this run ended abnormally"
-
-
-def salvage(folder: Path) -> tuple[Path, int]:
-    """Turn the rows that a dead run recorded into results: a final record and a file of complete rows.
-
-    They are treated like those of a failed run. Formats other than CSV cannot be read in part: such files are
-    removed, and the folder is as it was before the run. If the run had ended and only its files had not been
-    renamed yet, everything is kept, in any format.
-
-    Returns:
-        The folder of the results, and the number of rows.
-
-    Raises:
-        ResultsError: no run has died here, or its results cannot be read or written.
-    """
-    if not is_dead(folder):
-        raise ResultsError(
-            f"{folder}: no run has died here; there is nothing to salvage", code="nothing-to-salvage"
-        )
-    path = folder / f"{RESULTS_FILE}{PART}"
-    lock = FolderLock(folder)
-    try:
-        record = unfinished(folder) or {}
-        if is_final(folder):
-            rows = record.get("rows")
-            return put_in_place(folder), rows if isinstance(rows, int) else 0
-        rows = _keep_whole_rows(path) if is_regular(path) else 0
-        if rows:
-            ended = {
-                "status": RunStatus.DIED.value,
-                "rows": rows,
-                "checksum": checksum(path),
-                "error": {"message": WHY},
-            }
-            known = {name: value for name, value in record.items() if name not in ("results", KEY)}
-            part = folder / f"{RUN_FILE}{PART}"
-            write_whole(part, check_record(known | ended, part).to_json())
-            return put_in_place(folder), rows
-        tidy(folder)
-        return folder, 0
-    except OSError as error:
-        raise ResultsError(
-            f"{folder}: the remaining files cannot be renamed: {reason(error)}.", code="results-unwritable"
-        ) from None
-    except ValueError as error:
-        raise ResultsError(f"{path}: cannot be read: {error}") from None
-    finally:
-        lock.release()
-
-
-def _keep_whole_rows(path: Path) -> int:
-    """Truncate the file after the last complete row; return the number of rows."""
-    end = 0
-    with os.fdopen(open_own(path, os.O_RDWR), "r+b") as stream:
-        position = 0
-        while block := stream.read(1 << 20):
-            if b"\n" in block:
-                end = position + block.rfind(b"\n") + 1
-            position += len(block)
-        stream.truncate(end)
-    return sum(len(time) for (time,) in CsvFile(path).blocks(["time"])) if end else 0
-
-
-def lost_format(folder: Path) -> str | None:
-    """Return the file that a dead run was writing in a format other than CSV, which is lost; else None."""
-    others = (name for name in FILES.values() if name != RESULTS_FILE)
-    return next((name for name in others if is_regular(folder / f"{name}{PART}")), None)

@@ -13,8 +13,9 @@ from orchestrator.experiments.tables import runs_table
 from orchestrator.master.simulate import simulate
 from orchestrator.results import recorder
 from orchestrator.results import run_folder as module
-from orchestrator.results.reader import found_runs, load_results, lost_format, salvage
+from orchestrator.results.reader import found_runs, load_results
 from orchestrator.results.run_folder import FolderLock, holder_of, writing
+from orchestrator.results.salvage import lost_format, salvage
 from orchestrator.safe_files import LOCK_FILE
 from tests.sentences import golden_in, refused
 from tests.trees import snapshot

@@ -19,8 +19,8 @@ from lxml import html
 import yawbench as yb
 from orchestrator.errors import ResultsError, ScenarioError, YawbenchError
 from orchestrator.plan import Override
-from orchestrator.results.reader import salvage
 from orchestrator.results.run_folder import FolderLock, below_results, default_folder, holder_of
+from orchestrator.results.salvage import salvage
 from orchestrator.safe_files import LOCK_FILE, NEW, write_whole
 from tests.sentences import golden_in, refused
 from tests.trees import snapshot
