@@ -7,16 +7,15 @@
     run.metric("peak(sideslip)")         # 0.0548 rad
     run.plot("sideslip", "yaw_rate")     # a matplotlib figure
 
-A controller may be plain Python, run in this process; `export_fmu` makes an FMU of one that has proved
-itself:
+A controller may be plain Python, run in this process; `export_fmu` turns it into an FMU:
 
     def proportional(yaw_rate_ref, yaw_rate):
         return 20000 * (yaw_rate_ref - yaw_rate)
 
     yb.load("fnn_sideslip/25mps").swap(controller=proportional).run().metric("peak(sideslip)")
 
-Scenarios are immutable: `swap`, `set` and `fault` return new ones. Nothing is written or printed unless
-requested. All errors derive from YawbenchError; `diagnostics` lists what is wrong; `code`, `file` and `line`
+Scenarios are immutable: `swap`, `set` and `fault` return new scenarios. Nothing is written or printed unless
+requested. All errors derive from YawbenchError; `diagnostics` lists all problems; `code`, `file` and `line`
 are those of the first:
 
     YawbenchError
@@ -138,11 +137,11 @@ _MODULES = {
     "yawbench._view": ("View", "view"),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
-"""Module of each public name; all others are in `orchestrator.errors`."""
+"""Public name -> module; names not listed are in `orchestrator.errors`."""
 
 
 def _refuse_foreign_packages() -> None:
-    """Raise ImportError if a package of another project hides one of those that belong to yawbench."""
+    """Raise ImportError if a package of another project hides a package of yawbench."""
     home = Path(__file__).resolve().parents[1]
     for name in _PACKAGES:
         loaded = sys.modules.get(name)
@@ -161,7 +160,7 @@ _refuse_foreign_packages()
 
 
 def __getattr__(name: str) -> object:
-    """Import a public name when it is first used: `import yawbench` alone loads nothing else."""
+    """Import a public name at its first use, so that `import yawbench` itself is fast."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(_MODULE_OF.get(name, "orchestrator.errors")), name)

@@ -1,7 +1,7 @@
 """Components in plain Python, run in the process of the run without an FMU.
 
-A function, an object or a component class becomes a component with the model description that its FMU would
-have, so that wiring, master and results treat it as they treat an FMU.
+A function, an object or a component class is wrapped in a component with the model description of an
+equivalent FMU, so that wiring, master and results treat it like an FMU.
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ from ._parameters import ProgramParameters
 __all__ = ["Controller", "ControllerLike", "PythonComponent", "output", "parameter", "signal"]
 
 HOME = Path("/python")
-"""Folder in the made-up paths of Python components, used in messages and records; it does not exist."""
+"""Folder in the virtual paths of Python components, for messages and records; it does not exist."""
 
 
 class Controller(Protocol):
-    """An object in plain Python that replaces the FMU of an instance, usually of the controller.
+    """Object in plain Python that replaces the FMU of an instance, usually of the controller.
 
         >>> class Gain:
         ...     inputs = ("yaw_rate_ref", "yaw_rate")
@@ -65,11 +65,11 @@ class Controller(Protocol):
 
     @property
     def inputs(self) -> Sequence[str | VariableSpec]:
-        """Names of the inputs, or what `signal` returns."""
+        """Names of the inputs, or results of `signal`."""
 
     @property
     def outputs(self) -> Sequence[str | VariableSpec]:
-        """Names of the outputs, or what `output` returns."""
+        """Names of the outputs, or results of `output`."""
 
     def output(self, t: float, u: Any, /) -> Numbers:
         """Return the values of the outputs in SI, in order.
@@ -80,27 +80,27 @@ class Controller(Protocol):
         """
 
 
-Controller.__module__ = "yawbench"  # set here because a protocol has no other attributes than its members
+Controller.__module__ = "yawbench"  # set here, since the body of a protocol may only contain members
 
 Numbers = float | Sequence[float] | np.ndarray
-"""Return value of a program: the value of its only output, or one value for each, shape (outputs,)."""
+"""Return value of a program: the value of its only output, or a value for each, shape (outputs,)."""
 
 ControllerLike = str | Path | Callable[..., Numbers] | Controller | type[Component]
 """Replacement for the FMU of an instance: the name or path of an FMU, or plain Python."""
 
 
 class PythonComponent:
-    """A component in plain Python, used in a plan like an FMU.
+    """Component in plain Python, used in a plan like an FMU.
 
     Args:
         program: a function, an object with `output`, or a component class.
         instance: the instance whose FMU it replaces, for messages.
-        role: of that instance (controller, driver, ...); it determines the outputs of a function.
-        label: what it is known by in place of its name, to tell objects of a class apart.
+        role: role of that instance (controller, driver, ...); it determines the outputs of a function.
+        label: replaces its name, to distinguish objects of a class.
 
     Attributes:
         step_size: sampling time [s]; None if the program declares none.
-        parameters: name -> value that a function or an object brings along.
+        parameters: name -> value in a function or an object.
 
     Raises:
         ScenarioError: the program is none of these, or its declarations are invalid.
@@ -131,7 +131,7 @@ class PythonComponent:
         self.fmu: Fmu = replace(described, sha256=digest, generation_tool="Python, no FMU", role=role)
 
     def as_now(self) -> Fmu:
-        """Return its FMU in its present state, with a native library or with the reason why it has none."""
+        """Return its FMU in its current state, with a native library or the reason why there is none."""
         return in_native_code(self.program, self.component, self._translated, self.fmu, self._xml)
 
     def open(self, instance: Instance, log: Log) -> PythonInstance:
@@ -143,7 +143,7 @@ class PythonComponent:
 
 
 class PythonInstance:
-    """A running Python component, with the interface of `orchestrator.master.instance.FmuInstance`."""
+    """Instance of a Python component, with the interface of `orchestrator.master.instance.FmuInstance`."""
 
     def __init__(self, instance: Instance, component: Component, log: Log) -> None:
         self.name = instance.name
@@ -152,7 +152,7 @@ class PythonInstance:
 
     @property
     def error(self) -> BaseException | None:
-        """The exception raised by the program, if any."""
+        """Exception raised by the program, if any."""
         return getattr(self.component, "error", None)
 
     def connect(self, buffers: Buffers) -> StepCalls:
@@ -205,7 +205,7 @@ class PythonInstance:
         pass
 
     def _status(self, stepped: bool = True) -> Status:
-        """Pass on the component's messages; return its status."""
+        """Forward the component's messages; return its status."""
         queue = self.component.log_queue
         if queue:
             for message in queue:
@@ -217,7 +217,7 @@ class PythonInstance:
 
 
 def _described(description: ElementTree.Element) -> bytes:
-    """Return a model description as text, without its date; its GUID follows from the rest."""
+    """Return a model description as text, without date, and with a GUID derived from the rest."""
     description.attrib.pop("generationDateAndTime", None)
     description.set("guid", "")
     digest = hashlib.sha256(ElementTree.tostring(description)).digest()
@@ -228,7 +228,7 @@ def _described(description: ElementTree.Element) -> bytes:
 def _component(program: Any, role: str) -> tuple[type[Component], type[Component]]:
     """Return the component class made from a function, an object or a class.
 
-    Beside it, there is the class for the translator.
+    The second item is the class for the translator.
     """
     if arguments.is_a(program, type):
         if issubclass(program, Component):
@@ -392,7 +392,7 @@ def _numbers(returned: Any, outputs: Sequence[str]) -> tuple[float, ...]:
     """Return the outputs computed by a program as numbers.
 
     Raises:
-        TypeError, ValueError: the value is something else; names the output.
+        TypeError, ValueError: the value is not valid; the message names the output.
     """
     if type(returned) is float and len(outputs) == 1:
         return (returned,)
@@ -415,7 +415,7 @@ def _numbers(returned: Any, outputs: Sequence[str]) -> tuple[float, ...]:
 
 
 def _number(value: Any, output: str) -> float:
-    """Return one output as a number; the master checks that it is finite."""
+    """Return an output as a number; the master checks that it is finite."""
     converted = arguments.plain(value)
     if arguments.is_a(converted, bool) or not arguments.is_a(converted, int, float, Fraction):
         arguments.refuse(output, "a number", value)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def dataset(title: str, table: pd.DataFrame, axes: Sequence[str], runs: Sequence[Run | None]) -> xr.Dataset:
     """Return all columns of runs over axes and time; `attrs["units"]` of each has its unit.
 
-    A run that is missing, and what a run has not recorded, is NaN.
+    Missing runs, and columns that a run did not record, are NaN.
 
     Args:
         title: of the runs.

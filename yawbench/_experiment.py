@@ -1,4 +1,4 @@
-"""Experiments from Python: every combination of levels as a run, one table, curves and maps."""
+"""Experiments from Python: a run for every combination of levels, with table, curves and maps."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def experiment(
     Args:
         base: the scenario.
         axes: an instance -> FMUs by name or path, or plain Python, as in `Scenario.swap`, or a mapping of
-            labels to these, which tells objects of a class apart; a target of `Scenario.set` -> values,
+            labels to these, to distinguish objects of a class; a target of `Scenario.set` -> values,
             numbers in SI or all with the same unit ("80 km/h").
         metrics: columns of the table, such as "peak(sideslip)"; default: the standard metrics.
 
@@ -140,7 +140,7 @@ def numbers_of(name: str, items: Iterable[Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Experiment:
-    """An experiment that is not yet run; made by `experiment`.
+    """Experiment that is not yet run; created by `experiment`.
 
     >>> made = yb.experiment(base, {"driver.amplitude": [0.02, 0.03]}, metrics=["peak(sideslip)"]).run()
     >>> made.table[["driver.amplitude", "status"]]
@@ -168,8 +168,9 @@ class Experiment:
     def run(self, *, workers: int | None = None, keep: bool = True, progress: bool | None = None) -> Runs:
         """Make all runs and return their results; nothing is written.
 
-        Runs are made by worker processes; those with plain Python that is not native run here, one by one.
-        A failed run has a row with its reason in the table. All warnings are issued as one `YawbenchWarning`.
+        Runs are made by worker processes, those with plain Python that is not native in this process,
+        serially. A failed run has a row with its reason in the table. All warnings are issued as one
+        `YawbenchWarning`.
 
         Args:
             workers: number of processes; default: the number of cores.
@@ -207,7 +208,7 @@ def executed(
 
     Args:
         design: the experiment.
-        programs: Python components by their made-up paths.
+        programs: Python components by their virtual paths.
         workers, done: see `make_all`.
 
     Raises:
@@ -227,7 +228,7 @@ def _in_memory(job: Job, opener: OpenInstance = open_instance) -> Results:
 
 @dataclass(frozen=True)
 class Runs:
-    """The results of an experiment.
+    """Results of an experiment.
 
         >>> made = yb.experiment(base, {"driver.amplitude": [0.02, 0.03]}).run()
         >>> made.runs[0].metric("peak(sideslip)") < made.runs[1].metric("peak(sideslip)")
@@ -251,13 +252,13 @@ class Runs:
 
     @cached_property
     def table(self) -> pd.DataFrame:
-        """One row per run: axes, status, reason, metrics, key; `attrs["units"]` holds the units."""
+        """Table with a row per run: axes, status, reason, metrics, key; `attrs["units"]` has the units."""
         return to_pandas(columns_of(self._findings))
 
     def to_xarray(self) -> xr.Dataset:
         """Return all columns of all runs over the axes and time; `attrs["units"]` of each has its unit.
 
-        A failed run, and what a run has not recorded, is NaN.
+        Failed runs, and columns that a run did not record, are NaN.
 
         Raises:
             ResultsError: results were not kept, or the runs have different times.

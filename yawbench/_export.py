@@ -1,4 +1,4 @@
-"""FMUs of controllers in plain Python, for this bench and for every other tool."""
+"""Export of controllers in plain Python as FMUs, for this bench and other tools."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ from ._parameters import ProgramParameters
 from ._progress import bar
 
 STEPS, FEW, STEP = 400, 60, 0.001
-"""Steps in which an FMU is compared with its program, those with other parameters, and their length [s]."""
+"""Number of steps of an FMU's comparison with its program, with other parameters, and step size [s]."""
 NOWHERE = "/"
-"""No folder has this name, so an FMU is never taken for outdated: its program may be gone."""
+"""Not a valid folder name, so that an exported FMU is never stale: its program may be gone."""
 
 
 def export_fmu(controller: ControllerLike, file: str | Path, *, role: str = "controller") -> Path:
@@ -55,11 +55,11 @@ def export_fmu(controller: ControllerLike, file: str | Path, *, role: str = "con
     Args:
         controller: plain Python as in `Scenario.swap`.
         file: the FMU; its name without `.fmu` is the name of the model.
-        role: of the instances that it can be, such as "driver"; it determines the outputs of a function.
+        role: role of its instances, such as "driver"; it determines the outputs of a function.
 
     Raises:
         ScenarioError: the controller or the role is invalid.
-        BuildError: the program needs what an FMU cannot take along.
+        BuildError: the program needs something that an FMU cannot contain.
     """
     path = arguments.path(file, "file").absolute()
     role = arguments.text(role, "role")
@@ -99,7 +99,7 @@ def _write(controller: Any, path: Path, role: str, folder: str) -> None:
 
 @dataclass(frozen=True)
 class _ProgramRecipe(PythonRecipe):
-    """Builds an FMU from sources that are not in files."""
+    """Recipe of an FMU whose sources are not in files."""
 
     texts: dict[str, str] = field(default_factory=dict)
 
@@ -108,7 +108,7 @@ class _ProgramRecipe(PythonRecipe):
         return self.texts
 
     def listing(self) -> dict[str, str]:
-        """Return the component and the program, as path -> text."""
+        """Sources of component and program, as path -> text."""
         folder, name = self.module
         return {path: self.texts[path] for path in (f"{folder}/{name}.py", f"{folder}/{name}_program.py")}
 
@@ -148,7 +148,7 @@ def _user_modules(code: Any) -> UserModules:
         file = Path(inspect.getsourcefile(code) or "").resolve()
     except (TypeError, OSError):
         file = Path()
-    if not file.is_file():  # of a notebook or an interactive session
+    if not file.is_file():  # in a notebook or an interactive session
         return UserModules(Path.cwd() / "__main__.py", "__main__")
     spec = getattr(sys.modules.get(code.__module__), "__spec__", None)
     return UserModules(file, spec.name if spec else code.__module__)
@@ -210,14 +210,14 @@ Exported.__doc__ = program.__doc__
 
 @dataclass(frozen=True)
 class _Form:
-    """The component of an FMU, as text.
+    """Generator of the source of an exported component.
 
     Attributes:
-        name: of the FMU.
-        called: the function or class in the module beside it.
+        name: name of the FMU.
+        called: the function or class in the program's module.
         known: the component that runs in this process.
-        exact: keep whole numbers whole, and set attributes of a class before the constructor is called, as
-            Python does; the translator follows neither.
+        exact: keep integers as integers, and set attributes of a class before the constructor is called, as
+            in Python; the translator supports neither.
     """
 
     name: str
@@ -230,7 +230,7 @@ class _Form:
         return CLASS.format(**self._names())
 
     def of_function(self, program: Any) -> str:
-        """Return a component that calls a function, or what `functools.partial` has made of it."""
+        """Return a component that calls a function, or a `functools.partial` of it."""
         own = _parameters.of_function(program)
         first, named = getattr(program, "args", ()), getattr(program, "keywords", {})
         inputs = [v.name for v in self.known.variables if v.causality == "input"]
@@ -243,7 +243,7 @@ class _Form:
         return self._head(own) + call + RESULT + self._unitless(own)
 
     def of_object(self, program: Any) -> str:
-        """Return a component that makes an object and calls its methods."""
+        """Return a component that creates an object and calls its methods."""
         names = [v.name for v in self.known.variables if v.causality != "parameter"]
         own = _parameters.of_object(program, names)
         passed = [f"{x}={literal(value, x)}" for x, value in own.fixed.items()]

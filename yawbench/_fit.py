@@ -1,4 +1,4 @@
-"""Fits to measurements."""
+"""Parameters of scenarios fitted to measurements."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def fit(
 
     Args:
         path: a fit file.
-        workers: number of processes; default: one per core.
+        workers: number of processes; default: the number of cores.
         progress: called with a line after every few simulations.
 
     Raises:
@@ -45,7 +45,7 @@ def fit(
 
 @dataclass(frozen=True)
 class Fit:
-    """Parameters fitted to a measurement; made by `fit`.
+    """Parameters fitted to a measurement; created by `fit`.
 
     >>> yb.fit("fit.yaml").parameters  # doctest: +SKIP
     """
@@ -59,7 +59,7 @@ class Fit:
 
     @property
     def verdict(self) -> str:
-        """Whether the scenario's car is better than a fitted single track, in words."""
+        """Verdict in words: whether the scenario's car is better than a fitted single-track model."""
         return self._result.verdict
 
     @property
@@ -69,7 +69,7 @@ class Fit:
 
     @property
     def parameters(self) -> pd.DataFrame:
-        """The parameters of both models: value, interval (low, high) of 95 %, start, unit."""
+        """Parameters of both models: value, 95 % interval (low, high), start, unit."""
         import pandas as pd
 
         rows = [row for model in self._result.models for row in _rows(model)]

@@ -21,20 +21,21 @@ if TYPE_CHECKING:
     from control import StateSpace
 
 HORIZON = 1000
-"""Steps of the responses by which states are kept or left out. Chosen: 1 s at the usual step of 1 ms."""
+"""Steps of the responses that decide which states are kept. Chosen: 1 s at the usual step of 1 ms."""
 TOLERANCE = 1e-6
-"""Hankel singular value, relative to the largest, below which a state is left out. Chosen: well above the
-noise of the differences, and below what anyone measures."""
+"""Hankel singular value, relative to the largest, below which a state is omitted. Chosen: well above the
+noise of the differences, and below any measurable effect."""
 FAST = 0.3
 """Discrete eigenvalue below which a mode settles within a step. Chosen: a time constant of 0.8 steps."""
 DIRECT = 0.05
-"""Share of a signal's response that may follow the inputs at once if it is to be a state. Chosen: far above
-that of a step relative to a time constant, far below that of a gain."""
+"""Largest feedthrough, as a share of a signal's response, for a signal to be a state. Chosen: far above that
+of a step relative to a time constant, far below that of a gain."""
 SAME = 1e-4
-"""Relative difference up to which the reduced model has a value of the full one. Chosen: far above noise."""
+"""Relative difference up to which a value of the reduced model equals that of the full model. Chosen: far
+above noise."""
 DISTINCT = 1e6
-"""Largest condition number of values that are states, each relative to its largest response. Chosen: leaves
-them three digits above the noise."""
+"""Largest condition number of values chosen as states, each relative to its largest response. Chosen: leaves
+three digits above the noise."""
 REQUESTED, SIGNAL, VALUE, EARLIER = 100.0, 10.0, 1.0, 0.0
 """Preference as a state: of a requested output, of another signal, of a value inside a component, of a
 sample that the master keeps (none). Chosen: factors of 10, so that a signal is taken unless it is nearly a
@@ -43,7 +44,7 @@ combination of others."""
 
 @dataclass(frozen=True, repr=False)
 class LinearModel:
-    """A linear model, dx/dt = A x + B u, y = C x + D u, of deviations; made by `linearize`.
+    """Linear model of deviations, dx/dt = A x + B u, y = C x + D u; created by `linearize`.
 
         >>> yb.linearize(base, at=0.5, inputs=["driver.steer_angle"], outputs=["plant.yaw_rate"])
         <LinearModel at 0.5 s, continuous: ... states from driver.steer_angle to plant.yaw_rate>
@@ -53,8 +54,8 @@ class LinearModel:
             (outputs, inputs).
         inputs, outputs, states: name -> unit of measurement, in order; "" for a value inside a component.
         dt: sampling time [s] of a sampled model, x[k+1] = A x[k] + B u[k]; 0: continuous.
-        time: of the operating point [s].
-        title: of the scenario.
+        time: time of the operating point [s].
+        title: title of the scenario.
     """
 
     __module__ = "yawbench"
@@ -106,23 +107,23 @@ class LinearModel:
 def linearize(
     scenario: Scenario, *, at: float, inputs: Iterable[str], outputs: Iterable[str], discrete: bool = False
 ) -> LinearModel:
-    """Return the linear model of a scenario around the point that its run reaches at a time.
+    """Linearize a scenario around the state that its run reaches at a given time.
 
         >>> model = yb.linearize(base, at=1, inputs=["driver.steer_angle"], outputs=["plant.yaw_rate"])
         >>> model.inputs, model.outputs
         ({'driver.steer_angle': 'rad'}, {'plant.yaw_rate': 'rad/s'})
 
-    The components run in Python up to the point. From their saved states, every signal and every value
-    inside a component that the inputs reach is displaced both ways for one step of all instances, which
-    gives a sampled model. States that do not matter between inputs and outputs are left out by balanced
-    truncation; the others are signals, or values inside components where no signal shows them. The
-    continuous model has the same response to inputs that are held for a step; what settles within a step
-    follows the inputs at once.
+    The components run in Python up to this time. From their saved states, every signal and every value
+    inside a component that the inputs affect is displaced in both directions for one step of all instances,
+    which gives a sampled model. States without effect between inputs and outputs are removed by balanced
+    truncation; the others are signals, or values inside components that no signal shows. The continuous model
+    has the same response to inputs that are held for a step; modes that settle within a step become direct
+    feedthrough.
 
     Where a law is not smooth (a dead band, a limit just reached), the slope is the mean of both sides.
 
     Args:
-        scenario: what `load` returns, possibly changed.
+        scenario: scenario from `load`, possibly changed.
         at: time of the operating point [s], rounded down to a step of all instances.
         inputs: signals (`instance.output`, for all receivers) or inputs (`instance.input`) that deviate.
         outputs: signals that are observed.
@@ -153,17 +154,17 @@ def linearize(
 
 
 Matrices = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, str]]
-"""A, B, C, D, and the names of the states with their units."""
+"""A, B, C, D, and the names of the states with units."""
 
 
 @dataclass(frozen=True)
 class _Sampled:
-    """The sampled model x[k+1] = F x[k] + G u[k] of all that the inputs reach.
+    """Sampled model x[k+1] = F x[k] + G u[k] of all values that the inputs affect.
 
     Attributes:
         f, g: matrices in SI.
         names: of the values x, with units.
-        preferences: for them as states.
+        preferences: preference of each value as a state.
         outputs: indices of the outputs among x.
     """
 
@@ -201,7 +202,7 @@ def _differences(point: OperatingPoint) -> _Sampled:
 
 @dataclass(frozen=True)
 class _Reduced:
-    """A sampled model z[k+1] = a z[k] + b u[k], in whose states values of the full one are `rows` z."""
+    """Reduced sampled model z[k+1] = a z[k] + b u[k]; the values of the full model are `rows` z."""
 
     a: np.ndarray
     b: np.ndarray
@@ -215,8 +216,8 @@ class _Reduced:
         """Choose values of the full model as states, as many as `rows` has columns.
 
         Returns:
-            The states in the coordinates of `rows`, which values they are, and their names with units. If
-            too few of them are independent of each other, the last states are modes without a meaning.
+            The states in the coordinates of `rows`, the indices of the values, and their names with units. If
+            too few values are independent of each other, the last states are modes without a meaning.
         """
         from scipy.linalg import null_space, qr
 
@@ -231,7 +232,7 @@ class _Reduced:
         return np.vstack([rows[chosen], rest]), chosen, dict(names)
 
     def named(self) -> Matrices:
-        """Return the model in states that are values of the full one."""
+        """Return the model with values of the full model as states."""
         t, _, names = self._states(self.rows, self.shown)
         a, c = _changed(self.a, t), self.rows[self.full.outputs] @ np.linalg.inv(t)
         return a, t @ self.b, c, np.zeros((len(c), self.b.shape[1])), names
@@ -239,14 +240,14 @@ class _Reduced:
     def continuous(self, dt: float) -> Matrices | None:
         """Return the continuous model with the same response to held inputs; None if there is none.
 
-        What settles within a step is replaced by its final value.
+        Modes that settle within a step are replaced by their final values.
         """
         from scipy.linalg import expm, logm, schur, solve_sylvester
 
         triangle, q, n = schur(self.a, sort=lambda x, y=0.0: abs(complex(x, y)) > FAST)
         slow, cross, fast = triangle[:n, :n], triangle[:n, n:], triangle[n:, n:]
         x = solve_sylvester(slow, -fast, -cross) if cross.size else np.zeros_like(cross)
-        # z = q (s + x f, f) has s and f without effect on each other
+        # z = q (s + x f, f) decouples s and f
         b_fast = q[:, n:].T @ self.b
         b_slow = q[:, :n].T @ self.b - x @ b_fast
         of_slow = self.rows @ q[:, :n]
@@ -262,8 +263,8 @@ class _Reduced:
         c = of_slow[outputs] @ np.linalg.inv(t)
         d = (of_fast[outputs] - c @ follows) @ settled
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of inaccuracy, which is checked here
-            # of Schur's form: in states of different units it would lose digits
+            warnings.simplefilter("ignore")  # about accuracy, which is checked here
+            # logarithm of the Schur form: with states of different units it would lose digits
             logarithm = np.real(logm(slow)) if n else slow
         if np.abs(expm(logarithm) - slow).max(initial=0.0) > TOLERANCE * np.abs(slow).max(initial=0.0):
             return None
@@ -297,10 +298,10 @@ def _responses(f: np.ndarray, g: np.ndarray, steps: int) -> np.ndarray:
 
 
 def _reduced(full: _Sampled) -> _Reduced:
-    """Leave out states that the inputs do not reach or the outputs do not show, by balanced truncation.
+    """Remove states that are not controllable or not observable, by balanced truncation.
 
-    Over a finite time, so that integrators and unstable modes are allowed; from responses instead of
-    Gramians, which are their squares and would halve the digits.
+    The truncation uses a finite time, so that integrators and unstable modes are allowed, and responses
+    instead of Gramians, which are their squares and would halve the digits.
     """
     from scipy.linalg import qr, svd
 

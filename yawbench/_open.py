@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 EVALUATED = "evaluation"
-"""Name of the file and of the table of an evaluation."""
+"""Name of file and table of an evaluation."""
 
 MAIN = ("trials", "table", EVALUATED)
 """Names of a command's main table: of tunings, of experiments and rankings, of evaluations."""
@@ -40,10 +40,10 @@ def open(folder: str | Path) -> Run | RecordedRuns:
         'Sideslip tracking at 25 m/s, mu 0.65'
 
     Args:
-        folder: of a run, or of a sweep, a study, a tuning, a ranking or an evaluation; or a measurement file.
+        folder: folder of a run, sweep, study, tuning, ranking or evaluation; or a measurement file.
 
     Raises:
-        ResultsError: there is nothing of the kind, or it is unreadable.
+        ResultsError: there are no such results, or they are unreadable.
         ScenarioError: the measurement file, or a recording that it names, cannot be used.
     """
     place = arguments.path(folder, "folder")
@@ -62,7 +62,7 @@ def open(folder: str | Path) -> Run | RecordedRuns:
 
 @dataclass(frozen=True, repr=False)
 class RecordedRuns:
-    """The runs and tables in a folder that a command has written; made by `open`.
+    """Runs and tables in a folder written by a command; created by `open`.
 
         >>> recorded = yb.open("results")
         >>> recorded.runs["mine"].title
@@ -106,10 +106,10 @@ class RecordedRuns:
 
     @cached_property
     def runs(self) -> dict[str, Run]:
-        """All completed runs whose results are kept, by their folders within this one."""
+        """All completed runs whose results are kept, by their relative folders."""
         try:
             runs = found_runs(self.folder)
-        except ResultsError:  # a command may keep metrics only
+        except ResultsError:  # a command may keep only metrics
             return {}
         done = [run.folder for run in runs if run.status is RunStatus.COMPLETED]
         return {folder.relative_to(self.folder).as_posix(): Run(load_results(folder)) for folder in done}
@@ -139,7 +139,7 @@ class RecordedRuns:
             >>> yb.open("results").plot("sideslip").savefig("runs.svg")
 
         Args:
-            panels, title: as of `Run.plot`.
+            panels, title: as in `Run.plot`.
 
         Raises:
             ScenarioError: a signal was not recorded.
@@ -166,7 +166,7 @@ class RecordedRuns:
 
 
 def _frame(file: Path) -> pd.DataFrame:
-    """Return a table that a command has written as CSV."""
+    """Return a CSV table written by a command."""
     import pandas as pd
     import pyarrow as pa
     from pyarrow import csv

@@ -1,7 +1,7 @@
-"""A run held at a point of time, from which steps are repeated with other states and inputs.
+"""Operating point of a run, from which a step is repeated with other states and inputs.
 
-The components run in Python, because there every value inside them can be read and changed: it is an
-attribute, or an item of one. The library of a native FMU, which computes the same bits, keeps them to itself.
+The components run in Python, where every value inside them, an attribute or an item of an attribute, can be
+read and changed. The library of a native FMU computes the same bits, but does not expose them.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ from ._controller import PythonComponent
 from ._scenario import Scenario
 
 SMALL = 1e-5
-"""Size of a displacement, relative to a value of at least 1. Chosen: the third root of the precision of
-numbers, where rounding and curvature contribute alike."""
+"""Size of a displacement, relative to a value of at least 1. Chosen: the cube root of the machine precision,
+where errors by rounding and curvature are equal."""
 LARGE = {"N": 1.0, "N.m": 1.0, "Pa": 1e3}
-"""Unit -> size of a displacement where 1e-5 would vanish in the rounding of what it moves. Chosen: a
-thousandth of what a wheel brake or a tyre gives."""
+"""Unit -> size of a displacement if the effect of 1e-5 would be lost in rounding. Chosen: a thousandth of the
+values of a wheel brake or a tyre."""
 QUIET = 3
-"""Steps without a newly reached value after which no more are expected. Chosen: longer than any delay."""
+"""Steps without newly affected values after which no more are expected. Chosen: longer than any delay."""
 
 
 class Inside(NamedTuple):
-    """A value inside a component: the instance, and the keys and attributes that lead to the value."""
+    """Location of a value inside a component: the instance, and the path of keys and attributes."""
 
     instance: str
     path: tuple[Any, ...]
@@ -56,12 +56,12 @@ StateKey = int | Inside
 
 
 class OperatingPoint:
-    """A scenario at a point of time.
+    """State of a scenario at a time.
 
     Args:
         scenario: the scenario.
         time: [s], rounded down to a step of all instances.
-        inputs: signals or inputs of instances that something is added to.
+        inputs: signals or inputs of instances to which deviations are added.
         outputs: signals.
 
     Attributes:
@@ -117,7 +117,7 @@ class OperatingPoint:
         return self._pool.index[_pair(signal)]
 
     def size(self, key: StateKey, value: float) -> float:
-        """Return by how much a value is displaced."""
+        """Return the displacement of a value."""
         unit = self.signals.get(key, ("", ""))[1] if isinstance(key, int) else ""
         return LARGE.get(unit, SMALL * max(1.0, abs(value)))
 
@@ -134,7 +134,7 @@ class OperatingPoint:
         Args:
             keys: of the values.
             displaced: key -> the value of the state to step from.
-            added: input -> what is added during the step.
+            added: input -> deviation during the step.
         """
         states, pool, others = self._start
         changed, signals = dict(states), pool.copy()
@@ -149,9 +149,9 @@ class OperatingPoint:
         return _read(keys, after, self._pool.pool)
 
     def reached(self) -> list[StateKey]:
-        """Return the keys of all values that the inputs affect, sooner or later.
+        """Return the keys of all values that the inputs affect, immediately or later.
 
-        A signal that is an input is not among them: at every step, its value is that of the input.
+        A signal that is an input is not included: its value is always that of the input.
         """
         held = {self._pool.index.get(_pair(name)) for name in self.inputs}
         changing = len(self._pool.pool) - 1 - len(self._pool.inputs)
@@ -174,7 +174,7 @@ class OperatingPoint:
         return [key for key in reached if isinstance(key, int) or key in there]
 
     def name(self, key: StateKey) -> str:
-        """Return the name of a value for people."""
+        """Return the displayed name of a value."""
         if isinstance(key, Inside):
             return str(key)
         if key in self.signals:
@@ -230,7 +230,7 @@ class OperatingPoint:
         self._pool.others.update(others)
 
     def _step(self, added: Mapping[str, float]) -> None:
-        """Take the step from the point, with something added to inputs."""
+        """Execute a step from the operating point, with deviations of inputs."""
         pool, start = self._pool, self._start[1]
         into: dict[str, list[tuple[int, float]]] = {}
         of: dict[str, list[tuple[int, float]]] = {}
@@ -270,14 +270,14 @@ def _pair(name: str) -> tuple[str, str]:
 
 
 def _recording(plan: Plan, names: Iterable[str]) -> Plan:
-    """Return the plan, recording those of the names that are outputs."""
+    """Return the plan with those of the names recorded that are outputs."""
     outputs = {(instance.name, v.name) for instance in plan.instances for v in instance.fmu.of("output")}
     more = [SignalName(*_pair(name)) for name in names if _pair(name) in outputs]
     return replace(plan, record=tuple(dict.fromkeys((*plan.record, *more))))
 
 
 def _leaves(states: Mapping[str, Any]) -> Iterator[tuple[Inside, float]]:
-    """Yield all floating-point values of saved states; not those of the variables, which are signals."""
+    """Yield all floating-point values of saved states, except those of variables, which are signals."""
     for name, state in states.items():
         visited: set[int] = set()
         own = {key: value for key, value in state.items() if key != "_values"}
@@ -330,5 +330,5 @@ def _with(value: Any, path: tuple[Any, ...], new: float) -> Any:
     if isinstance(value, (dict, list, np.ndarray)):
         changed[key] = item
     else:
-        object.__setattr__(changed, key, item)  # of a frozen dataclass, too
+        object.__setattr__(changed, key, item)  # works for frozen dataclasses, too
     return changed

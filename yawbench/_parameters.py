@@ -1,8 +1,8 @@
 """Parameters of plain Python: default values of functions, and constructor arguments of objects.
 
-An object has a parameter for every argument of its constructor that it keeps under its own name, as in
-scikit-learn, and for every number in the body of its class. Another value makes the object anew, so that
-what the constructor derives follows.
+An object has a parameter for every constructor argument that it stores under the same name, as in
+scikit-learn, and for every number in the body of its class. With another value the object is created anew, so
+that attributes derived by the constructor follow.
 """
 
 from __future__ import annotations
@@ -30,25 +30,25 @@ from orchestrator.signal_names import SETTINGS
 from . import arguments
 
 PLAIN = (bool, int, float, str)
-"""Types of the values that FMI has."""
+"""Python types of FMI values."""
 DECLARATIONS = frozenset({"inputs", "outputs", "sampled", *SETTINGS})
-"""Attributes of an object that declare it, and settings of every instance."""
+"""Attributes of an object that are declarations, and settings of every instance."""
 INSTALLED = tuple({sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")})
 """Folders of Python and of installed packages."""
 UNIT = "1"
-"""Placeholder for units that Python does not know, until `without_units` removes it."""
+"""Placeholder for undeclared units, until `without_units` removes it."""
 
 
 @dataclass(frozen=True)
 class ProgramParameters:
-    """The parameters of a function or an object.
+    """Parameters of a function or an object.
 
     Attributes:
         values: name -> value in Python.
-        declared: name -> what `parameter` returned, in the same order.
-        fixed: arguments of the constructor that are not parameters.
-        attributes: names of those that are attributes of the class.
-        unitless: names of those without a declared unit.
+        declared: name -> result of `parameter`, in the same order.
+        fixed: constructor arguments that are not parameters.
+        attributes: names of parameters that are attributes of the class.
+        unitless: names of parameters without a declared unit.
     """
 
     values: dict[str, Any] = field(default_factory=dict)
@@ -58,7 +58,7 @@ class ProgramParameters:
     unitless: frozenset[str] = frozenset()
 
     def __or__(self, other: ProgramParameters) -> ProgramParameters:
-        """Return the parameters of both; what an object is made with is that of `other`."""
+        """Return the parameters of both; constructor arguments are those of `other`."""
         return replace(
             other,
             values=self.values | other.values,
@@ -71,7 +71,7 @@ class ProgramParameters:
         return {"Parameters": parameter_class(__name__, f"{name}Parameters", self.declared)}
 
     def chosen(self, p: Any) -> dict[str, Any]:
-        """Return the values of a run as Python had them: one that is unchanged is the same object.
+        """Return the values of a run in Python; an unchanged value is the original object.
 
         Args:
             p: the parameters of the component.
@@ -88,13 +88,13 @@ class ProgramParameters:
 
 
 def of_function(function: Callable[..., Any]) -> ProgramParameters:
-    """Return the parameters of a function: its arguments with a default value that FMI has."""
+    """Return the parameters of a function: arguments whose default value has an FMI type."""
     defaults = [p for p in _arguments_of(function) if p.default is not p.empty and p.name not in SETTINGS]
     return _declared({p.name: (p.default, p.annotation, None) for p in defaults})
 
 
 def of_object(program: Any, signals: Sequence[str]) -> ProgramParameters:
-    """Return the parameters of an object; none if its constructor does not make the same object again.
+    """Return the parameters of an object; none if its constructor cannot recreate the object.
 
     Args:
         program: the object.
@@ -140,11 +140,11 @@ def of_object(program: Any, signals: Sequence[str]) -> ProgramParameters:
 
 
 def fresh(program: Any, own: ProgramParameters, p: Any) -> Any:
-    """Return a program as it is before a run, so that no run affects the next one.
+    """Return a program in its state before a run, so that runs do not affect each other.
 
     Args:
         program: a function or an object.
-        own: parameters that an object is made with.
+        own: constructor parameters of an object.
         p: the parameters of the component.
     """
     values = own.chosen(p)
@@ -153,7 +153,7 @@ def fresh(program: Any, own: ProgramParameters, p: Any) -> Any:
 
 
 def _made_anew(program: Any, parameters: ProgramParameters, values: Mapping[str, Any]) -> Any:
-    """Return an object like a program, made with other values of its parameters."""
+    """Create an object like a program with other values of its parameters."""
     cls: Any = type(program)
     keywords = {
         name: copy.deepcopy(value)
@@ -161,7 +161,7 @@ def _made_anew(program: Any, parameters: ProgramParameters, values: Mapping[str,
         if name not in parameters.attributes
     }
     made = cls.__new__(cls) if cls.__new__ is object.__new__ else cls.__new__(cls, **keywords)
-    for name in parameters.attributes:  # before the constructor, which may derive something from them
+    for name in parameters.attributes:  # before the constructor, which may use them
         if values[name] is not getattr(cls, name):
             object.__setattr__(made, name, values[name])
     if has_constructor(cls):
@@ -172,19 +172,19 @@ def _made_anew(program: Any, parameters: ProgramParameters, values: Mapping[str,
 def _arguments_of(function: Callable[..., Any]) -> list[inspect.Parameter]:
     try:
         return list(inspect.signature(function, eval_str=True).parameters.values())
-    except Exception:  # an annotation that has no meaning here
+    except Exception:  # an annotation that cannot be evaluated here
         return list(inspect.signature(function).parameters.values())
 
 
 def brought_along(program: Any, component: type[Component]) -> dict[str, Value]:
-    """Return the values of the parameters that a program has, unless it is a component class itself."""
+    """Return the values of a program's parameters, unless it is a component class itself."""
     if isinstance(program, type):
         return {}
     return {v.name: v.start for v in component.variables if v.causality == "parameter"}
 
 
 def text_of(program: Any) -> bytes:
-    """Return a program's source text and state, as far as Python knows them, to distinguish programs."""
+    """Return a program's source text and state, as far as available, to distinguish programs."""
     parts = []
     for value in _reached([program], named=True):
         if isinstance(value, FunctionType):
@@ -203,7 +203,7 @@ def text_of(program: Any) -> bytes:
 
 
 def functions_of(*programs: Any) -> list[FunctionType]:
-    """Return the functions of programs: their own, of their classes, and of what they hold.
+    """Return the functions of programs: their own, those of their classes, and of their attributes.
 
     Args:
         programs: functions, classes, and objects.
@@ -212,11 +212,11 @@ def functions_of(*programs: Any) -> list[FunctionType]:
 
 
 def _reached(programs: Sequence[Any], named: bool = False) -> list[Any]:
-    """Return programs, their classes and what they hold, except numbers and texts.
+    """Return programs, their classes and all contained objects, except numbers and texts.
 
     Args:
         programs: functions, classes, and objects.
-        named: with what their functions use by the names of modules.
+        named: include objects that their functions use by global names.
     """
     reached: dict[int, Any] = {}
     waiting = list(reversed(programs))
@@ -234,7 +234,7 @@ def _reached(programs: Sequence[Any], named: bool = False) -> list[Any]:
                 ]
         elif issubclass(type(value), type):  # `isinstance` would ask the object
             waiting += value.__mro__[1:-1]
-            waiting += [x for name, x in vars(value).items() if name != "__slotnames__"]  # which pickle adds
+            waiting += [x for name, x in vars(value).items() if name != "__slotnames__"]  # added by pickle
         elif type(value) in (list, tuple):
             waiting += value
         elif type(value) is dict:
@@ -261,15 +261,15 @@ def _closed_over(function: FunctionType) -> list[Any]:
 
 
 def _used(function: FunctionType) -> list[Any]:
-    """Return what a function uses by the names of its module, and of modules of the user that it uses."""
+    """Return the objects that a function uses by names of its module, and of the user's modules it uses."""
     names: dict[str, None] = {}
     codes = [function.__code__]
-    for code in codes:  # which grows by the codes within
+    for code in codes:  # grows by nested code objects
         names |= dict.fromkeys(code.co_names)
         codes += [x for x in code.co_consts if isinstance(x, CodeType)]
     spaces, used = {id(function.__globals__): function.__globals__}, []
     waiting = list(spaces.values())
-    for space in waiting:  # which grows by the modules within
+    for space in waiting:  # grows by nested modules
         there = [space[name] for name in names if name in space]
         modules = [vars(x) for x in there if isinstance(x, ModuleType) and _is_of_user(x)]
         waiting += [x for x in modules if id(x) not in spaces]
@@ -293,7 +293,7 @@ def _is_empty(cell: CellType) -> bool:
 
 
 def _pickled(value: Any) -> bytes:
-    """Return a value as bytes; of what Python cannot pickle, its type and the values that it can."""
+    """Return a value as bytes; for unpicklable objects, their type and picklable values."""
     try:
         return pickle.dumps(value)
     except Exception:
@@ -312,7 +312,7 @@ def _declared(candidates: Mapping[str, tuple[Any, Any, VariableSpec | None]]) ->
     """Return the parameters among values; others are left as they are.
 
     Args:
-        candidates: name -> value, annotation, and what was declared by `yawbench.parameter`, if anything.
+        candidates: name -> value, annotation, and declaration by `yawbench.parameter`, if any.
     """
     values, declared, unitless = {}, {}, set()
     for name, (value, annotation, spec) in candidates.items():
@@ -320,7 +320,7 @@ def _declared(candidates: Mapping[str, tuple[Any, Any, VariableSpec | None]]) ->
         if type(start) not in PLAIN or (type(start) is float and not math.isfinite(start)):
             continue
         if type(start) is int and not (_is_named(annotation, "int") or abs(start) > 2**53):
-            start = float(start)  # 20000 means a gain, but `n: int = 3` a number of things
+            start = float(start)  # 20000 means a gain, but `n: int = 3` a count
         if type(start) is int and not -(2**31) <= start < 2**31:
             continue
         choices = get_args(annotation) if get_origin(annotation) is Literal else None
@@ -340,7 +340,7 @@ def _is_named(annotation: Any, name: str) -> bool:
 
 
 def _as_written(written: Any, value: Any) -> Any:
-    """Return the value of a run; integers stay integers where possible."""
+    """Return the value of a run, as an integer where possible if it was an integer."""
     plain = arguments.plain(written)
     if type(value) in (bool, str):
         return written if plain == value else value
@@ -361,5 +361,5 @@ def _alike(first: Any, second: Any) -> bool:
         return bool(np.array_equal(first, second, equal_nan=first.dtype.kind in "fc"))
     try:
         return bool(first == second) or pickle.dumps(first) == pickle.dumps(second)
-    except Exception:  # what cannot be compared
+    except Exception:  # cannot be compared
         return False

@@ -1,7 +1,7 @@
-"""A progress bar for calls that take long, in terminals and notebooks.
+"""Progress bar of long calls, in terminals and notebooks.
 
-It appears after `DELAY`, and nothing is left of it at the end. Where it would not be seen (output to a file,
-tests, worker processes) no thread is started. `YAWBENCH_PROGRESS=off` shows none.
+The bar appears after `DELAY` and is removed at the end. Where it would not be visible (output to a file,
+tests, worker processes) no thread is started. `YAWBENCH_PROGRESS=off` turns it off.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
 DELAY = 2.0
-"""Time [s] before a bar appears. Chosen: what takes less needs none."""
+"""Time [s] before a bar appears. Chosen: shorter calls need none."""
 SWITCH = "YAWBENCH_PROGRESS"
-"""Environment variable; "off" shows no bars."""
+"""Environment variable; "off" disables bars."""
 _shown = threading.Lock()
 """Lock of the call whose bar is shown; calls within it show none."""
 
@@ -37,17 +37,17 @@ class Bar:
         self._task: Any = None
 
     def update(self, done: int, total: int | None) -> None:
-        """Set how much is done, and of how much if that is known."""
+        """Set the number of completed items, and the total if known."""
         self._done, self._total = done, total
         if self._display is not None:
             self._display.update(self._task, completed=done, total=total)
 
     def advance(self) -> None:
-        """Count one more."""
+        """Count a completed item."""
         self.update(self._done + 1, self._total)
 
     def extend(self, more: int) -> None:
-        """Count more that is to be done."""
+        """Increase the total."""
         self.update(self._done, (self._total or 0) + more)
 
     def appear(self, on: Console) -> None:
@@ -71,9 +71,9 @@ def bar(title: str, total: int | None = None, *, wanted: bool | None = None) -> 
     """Show a bar while the block runs, if it runs long and output goes to a terminal or notebook.
 
     Args:
-        title: what is done.
-        total: number of items, if it is known.
-        wanted: whether to show it: True at once and anywhere, False never.
+        title: label of the bar.
+        total: number of items, if known.
+        wanted: True: show it immediately and anywhere; False: never.
     """
     made, on = Bar(title, total), None if wanted is False else _console(always=bool(wanted))
     if on is None or not _shown.acquire(blocking=False):
@@ -96,7 +96,7 @@ def bar(title: str, total: int | None = None, *, wanted: bool | None = None) -> 
 
 
 def _console(*, always: bool = False) -> Console | None:
-    """Return where bars are shown, None if they would not be seen."""
+    """Return the console for bars, None if they would not be visible."""
     in_terminal = sys.stderr is not None and sys.stderr.isatty()
     if not always and (os.environ.get(SWITCH) == "off" or not (in_terminal or "IPython" in sys.modules)):
         return None

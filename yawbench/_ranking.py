@@ -69,7 +69,7 @@ def rank(
     Args:
         controller: name or path of an FMU, or plain Python as in `Scenario.swap`, or a class of such
             objects, or a mapping of names of entries to these; None: rank only the others.
-        name: of the entry of a single controller; default: the name of the controller.
+        name: name of the entry of a single controller; default: the name of the controller.
         against: other entries to rank; default: all of the ranking.
         conditions: of the ranking; default: all.
         quick: run only the last amplitude of a few conditions.
@@ -139,7 +139,7 @@ def _entries(controller: Any, name: str) -> tuple[dict[str, EntrySpec], dict[Pat
 
 
 def _entry(controller: Any, name: str) -> tuple[str, EntrySpec, PythonComponent | None]:
-    """Return the name of a controller's entry, the entry, and the Python component if it is one."""
+    """Return the name of a controller's entry, the entry, and the Python component, if any."""
     if arguments.names_file(controller):
         fmu = fmu_of(controller, "controller")
         if not (name or Path(fmu).stem):
@@ -168,7 +168,7 @@ def _spec(name: str, fmu: str, parameters: Mapping[str, Any] | None = None) -> E
 
 @dataclass(frozen=True)
 class Ranking:
-    """The result of a ranking; made by `rank`.
+    """Result of a ranking; created by `rank`.
 
     >>> places = yb.rank(against=["none"], conditions=["hard"], quick=True)
     >>> places.cells[["entry", "condition", "state"]].values.tolist()
@@ -184,12 +184,12 @@ class Ranking:
 
     @cached_property
     def table(self) -> pd.DataFrame:
-        """One row per controller, the best first; `attrs["units"]` holds the units."""
+        """Table with a row per controller, the best first; `attrs["units"]` has the units."""
         return to_pandas(columns_of_entries(self._ranked))
 
     @cached_property
     def cells(self) -> pd.DataFrame:
-        """One row per controller and condition."""
+        """Table with a row per controller and condition."""
         return to_pandas(columns_of_cells(self._ranked))
 
     def place(self, name: str) -> int | None:

@@ -1,4 +1,4 @@
-"""The results of a run as arrays, metrics, figures and files."""
+"""Results of a run as arrays, metrics, figures and files."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ if TYPE_CHECKING:
 
 
 def measured(file: str | Path, segment: int | None = None, *, start: float = 0.0) -> Run:
-    """Return a recording of a car as a run: `metric`, `plot`, `evaluate`, `view` take it like one.
+    """Return a recording of a car as a run, for `metric`, `plot`, `evaluate` and `view`.
 
         >>> laps = yb.measured("measured.yaml", segment=2)  # doctest: +SKIP
 
     Args:
         file: the measurement file.
         segment: its number, counted from 1, if the file has several.
-        start: time of the recording [s] that becomes 0, to lie beside a run that begins there.
+        start: time of the recording [s] that becomes 0, to align it with a run that begins there.
 
     Raises:
         ScenarioError: the file, or a recording that it names, cannot be used.
-        ResultsError: there is no such segment.
+        ResultsError: the segment does not exist.
     """
     path = arguments.path(file, "file")
     number = None if segment is None else arguments.count(segment, "segment", least=1, most=10**6)
@@ -50,7 +50,7 @@ def measured(file: str | Path, segment: int | None = None, *, start: float = 0.0
 
 
 class Run:
-    """A run and its results.
+    """Run with its results.
 
     >>> run = yb.load("fnn_sideslip/25mps").run()
     >>> len(run), "plant.yaw_rate" in run, sorted(run)[:2]
@@ -80,7 +80,7 @@ class Run:
 
     @property
     def record(self) -> dict[str, Any]:
-        """The run record: everything needed to repeat the run, as in run.json."""
+        """Run record: everything needed to repeat the run, as in run.json."""
         return self.results.record.content()
 
     @property
@@ -99,7 +99,7 @@ class Run:
         return self.results.record.overrides
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """Return a column, shape (rows,): `instance.variable`, or the only variable of that name."""
+        """Return a column, shape (rows,), by `instance.variable` or by a unique variable name."""
         return self.results.columns[self.results.column(arguments.text(name, "name of a column"))]
 
     def __contains__(self, name: object) -> bool:

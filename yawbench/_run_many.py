@@ -1,4 +1,4 @@
-"""Execution of many runs: those with Python components in this process, the others in worker processes."""
+"""Executes many runs: those with Python components in this process, the others in worker processes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ._controller import PythonComponent
 
 
 def opener_of(programs: Mapping[Path, PythonComponent]) -> Callable[[Instance, Log, set[Path]], Any]:
-    """Return the function that opens a run's instances: FMUs, and `programs` by their made-up paths."""
+    """Return the function that opens a run's instances: FMUs, and `programs` by their virtual paths."""
 
     def opener(instance: Instance, log: Log, corrupted: set[Path]) -> Any:
         program = programs.get(instance.fmu.path)
@@ -31,7 +31,7 @@ def opener_of(programs: Mapping[Path, PythonComponent]) -> Callable[[Instance, L
 
 
 def planner_of(programs: Mapping[Path, PythonComponent]) -> Planner:
-    """Return a planner that builds FMUs silently if out of date and knows the plain Python components."""
+    """Return a planner that rebuilds stale FMUs silently and resolves plain Python components."""
     opened = {path: program.as_now() for path, program in programs.items()}
     return Planner(build=True, report=lambda text: None, opened=opened)
 
@@ -48,11 +48,11 @@ def make_all(
     done: Callable[[Outcome], None],
     run: Callable[..., Any],
 ) -> list[Outcome]:
-    """Make all runs and return their outcomes in order; those with Python components run last, one by one.
+    """Make all runs and return their outcomes in order; those with Python components run last, serially.
 
     Args:
         jobs: planned runs.
-        programs: Python components by their made-up paths.
+        programs: Python components by their virtual paths.
         workers, done, run: see `execute`; `run` also takes an `opener`.
     """
     here = [

@@ -60,7 +60,7 @@ def load(source: str | Path) -> Scenario:
 
 @dataclass(frozen=True)
 class Scenario:
-    """An immutable scenario with overrides; made by `load`.
+    """Immutable scenario with overrides; created by `load`.
 
         >>> base = yb.load("fnn_sideslip/25mps")
         >>> run = base.swap(controller="controller_off").set({"plant.initial_speed": "80 km/h"}).run()
@@ -77,7 +77,7 @@ class Scenario:
     path: Path
     changes: tuple[Override, ...] = ()
     _programs: Mapping[Path, PythonComponent] = field(default_factory=dict, repr=False)
-    """Components in plain Python, by their made-up paths."""
+    """Components in plain Python, by their virtual paths."""
 
     def __post_init__(self) -> None:
         if not arguments.is_a(self.path, Path):
@@ -92,7 +92,7 @@ class Scenario:
     def swap(
         self, replacements: Mapping[str, ControllerLike] | None = None, /, **instances: ControllerLike
     ) -> Scenario:
-        """Return the scenario with other FMUs or plain Python in place of instances.
+        """Return the scenario with instances replaced by other FMUs or plain Python.
 
             >>> linear = base.swap(tyre="tyre_linear")
             >>> follow = base.swap(controller=lambda yaw_rate_ref, yaw_rate: 2e4 * (yaw_rate_ref - yaw_rate))
@@ -104,8 +104,8 @@ class Scenario:
                 mapping as for `set` or by name. Plain Python is a function whose arguments have the names
                 of signals (`t` is the time in s); an object with `inputs`, `outputs` and `output(t, u)`,
                 and optionally `advance(t, h, u)`, `start(t, u)` and `step_size`; or a component class.
-                Every run uses a copy of the object. Arguments with a default value, and what the object
-                was made with, are parameters for `set`.
+                Every run uses a copy of the object. Arguments with a default value, and constructor
+                arguments of the object, are parameters for `set`.
 
         Raises:
             ScenarioError: the instance is unknown, or its replacement invalid.
@@ -116,7 +116,7 @@ class Scenario:
         return self._swapped({**entries, **instances})
 
     def _swapped(self, instances: Mapping[str, ControllerLike], label: str = "") -> Scenario:
-        """Return the scenario with instances replaced; plain Python is known by the label, if any."""
+        """Return the scenario with instances replaced; a label, if any, names plain Python."""
         existing = self._loaded.units
         changes, programs = [*self._unswapped(instances).changes], dict(self._programs)
         for instance, wanted in instances.items():
@@ -147,7 +147,7 @@ class Scenario:
                 yield Override(target, value, "swap")
 
     def _unswapped(self, instances: Iterable[str]) -> Scenario:
-        """Return the scenario without earlier swaps of instances and the values that came with them."""
+        """Return the scenario without earlier swaps of instances and the values of their programs."""
         swapped = set(instances)
         kept = (
             change
@@ -206,7 +206,7 @@ class Scenario:
             target: `instance.output` for all receivers and the results, `instance.output -> instance` for a
                 single receiver, or `instance.input`; `*` matches several signals.
             kind: such as bias or freeze; the reference of scenario files lists all kinds.
-            value: of the kind, in SI or with its unit.
+            value: value of the fault, in SI or with its unit.
             start, until: start and end [s]; default: those of the run.
             share: fraction of the messages that are affected.
             every: time between two messages [s].
@@ -259,7 +259,7 @@ class Scenario:
         All warnings about the run are issued as one `YawbenchWarning`.
 
         Args:
-            progress: called a few times per second with the number of steps done and in total; or whether
+            progress: called a few times per second with the numbers of completed and all steps; or whether
                 to show a bar; default: in a terminal or a notebook, after two seconds.
 
         Raises:
@@ -284,7 +284,7 @@ class Scenario:
                     if (again := self._in_python(plan)) == plan:
                         raise
                     opened.clear()
-                    run = Run(simulate_in_memory(again, opener=opener))  # fails, too, with an exception
+                    run = Run(simulate_in_memory(again, opener=opener))  # fails again, now with the exception
             except SimulationError as error:
                 warn(plan.title, (*plan.diagnostics, *error.warnings))
                 ended = [instance for instance in opened if instance.name == error.instance]
@@ -323,13 +323,13 @@ def _how_it_runs(fmu: Fmu) -> str:
 
 
 def warn(title: str, diagnostics: Iterable[Diagnostic]) -> None:
-    """Issue all warnings among diagnostics, if any, as one, attributed to the caller of our caller."""
+    """Issue all warnings among diagnostics, if any, as a single warning of the caller's caller."""
     if text := text_of(warnings_in(diagnostics)):
         warnings.warn(f"{title}: {text}", YawbenchWarning, stacklevel=3)
 
 
 def fmu_of(wanted: str | Path, name: str) -> str:
-    """Return the FMU that an argument names: a name unchanged, a path made absolute."""
+    """Return the FMU of an argument: a name unchanged, a path made absolute."""
     path = arguments.path(wanted, name)
     if path.suffix == ".fmu":
         return str(path.absolute())

@@ -1,4 +1,4 @@
-"""Tuning of parameters from Python, of plain Python controllers, too."""
+"""Tuning of parameters from Python, including those of plain Python controllers."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 OBJECTIVE = "objective"
-"""Name of what is minimized, in the made-up experiment."""
+"""Name of the minimized number in the generated experiment."""
 SPACINGS = ("linear", "log")
 
 
@@ -67,7 +67,7 @@ def tune(
             "log" if trials are spread by equal factors.
         objective: a metric, or a mapping of metrics to weights, whose weighted sum is minimized.
         population: trials of a generation; default as in the proving ground's tuning.
-        generations: number of generations, with the first; default: chosen, as many as trials of each.
+        generations: number of generations, including the first; default: chosen, equal to `population`.
         seed: of the random numbers.
         workers: number of processes; default: the number of cores. Plain Python that is not native runs here.
         progress: show a bar; default: in a terminal or a notebook, after two seconds.
@@ -223,7 +223,7 @@ def _diagnostics(done: list[ExperimentResult], reasons: list[str]) -> list[Diagn
 
 @dataclass(frozen=True)
 class Tuning:
-    """The result of a tuning; made by `tune`.
+    """Result of a tuning; created by `tune`.
 
     >>> ranges = {"driver.amplitude": (0.02, 0.03)}
     >>> tuned = yb.tune(base, ranges, "peak(sideslip)", population=5, generations=1)
@@ -242,12 +242,12 @@ class Tuning:
 
     @property
     def objective(self) -> float:
-        """The smallest objective, in SI."""
+        """Smallest objective, in SI."""
         return self._tuned.best.cost
 
     @property
     def values(self) -> dict[str, Value]:
-        """Target -> value with the smallest objective, as `Scenario.set` takes them."""
+        """Values with the smallest objective, as target -> value for `Scenario.set`."""
         assert self._design.spec.tuning is not None
         axes = self._design.spec.tuning.laws[OBJECTIVE].axes
         units = {target: axis.unit for axis in axes.values() for target in axis.vary}
@@ -258,7 +258,7 @@ class Tuning:
 
     @cached_property
     def table(self) -> pd.DataFrame:
-        """One row per trial: generation, objective, values in the units of the ranges."""
+        """Table with a row per trial: generation, objective, values in the units of the ranges."""
         return to_pandas(columns_of([self._tuned])).drop(columns="law")
 
     def plot(self) -> Figure:

@@ -1,4 +1,4 @@
-"""Runs compared with measurements."""
+"""Validation of runs by measurements."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ def validate(run: Run, file: str | Path, *, bands: str | Path = BANDS) -> Valida
         0.77
 
     Args:
-        run: of a steady-state test.
+        run: run of a steady-state test.
         file: the measurement file; each of its segments is a test.
         bands: file of tolerances, or its name in `scenarios/bands`.
 
     Raises:
-        ScenarioError: one of the files cannot be used.
+        ScenarioError: a file cannot be used.
         ResultsError: the signal over which the others are plotted was not recorded.
     """
     simulated = arguments.instance(run, "run", Run, "Scenario.run")

@@ -23,7 +23,7 @@ HEIGHT = 860
 """Default height of a viewer in a notebook [px]. Chosen: five panels with their table."""
 
 LEAST, MOST = 100, 10_000
-"""Limits of that height [px]. Chosen: a table of runs, and more than any screen."""
+"""Limits of the height [px]. Chosen: a table of runs, and more than any screen."""
 
 
 def view(
@@ -45,8 +45,8 @@ def view(
         runs: a run, several, or a mapping of labels to runs; the first is the baseline.
         panels: signals shown at first, such as "yaw_rate" or "plant.sideslip - reference.sideslip_ref";
             default: those of the papers.
-        title: of the page; default: the labels.
-        height: in a notebook [px].
+        title: title of the page; default: the labels.
+        height: height in a notebook [px].
 
     Raises:
         ResultsError: there are no or too many runs, or no run has recorded the signal of a panel.
@@ -89,15 +89,15 @@ def _labelled(runs: object) -> list[LabelledRun]:
 
 @dataclass(frozen=True, repr=False)
 class View:
-    """An interactive viewer; made by `view`.
+    """Interactive viewer; created by `view`.
 
     >>> yb.view(run, "sideslip")
     <View of Sideslip tracking at 25 m/s, mu 0.65>
 
     Attributes:
-        labels: of the runs.
+        labels: labels of the runs.
         html: the complete page, which works offline.
-        height: in a notebook [px].
+        height: height in a notebook [px].
     """
 
     __module__ = "yawbench"

@@ -2,8 +2,8 @@
 
 Public functions check their arguments here before they use them. A check returns the value as plain Python,
 or raises TypeError (wrong kind) or ValueError (right kind, but not allowed) with a sentence that begins with
-the argument's name. Nothing that the value itself defines is trusted: only its type counts, text or bytes
-are never numbers, and no iterator is read without a limit.
+the argument's name. Methods of the value itself are not trusted: only its type counts, text and bytes are
+never numbers, and iterators are read up to a limit.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def count(value: Any, name: str, *, least: int = 1, most: int = MOST) -> int:
 
 
 def scalar(value: Any, name: str) -> float | int | bool | str:
-    """Return a value that a scenario may give: a number, True or False, or text."""
+    """Return a value allowed in a scenario: a number, True or False, or text."""
     converted = plain(value)
     if is_a(converted, bool):
         return cast(bool, converted)
@@ -150,7 +150,7 @@ def items(value: Any, name: str, wanted: str, *, ordered: bool = True) -> list[A
 
 
 def texts(value: Any, name: str, *, ordered: bool = True) -> list[str]:
-    """Return a list of texts, also from a single text."""
+    """Return a list of texts; a single text gives a list with one item."""
     if is_a(plain(value), str):
         return [text(value, name)]
     entries = items(value, name, "text, or a list of texts", ordered=ordered)
@@ -172,7 +172,7 @@ def mapping(value: Any, name: str, wanted: str) -> dict[str, Any]:
 
 
 def function(value: Any, name: str, *parameters: str) -> Callable[..., Any]:
-    """Return a callable that accepts `parameters`, by position."""
+    """Return a callable that accepts the positional arguments `parameters`."""
     wanted = f"a function of {listed(parameters)}"
     if not callable(value) or is_a(value, type):
         refuse(name, wanted, value)
@@ -210,7 +210,7 @@ def as_scenario_errors(origin: str = "") -> Iterator[None]:
 def plain(value: Any) -> Any:
     """Return a NumPy scalar, a 0-d array or an instance of a subclass as plain Python.
 
-    Other objects than numbers, text, True and False are returned unchanged.
+    Objects other than numbers, text, True and False are returned unchanged.
     """
     if is_a(value, np.generic, np.ndarray) and value.shape == ():
         makes = {"b": bool, "i": int, "u": int, "f": float, "U": str}

@@ -1,4 +1,4 @@
-"""Standard tests as environments of Gymnasium, to train controllers.
+"""Gymnasium environments of standard tests, for training controllers.
 
     import gymnasium
     import yawbench.gym
@@ -7,7 +7,7 @@
     observation, info = env.reset(seed=1)
     observation, reward, terminated, truncated, info = env.step([0.2])
 
-A trained policy becomes a controller by `as_controller`, for `Scenario.swap` and `rank`.
+`as_controller` turns a trained policy into a controller, for `Scenario.swap` and `rank`.
 """
 
 from __future__ import annotations
@@ -58,16 +58,16 @@ ANGLE = 0.77667
 LARGEST = 10_000.0
 """Yaw moment of an action of 1 [N.m]. Chosen: about that of locking both wheels of a side on dry road."""
 WORST = -1.0
-"""Reward of a car that spins, or that fails a criterion by its whole bound or more."""
+"""Reward if the car spins, or fails a criterion by 100 % of its bound or more."""
 
 Observation = np.ndarray
 """Signals in SI, shape (signals,)."""
 Policy = Callable[[Observation], Any]
-"""Observation -> action, a number from -1 to 1 or an array of one."""
+"""Observation -> action, a number from -1 to 1 or an array with such a number."""
 
 
 class SineWithDwell(gymnasium.Env[Observation, np.ndarray]):
-    """A controller's view of the sine with dwell (UN R140): one run of the series per episode.
+    """Sine with dwell (UN R140) as an environment for controllers: an episode is a run of the series.
 
         >>> import gymnasium, yawbench.gym
         >>> env = gymnasium.make("yawbench/sine-with-dwell-v0")
@@ -88,7 +88,7 @@ class SineWithDwell(gymnasium.Env[Observation, np.ndarray]):
 
     Args:
         scenario: a scenario of sine with dwell, by name or path.
-        signals: names of the signals that are observed.
+        signals: names of the observed signals.
         angle: hand-wheel angle at 0.3 g [rad] of the scenario's car, of which amplitudes are multiples.
         largest: yaw moment of an action of 1 [N.m].
         render_mode: None; a run is shown by `Run.plot` and `view`.
@@ -133,7 +133,7 @@ class SineWithDwell(gymnasium.Env[Observation, np.ndarray]):
         """Begin a run, and return the first observation and the amplitude.
 
         Args:
-            seed: of the random numbers that choose amplitude and side.
+            seed: seed of the random amplitude and side.
             options: `{"amplitude": ...}`, the amplitude of the hand wheel [rad].
         """
         super().reset(seed=seed)
@@ -164,10 +164,10 @@ class SineWithDwell(gymnasium.Env[Observation, np.ndarray]):
         return self._plans[amplitude]
 
     def _drive(self, plan: Plan) -> None:
-        """Make a run in a thread of its own: it waits in the controller for every action."""
+        """Make a run in a separate thread, in which the controller waits for every action."""
         try:
             self._hand.requests.put(simulate_in_memory(plan, opener=opener_of(self._scenario._programs)))
-        except BaseException as error:  # also that it was abandoned
+        except BaseException as error:  # including `_Abandoned`
             self._hand.requests.put(error)
 
     def _next(self) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -196,7 +196,7 @@ class SineWithDwell(gymnasium.Env[Observation, np.ndarray]):
         return min(margins.values()), {**margins, "passed": min(margins.values()) >= 0.0}
 
     def _abandon(self) -> None:
-        """End the run that waits for an action."""
+        """End a run that waits for an action."""
         if self._thread is not None:
             self._hand.answers.put(None)
             self._thread.join()
@@ -206,11 +206,11 @@ class SineWithDwell(gymnasium.Env[Observation, np.ndarray]):
 
 
 class _Abandoned(BaseException):
-    """Ends a run whose episode is not continued; no error of a controller."""
+    """Exception that ends the run of an abandoned episode; not an error of the controller."""
 
 
 class _Hand:
-    """The controller of an environment: it asks for every value."""
+    """Controller of an environment, which requests every value from the agent."""
 
     outputs = ("yaw_moment",)
 
@@ -221,7 +221,7 @@ class _Hand:
         self._began = -math.inf
 
     def __deepcopy__(self, memo: object) -> _Hand:
-        return self  # the run asks the environment itself
+        return self  # the run uses this object itself
 
     def start(self, t: float, u: Sequence[float]) -> None:
         self._began = t
@@ -237,7 +237,7 @@ class _Hand:
 
 
 class _PolicyController:
-    """A policy as a controller: runs call it as the environment does."""
+    """Policy as a controller, called in runs as in the environment."""
 
     outputs = ("yaw_moment",)
 
@@ -276,7 +276,7 @@ def _moment(action: Any, largest: float) -> float:
     """Return the yaw moment of an action [N.m].
 
     Raises:
-        ValueError: it is not one finite number.
+        ValueError: it is not a single finite number.
     """
     values = np.ravel(np.asarray(action, dtype=float))
     if values.size != 1 or not math.isfinite(values[0]):

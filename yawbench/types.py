@@ -1,4 +1,4 @@
-"""Types of what the library takes and returns, for annotations and `isinstance`; users make few of them.
+"""Types of arguments and results of the library, for annotations and `isinstance`; users create few of them.
 
 import yawbench as yb
 from yawbench.types import Instance
