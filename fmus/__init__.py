@@ -1,1 +1,1 @@
-"""Building FMUs from components; the built *.fmu files are next to this file and not in git."""
+"""Builder of FMUs from components; the *.fmu files are written next to this file and not kept in git."""

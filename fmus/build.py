@@ -1,11 +1,11 @@
-"""Building FMUs from components: find those that changed, build, check and install them.
+"""Builds FMUs from components: finds changed components, builds, checks and installs their FMUs.
 
     build_all(out)                       all components of the project, in Python or in C
-    build_component(source, out, ...)    a component from anywhere, also with other default values
+    build_component(source, out, ...)    any component, optionally with other default values
 
 An FMU is current if it was built from the same sources, by the same builder, with the same
-launcher; the key of all these is in the stamp of its archive. If a component cannot be built, its old
-FMU stays, but runs do not use it (see `rebuild_stale`).
+launcher; a key of all these is in the stamp of its archive. If a component cannot be built, its old
+FMU is kept, but runs do not use it (see `rebuild_stale`).
 """
 
 from __future__ import annotations
@@ -52,11 +52,11 @@ class Report:
     current: list[str] = field(default_factory=list)
     removed: list[str] = field(default_factory=list)
     in_python: dict[str, str] = field(default_factory=dict)  # built without a native library -> why
-    warning: str = ""  # why FMUs that were built have no launcher, if they have none
+    warning: str = ""  # reason if the FMUs have no launcher
 
 
 def find_components(root: Path = COMPONENTS) -> dict[str, Parts]:
-    """Return the components in Python below `root`, as name of FMU -> module."""
+    """Return the Python components below `root`, as name of FMU -> module."""
     modules: dict[str, Parts] = {}
     for folder in sorted(root.iterdir()):
         if folder.is_dir() and folder.name in ROLES:
@@ -84,10 +84,10 @@ def build_all(
 ) -> Report:
     """Build changed components into `out`: all, or those with the given FMU names.
 
-    If all are built without error, FMUs whose components no longer exist are removed.
+    If all are built without errors, FMUs whose components no longer exist are removed.
 
     Raises:
-        BuildError: some components cannot be built; all others are.
+        BuildError: some components cannot be built; all others are built.
     """
     known = find_recipes(root)
     chosen = list(known) if components is None else list(dict.fromkeys(components))
@@ -168,7 +168,7 @@ def _build_one(name: str, out: Path, root: Path) -> list[Diagnostic]:
 
 
 _recipes = functools.cache(find_recipes)
-"""`find_recipes`, once for each worker process."""
+"""`find_recipes`, cached in each worker process."""
 
 
 def errors_of(recipe: Recipe, out: Path, root: Path) -> list[Diagnostic]:
@@ -195,7 +195,7 @@ def build_component(
     force: bool = False,
     root: Path = COMPONENTS,
 ) -> Path:
-    """Build one component into `out` and return the FMU.
+    """Build a component into `out` and return the FMU.
 
     Args:
         source: a Python file inside or outside `root`, or the folder of a component in C. A file
@@ -203,7 +203,7 @@ def build_component(
             package by relative or absolute names.
         role: folder of a role, such as "controllers"; default: that of the source's folder or of the
             file's name ("controller_idea.py").
-        name: of the FMU; default `<role>_<file>`.
+        name: name of the FMU; default `<role>_<file>`.
         defaults: other default values of parameters.
         root: the folder `components`.
     """
@@ -305,7 +305,7 @@ def put(target: Path, content: bytes, *modules: str) -> None:
     """Check an FMU with the Python modules `modules`, and move it to its place atomically.
 
     Raises:
-        BuildError: it is defective; an existing FMU stays unchanged.
+        BuildError: the FMU is defective; an existing FMU is not changed.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
     with draft_of(target, content) as draft:

@@ -1,4 +1,4 @@
-"""Build stamps: the sources and settings that an FMU was built from, in the comment of its archive."""
+"""Build stamps: sources and settings from which an FMU was built, in the comment of its archive."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _UNFINISHED = "-unfinished"
 
 @dataclass(frozen=True)
 class BuildStamp:
-    """The origin of an FMU, and the key of everything that determines its content."""
+    """Origin of an FMU, and the key of everything that determines its content."""
 
     name: str
     key: str
-    source: str  # of a component: from the folder above components/; of a file: from the FMU's folder
-    tool: str = ""  # what built it
-    home: str = ""  # of a file: name of the FMU's folder; copies in other folders are left alone
-    role: str = ""  # of a file: the folder of its role
+    source: str  # path, for components from the folder above components/, for files from the FMU's folder
+    tool: str = ""  # builder and its version
+    home: str = ""  # for files: name of the FMU's folder; copies in other folders are not touched
+    role: str = ""  # for files: folder of the role
     defaults: Mapping[str, Any] = field(default_factory=dict)  # default values that replace the source's
 
     @property
@@ -52,7 +52,7 @@ class BuildStamp:
 
 
 def read_stamp(fmu: Path) -> BuildStamp | None:
-    """Return the stamp of an FMU that was built here, None for other or missing files."""
+    """Return the stamp of an FMU built by this program, None for other or missing files."""
     try:
         check_regular(fmu)
         with zipfile.ZipFile(fmu) as archive:

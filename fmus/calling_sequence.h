@@ -1,5 +1,5 @@
-/* Which call FMI 2.0 allows when, and the time that an instance has reached: one definition for the launcher,
- * native libraries and components in C. What is refused leaves the instance as it was. */
+/* Calling sequence of FMI 2.0, and the time of an instance, for the launcher, native libraries and components
+ * in C. A refused call does not change the instance. */
 #ifndef YAWBENCH_CALLING_SEQUENCE_H
 #define YAWBENCH_CALLING_SEQUENCE_H
 
@@ -19,8 +19,8 @@ typedef struct {
     char text[160];
 } Refusal;
 
-/* Hosts compute their times by sums, products or from whole nanoseconds: a time within this counts as the same.
- * A hundredth of the step is far more than any of them is off, and far less than a step too many. */
+/* Tolerance for the times of hosts, which compute them by sums, products or from integer nanoseconds. A hundredth
+ * of the step is far above their errors, and far below an extra step. */
 static inline double time_tolerance(const Progress *at, double h)
 {
     return 0.01 * h + 1e-12 * fabs(at->time);
@@ -34,7 +34,7 @@ static inline int not_allowed(const Progress *at, const char *call, Refusal *why
     return 0;
 }
 
-/* Write a refusal that holds one or two numbers, with a point whatever the host's locale. */
+/* Write a refusal with one or two numbers, with a decimal point in every locale. */
 static inline int refuse_step(Refusal *why, const char *format, double x, double y)
 {
     snprintf(why->text, sizeof why->text, format, x, y);
@@ -46,7 +46,7 @@ static inline int refuse_step(Refusal *why, const char *format, double x, double
     return 0;
 }
 
-/* Note a call that leads from one phase to another; 0 with the reason if it is not allowed now. */
+/* Register a call that changes the phase; 0 with the reason if it is not allowed now. */
 static inline int pass_on(Progress *at, int from, int to, const char *call, Refusal *why)
 {
     if (at->phase != from) {
@@ -65,7 +65,7 @@ static inline int set_up(Progress *at, double start, int stop_defined, double st
     return 1;
 }
 
-/* Hosts terminate what failed in initialization as well. */
+/* Hosts also terminate instances that failed in initialization. */
 static inline int terminate(Progress *at, Refusal *why)
 {
     if (at->phase == AFTER_TERMINATE) {

@@ -1,7 +1,7 @@
-"""Checks of a newly built FMU: is its model description valid, does it load, what does it compute?
+"""Checks of newly built FMUs: valid model description, loading, parameter values, reference results.
 
-FMUs are loaded in a separate process, the same for all FMUs of a build: an FMU may crash its process or
-leave anything behind in it.
+FMUs are loaded in a separate process, shared by all FMUs of a build, because an FMU may crash its process or
+change its state.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ def defects(fmu: Path, *modules: str) -> list[str]:
 
 
 def reference_files(fmu: Path, *modules: str) -> dict[str, str]:
-    """Return path in the archive -> text of an FMU's reference result, empty if its run fails.
+    """Return an FMU's reference result as path in the archive -> text, empty if its run fails.
 
-    It fails, for instance, without a binary for this platform.
+    The run fails, for instance, without a binary for this platform.
     """
     answer = _ask("reference_files", fmu, *modules)
     return {} if isinstance(answer, str) else answer
 
 
 def _ask(what: str, *arguments: object) -> Any:
-    """Return the answer to a request; if the process died, a text with how it ended."""
+    """Return the answer to a request, or a text with the exit status if the process died."""
     global _checker
     if _checker is None or _checker.poll() is not None:
         _checker = subprocess.Popen(

@@ -1,4 +1,4 @@
-"""Compiling C sources to shared libraries; the launcher and C code that this program calls are cached."""
+"""Compiles C sources to shared libraries, with a cache for the launcher and C code of this program."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ LIBRARIES = ("-ldl", "-pthread")
 STORE = "launcher"
 """Folder of the cache for compiled launchers."""
 OWN_FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off", "-pthread")
-"""Compiler flags for C code that this program calls; contracted operations would differ from Python's."""
+"""Compiler flags for C code of this program; fused multiply-add would give other results than Python."""
 
 
 def compiler_command() -> list[str]:
-    """Return the command of the C compiler: that in the environment variable CC, else `cc`."""
+    """Return the command of the C compiler: environment variable CC, else `cc`."""
     return shlex.split(os.environ.get("CC", "")) or ["cc"]
 
 
 def compiler_tools() -> tuple[str, str]:
-    """Return what identifies the compiler (see `evidence`)."""
+    """Return the items that identify the compiler (see `evidence`)."""
     return "env:CC", f"tool:{compiler_command()[0]}"
 
 
@@ -57,12 +57,12 @@ def compile_library(command: Sequence[str], sources: Mapping[str, bytes], *argum
     """Compile files into a shared library and return it; warnings of the compiler go to stderr.
 
     Args:
-        command: the command of the compiler.
+        command: command of the compiler.
         sources: relative name -> content; relative, so that equal sources give equal libraries.
         arguments: files to compile, and options.
 
     Raises:
-        BuildError: compiling fails; with the compiler's messages.
+        BuildError: compilation fails; with the compiler's messages.
     """
     with tempfile.TemporaryDirectory(prefix="yawbench_") as temporary:
         for name, content in sources.items():
@@ -87,15 +87,15 @@ def compile_library(command: Sequence[str], sources: Mapping[str, bytes], *argum
 def cached_library(
     store: str, sources: Mapping[str, bytes], arguments: Sequence[str], version: str | None = None
 ) -> bytes:
-    """Return a shared library from the cache; compile it first if it is not there.
+    """Return a shared library from the cache, compiling it first if necessary.
 
     Args:
         store: folder of the cache.
         sources, arguments: as for `compile_library`.
-        version: of the compiler; None: libraries of all versions are equivalent.
+        version: version of the compiler; None: libraries of all versions are equivalent.
 
     Raises:
-        BuildError: there is no C compiler, or compiling fails.
+        BuildError: there is no C compiler, or compilation fails.
     """
     command = compiler_command()
     settings = "\0".join([*command, version or platform.machine(), *arguments])

@@ -1,4 +1,4 @@
-/* A Python interpreter for this process: the one that is there, or libpython opened and started. */
+/* Provides a Python interpreter: that of the process, or libpython, which is loaded and started. */
 #ifndef YAWBENCH_FIND_PYTHON_H
 #define YAWBENCH_FIND_PYTHON_H
 
@@ -15,7 +15,7 @@
 
 enum { OLDEST_PYTHON = 10, NEWEST_TESTED_PYTHON = 13, NEWEST_PYTHON = 19 };
 
-/* What the launcher itself calls; the C API's names. */
+/* Functions of Python's C API that the launcher calls. */
 typedef struct {
     int (*Py_IsInitialized)(void);
     void (*Py_InitializeEx)(int with_signal_handlers);
@@ -31,7 +31,7 @@ typedef struct {
     size_t count;
 } Libraries;
 
-/* Only take names here: the loader is locked, opening anything would be a way to a deadlock. */
+/* Only collect names here: the loader is locked, so opening a library could deadlock. */
 static int note_library(struct dl_phdr_info *info, size_t size, void *data)
 {
     (void)size;
@@ -51,7 +51,7 @@ static int note_library(struct dl_phdr_info *info, size_t size, void *data)
     return 0;
 }
 
-/* Give a Python that was loaded with local symbols global ones; false if there is none. */
+/* Make the symbols of a Python that was loaded with local symbols global; false if there is none. */
 static bool promote_loaded_python(void)
 {
     Libraries loaded = {NULL, 0};
@@ -82,7 +82,7 @@ static bool exists(const char *format, ...)
     return length > 0 && (size_t)length < sizeof path && access(path, R_OK) == 0;
 }
 
-/* Cut the last part off `path`; false if nothing would be left. */
+/* Remove the last component of `path`; false if nothing would be left. */
 static bool to_parent(char *path)
 {
     char *slash = strrchr(path, '/');
@@ -93,7 +93,7 @@ static bool to_parent(char *path)
     return true;
 }
 
-/* Find the folder above the library `file` that holds Python 3.`minor`'s modules. */
+/* Find the folder above the library `file` with the modules of Python 3.`minor`. */
 static bool find_home(const char *file, int minor, char home[PATH_MAX])
 {
     if (realpath(file, home) == NULL) {
@@ -113,7 +113,7 @@ static void *open_globally(const char *file)
     return dlopen(file, RTLD_NOW | RTLD_GLOBAL);
 }
 
-/* Open libpython3.`minor` where the loader finds it, or beside a python3 on PATH. */
+/* Open libpython3.`minor` from the loader's search path, or beside a python3 on PATH. */
 static void *open_version(int minor)
 {
     char file[PATH_MAX], binary[PATH_MAX], home[PATH_MAX];
@@ -163,8 +163,7 @@ static bool open_python(char *problem, size_t size)
     return false;
 }
 
-/* True in the plain C locale, where Python itself would read file names as UTF-8 but an embedded one does
- * not. */
+/* True in the C locale, where Python reads file names as UTF-8, but an embedded Python does not. */
 static bool is_plain_locale(void)
 {
     const char *names[] = {"LC_ALL", "LC_CTYPE", "LANG"};
@@ -177,12 +176,12 @@ static bool is_plain_locale(void)
     return true;
 }
 
-/* Start Python without signal handlers and let go of its lock.
+/* Start Python without signal handlers and release its lock.
  *
- * We do it, not a PythonFMU library: the library that starts Python also ends it when it is
- * unloaded, under the feet of all other FMUs. Ours stays until the process ends. The home is named
- * because Python would search it from a python3 on PATH, which may be another one. Python sets the
- * process's LC_CTYPE; the host gets its own back.
+ * The launcher starts Python, not a PythonFMU library: the library that starts Python also ends it when
+ * it is unloaded, while other FMUs use it. Ours runs until the process ends. Python's home is set
+ * because Python would search for it from a python3 on PATH, which may be another installation. Python
+ * sets the process's LC_CTYPE, which is restored for the host.
  */
 static void start_python(const Python *python, int minor)
 {
@@ -222,7 +221,7 @@ static void start_python(const Python *python, int minor)
     python->PyEval_SaveThread();
 }
 
-/* Find or start Python; false with a sentence in `problem` if there is none to be had. */
+/* Find or start Python; false with a sentence in `problem` if there is none. */
 static bool provide_python(Python *python, char *problem, size_t size)
 {
     if (dlsym(RTLD_DEFAULT, "Py_IsInitialized") == NULL && !promote_loaded_python() &&
@@ -260,7 +259,7 @@ static bool provide_python(Python *python, char *problem, size_t size)
                  OLDEST_PYTHON, (int)strcspn(version, " "), version);
         return false;
     }
-    /* Two FMUs may be loaded at once by two threads; a lock that all libraries share is stderr's. */
+    /* Two threads may load FMUs at once; the lock of stderr is shared by all libraries. */
     flockfile(stderr);
     if (!python->Py_IsInitialized()) {
         start_python(python, minor);

@@ -1,16 +1,16 @@
-/* The FMU's binary on Linux: opens the component's native library if there is one beside it, and passes every call
- * on to it. Otherwise it provides Python, and passes them on to PythonFMU's library.
+/* Launcher: the FMU's binary on Linux. It forwards every call to the component's native library if there is one
+ * beside it, otherwise to PythonFMU's library, for which it provides Python.
  *
- * PythonFMU 0.7.0's own library has no link to libpython, so only a host that is itself a Python
- * could load it. This launcher lies in its place and opens it, from beside itself, at the first
- * instantiation. On the way it mends what the library gets wrong for every host:
+ * PythonFMU 0.7.0's own library is not linked to libpython, so only a host that is itself a Python
+ * process could load it. This launcher takes its place and opens it, in its own folder, at the first
+ * instantiation. It also corrects faults of the library that affect every host:
  *
  * - the resource location is decoded in full, not only "%20";
  * - an error that the component logged becomes the status of the call during which it was logged,
  *   and errors are logged even if debug logging is off, so that no host can miss them;
- * - after fmi2Fatal the instance has been released already: nothing is called on it any more;
- * - reset makes a new instance, because the library touches a freed list if that fails;
- * - arguments that are NULL, empty or no UTF-8 are refused instead of ending the process;
+ * - after fmi2Fatal the instance has already been released: no further function is called on it;
+ * - reset creates a new instance, because the library accesses a freed list if its own reset fails;
+ * - arguments that are NULL, empty or not UTF-8 are refused instead of crashing the process;
  * - a GUID of another FMU, calls out of order and steps from a wrong time are refused (calling_sequence.h).
  */
 #define _GNU_SOURCE
@@ -32,10 +32,10 @@
 #define NATIVE "native.so"
 #define WANTED "YAWBENCH_UNITS" /* "python" for the component itself */
 
-/* PythonFMU's library, or the native one: loaded once, by whoever instantiates first. */
+/* PythonFMU's library, or the native library: loaded once, at the first instantiation. */
 static struct {
     void *handle;
-    bool native; /* it is the component's own library, not PythonFMU's */
+    bool native; /* the component's native library, not PythonFMU's */
     fmi2InstantiateFn Instantiate;
     fmi2FreeInstanceFn FreeInstance;
 #define MEMBER(name, parameters) fmi2##name##Fn name;
@@ -45,7 +45,7 @@ static struct {
 static Python python;
 static pthread_mutex_t loading = PTHREAD_MUTEX_INITIALIZER;
 
-/* What the host gets as the state of an instance. */
+/* State of an instance as passed to the host. */
 typedef struct {
     fmi2FMUstate stock; /* the library's */
     Progress at;
@@ -72,7 +72,7 @@ typedef struct {
 
 /* ---- log ---- */
 
-/* Send a message of the launcher's own to the host; its text must hold no '%'. */
+/* Send a message of the launcher itself to the host; its text must not contain '%'. */
 static void tell(const fmi2CallbackFunctions *host, const char *name, const char *text)
 {
     char *safe = double_percent(text);
@@ -82,7 +82,7 @@ static void tell(const fmi2CallbackFunctions *host, const char *name, const char
     free(safe);
 }
 
-/* Messages of a failure reach every host; the rest only those that asked for debug logging. */
+/* Error messages reach every host; other messages only hosts with debug logging on. */
 static bool wanted(const Instance *in, fmi2Status status, const char *category)
 {
     if (status != fmi2OK && strcmp(category, "traceback") != 0) {
@@ -99,7 +99,7 @@ static bool wanted(const Instance *in, fmi2Status status, const char *category)
     return false;
 }
 
-/* The logger that PythonFMU's library sees; the component has doubled its '%' already. */
+/* Logger passed to PythonFMU's library; the component has already doubled its '%'. */
 static void relay(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
                   fmi2String category, fmi2String message, ...)
 {
@@ -109,7 +109,7 @@ static void relay(fmi2ComponentEnvironment environment, fmi2String name, fmi2Sta
         in->error_logged = true;
     }
     char *safe = NULL;
-    if (category == NULL) { /* from the library itself, which doubles nothing */
+    if (category == NULL) { /* from the library itself, which does not double '%' */
         category = status == fmi2Fatal ? "logStatusFatal" : status == fmi2OK ? "logAll" : "logStatusError";
         message = safe = double_percent(message);
     }
@@ -134,7 +134,7 @@ static inline fmi2Status checked(Instance *in, fmi2Status status)
     return UNLIKELY(in->error_logged || status == fmi2Fatal) ? settled(in, status) : status;
 }
 
-/* Refuse a call, unless it is allowed. */
+/* Refuse a call if it is not allowed. */
 #define ALLOWED(condition)                                                                                   \
     Refusal why;                                                                                             \
     if (UNLIKELY(!(condition))) {                                                                            \
@@ -147,7 +147,7 @@ static fmi2Status refused(Instance *in, const char *text)
     return fmi2Error;
 }
 
-/* Leave the calling function unless its instance `c` is there and alive. */
+/* Return from the calling function unless its instance `c` exists and is alive. */
 #define INSTANCE(c)                                                                                          \
     Instance *in = (c);                                                                                      \
     if (UNLIKELY(in == NULL || in->dead)) {                                                                  \
@@ -161,18 +161,18 @@ static fmi2Status refused(Instance *in, const char *text)
 
 /* ---- loading ---- */
 
-/* Write the folder of this very file to `folder`. */
+/* Write the folder of this library to `folder`. */
 static bool own_folder(char folder[PATH_MAX])
 {
     Dl_info own;
     return dladdr(&library, &own) != 0 && realpath(own.dli_fname, folder) != NULL && to_parent(folder);
 }
 
-/* The process ends or the FMU is being unloaded; Python itself stays.
+/* Called when the process ends or the FMU is unloaded; Python itself stays loaded.
  *
- * PythonFMU's library gives up its handle on Python twice when a process ends, the second time
- * through a freed pointer. Asked to do it before, it has none left. It must be asked by a handler
- * that is younger than its own, so not by a destructor.
+ * PythonFMU's library releases its handle on Python twice when a process ends, the second time
+ * through a freed pointer. If it has released the handle before, it does not release it again. This must be
+ * done by an exit handler registered after the library's own, not by a destructor.
  */
 static void unload(void)
 {
@@ -224,7 +224,7 @@ static bool open_library(const char *name, char *problem, size_t size)
     return true;
 }
 
-/* True if the FMU has a native library and nobody asks for Python. */
+/* True if the FMU has a native library and Python is not requested. */
 static bool is_native(void)
 {
     char folder[PATH_MAX];
@@ -246,7 +246,7 @@ static bool load(char *problem, size_t size)
 
 /* ---- resources ---- */
 
-/* Read the first line of a file of `folder`; false if there is none. */
+/* Read the first line of a file in `folder`; false if there is none. */
 static bool read_line(const char *folder, const char *name, char *line, int size)
 {
     char file[PATH_MAX];
@@ -260,7 +260,7 @@ static bool read_line(const char *folder, const char *name, char *line, int size
     return read;
 }
 
-/* True if `folder` holds what PythonFMU's library is going to read without looking. */
+/* True if `folder` contains the files that PythonFMU's library reads without checking. */
 static bool is_complete(const char *folder)
 {
     char module[256] = "";
@@ -269,14 +269,14 @@ static bool is_complete(const char *folder)
     return named && exists("%s/%s.py", folder, module);
 }
 
-/* True if `guid` is the one that was packed with the resources. */
+/* True if `guid` is that packed with the resources. */
 static bool is_guid_of(const char *folder, const char *guid)
 {
     char packed[64] = "";
     return read_line(folder, "guid.txt", packed, sizeof packed) && strcmp(packed, guid) == 0;
 }
 
-/* Return the resource folder as PythonFMU's library must be told it; NULL with a sentence in `problem`. */
+/* Return the resource folder in the form expected by PythonFMU's library; NULL with a sentence in `problem`. */
 static char *find_resources(const char *location, const char *guid, char *problem, size_t size)
 {
     char folder[PATH_MAX], own[PATH_MAX + sizeof "/../../resources"];
@@ -290,7 +290,7 @@ static char *find_resources(const char *location, const char *guid, char *proble
     decode_percent(decoded);
     own[0] = '\0';
     if (own_folder(
-            folder)) { /* by the standard's layout; for a host that names no location, or a wrong one */
+            folder)) { /* from the standard's layout, if the host passes no location or a wrong one */
         snprintf(own, sizeof own, "%s/../../resources", folder);
     }
     const char *candidates[] = {decoded, plain, own};
@@ -361,7 +361,7 @@ static void discard(Instance *in)
     free(in);
 }
 
-/* PythonFMU's library always logs, so that no error passes unseen; `wanted` decides for the host. */
+/* PythonFMU's library always logs, so that no error is lost; `wanted` decides what the host gets. */
 static fmi2Component new_stock(Instance *in)
 {
     return library.Instantiate(in->name, fmi2CoSimulation, in->guid, in->resources, &in->own, in->visible,
@@ -398,7 +398,7 @@ EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String 
     in->visible = visible;
     in->log_all = logging_on != fmi2False;
     in->guid = strdup(guid == NULL ? "" : guid);
-    if (!library.native && in->guid != NULL) { /* a native library needs none */
+    if (!library.native && in->guid != NULL) { /* not needed by a native library */
         in->resources = find_resources(location, in->guid, problem, sizeof problem);
     }
     if (in->resources == NULL && !library.native) {
@@ -531,7 +531,7 @@ SET(String, REQUIRE(all_utf8(n, value), "fmi2SetString: a string is missing or n
 
 /* ---- FMI: state ---- */
 
-/* Take note of a new state, so that none outlives its instance; false where there is no memory for it. */
+/* Register a new state, so that it is freed with its instance; false if out of memory. */
 static bool keep(Instance *in, State *state)
 {
     State **states = realloc(in->states, (in->n_states + 1) * sizeof *states);
@@ -572,7 +572,7 @@ static bool is_empty(fmi2FMUstate state)
     return empty;
 }
 
-/* Hand a new state over in place of the one that `*target` may hold; a failed instance gives an empty one. */
+/* Return a new state in `*target`, replacing an existing state; a failed instance gives an empty state. */
 static fmi2Status deliver(Instance *in, fmi2FMUstate fresh, Progress at, fmi2FMUstate *target,
                           const char *failure)
 {
@@ -627,7 +627,7 @@ EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
     return status;
 }
 
-/* A saved state in bytes: what the library makes of it, then how far the instance had come. */
+/* Serialized state: the library's serialization, then phase and time of the instance. */
 EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
 {
     INSTANCE(c)
@@ -642,7 +642,7 @@ EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi
 {
     INSTANCE(c)
     REQUIRE(bytes != NULL, "fmi2SerializeFMUstate: no place for the bytes")
-    size_t needed = 0; /* the library copies as many as it is told, however many there are */
+    size_t needed = 0; /* the library copies as many bytes as requested, without checking */
     fmi2Status status = fmi2SerializedFMUstateSize(c, state, &needed);
     if (status != fmi2OK) {
         return status;

@@ -1,7 +1,7 @@
-/* Functions by the versions that glibc has had from the beginning, so that a library made here runs with glibc 2.14
- * (2011) and newer. Without this, exp, log and pow ask for 2.29, fmod for 2.38 and dlopen for 2.34. Their results
- * are the same; the older versions also set errno. Programs that load libraries at all have dlopen, wherever their
- * glibc keeps it. To be included after a header of the standard library. */
+/* Binds functions to their oldest symbol versions in glibc, so that libraries built here run with glibc 2.14 (2011)
+ * and newer. Otherwise exp, log and pow require 2.29, fmod 2.38 and dlopen 2.34. Results are the same; the older
+ * versions also set errno. Programs that load libraries have dlopen, in whichever library of their glibc. Include
+ * this after a header of the standard library. */
 #ifndef YAWBENCH_OLDEST_GLIBC_H
 #define YAWBENCH_OLDEST_GLIBC_H
 

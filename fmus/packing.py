@@ -1,8 +1,8 @@
-"""Packing of FMU archives: complete, minimal, reproducible.
+"""Reproducible packing of FMU archives.
 
-The same sources give the same bytes, wherever and whenever they are built: files are sorted,
+The same sources give the same bytes, independent of place and time of the build: files are sorted,
 stored without compression (compressors differ), all with the same date and permissions. The GUID
-follows from the model description and the resources, not from the binaries.
+is derived from the model description and the resources, not from the binaries.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .source_files import PYTHONFMU
 DESCRIPTION = "modelDescription.xml"
 _DATE = (1980, 1, 1, 0, 0, 0)
 LIBRARIES = sorted(PYTHONFMU.glob("resources/binaries/*/*"))
-"""PythonFMU's libraries, in a folder for each platform."""
+"""PythonFMU's libraries, in a folder per platform."""
 PYTHONFMU_LIBRARY = "libpythonfmu-export.so"
 """Name of PythonFMU's library next to the launcher, which opens it by this name."""
 
@@ -33,10 +33,9 @@ def pack(
 
     Args:
         resources: Python sources, as path -> text.
-        description: the model description.
-        name: of the FMU.
-        version: of the FMU.
-        launcher: binary for Linux that opens PythonFMU's library; None: that library alone.
+        description: model description.
+        name, version: of the FMU.
+        launcher: binary for Linux that opens PythonFMU's library; None: only that library.
     """
     files = {f"resources/{path}": text.encode() for path, text in sorted(resources.items())}
     description.set("version", version)

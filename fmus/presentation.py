@@ -1,6 +1,6 @@
-"""Metadata of an FMU that other programs show: authors, a page of documentation, an icon.
+"""Metadata of an FMU for display in other programs: authors, documentation page, icon.
 
-Nothing here depends on when or where the FMU is built: the date is that of this version of the
+The metadata do not depend on time or place of the build: the date is that of this version of the
 program, and the icons are drawn in advance (`docs/generate/icons.py`).
 """
 
@@ -21,17 +21,17 @@ from .packing import DESCRIPTION
 from .reference_result import FOLDER
 
 DATE = "2026-11-22T00:00:00Z"
-"""Date of this version of the program; with the time of the build, FMUs would not be reproducible."""
+"""Date of this version of the program; the time of the build would make FMUs irreproducible."""
 CREDITS = {
     "author": "The yawbench developers",
     "copyright": "Copyright (c) 2026 The yawbench developers",
     "license": "MIT",
 }
-"""Attributes of the model descriptions of the project's own components."""
+"""Attributes of model descriptions of the project's components."""
 HERE = Path(__file__).resolve().parent
 ICONS = HERE / "icons"
 PAGE = HERE / "page.html.j2"
-"""Template of the documentation."""
+"""Template of the documentation page."""
 
 
 def presented(
@@ -40,7 +40,7 @@ def presented(
     """Return the files of an FMU with documentation, icon and credits added.
 
     Args:
-        files: of the archive.
+        files: files of the archive.
         sources: its sources as path -> text, the component's own file first.
         role: such as "controller".
         credits: attributes of the model description, added where they are missing.
@@ -61,7 +61,7 @@ def presented(
 
 
 def _declare_role(root: Element, role: str) -> None:
-    """Add the role to a model description, in an annotation of its own: each may hold one element."""
+    """Add the role to a model description, in a separate annotation: each may contain only one element."""
     annotations = root.find("VendorAnnotations")
     if annotations is None:
         annotations = Element("VendorAnnotations")
@@ -100,7 +100,7 @@ def _blocks(source: str) -> list[str]:
     """Return the blocks of a docstring: paragraphs and indented equations."""
     try:
         docstring = ast.get_docstring(ast.parse(source)) or ""
-    except SyntaxError:  # not written in Python
+    except SyntaxError:  # not Python
         return []
     return [block for block in re.split(r"\n\s*\n", docstring.strip("\n")) if block]
 
@@ -112,7 +112,7 @@ _GREEK = {
 
 
 def _symbols(equations: str) -> str:
-    """Return equations with Greek letters and superscripts."""
+    """Return equations typeset with Greek letters and superscripts."""
     shown = re.sub(r"\b([a-z]+)(?=\b|_)", lambda m: _GREEK.get(m[1], m[1]), equations)
     return shown.replace("^2", "²").replace("^3", "³")
 

@@ -1,10 +1,10 @@
 """Rebuilds stale FMUs before a scenario runs.
 
-FMUs that were built here carry a stamp. Its key is compared with the present key of the sources.
+FMUs built by this program carry a stamp, whose key is compared with the current key of the sources.
 Computing a key takes a tenth of a second, so it is cached with its evidence, which takes a few
 milliseconds to check. FMUs are rebuilt in place: those of the project's components in its folder
-`fmus/`, those of users' own files where they were built. Copies elsewhere are never changed, only
-reported. If the folder cannot be written, or belongs to an installed yawbench, FMUs are built into
+`fmus/`, those of users' files where they were built. Copies elsewhere are never changed, only
+reported. If the folder is not writable, or belongs to an installed yawbench, FMUs are built into
 the cache.
 """
 
@@ -33,11 +33,11 @@ KEYS = "keys"
 BUILT = "fmus"
 """Folder of the cache for FMUs that are not built in their own folder."""
 _NO_KEY = "none"
-"""The key of sources that cannot be read or parsed."""
+"""Key of sources that cannot be read or parsed."""
 
 
 class FmuUpdater:
-    """Brings FMUs up to date, each once. `report` is called with a line for each FMU that is built."""
+    """Brings FMUs up to date, each once; `report` is called with a line for each FMU that is built."""
 
     def __init__(self, report: Callable[[str], None]) -> None:
         self._report = report
@@ -46,12 +46,12 @@ class FmuUpdater:
         self._brought: dict[tuple[Path, bool], tuple[Path, BuildInfo | None]] = {}
 
     def bring(self, archive: Path, *, build: bool) -> tuple[Path, BuildInfo | None]:
-        """Return the archive to open instead of `archive`, and its build info if its sources are here.
+        """Return the archive to open instead of `archive`, and its build info if its sources exist.
 
-        If it does not exist and cannot be built, `archive` itself is returned.
+        If the FMU does not exist and cannot be built, `archive` itself is returned.
 
         Raises:
-            BuildError: it has to be built, and cannot be.
+            BuildError: the FMU must be built, but the build fails.
         """
         if (archive, build) not in self._brought:
             self._brought[archive, build] = self._bring(archive, build)
@@ -77,7 +77,7 @@ class FmuUpdater:
         return existing, _built(stamp, current=False) if stale else None
 
     def _key(self, archive: Path, stamp: BuildStamp) -> str | None:
-        """Return the key that the FMU would have if built now, None if its source is not here."""
+        """Return the key that the FMU would have if built now, None if its source does not exist."""
         entry = content_digest(str(archive).encode())
         about = asdict(replace(stamp, key=""))
         record = json.loads(recall(KEYS, entry) or b"{}")
@@ -96,7 +96,7 @@ class FmuUpdater:
         return key
 
     def _recipe(self, archive: Path, stamp: BuildStamp) -> Recipe | None:
-        """Return the recipe of an FMU, None if its source is not here."""
+        """Return the recipe of an FMU, None if its source does not exist."""
         from .build import find_recipes, recipe_of  # slow to import, and not needed if all is current
 
         if stamp.is_component:
@@ -127,13 +127,13 @@ class FmuUpdater:
 
 
 def build_folder(folder: Path) -> Path:
-    """Return the folder into which FMUs of `folder` are built: itself, or one in the cache."""
+    """Return the folder into which FMUs of `folder` are built: `folder` itself, or a folder of the cache."""
     installed = folder == HERE and not (HERE.parent / "pyproject.toml").exists()
     return folder if os.access(folder, os.W_OK) and not installed else in_cache(folder)
 
 
 def in_cache(folder: Path) -> Path:
-    """Return the folder in the cache for FMUs whose own folder cannot be written or is installed."""
+    """Return the folder of the cache for FMUs whose own folder is not writable or installed."""
     return cache_folder() / BUILT / content_digest(str(folder).encode())
 
 
@@ -142,5 +142,5 @@ def _built(stamp: BuildStamp, *, current: bool) -> BuildInfo:
 
 
 def _is_at_home(archive: Path, stamp: BuildStamp) -> bool:
-    """Return whether an FMU is where it was built, as far as its stamp shows."""
+    """Return whether an FMU is still where it was built, according to its stamp."""
     return archive.parent.resolve() == HERE if stamp.is_component else archive.parent.name == stamp.home

@@ -1,4 +1,4 @@
-"""Recipe of a Python component: the files of its FMU; `c.c_recipe` has that of a component in C."""
+"""Recipe of Python components, which makes the files of an FMU (for components in C: `c.c_recipe`)."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ HERE = Path(__file__).resolve().parent
 
 @dataclass(frozen=True)
 class PythonRecipe:
-    """Builds the FMU of a Python component. Its methods raise BuildError if the sources are wrong."""
+    """Recipe of the FMU of a Python component. Methods raise BuildError if the sources are wrong."""
 
     name: str
     module: Parts
@@ -45,7 +45,7 @@ class PythonRecipe:
         return ROLES[self.module[0]].name
 
     def listing(self) -> dict[str, str]:
-        """Return the component's own file, as path -> text."""
+        """Component's own file, as path -> text."""
         path = "/".join(self.module) + ".py"
         return {path: self._files[path]}
 

@@ -1,6 +1,6 @@
-"""Reference results: outputs of an FMU for given inputs, with which other tools can compare theirs.
+"""Reference results: outputs of an FMU for given inputs, for comparison with other tools.
 
-Inputs, settings and outputs have the form of the FMI Cross-Check (`NAME_in.csv`, `NAME_ref.opt`,
+Inputs, settings and outputs are in the format of the FMI Cross-Check (`NAME_in.csv`, `NAME_ref.opt`,
 `NAME_ref.csv`), which many tools read; a manifest following FMI-LS-REF 1.0.0-alpha.1, the layered
 standard for reference files, describes them.
 
@@ -21,7 +21,7 @@ from .usual_ranges import usual_range
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 STOP, STEP = 2.0, 0.02  # [s], chosen: all components respond by then; few enough rows for an archive
 DIGITS = 6
-"""Digits of the largest value of a column. Chosen: far coarser than differences of mathematical libraries."""
+"""Digits of the largest value of a column. Chosen: much coarser than differences of math libraries."""
 _MANIFEST = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiReferences xmlns:fmi-ls="http://fmi-standard.org/fmi-ls-manifest"
   fmi-ls:fmi-ls-name="org.fmi-standard.fmi-ls-ref" fmi-ls:fmi-ls-version="1.0.0-alpha.1"
@@ -42,7 +42,7 @@ def reference_result(fmu: Path) -> dict[str, str]:
     """Run an FMU and return its reference result, as path in the archive -> text.
 
     Raises:
-        Exception: the run fails.
+        Exception: the run failed.
     """
     import fmpy
 

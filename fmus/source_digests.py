@@ -1,6 +1,6 @@
-"""Evidence for the key of an FMU: the files, folders and tools that determine it, with their digests.
+"""Evidence for the key of an FMU: digests of the files, folders and tools that determine it.
 
-A key is costly to compute (sources are parsed, the compiler reports its version), its evidence is
+A key is expensive to compute (sources are parsed, the compiler reports its version), its evidence is
 cheap to check: as long as all digests are the same, so is the key.
 
     /path/to/file, /path/to/folder      content; names in it
@@ -22,13 +22,13 @@ Evidence = Mapping[str, str]
 
 
 class SourceDigests:
-    """Digests of the present state, each computed once."""
+    """Digests of the current state, each computed once."""
 
     def __init__(self) -> None:
         self._digests: dict[str, str] = {}
 
     def at(self, item: str) -> str:
-        """Return the present digest of an item."""
+        """Return the current digest of an item."""
         if item not in self._digests:
             self._digests[item] = _digest(item)
         return self._digests[item]
@@ -38,7 +38,7 @@ class SourceDigests:
         return all(self.at(item) == digest for item, digest in evidence.items())
 
     def evidence(self, items: Iterable[str | Path]) -> dict[str, str]:
-        """Return the present evidence: the items with their digests."""
+        """Return the current evidence: items with their digests."""
         return {str(item): self.at(str(item)) for item in items}
 
 

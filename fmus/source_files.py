@@ -1,13 +1,13 @@
-"""The source files that an FMU needs: the transitive closure of its imports.
+"""Source files of an FMU: the transitive closure of its imports.
 
 Only the closure is packed and hashed, so a change of `mathematics/fuzzy.py` changes only the FMUs that use
-it. Imports are read from the syntax tree; nothing is executed. Absolute imports must be of the standard
+it. Imports are read from the syntax tree, without executing code. Absolute imports must be of the standard
 library, because the host's Python may have nothing else, or of packages that the component declares as
-`host_packages`. All others are made relative, so that an FMU uses neither another FMU's version of a module
-nor one of its host that has the same name:
+`host_packages`. All others are made relative, so that an FMU does not use a module of the same name from
+another FMU or its host:
 
     components.<...>, vocabulary.<...>, pythonfmu.<...>    modules of this project
-    yawbench                                               its functions for declarations
+    yawbench                                               functions for declarations
     <...>                                                  modules of the user, see `UserModules`
 """
 
@@ -30,12 +30,12 @@ from orchestrator.errors import BuildError
 from .source_digests import SourceDigests, content_digest
 
 Parts = tuple[str, ...]
-"""A module's dotted name inside the package, split: ("controllers", "fnn")."""
+"""Dotted name of a module inside the package, split: ("controllers", "fnn")."""
 
 PYTHONFMU = Path(pythonfmu.__file__).resolve().parent
 """Folder of the installed PythonFMU."""
 BESIDE = {"pythonfmu": PYTHONFMU, "vocabulary": Path(vocabulary.__file__).resolve().parent}
-"""Packages that are copied into FMUs besides the components -> their folders."""
+"""Packages other than the components that are copied into FMUs -> their folders."""
 DECLARATIONS = ("fmi", "variables")
 """Module of `yawbench.parameter`, `yawbench.signal` and `yawbench.output`."""
 OWN = "own"
@@ -43,15 +43,15 @@ OWN = "own"
 
 
 class UserModules:
-    """Modules of a user that an FMU takes along: those beside a file, and those of the file's package.
+    """User modules that are packed into an FMU: those beside a file, and those of the file's package.
 
     Args:
-        file: of the component or program.
+        file: file of the component or program.
         module: its name; default: as if imported from above all folders that have an `__init__.py`.
 
     Attributes:
         root: folder from which the modules are imported.
-        package: of the file.
+        package: package of the file.
     """
 
     def __init__(self, file: Path, module: str | None = None) -> None:
@@ -77,7 +77,7 @@ class UserModules:
         return None
 
     def base(self, node: ast.ImportFrom) -> Parts | None:
-        """Return the module that a relative import of the file is of, None if it is not the user's."""
+        """Return the module to which a relative import of the file refers, None if it is not the user's."""
         depth = len(self.package) + 1 - node.level
         if depth < 0:
             return None
@@ -88,12 +88,12 @@ class UserModules:
 
 @dataclass(frozen=True)
 class ResolvedImport:
-    """An import statement inside an FMU.
+    """Import statement inside an FMU.
 
     Attributes:
-        modules: of the package that it needs.
-        outside: packages that it needs outside of the standard library.
-        text: the statement with relative names; None: as it is.
+        modules: modules of the package that it needs.
+        outside: packages outside the standard library that it needs.
+        text: the statement with relative names; None: unchanged.
     """
 
     modules: tuple[Parts, ...] = ()
@@ -103,23 +103,23 @@ class ResolvedImport:
 
 @dataclass(frozen=True)
 class _Module:
-    """One source file: its text, and the modules of the package it imports."""
+    """Source file: its text, and the modules of the package that it imports."""
 
     text: str
-    imports: tuple[tuple[Parts, str], ...]  # and where: file:line
-    outside: tuple[tuple[str, str], ...] = ()  # packages outside the standard library, and where
-    host_packages: tuple[str, ...] = ()  # of these, those that the component in it declares
+    imports: tuple[tuple[Parts, str], ...]  # module, and location as file:line
+    outside: tuple[tuple[str, str], ...] = ()  # packages outside the standard library, and locations
+    host_packages: tuple[str, ...] = ()  # of these, those declared by the component in it
     file: Path | None = None
     digest: str = ""  # of the file's content
 
 
 class Sources:
-    """The source files of components, read and parsed once.
+    """Source files of components, read and parsed once.
 
     Args:
         root: folder of the package `components`.
-        user: modules of the user, for a component outside of `root`.
-        entry: module that the user's file becomes.
+        user: modules of the user, for a component outside `root`.
+        entry: module of the user's file inside the package.
     """
 
     def __init__(self, root: Path, *, user: UserModules | None = None, entry: Parts | None = None) -> None:
@@ -131,11 +131,11 @@ class Sources:
     def closure(self, module: Parts) -> dict[str, str]:
         """Return path -> text of every file that importing `module` executes, sorted.
 
-        The `__init__.py` of a user's package is empty unless something is imported from it: it often imports
-        what an FMU does not need and cannot take along.
+        The `__init__.py` of a user's package is left empty unless names are imported from it, because it
+        often imports modules that an FMU does not need and cannot contain.
 
         Raises:
-            BuildError: a file is missing, cannot be parsed, or imports what an FMU must not.
+            BuildError: a file is missing, cannot be parsed, or has an import that is not allowed in FMUs.
         """
         files: dict[str, str] = {}
         evidence: dict[str, str] = {}
@@ -169,12 +169,12 @@ class Sources:
                     )
             if source.file is not None:
                 evidence[str(source.file)] = source.digest
-                folders.add(source.file.parent)  # a new file in it can come before one that is known
+                folders.add(source.file.parent)  # a new file in it may take precedence over a known file
         self.evidence[module] = evidence | SourceDigests().evidence(sorted(folders))
         return dict(sorted(files.items()))
 
     def _missing(self, parts: Parts) -> str:
-        """Return the message about a module that does not exist."""
+        """Return the error message for a module that does not exist."""
         if self.user and parts[0] == OWN:
             return f"no module {'.'.join(parts[1:])} in {self.user.root}"
         if self.user and self.entry and parts[:-1] == self.entry[:-1]:
@@ -202,7 +202,7 @@ class Sources:
         return _module_file(self.root, parts)
 
     def _module(self, parts: Parts) -> _Module | None:
-        """Return a module of the package, None if there is none."""
+        """Return a module of the package, None if it does not exist."""
         if parts not in self._modules:
             file = self.file(parts)
             source = None
@@ -250,7 +250,7 @@ class Sources:
     def resolve(
         self, node: ast.Import | ast.ImportFrom, package: Parts, where: str, *, is_entry: bool = False
     ) -> ResolvedImport:
-        """Resolve an import in a module of `package`, or in the entry. `where` begins messages.
+        """Resolve an import in a module of `package`, or in the entry; messages begin with `where`.
 
         Raises:
             BuildError: the import cannot be written with relative names.
@@ -288,7 +288,7 @@ class Sources:
             if alias.asname or len(base) == 2:
                 name = alias.asname or alias.name
                 statements.append(f"from {dots}{'.'.join(base[:-1])} import {base[-1]} as {name}")
-            else:  # binds the first name; importing the others makes them its attributes
+            else:  # binds the first name; importing the submodules makes them its attributes
                 statements.append(f"from {dots}{OWN} import {base[1]}")
                 statements.append(f"from {dots}{'.'.join(base[:-1])} import {base[-1]} as _{base[-1]}")
         return ResolvedImport(tuple(modules), tuple(outside), "; ".join(statements) if modules else None)
@@ -299,7 +299,7 @@ class Sources:
         return self.file(parts).exists()
 
     def _absolute(self, module: str) -> Parts | None:
-        """Return the module of the package with an absolute name, None if it is not in the package."""
+        """Return the module of the package for an absolute name, None if it is not in the package."""
         names = tuple(module.split("."))
         if names[0] == "components":
             return names[1:]
@@ -311,7 +311,7 @@ class Sources:
         return (OWN, *names) if is_own else None
 
     def _base(self, node: ast.ImportFrom, package: Parts, where: str) -> Parts | None:
-        """Return the module of the package that a `from` imports from, None for the standard library."""
+        """Return the module of the package to which a `from` refers, None for the standard library."""
         if node.level == 0:
             return self._absolute(node.module or "")
         if node.level > len(package) + 1:
@@ -331,12 +331,12 @@ def _module_file(folder: Path, parts: Parts) -> Path:
 
 
 def _dots(package: Parts) -> str:
-    """Return the beginning of relative names in a module of `package`."""
+    """Return the dots with which relative names begin in a module of `package`."""
     return "." * (len(package) + 1)
 
 
 def _replace(lines: list[str], node: ast.Import | ast.ImportFrom, text: str) -> None:
-    """Replace a statement in the lines of a module; the lines keep their numbers."""
+    """Replace a statement in the lines of a module, without changing line numbers."""
     first, last = node.lineno - 1, (node.end_lineno or node.lineno) - 1
     before = lines[first].encode()[: node.col_offset].decode()
     after = lines[last].encode()[node.end_col_offset :].decode()
@@ -350,23 +350,23 @@ def _replace(lines: list[str], node: ast.Import | ast.ImportFrom, text: str) -> 
 _FROM = re.compile(r"from\s+[.\w]+")
 
 
-@lru_cache(maxsize=1024)  # chosen: several times the modules of all components
+@lru_cache(maxsize=1024)  # chosen: several times the number of modules
 def _syntax(text: str) -> tuple[tuple[ast.Import | ast.ImportFrom, ...], tuple[str, ...]]:
-    """Return the imports of a module, the last first, and the `host_packages` that it declares."""
+    """Return the imports of a module, last first, and the `host_packages` that it declares."""
     tree = ast.parse(text)
     imports = sorted(_imports(tree), key=lambda node: (-node.lineno, -node.col_offset))
     return tuple(imports), _declared_packages(tree)
 
 
 def _imports(tree: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:
-    """Yield all imports that run, so none below `if TYPE_CHECKING:`."""
+    """Yield all imports that are executed, that is, none below `if TYPE_CHECKING:`."""
     for node in ast.iter_child_nodes(tree):
         if isinstance(node, ast.Import | ast.ImportFrom):
             yield node
         elif isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
             for other in node.orelse:
                 yield from _imports(ast.Module([other], []))
-        elif not isinstance(node, ast.expr):  # in which there are no statements
+        elif not isinstance(node, ast.expr):  # expressions contain no statements
             yield from _imports(node)
 
 
@@ -389,7 +389,7 @@ def _outside(name: str, where: str) -> str | None:
 
 
 def _declared_packages(tree: ast.Module) -> tuple[str, ...]:
-    """Return the `host_packages` that a class of a module declares, which must be literals."""
+    """Return the `host_packages` declared by a class of a module, which must be literals."""
     for node in ast.walk(tree):
         match node:
             case ast.Assign([ast.Name("host_packages")], value) | ast.AnnAssign(

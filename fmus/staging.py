@@ -1,6 +1,6 @@
-"""A component's sources as a separate package, imported in isolation.
+"""Isolated import of a component's sources as a separate package.
 
-Building imports the component, because its class gives the model description. Its package is named
+The build imports the component, because its class creates the model description. The package is named
 `yawbench_<hash>` and removed from `sys.modules` afterwards; modules of the same name that are in use
 (by an FMU loaded in this process) are restored.
 """
@@ -76,7 +76,7 @@ class {component}(Base):
 
 @contextmanager
 def isolated_modules(*packages: str) -> Iterator[None]:
-    """Import modules of these packages anew within the block, and remove them afterwards."""
+    """Import modules of these packages afresh within the block, and remove them afterwards."""
 
     def ours(name: str) -> bool:
         return name.partition(".")[0] in packages
@@ -98,13 +98,13 @@ def isolated_modules(*packages: str) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class StagingFolder:
-    """A temporary folder with the package of a component; see `staged`."""
+    """Temporary folder with the package of a component, see `staged`."""
 
     folder: Path
     package: str
 
     def component(self, module: Parts) -> type[Any]:
-        """Return the component class that a module of the package defines.
+        """Return the component class defined in a module of the package.
 
         Raises:
             BuildError: importing it fails, or it does not define exactly one component.
@@ -171,7 +171,7 @@ def staged(files: Mapping[str, str], package: str) -> Iterator[StagingFolder]:
 
 
 def entry_module(name: str, component: type[Any]) -> str:
-    """Return the source of the module that PythonFMU's library loads in the FMU `name`."""
+    """Return the source of the module that PythonFMU's library loads for the FMU `name`."""
     package, _, module = component.__module__.partition(".")
     packages = component.host_packages
     needs = NEEDS.format(name=name, packages=packages) if packages else ""
@@ -179,10 +179,10 @@ def entry_module(name: str, component: type[Any]) -> str:
 
 
 def variant(component: type[Any], name: str, defaults: Mapping[str, Any]) -> str:
-    """Return the source of a module that gives a component another name and other defaults.
+    """Return the source of a module that defines a component with another name and other defaults.
 
     Raises:
-        BuildError: a default is not of a parameter, has the wrong type, or is not allowed.
+        BuildError: a default belongs to no parameter, has the wrong type, or is not allowed.
     """
     parameters = {v.name: v for v in component.variables if v.causality == "parameter"}
     annotation = {"Real": "float", "Integer": "int", "Boolean": "bool", "String": "str"}

@@ -1,4 +1,4 @@
-/* Text as it crosses the border between hosts, PythonFMU's library and Python. */
+/* Conversion of text between hosts, PythonFMU's library and Python. */
 #ifndef YAWBENCH_TEXT_H
 #define YAWBENCH_TEXT_H
 
@@ -26,7 +26,7 @@ static char *double_percent(const char *text)
     return copy;
 }
 
-/* Python builds no string from anything else, and PythonFMU's library does not check. */
+/* Python creates strings only from UTF-8, and PythonFMU's library does not check. */
 static bool is_utf8(const char *text)
 {
     const unsigned char *c = (const unsigned char *)text;
@@ -59,7 +59,7 @@ static int hex_digit(char c)
                                   : -1;
 }
 
-/* Return where the path starts in a location: file:///p, file://host/p, file:/p or a plain path. */
+/* Return the path in a location: file:///p, file://host/p, file:/p or a plain path. */
 static const char *without_scheme(const char *location)
 {
     if (strncasecmp(location, "file:", 5) != 0) {
@@ -73,7 +73,7 @@ static const char *without_scheme(const char *location)
     return location;
 }
 
-/* Replace every %XX in `text` by the byte it stands for; %00 and what is not hexadecimal stay. */
+/* Decode every %XX in `text`; %00 and invalid sequences are kept. */
 static void decode_percent(char *text)
 {
     char *end = text;
@@ -89,10 +89,10 @@ static void decode_percent(char *text)
     *end = '\0';
 }
 
-/* Return `path` spelled so that PythonFMU's library arrives at it, or NULL if that cannot be.
+/* Return `path` encoded for PythonFMU's library, or NULL if that is impossible.
  *
- * The library turns each "%20" into a space, then cuts out the first "file://". Nothing else is
- * decoded, so a folder that is really called "a%20b" is passed as "a%file://20b".
+ * The library turns each "%20" into a space, then removes the first "file://". It decodes nothing else,
+ * so a folder with the actual name "a%20b" is passed as "a%file://20b".
  */
 static char *spelled_for_pythonfmu(const char *path)
 {

@@ -1,6 +1,6 @@
-"""Usual ranges of signals while a car is driven; test inputs of components.
+"""Usual ranges of signals of a moving car, for test inputs of components.
 
-Lowest and highest value, in the unit of the signal. Chosen: a passenger car between 55 and 110 km/h, up
+Smallest and largest value, in the unit of the signal. Chosen: a passenger car between 55 and 110 km/h, up
 to the limit of its tyres on a dry road.
 """
 
@@ -58,7 +58,7 @@ _RANGES = {
 
 
 def pattern_of(name: str) -> str:
-    """Return a signal's name with its wheel, if it has one, replaced by `*`."""
+    """Return a signal's name with the wheel suffix, if any, replaced by `*`."""
     return f"{name[:-2]}*" if name[-2:] in WHEELS and name[-3:-2] == "_" else name
 
 

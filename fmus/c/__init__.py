@@ -1,1 +1,1 @@
-"""Components written in C: shared code, and their build."""
+"""Build of components written in C, and the C code that they share."""

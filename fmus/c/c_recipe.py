@@ -1,8 +1,8 @@
-"""Components written in C: a folder with modelDescription.xml and C files becomes the files of an FMU.
+"""Recipe of components written in C: an FMU from a folder with modelDescription.xml and C files.
 
-The model description is the one place where variables are declared; `variables.h` is made from it
-at every build, the GUID follows from it and the sources. As with components in Python, the same
-sources and the same compiler give the same bytes.
+Variables are declared only in the model description; `variables.h` is generated from it at every build, and
+the GUID is derived from it and the sources. As with Python components, the same sources and the same compiler
+give the same bytes.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ SHARED = (
     HERE.parent / "presentation.py",
     PAGE,
 )
-"""Files that every FMU in C depends on."""
+"""Files on which every FMU in C depends."""
 FLAGS = ("-std=c11", "-O2", "-Wall", "-Wextra", "-Wno-unused-parameter", "-fPIC", "-shared")
-EXACT = ("-fvisibility=hidden", "-ffp-contract=off")  # no fused multiply-add: the same numbers everywhere
+EXACT = ("-fvisibility=hidden", "-ffp-contract=off")  # no fused multiply-add: same results everywhere
 LINUX = ("-Wl,--build-id=none", "-Wl,-z,defs", "-s")
 TO_WINDOWS = "x86_64-w64-mingw32-gcc"
-"""A compiler for 64-bit Windows; if it is there, the FMU gets a library for it as well."""
+"""Compiler for 64-bit Windows; if installed, FMUs also get a library for Windows."""
 WINDOWS = ("-static", "-Wl,--no-insert-timestamp", "-s")
 
 
@@ -58,7 +58,7 @@ def find_c_components(root: Path) -> dict[str, Path]:
 
 @dataclass(frozen=True)
 class CRecipe:
-    """A component in C; the folder that holds its own says the role, as in `controllers/idea/idea.c`.
+    """Component in C; its parent folder gives the role, as in `controllers/idea/idea.c`.
 
     Raises:
         BuildError: no model description, or no role.

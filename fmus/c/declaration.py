@@ -1,4 +1,4 @@
-"""Model description of a component in C: read, checked, and made into a C header."""
+"""Reads and checks the model description of a component in C, and generates a C header."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..staging import missing_signals
 
 @dataclass(frozen=True)
 class CVariable:
-    """A variable as the model description declares it."""
+    """Variable declared in a model description."""
 
     name: str
     causality: str
@@ -26,10 +26,10 @@ class CVariable:
 
 
 def read_declaration(xml: bytes, name: str, role: Role) -> tuple[ElementTree.Element, list[CVariable]]:
-    """Return the model description and its variables, after checking what the C side relies on.
+    """Return the model description and its variables, after checking the assumptions of the C code.
 
     Raises:
-        BuildError: not XML, or with a sentence per variable that a component in C cannot have.
+        BuildError: invalid XML, or variables that are not supported, with a sentence for each.
     """
     try:
         root = ElementTree.fromstring(xml)
@@ -85,7 +85,7 @@ def _variable(element: ElementTree.Element, real: ElementTree.Element) -> CVaria
 
 
 def header(variables: list[CVariable], guid: str) -> str:
-    """Return the text of variables.h: the variables as members of a struct, and what is declared of each."""
+    """Return the text of variables.h: the variables as members of a struct, and their declarations."""
     members, declared = [], []
     for v in variables:
         text = " ".join(v.description.replace("*/", "* /").split())

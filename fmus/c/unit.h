@@ -1,17 +1,17 @@
-/* An FMU for co-simulation in C: every function of FMI 2.0, around what the component's own file defines.
+/* FMI 2.0 for co-simulation, for components written in C.
  *
- * The component's file includes variables.h, which `yawbench build` makes from modelDescription.xml
- * (`Variables`: one double per variable, by name), and then defines
+ * The component's file includes variables.h, which `yawbench build` generates from modelDescription.xml
+ * (`Variables`: a double per variable, by name), and then defines
  *
- *     State                                           what it remembers from step to step
- *     void start(State *, const Variables *, double t)              the state at start time
- *     void advance(State *, const Variables *, double t, double h)  the state from t to t + h
- *     void output(const State *, Variables *, double t)             all outputs at t
+ *     State                                           the state between steps
+ *     void start(State *, const Variables *, double t)              sets the state at start time
+ *     void advance(State *, const Variables *, double t, double h)  advances the state from t to t + h
+ *     void output(const State *, Variables *, double t)             sets all outputs at t
  *
- * all static, and includes this file last. Like a component in Python, it computes its outputs
- * whenever somebody asks for them until initialization ends, and after every step from then on;
- * parameters out of their range are refused in one sentence. State and variables are saved and
- * restored as they lie in memory, so a State must not hold pointers. */
+ * all static, and includes this file last. As with a component in Python, outputs are computed when they
+ * are read until initialization ends, and after every step from then on; parameters out of range are
+ * refused with a sentence. State and variables are saved and restored as a memory image, so a State must
+ * not contain pointers. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -33,8 +33,8 @@ typedef struct {
     State state;
     double start_time;
     Progress at;
-    int initializing; /* until initialization ends, outputs follow what is set */
-    int stale;        /* something has been set since the outputs were computed */
+    int initializing; /* until initialization ends, outputs follow the inputs */
+    int stale;        /* a variable has been set since the outputs were computed */
 } Content;
 
 typedef struct {
@@ -289,7 +289,7 @@ FMI2_EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte b
     return status;
 }
 
-/* ---- functions that such an FMU does not have ---- */
+/* ---- functions that are not supported ---- */
 
 #define FMI2_NOTHING(name, parameters)                                                                      \
     FMI2_EXPORT fmi2Status fmi2##name parameters                                                            \
@@ -307,7 +307,7 @@ FMI2_NOTHING(SetString, (fmi2Component c, const fmi2ValueReference *r, size_t n,
 FMI2_EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String names[])
 {
     (void)c, (void)on, (void)n, (void)names;
-    return fmi2OK; /* only errors are logged, and they always are */
+    return fmi2OK; /* only errors are logged, and always */
 }
 
 FMI2_EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)

@@ -1,1 +1,1 @@
-"""Components in Python translated to C: read, evaluated in part, lowered, emitted, compiled, and checked."""
+"""Translator of Python components to C by partial evaluation, and comparison of the result with Python."""

@@ -1,4 +1,4 @@
-/* Arithmetic as CPython has it, lists that grow, and the texts of exceptions: for translated components. */
+/* Run-time library of translated components: CPython's arithmetic, growing lists, texts of exceptions. */
 #include <math.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -18,7 +18,7 @@
 enum { REAL, INTEGER, BOOLEAN, STRING };
 enum { INPUT, OUTPUT, PARAMETER };
 
-/* A variable as the component declares it; `place` is where Variables has it. */
+/* Declaration of a variable; `place` is its offset in Variables. */
 typedef struct {
     const char *name;
     int type, causality;
@@ -67,7 +67,7 @@ MAYBE_UNUSED static int complex_power(double a, double b)
     return a < 0.0 && isfinite(a) && isfinite(b) && b != floor(b);
 }
 
-/* math.hypot and math.dist: the root of a compensated sum of squares, corrected once. */
+/* math.hypot and math.dist: square root of a compensated sum of squares, corrected once. */
 MAYBE_UNUSED static double norm(int n, const double *given)
 {
     double largest = 0.0, sum = 1.0, lost_1 = 0.0, lost_2 = 0.0, lost_3 = 0.0, old, x, t, high, low, root;
@@ -87,7 +87,7 @@ MAYBE_UNUSED static double norm(int n, const double *given)
         return largest;
     }
     frexp(largest, &exponent);
-    if (exponent <= -1023) { /* too small to be scaled: as subnormal numbers are */
+    if (exponent <= -1023) { /* too small to be scaled, as with subnormal numbers */
         double scaled = 0.0;
         for (int i = 0; i < n; i++) {
             x = __builtin_fabs(given[i]) / 2.2250738585072014e-308;
@@ -118,7 +118,7 @@ MAYBE_UNUSED static double norm(int n, const double *given)
     return (root + x / (2.0 * root)) / scale;
 }
 
-/* sum() from CPython 3.12 on, after A. Neumaier. */
+/* sum() since CPython 3.12, after A. Neumaier. */
 MAYBE_UNUSED static double compensated_sum(int n, const double *x)
 {
     double sum = x[0], lost = 0.0;
@@ -130,7 +130,7 @@ MAYBE_UNUSED static double compensated_sum(int n, const double *x)
     return lost != 0.0 && isfinite(lost) ? sum + lost : sum;
 }
 
-/* ---- lists that grow: a ring of items, each of some numbers ---- */
+/* ---- growing lists: ring buffers of items with a fixed number of doubles ---- */
 
 typedef struct {
     double *items;
@@ -143,7 +143,7 @@ MAYBE_UNUSED static const double *item(const List *list, int width, double index
     return list->items + (place < list->capacity ? place : place - list->capacity) * (size_t)width;
 }
 
-/* Append an item; false where there is no memory for it. */
+/* Append an item; false if out of memory. */
 MAYBE_UNUSED static int push(List *list, int width, const double *numbers)
 {
     size_t size = (size_t)width * sizeof *numbers;
@@ -197,8 +197,8 @@ MAYBE_UNUSED static void begin_problem(Problem *problem, const char *kind, const
     problem->length = 0, problem->text[0] = '\0';
 }
 
-/* Write a number in digits: exponents from `widest` on, and below -4, are written out; ".0" if `real`.
- * Printf and strtod are used on each other's text alone: what a locale takes for the point does not matter. */
+/* Write a number with some digits: exponents from `widest` on, and below -4, use exponential notation; ".0" if
+ * `real`. printf and strtod only process each other's text, so the locale's decimal point does not matter. */
 static void write_digits(char *out, double x, int digits, int widest, int real)
 {
     char text[40], *end = out, found[24];
@@ -249,7 +249,7 @@ static void write_digits(char *out, double x, int digits, int widest, int real)
     *end = '\0';
 }
 
-/* repr() of a float: the fewest digits that give it back. */
+/* repr() of a float: the shortest text that reads back as the same float. */
 static void write_repr(char *out, double x)
 {
     char text[40];
@@ -263,7 +263,7 @@ static void write_repr(char *out, double x)
     write_digits(out, x, digits, 16, 1);
 }
 
-/* A number in some digits, as :.6g has it; 0: as repr() has it. */
+/* A number with some digits, as in :.6g; 0: as repr(). */
 MAYBE_UNUSED static void say_real(Problem *problem, double x, int digits)
 {
     char text[64];

@@ -1,8 +1,8 @@
-"""Native library of a component: translated to C and compared with Python, or the reason why there is none.
+"""Builds the native library of a component: translates it to C, compiles, and compares with Python.
 
-What was compiled and let through is kept in the cache by the C text (which has the GUID, and so follows from
-the component's sources), the headers, the compilers, the comparison and the Python it was compared with. A
-change of the translator that leaves a text as it was compiles nothing.
+Verified libraries are cached by the C text (which contains the GUID, and thus depends on the component's
+sources), the headers, the compilers, the comparison and the Python used in the comparison. A change of the
+translator that leaves the C text unchanged needs no compilation.
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ HERE = Path(__file__).resolve().parent
 SHARED = [HERE.parent / name for name in ("calling_sequence.h", "fmi2.h", "oldest_glibc.h")]
 HEADERS = {file.name: file for file in (HERE / "arithmetic.h", HERE / "unit.h", *SHARED)}
 NATIVE_LIBRARY = "native.so"
-"""Name of the native library beside the launcher, which opens it by this name."""
+"""Name of the native library, in the folder of the launcher, which opens it by this name."""
 FLAGS = ("-std=c11", "-ffp-contract=off", "-fno-builtin", "-fno-math-errno", "-w", "-fPIC", "-shared",
          "-fvisibility=hidden")  # fmt: skip
-"""Functions are those of libm, as in CPython: the compiler must neither know nor fuse them."""
+"""Compiler flags: functions are those of libm, as in CPython, neither replaced nor fused by the compiler."""
 LINUX = ("-O2", "-Wl,--build-id=none", "-Wl,-z,defs", "-s")
 TO_WINDOWS = "x86_64-w64-mingw32-gcc"
 WINDOWS = ("-O1", "-static", "-Wl,--no-insert-timestamp", "-s")
 STORE = "native"
 """Folder of native libraries in the cache."""
 EFFORTS = "efforts"
-"""Folder of the processor times that native libraries took, in the cache."""
+"""Folder of the processor times of builds of native libraries, in the cache."""
 LONGEST = 3.0
-"""Processor time [s] of a native library for which no run waits; chosen: a run then begins within 3 s."""
+"""Processor time [s] above which a run does not wait for a native library; chosen: runs start within 3 s."""
 LATER = "its native library takes longer than a run should wait; 'yawbench build' makes it"
 
 
@@ -56,7 +56,7 @@ class Native:
 
     Attributes:
         files: path in the archive -> content.
-        why_not: why there are none, "" if there are.
+        why_not: reason if there are none, else "".
     """
 
     files: dict[str, bytes] = field(default_factory=dict)
@@ -64,17 +64,17 @@ class Native:
 
 
 def tools() -> list[str]:
-    """Return what decides what a native library is, beside sources (see `evidence`)."""
+    """Return the items other than sources that determine a native library (see `evidence`)."""
     return [f"tool:{TO_WINDOWS}"]
 
 
 def toolchain() -> str:
-    """Return a text that changes with whatever translates, compiles or checks."""
+    """Return a text that changes with translator, compilers and comparison."""
     return _compilers(tuple(compiler_command())) + _digests(*sorted(HERE.glob("*.py")))
 
 
 def _comparison() -> str:
-    """Return a text that changes with whatever compiles or checks."""
+    """Return a text that changes with compilers and comparison."""
     return _compilers(tuple(compiler_command())) + _digests(
         Path(compare_with_python.__file__), Path(usual_ranges.__file__)
     )
@@ -107,18 +107,18 @@ def native(
     hurry: bool = False,
     limit: int = compare_with_python.LIMIT,
 ) -> Native:
-    """Return the native libraries of a component, or why there are none.
+    """Return the native libraries of a component, or the reason why there are none.
 
     Args:
         component: its class, imported.
-        home, others: where its functions are (see `Sources`).
-        source: its file, as a comment names it.
-        guid: of the FMU.
+        home, others: folders and files of its functions (see `Sources`).
+        source: name of its file, for a comment.
+        guid: GUID of the FMU.
         resources: folder passed to an instance.
-        translated: a class for the translator that gives the same; default: the component.
-        unnamed: a file whose lines the reason does not name.
-        hurry: leave it for later if it took longer than `LONGEST` the last time.
-        limit: processor time [s] that the comparison may take.
+        translated: equivalent class for the translator; default: the component.
+        unnamed: a file whose lines are not mentioned in the reason.
+        hurry: postpone the build if the last one took longer than `LONGEST`.
+        limit: largest processor time [s] of the comparison.
     """
     if sys.platform != "linux" or platform.machine() != "x86_64":
         return Native(why_not=f"native libraries are built on Linux on x86-64, this is {platform.system()}")
@@ -137,18 +137,18 @@ def native(
         return Native(why_not=str(refused))
     except BuildError as error:
         return Native(why_not=str(error.diagnostics[0]))
-    except Exception as error:  # whatever it is, the FMU itself works
+    except Exception as error:  # whatever fails here, the FMU works in Python
         return Native(why_not=f"not translated: {type(error).__name__}: {error}")
 
 
 def _processor_time() -> float:
-    return sum(os.times()[:4])  # of this process and the compilers it has waited for
+    return sum(os.times()[:4])  # of this process and its finished compilers
 
 
 def _let_through(
     text: str, component: type[Any], guid: str, resources: Path, limit: int
 ) -> tuple[Native, bool]:
-    """Return what the cache has for a text, or else make it; and whether it was made."""
+    """Return the cached result for a C text, or compile and compare it; and whether it was compiled."""
     key = hashlib.sha256(f"{text}{_comparison()}{limit}".encode()).hexdigest()[:32]
     kept = recall(STORE, key)
     if kept is not None:

@@ -1,4 +1,4 @@
-"""Built-in functions of Python, and methods of its lists, strings and dictionaries."""
+"""Evaluation of Python's built-in functions, and of methods of lists, strings and dictionaries."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _PURE = (set, frozenset, str, repr, ord, chr, divmod, pow, format, float, int, b
 
 
 def _is_pure(function: Any) -> bool:
-    """Return whether a function does nothing but compute, so that it may be called at build time."""
+    """Return whether a function has no side effects, so that it may be called at build time."""
     if any(function is pure for pure in _PURE):
         return True
     owner = getattr(function, "__self__", None)
@@ -63,7 +63,7 @@ class Repeated:
 
 
 class BuiltIn(Looping):
-    """Calls of what Python has built in."""
+    """Calls of built-in functions and methods."""
 
     # ---- methods of lists, texts and dictionaries -------------------------------------------
 
@@ -122,13 +122,13 @@ class BuiltIn(Looping):
     def _view(self, owner: Dict, keys: tuple[Any, ...], with_keys: bool) -> Each:
         def item(k: int) -> Any:
             if tuple(self.read(owner)) != keys:
-                raise Refused("a dictionary whose keys change while it is gone through")
+                raise Refused("a dictionary whose keys change during iteration")
             value = self.read(owner)[keys[k]]
             return (keys[k], value) if with_keys else value
 
         return Each(len(keys), item, once=False)
 
-    # ---- what Python has built in -----------------------------------------------------------
+    # ---- built-in functions -----------------------------------------------------------------
 
     def _built_in(self, function: Any, args: list[Any], named: dict[str, Any]) -> Any:
         name = getattr(function, "__name__", "")
@@ -256,7 +256,7 @@ class BuiltIn(Looping):
         items = self.items(values)
         if not any(isinstance(x, ir.Var) for x in items):
             return List(sorted(items))
-        for end in range(1, len(items)):  # by insertion, so that equal numbers keep their order
+        for end in range(1, len(items)):  # insertion sort, which is stable
             for k in range(end, 0, -1):
                 a, b = items[k - 1], items[k]
                 less = self.compare("<", b, a)
@@ -317,7 +317,7 @@ class BuiltIn(Looping):
         if not any(isinstance(x, ir.Var) for x in ends):
             return range(*ends)
         if len(ends) > 2:
-            raise Refused("a range whose step or ends are known at run time only")
+            raise Refused("a range whose step or ends are only known at run time")
         return Span(ends[0] if len(ends) == 2 else 0, ends[-1], lambda k: k)
 
     def _python_bisect_right(self, values: Any, x: Any) -> Any:
@@ -327,7 +327,7 @@ class BuiltIn(Looping):
             return bisect.bisect_right(items, x)
         low, high = 0, len(items)
 
-        def go(low: int, high: int) -> ir.Operand:  # as the library searches
+        def go(low: int, high: int) -> ir.Operand:  # the search order of `bisect`
             if low == high:
                 return low
             middle = (low + high) // 2

@@ -1,4 +1,4 @@
-"""Calls of a component's own functions and classes; `built_in` has those of Python."""
+"""Evaluation of calls of a component's own functions and classes (`built_in`: those of Python)."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from .values import (
 
 
 class Calling(BuiltIn):
-    """Calls of functions, methods, classes and what Python has built in."""
+    """Calls of functions, methods, classes and built-in functions."""
 
     def _call(self, node: ast.Call) -> Any:
         if isinstance(node.func, ast.Name) and node.func.id == "super":
@@ -79,7 +79,7 @@ class Calling(BuiltIn):
         raise Refused(f"super().{name}")
 
     def call(self, function: Any, args: Sequence[Any], named: dict[str, Any]) -> Any:
-        """Return what a call returns."""
+        """Return the value of a call."""
         function = self.narrowed(function)
         args = list(args)
         if isinstance(function, Union):
@@ -137,9 +137,9 @@ class Calling(BuiltIn):
         return self.inside(call, node)
 
     def inside(self, call: Call, node: ast.FunctionDef | ast.Lambda) -> Any:
-        """Return what a function returns, evaluated in place."""
+        """Return the value of a function, evaluated in place."""
         if len(self.calls) > DEEPEST:
-            raise Refused("calls within calls without end")
+            raise Refused("unlimited recursion")
         self.calls.append(call)
         try:
             if isinstance(node, ast.Lambda):
@@ -203,15 +203,15 @@ class Calling(BuiltIn):
             self.call(init, [made, *args], named)
 
     def _copied(self, value: Any, name: str, copies: dict[int, Any]) -> Any:
-        """Return a copy of an object of Python that the evaluation can change.
+        """Return a copy of a Python object that the evaluation can change.
 
         Args:
-            value: the object, or what it holds.
-            name: of the value in refusals.
+            value: the object, or a part of it.
+            name: name of the value in messages.
             copies: id of an object -> its copy.
 
         Raises:
-            Refused: it holds something else than numbers, texts, functions, lists and objects of own classes.
+            Refused: it contains other values than numbers, texts, functions, lists, objects of own classes.
         """
         if is_plain(value) or isinstance(value, (type, types.FunctionType, types.BuiltinFunctionType)):
             return value
@@ -260,11 +260,11 @@ class Calling(BuiltIn):
 
 
 class _Empty:
-    """A class without slots or base, with which others are compared."""
+    """Class without slots or base, for comparison with other classes."""
 
 
 def _is_its_attributes(value: Any) -> bool:
-    """Return whether an object of Python is all in its attributes, and copied as Python does by default."""
+    """Return whether a Python object consists of its attributes, and has no copy method of its own."""
     cls: Any = type(value)
     ways = ("__reduce_ex__", "__reduce__", "__getstate__", "__setstate__", "__deepcopy__")
     return (

@@ -1,10 +1,10 @@
-"""Comparison of a native library with its Python twin: driven through the same calls, equal in every bit.
+"""Bitwise comparison of a native library with its Python component under the same sequence of calls.
 
-Both are taken through 2,000 steps at each of three step lengths, with inputs in their usual ranges, a
-hundredth and three times of them; with every value of parameters that have choices, with parameters moved;
-through reset, a second start, states saved, restored and serialized; through parameters out of range and
-inputs that are not finite. Values, statuses and sentences must be the same, but where inputs are huge a
-native library may refuse to compute an integer beyond 2^53. NaN is NaN, whatever its sign.
+Both run 2,000 steps at each of three step sizes, with inputs in their usual ranges, a hundredth and three
+times these ranges; with every choice of parameters and with changed parameters; with reset, a second start,
+saved, restored and serialized states; with parameters out of range and inputs that are not finite. Values,
+statuses and messages must be the same, except that for huge inputs a native library may refuse to compute an
+integer beyond 2^53. All NaNs are equal.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from .ir import INEXACT
 
 STEPS = 2000
 LENGTHS = (0.001, 0.005, 0.02)
-"""Lengths of steps [s]: those of plants, controllers and sensors."""
+"""Step sizes [s]: those of plants, controllers and sensors."""
 FEW, FEWEST, IN_ALL = 100, 2, 3000
-"""Steps with every other value of a parameter: at most, at least, and of all values together about."""
+"""Steps per other value of a parameter, at most and at least, and approximate number for all values."""
 MANY = 60
-"""Numbers among parameters from which each is moved once only."""
+"""Number of numeric parameters above which each is changed only once."""
 LIMIT = 240
-"""Processor time [s] of a comparison: a wrongly translated loop may never end."""
+"""Largest processor time [s] of a comparison, since a wrongly translated loop may never end."""
 _LOGGER = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 
 
@@ -43,15 +43,15 @@ class _Callbacks(ctypes.Structure):
 
 
 class Difference(Exception):
-    """A difference between a native library and its twin."""
+    """Error: a difference between a native library and its Python component."""
 
 
 Answer = tuple[bool, list[str], bytes]
-"""Whether a call succeeded, what was logged, and the values that it gave."""
+"""Whether a call succeeded, the logged messages, and the returned values."""
 
 
 class Native:
-    """An instance of a native library."""
+    """Instance of a native library."""
 
     def __init__(self, library: Path, guid: str) -> None:
         self.library = ctypes.CDLL(str(library))
@@ -100,7 +100,7 @@ class Native:
         return self._answer(self.library.fmi2DoStep(self.instance, c_double(t), c_double(h), c_int(1)))
 
     def save(self) -> bytes:
-        """Return the state in bytes, as a host may keep it."""
+        """Return the serialized state."""
         state, size = c_void_p(), c_size_t()
         self.library.fmi2GetFMUstate(self.instance, byref(state))
         self.library.fmi2SerializedFMUstateSize(self.instance, state, byref(size))
@@ -120,7 +120,7 @@ class Native:
 
 
 class Twin:
-    """The component itself."""
+    """Instance of the Python component."""
 
     def __init__(self, component: type[Any], resources: Path) -> None:
         self.messages: list[str] = []
@@ -174,7 +174,7 @@ class Twin:
 
 
 class _Beside:
-    """Both, called alike."""
+    """Both instances, called in the same way."""
 
     def __init__(self, native: Native, twin: Twin, variables: Sequence[Any]) -> None:
         self.native, self.twin, self.variables = native, twin, variables
@@ -183,7 +183,7 @@ class _Beside:
             for c in ("input", "output", "parameter")
         }
         self.label = ""
-        self.extreme = False  # whether inputs are so large that integers made of them may be inexact
+        self.extreme = False  # whether inputs are so large that integers computed from them may be inexact
 
     def call(self, what: str, *args: Any) -> bool:
         """Call both and return whether they succeeded."""
@@ -218,7 +218,7 @@ class _Beside:
         return self.call("get", self.of["output"])
 
     def steps(self, count: int, h: float, inputs: Iterator[list[float]], t: float) -> float:
-        """Take both through steps, until they fail; return the time."""
+        """Run steps of both until they fail; return the time."""
         for k in range(count):
             if self.of["input"]:
                 self.call("set", "Real", self.of["input"], next(inputs))
@@ -226,7 +226,7 @@ class _Beside:
                 break
             t += h
             self.outputs()
-            if k % 50 == 49:  # a step of another length, as a host makes for an event
+            if k % 50 == 49:  # another step size, as a host uses at an event
                 self.call("step", t, 0.37 * h)
                 t += 0.37 * h
         return t
@@ -249,7 +249,7 @@ def _shown(args: Sequence[Any]) -> str:
 
 
 def random_inputs(variables: Sequence[Any], seed: str) -> Iterator[list[float]]:
-    """Yield inputs without end: walks, jumps and stays in their usual ranges, smaller and larger ones."""
+    """Yield inputs endlessly: random walks, jumps and constants in usual, smaller and larger ranges."""
     chance = random.Random(seed)
     ranges = [usual_range(v.name) for v in variables if v.causality == "input"]
     now = [0.5 * (low + high) for low, high in ranges]
@@ -271,10 +271,10 @@ def random_inputs(variables: Sequence[Any], seed: str) -> Iterator[list[float]]:
 
 
 def compare(library: Path, guid: str, component: type[Any], resources: Path, steps: int = STEPS) -> None:
-    """Take a native library and its twin through everything.
+    """Compare a native library with its Python component in all cases.
 
     Raises:
-        Difference: the first one that is found.
+        Difference: the first difference.
     """
     variables = component.variables
     beside = _Beside(Native(library, guid), Twin(component, resources), variables)
@@ -309,10 +309,10 @@ def compare(library: Path, guid: str, component: type[Any], resources: Path, ste
 
 
 def _restored(beside: _Beside, inputs: Iterator[list[float]], h: float, t: float) -> None:
-    """Save both, go on, restore, and go on from there; then start anew."""
+    """Save both states, continue, restore and continue from there; then restart."""
     kept = beside.native.save(), beside.twin.save()
     beside.steps(FEW, h, inputs, t)
-    if not kept[1]:  # it cannot be pickled, with a function in it for instance
+    if not kept[1]:  # cannot be pickled, for instance because of a function in it
         return
     if beside.native.restore(kept[0])[0] != beside.twin.restore(kept[1])[0]:
         raise Difference("a saved state is not restored")
@@ -321,7 +321,7 @@ def _restored(beside: _Beside, inputs: Iterator[list[float]], h: float, t: float
 
 
 def _choices(beside: _Beside, variables: Sequence[Any]) -> Iterator[tuple[str, Callable[[], None]]]:
-    """Yield settings of parameters: every choice, every number moved, and values out of range."""
+    """Yield settings of parameters: every choice, every number changed, and values out of range."""
     many = len(beside.of["parameter"]) > MANY
     for i in beside.of["parameter"]:
         v = variables[i]
@@ -358,17 +358,17 @@ def _choices(beside: _Beside, variables: Sequence[Any]) -> Iterator[tuple[str, C
 
 
 def differences(library: Path, guid: str, component: type[Any], resources: Path, limit: int = LIMIT) -> str:
-    """Return the first difference between a native library and its twin, "" if none; in another process.
+    """Return the first difference between a native library and its component, "" if none; in another process.
 
     Args:
         library, guid: of the native library.
-        component, resources: of its twin.
-        limit: processor time [s] that all may take.
+        component, resources: of the Python component.
+        limit: largest processor time [s].
 
     Raises:
-        TimeoutError: it takes longer.
+        TimeoutError: the comparison takes longer.
     """
-    import resource  # of POSIX alone, as os.fork is
+    import resource  # POSIX only, as os.fork
 
     reading, writing = os.pipe()
     child = os.fork()

@@ -1,4 +1,4 @@
-"""C code from the intermediate form: variables, the four functions, and `unit.h` around them."""
+"""Generates C code from the intermediate form: variables, the four functions, and the include of `unit.h`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _SIGNATURES = {
 
 
 def emit(program: Program, source: str, guid: str) -> str:
-    """Return a program as the text of a C file that includes `arithmetic.h` and `unit.h`."""
+    """Return the text of a C file for a program, which includes `arithmetic.h` and `unit.h`."""
     lines = [f"/* Made from {source} by yawbench build. */", '#include "arithmetic.h"', ""]
     lines += _variables(program.variables, guid)
     for name, kind, types in (("Configured", "c", program.configured), ("State", "s", program.state)):
@@ -106,7 +106,7 @@ def _variables(variables: Sequence[Any], guid: str) -> list[str]:
 
 
 class _Function:
-    """The text of one function."""
+    """Generator of the text of a function."""
 
     def __init__(self, program: Program, function: ir.Function, names: dict[ir.Outlined, str]) -> None:
         self.program, self.function, self.names = program, function, names
@@ -125,7 +125,7 @@ class _Function:
         return self._whole(head, body, made, [x for _, x in stores], ())
 
     def of_its_own(self, function: ir.Outlined) -> list[str]:
-        """Return the lines of a function that computes from numbers alone."""
+        """Return the lines of an outlined function, which depends only on numbers."""
         body: list[str] = []
         self._statements(function.body, body, 1)
         parameters = "".join(f", {TYPES[x.type]} {x.name}" for x in function.parameters)
@@ -364,7 +364,7 @@ class _Function:
 
 
 def _outlined(body: Sequence[ir.Statement]) -> Iterator[ir.Outlined]:
-    """Yield the functions that statements call, each after those that it calls itself."""
+    """Yield the functions called by statements, each after those that it calls itself."""
     for s in ir.every(body):
         if isinstance(s, ir.Invoke):
             yield from _outlined(s.function.body)

@@ -1,4 +1,4 @@
-"""Expressions of a component, evaluated as far as they are known at build time."""
+"""Partial evaluation of a component's expressions at build time."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ from .values import (
 )
 
 DEEPEST = 60
-"""Calls within each other; chosen: more than components have, fewer than a recursion without end."""
+"""Largest depth of nested calls; chosen: more than components need, to detect infinite recursion."""
 
 
 class Promote(Exception):
-    """A list of the state changes its length."""
+    """Signal that the length of a list of the state changes, which restarts the evaluation."""
 
     def __init__(self, path: str, item: Shape) -> None:
         super().__init__(path)
@@ -56,7 +56,7 @@ class Promote(Exception):
 
 @dataclass
 class Call:
-    """A function that is being evaluated."""
+    """Call of a function that is being evaluated."""
 
     source: Source
     frame: Frame
@@ -65,7 +65,7 @@ class Call:
 
 
 class Evaluation(Merging):
-    """Names, structures, attributes and items; `operators`, `statements`, `loops`, `calls` add the rest."""
+    """Evaluation of names, structures, attributes and items; other modules add the rest."""
 
     def __init__(self, sources: Sources) -> None:
         super().__init__()
@@ -81,7 +81,7 @@ class Evaluation(Merging):
         return f"{inner.source.file}:{inner.line}" if inner else ""
 
     def at(self, node: ast.AST) -> None:
-        """Take note of the line that is being evaluated."""
+        """Record the line that is being evaluated."""
         self.calls[-1].line = node.lineno  # type: ignore[attr-defined]
 
     def evaluate(self, node: ast.expr) -> Any:
@@ -93,7 +93,7 @@ class Evaluation(Merging):
         return self.narrowed(self.dispatched("_", node))
 
     def dispatched(self, prefix: str, node: ast.AST) -> Any:
-        """Return what the method for this kind of node gives: `prefix` and the kind are its name.
+        """Call the method for a kind of node, whose name consists of `prefix` and the kind.
 
         Raises:
             Refused: there is no such method, or it refuses; with file and line.
@@ -113,11 +113,11 @@ class Evaluation(Merging):
             raise
 
     def call(self, function: Any, args: Sequence[Any], named: dict[str, Any]) -> Any:
-        """Return what a call returns; `calls` has the meaning."""
+        """Return the value of a call; implemented in `calls`."""
         raise NotImplementedError
 
     def end(self, kind: str, message: str) -> NoReturn:
-        """Raise on the path that is being followed, and follow it no further."""
+        """Emit an exception on the current path, and stop evaluating the path."""
         self.fail(kind, message)
         raise Unreachable
 
@@ -140,7 +140,7 @@ class Evaluation(Merging):
         raise Refused(f"{node.id} has no value here")
 
     def present(self, value: Any, kind: str, name: str) -> Any:
-        """Return a value that is there, or raise as Python does where it is not."""
+        """Return a value that is set, or raise like Python where it is not."""
         if not isinstance(value, Union) or not any(x is UNSET for x in value.alternatives):
             return value
         text = f"cannot access local variable '{name}' where it is not associated with a value"
@@ -213,19 +213,19 @@ class Evaluation(Merging):
     @staticmethod
     def _key(value: Any) -> Any:
         if not is_plain(value):
-            raise Refused("a key that is known at run time only")
+            raise Refused("a key that is only known at run time")
         return value
 
     def each(self, value: Any) -> Each:
-        """Return the items of what can be gone through, read as their turn comes.
+        """Return the items of an iterable, evaluated lazily.
 
         Raises:
-            Refused: how many there are is known at run time only.
+            Refused: the number of items is only known at run time.
         """
         value = self.narrowed(value)
         if isinstance(value, Each):
             if self.facts.known(self.read(value)["used"]) is True:
-                raise Refused("an iterator that is gone through twice")
+                raise Refused("an iterator that is used twice")
             if value.once:
                 self.write(value, "used", True)
             return value
@@ -242,10 +242,10 @@ class Evaluation(Merging):
         return Each(count, lambda k: content()[k], content)
 
     def items(self, value: Any) -> list[Any]:
-        """Return the items of what can be gone through.
+        """Return the items of an iterable.
 
         Raises:
-            Refused: how many there are is known at run time only.
+            Refused: the number of items is only known at run time.
         """
         value = self.narrowed(value)
         if isinstance(value, Each):
@@ -256,17 +256,17 @@ class Evaluation(Merging):
         if isinstance(value, Picked):
             return [self.subscript(value, k) for k in range(len(value.items[0]))]
         if isinstance(value, (ir.Var, Ring, Span, Union, Bytes, Text, Instance)):
-            raise Refused("how many items there are is known at run time only")
+            raise Refused("the number of items is only known at run time")
         if isinstance(value, (tuple, list, str, bytes, range, dict, set, frozenset)):
             return list(value)
         if hasattr(value, "__iter__"):
             return [self.imported(x) for x in value]
         if value is None:
             self.end("TypeError", "cannot unpack non-iterable NoneType object")
-        raise Refused(f"going through {type(value).__name__}")
+        raise Refused(f"iterating over {type(value).__name__}")
 
     def imported(self, value: Any) -> Any:
-        """Return what a function of Python gave, as the evaluation works with it."""
+        """Convert the result of a Python function to a value of the evaluation."""
         if isinstance(value, list):
             return List([self.imported(x) for x in value])
         if type(value) is tuple:
@@ -330,7 +330,7 @@ class Evaluation(Merging):
     def _slice(self, node: ast.Slice) -> Any:
         ends = [None if x is None else self.evaluate(x) for x in (node.lower, node.upper, node.step)]
         if any(isinstance(x, ir.Var) for x in ends):
-            raise Refused("a slice whose ends are known at run time only")
+            raise Refused("a slice whose ends are only known at run time")
         return slice(*ends)
 
     def subscript(self, owner: Any, index: Any) -> Any:
@@ -348,7 +348,7 @@ class Evaluation(Merging):
             index = self.settled(index, self.facts)
         if isinstance(index, ir.Var):
             if not isinstance(items, (tuple, list)) or not items:
-                raise Refused("an index that is known at run time only")
+                raise Refused("an index that is only known at run time")
             return self._at(tuple(items), self.within(index, len(items), _beyond(items)))
         if (
             isinstance(items, (tuple, list))
@@ -360,7 +360,7 @@ class Evaluation(Merging):
         return List(item) if isinstance(owner, List) and isinstance(index, slice) else item
 
     def within(self, index: ir.Operand, count: int, text: str) -> ir.Operand:
-        """Return an index known at run time as one from the beginning, raising where there is no item."""
+        """Return an index known at run time, counted from the beginning; raises if it is out of range."""
         from_end = self.compare("<", index, 0)
         index = self.branch(from_end, lambda: self.binary("+", index, count), lambda: index)
         self.require(self.compare(">=", index, 0), "IndexError", text)
@@ -396,7 +396,7 @@ class Evaluation(Merging):
         return self._at(tuple(x for row in rows for x in row), place)
 
     def loaded(self, value: Picked) -> Any:
-        """Return an item of a table with its numbers read."""
+        """Return an item of a table, with its numbers loaded."""
         first = value.items[0]
         if not all(alike(first, x) for x in value.items):
             raise Refused("an item of a table whose items are not alike")
@@ -417,7 +417,7 @@ class Evaluation(Merging):
         return self.let(ir.INT, "ring_length", ring.number)
 
     def ring_index(self, ring: Ring, index: Any, text: str) -> ir.Operand:
-        """Return a place in a list of the state, from its beginning."""
+        """Return an index in a list of the state, counted from the beginning."""
         length = self.ring_length(ring)
         if not isinstance(index, ir.Var) and index < 0:
             index = self.binary("+", length, index)
@@ -432,7 +432,7 @@ class Evaluation(Merging):
         return index  # type: ignore[no-any-return]
 
     def ring_item(self, ring: Ring, index: ir.Operand) -> Any:
-        """Return the item at a place that is there."""
+        """Return the item at a valid index."""
         types = list(types_of(ring.item))
         read = [self.let(type, "ring_item", ring.number, k, index) for k, type in enumerate(types)]
         return build(ring.item, iter(read))

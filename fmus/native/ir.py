@@ -1,7 +1,8 @@
-"""The intermediate form between a component in Python and C: typed variables, each assigned in one place.
+"""Intermediate form between Python and C: typed variables with static single assignment.
 
-A variable that both arms of an `If` assign is what the two paths join in; one that a loop carries is assigned
-before it and at the end of its body. Integers are kept as doubles, exact up to 2^53, except words of 64 bits.
+Two exceptions: a variable in which the paths of an `If` join is assigned in both arms, and a loop-carried
+variable before the loop and at the end of its body. Integers are stored as doubles, exact up to 2^53, except
+64-bit words.
 """
 
 from __future__ import annotations
@@ -10,17 +11,17 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 REAL, INT, BOOL, WORD, WIDE = "real", "int", "bool", "word", "wide"
-"""Types. A WORD is an integer of 64 bits without sign, a WIDE one known modulo 2^64 alone."""
+"""Types. A WORD is an unsigned 64-bit integer, a WIDE an integer known only modulo 2^64."""
 
 EXACT = 2**53
-"""Up to which an integer is exact as a double."""
+"""Largest integer up to which doubles are exact."""
 INEXACT = "an integer beyond 2^53, which Python alone computes exactly: set YAWBENCH_UNITS=python"
-"""Error of a native library whose integer becomes larger."""
+"""Error message of a native library for larger integers."""
 
 
 @dataclass(frozen=True, eq=False)
 class Var:
-    """A variable, told apart by identity."""
+    """Variable, distinguished by identity."""
 
     name: str
     type: str
@@ -31,7 +32,7 @@ class Var:
 
 Operand = Var | bool | int | float
 Part = str | tuple[Operand, str]
-"""Part of a text: as it is, or a value with its format: "r" as `repr`, ".3g" as `:.3g`."""
+"""Part of a text: a literal, or a value with its format: "r" for `repr`, ".3g" for `:.3g`."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class Load:
 
 @dataclass(frozen=True)
 class Digits:
-    """count = number of characters of an integer's text; they are read by `Digit`."""
+    """count = number of characters of an integer's text, which are read by `Digit`."""
 
     count: Var
     value: Operand
@@ -62,7 +63,7 @@ class Digits:
 
 @dataclass(frozen=True)
 class Digit:
-    """target = character at `index` of the text that `Digits` made."""
+    """target = character at `index` of the text of `Digits`."""
 
     target: Var
     digits: Var
@@ -71,7 +72,7 @@ class Digit:
 
 @dataclass
 class If:
-    """A branch: one of two paths is taken."""
+    """Branch with two paths."""
 
     test: Var
     then: list[Statement] = field(default_factory=list)
@@ -80,21 +81,21 @@ class If:
 
 @dataclass
 class Loop:
-    """A loop that ends at a `Leave`."""
+    """Loop that ends at a `Leave`."""
 
     body: list[Statement] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
 class Leave:
-    """Leave the innermost loop if `test` holds."""
+    """Leave the innermost loop if `test` is true."""
 
     test: Operand
 
 
 @dataclass(frozen=True)
 class Raise:
-    """End the call as the exception `kind` does."""
+    """End the call with an exception of the type `kind`."""
 
     kind: str
     message: tuple[Part, ...]
@@ -103,7 +104,7 @@ class Raise:
 
 @dataclass(frozen=True)
 class Push:
-    """Append to the end of a list of the state."""
+    """Append an item to a list of the state."""
 
     ring: int
     items: tuple[Operand, ...]
@@ -111,7 +112,7 @@ class Push:
 
 @dataclass(frozen=True)
 class Drop:
-    """Take the first item off a list of the state; `every` one of them."""
+    """Remove the first item of a list of the state, or `every` item."""
 
     ring: int
     every: bool = False
@@ -119,7 +120,7 @@ class Drop:
 
 @dataclass(frozen=True, eq=False)
 class Outlined:
-    """A function of its own: what it computes from numbers alone."""
+    """Outlined function, which depends only on numbers."""
 
     name: str
     parameters: tuple[Var, ...]
@@ -141,11 +142,11 @@ Statement = Let | Load | Invoke | Digits | Digit | If | Loop | Leave | Raise | P
 
 @dataclass(frozen=True)
 class Function:
-    """One of the four functions of a component.
+    """Function of a component: configure, start, advance or output.
 
     Attributes:
         body: its statements.
-        stores: (place, value): what it leaves in the instance; a place is a C expression.
+        stores: (place, value) of the values stored in the instance; a place is a C expression.
     """
 
     body: Sequence[Statement]
@@ -153,7 +154,7 @@ class Function:
 
 
 def every(body: Sequence[Statement]) -> Iterator[Statement]:
-    """Yield statements and all that are within them."""
+    """Yield statements and all nested statements."""
     for s in body:
         yield s
         if isinstance(s, If):
@@ -175,7 +176,7 @@ def type_of(value: Operand) -> str:
 
 
 def joined(first: str, second: str) -> str:
-    """Return the type that holds the values of both.
+    """Return the common type of two types.
 
     Raises:
         ValueError: there is none.
@@ -184,7 +185,7 @@ def joined(first: str, second: str) -> str:
         return first
     both = {first, second}
     if WIDE in both:
-        raise ValueError("an integer beyond 64 bits is kept")
+        raise ValueError("an integer beyond 64 bits is stored")
     if WORD in both:
         if REAL in both:
             raise ValueError("an integer of 64 bits or a real number")

@@ -1,4 +1,4 @@
-"""Loops of a component: unrolled where the items are known, else followed until values keep their form."""
+"""Evaluation of loops: unrolled if the items are known, else repeated until shapes of values converge."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from .statements import CONTINUE, EXIT, ON, OVER, RESULT, RETURN, Execution
 from .values import RESIZED, UNSET, Box, Bytes, Each, List, Refused, Ring, Span, now, same
 
 UNROLLED = 16
-"""Passes up to which a loop over a range is written out; chosen: four wheels, seven sets."""
+"""Number of passes up to which a loop over a range is unrolled; chosen: four wheels, seven sets."""
 WIDEST = 12
-"""Times a loop is followed until what it carries has its form."""
+"""Largest number of evaluations of a loop until the shapes of its values converge."""
 
 
 @dataclass
 class Pass:
-    """One pass through a loop: its statements, how it ends, what has changed."""
+    """Pass through a loop: its statements, its end, its changes."""
 
     out: list[ir.Statement]
     exit: Any
@@ -32,7 +32,7 @@ class Pass:
 
 
 class Looping(Execution):
-    """Loops."""
+    """Evaluation of loops."""
 
     # ---- loops ------------------------------------------------------------------------------
 
@@ -149,13 +149,13 @@ class Looping(Execution):
             name
             for name in _stored(node)
             if held.get(name, UNSET) is UNSET and not self._is_read_outside(node, name)
-        }  # names of one pass, which no other looks at
+        }  # names that are local to a pass
         carried: dict[tuple[Box, Any], Shape] = {}
         for _ in range(WIDEST):
             heads: list[tuple[ir.Var, ir.Var]] = []
             made = self._pass(test, body, carried, heads, passing)
             if not isinstance(made.exit, ir.Var) and made.exit not in (ON, CONTINUE):
-                break  # it is left at once
+                break  # the loop is left at once
             widening = Widening()
             grew = False
             for key, end in made.ends.items():
@@ -172,7 +172,7 @@ class Looping(Execution):
             if not grew:
                 break
         else:
-            raise Refused("a loop in which values take ever new forms")
+            raise Refused("a loop in which values keep taking new forms")
         self._finish_loop(node, made, carried, heads)
 
     def _is_read_outside(self, loop: ast.AST, name: str) -> bool:
@@ -220,7 +220,7 @@ class Looping(Execution):
                     starts.setdefault((box, key), before)
                     ends[box, key] = slots[key]
             if isinstance(slots, list) and len(slots) != len(box.slots) and not path.dead:
-                raise Refused("a list that is made longer or shorter in a loop")
+                raise Refused("a list whose length changes in a loop")
         for key in carried:
             box, name = key
             held = path.changed.get(box, box.slots)
@@ -236,8 +236,8 @@ class Looping(Execution):
     ) -> None:
         if not isinstance(made.exit, ir.Var):
             if made.exit in (ON, CONTINUE):
-                raise Refused("a loop without end")
-            self.out += made.out  # one pass, which always leaves
+                raise Refused("an endless loop")
+            self.out += made.out  # a single pass, which always leaves
             for (box, name), end in made.ends.items():
                 self.write(box, name, end)
             self.leave(made.exit)

@@ -1,7 +1,7 @@
-"""Arithmetic of Python as operations of the intermediate form, with the exceptions that it can raise.
+"""Lowering of Python's arithmetic to operations of the intermediate form, with its exceptions.
 
-Messages are those of the Python that builds. What is known of conditions on the path that is being followed
-(`Facts`) decides further ones.
+Messages are those of the Python that runs the build. Known conditions on the current path (`Facts`) decide
+further conditions.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ FUNCTIONS = (*CAN_OVERFLOW, *ALWAYS_DEFINED, *DOMAIN)
 
 
 def complaint(call: Callable[[], Any]) -> tuple[str, str]:
-    """Return kind and message of the exception that a call raises."""
+    """Return type and message of the exception raised by a call."""
     try:
         call()
     except Exception as error:
@@ -39,24 +39,24 @@ def complaint(call: Callable[[], Any]) -> tuple[str, str]:
 
 
 class Facts:
-    """Conditions known to hold, or not to hold, on a path."""
+    """Conditions known to be true or false on a path."""
 
     def __init__(self) -> None:
         self.truths: dict[ir.Var, bool] = {}
         self.numbers: dict[ir.Var, int] = {}
-        self.others: dict[ir.Var, frozenset[int]] = {}  # what a variable is not
+        self.others: dict[ir.Var, frozenset[int]] = {}  # excluded values of a variable
         self.meanings: dict[ir.Var, tuple[Any, ...]] = {}
-        self.domains: dict[ir.Var, frozenset[int]] = {}  # all values that a variable can have
+        self.domains: dict[ir.Var, frozenset[int]] = {}  # possible values of a variable
 
     def copy(self) -> Facts:
-        """Return facts to which others can be added; what conditions mean is shared."""
+        """Return a copy to which facts can be added; the meanings of conditions are shared."""
         more = Facts()
         more.truths, more.numbers, more.others = dict(self.truths), dict(self.numbers), dict(self.others)
         more.meanings, more.domains = self.meanings, self.domains
         return more
 
     def left(self, variable: ir.Var) -> frozenset[int] | None:
-        """Return the values that a variable can have on this path; None if they are not known."""
+        """Return the possible values of a variable on this path; None if unknown."""
         if variable in self.numbers:
             return frozenset([self.numbers[variable]])
         if variable not in self.domains:
@@ -64,7 +64,7 @@ class Facts:
         return self.domains[variable] - self.others.get(variable, frozenset())
 
     def learn(self, condition: ir.Operand, holds: bool) -> None:
-        """Take note that a condition holds, or does not."""
+        """Record that a condition is true or false."""
         if not isinstance(condition, ir.Var) or self.truths.get(condition) is holds:
             return
         self.truths[condition] = holds
@@ -82,7 +82,7 @@ class Facts:
                 self.others[tag] = self.others.get(tag, frozenset()) | {number}
 
     def known(self, condition: ir.Operand) -> bool | None:
-        """Return whether a condition holds; None if that is not known."""
+        """Return whether a condition is true; None if unknown."""
         if not isinstance(condition, ir.Var):
             return bool(condition)
         if condition in self.truths:
@@ -108,20 +108,22 @@ class Facts:
 
 
 class Lowering:
-    """The statements so far, and the arithmetic that adds to them."""
+    """Statements emitted so far, and the arithmetic that emits more."""
 
     def __init__(self) -> None:
         self.out: list[ir.Statement] = []
         self.facts = Facts()
-        self.choices: dict[ir.Var, tuple[ir.Operand, int, int]] = {}  # of constants: condition, then, else
+        self.choices: dict[
+            ir.Var, tuple[ir.Operand, int, int]
+        ] = {}  # choices between constants: condition, then, else
         self._count = 0
 
     def where(self) -> str:
-        """Return file and line of what is being evaluated."""
+        """Return the file and line that are being evaluated."""
         raise NotImplementedError
 
     def raised_at(self) -> str:
-        """Return the file and line that an exception names: within the package."""
+        """Return the file and line in the package for an exception's message."""
         return self.where()
 
     def new(self, type: str) -> ir.Var:
@@ -130,20 +132,20 @@ class Lowering:
         return ir.Var(f"{type[0]}{self._count}", type)
 
     def let(self, type: str, op: str, *operands: ir.Operand) -> ir.Var:
-        """Return a new variable that has the value of an operation."""
+        """Return a new variable with the value of an operation."""
         target = self.new(type)
         self.out.append(ir.Let(target, op, operands))
         return target
 
     def fail(self, kind: str, *message: ir.Part) -> None:
-        """Raise on the path that is being followed."""
+        """Emit an exception on the current path."""
         self.out.append(ir.Raise(kind, message, self.raised_at()))
 
     def require(self, condition: ir.Operand, kind: str, message: str) -> None:
-        """Raise unless a condition holds.
+        """Emit an exception for the case that a condition is false.
 
         Raises:
-            Unreachable: it is known not to hold.
+            Unreachable: the condition is known to be false.
         """
         known = self.facts.known(condition)
         if known:
@@ -157,7 +159,7 @@ class Lowering:
         self.facts.learn(condition, True)
 
     def settled(self, value: ir.Operand, facts: Facts) -> ir.Operand:
-        """Return the number that a variable is on a path, if that is known."""
+        """Return the value of a variable on the current path, if known."""
         if not isinstance(value, ir.Var):
             return value
         if value in self.choices:
@@ -195,7 +197,7 @@ class Lowering:
         return negated
 
     def compare(self, op: str, a: ir.Operand, b: ir.Operand) -> ir.Operand:
-        """Return whether a comparison of two numbers holds."""
+        """Return the result of a comparison of two numbers."""
         if not isinstance(a, ir.Var) and not isinstance(b, ir.Var):
             return bool(OPERATORS[op](a, b))
         if isinstance(a, ir.Var) and a in self.choices and not isinstance(b, ir.Var):
@@ -298,7 +300,7 @@ class Lowering:
         return a if a.type == ir.REAL else self.let(ir.REAL, "real", a)
 
     def whole(self, op: str, a: ir.Operand) -> ir.Operand:
-        """Return int(a) or round(a), for `op` "trunc" or "rint"; or what "floor" or "ceil" make of it."""
+        """Return int(a) or round(a) for `op` "trunc" or "rint", or floor or ceil of a."""
         rounding: dict[str, Callable[[Any], int]]
         rounding = {"trunc": int, "rint": round, "floor": math.floor, "ceil": math.ceil}
         by = rounding[op]
@@ -317,7 +319,7 @@ class Lowering:
         return self.let(ir.INT, op, a)
 
     def function(self, name: str, *operands: ir.Operand) -> ir.Operand:
-        """Return a function of `math` of numbers."""
+        """Return the value of a function of `math`."""
         if not any(isinstance(x, ir.Var) for x in operands):
             try:
                 return getattr(math, name)(*operands)  # type: ignore[no-any-return]
@@ -347,7 +349,7 @@ class Lowering:
         return result
 
     def total(self, items: list[ir.Operand], start: ir.Operand) -> ir.Operand:
-        """Return sum(items, start), by the summation of the Python that builds."""
+        """Return sum(items, start), with the summation of the Python that runs the build."""
         if not any(isinstance(x, ir.Var) for x in (*items, start)):
             return sum(items, start)  # type: ignore[arg-type]
         if COMPENSATED and any(ir.type_of(x) == ir.REAL for x in (*items, start)):
@@ -359,4 +361,4 @@ class Lowering:
 
 
 COMPENSATED = sum([1.0, 1e100, 1.0, -1e100]) == 2.0
-"""Whether `sum` is compensated, as from CPython 3.12 on."""
+"""Whether `sum` is compensated, as since CPython 3.12."""

@@ -1,6 +1,6 @@
-"""Merging of two paths where they join: the changes of each are undone, and become one value per place.
+"""Merging of two paths at a join: the changes of both are undone, and their values merged.
 
-Numbers that differ are joined in a variable, tuples and objects of one kind item by item; values of
+Different numbers are merged into a variable, tuples and objects of the same kind item by item; values of
 different form become the alternatives of a union.
 """
 
@@ -34,12 +34,12 @@ from .values import (
 )
 
 MOST_FORMS = 48
-"""Alternatives of a union; chosen: more than a component has, few enough to see that something grows."""
+"""Largest number of alternatives of a union; chosen: more than components need, to detect endless growth."""
 
 
 @dataclass
 class Path:
-    """One of two paths: its statements, its value, and what boxes hold at its end."""
+    """Path of a branch: its statements, its value, and the content of boxes at its end."""
 
     out: list[ir.Statement]
     facts: Facts
@@ -52,7 +52,7 @@ class Path:
 
 
 def items_of(slots: Any, key: Any) -> Any:
-    """Return what slots hold at a key, or that there is nothing."""
+    """Return the content of slots at a key, or `UNSET`."""
     return slots[key] if isinstance(slots, list) else slots.get(key, UNSET)
 
 
@@ -62,7 +62,7 @@ def forms(value: Any) -> tuple[Any, ...]:
 
 
 def alike(a: Any, b: Any) -> bool:
-    """Return whether two values can be joined into one of the same form."""
+    """Return whether two values can be merged into a value of the same form."""
     if a is b or same(a, b):
         return True
     if is_number(a) and is_number(b):
@@ -87,30 +87,30 @@ def alike(a: Any, b: Any) -> bool:
 
 
 class Merging(Lowering):
-    """Branches, the journal of what is changed, and joins."""
+    """Branches, the journal of changes, and joins."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.choosers: set[ir.Var] = set()  # parameters that are one of some texts
-        self.maps: dict[ir.Var, tuple[ir.Var, dict[int, int]]] = {}  # variables that follow from another
-        self.journals: list[tuple[int, dict[Box, Any]]] = []  # since when, what boxes held before
+        self.choosers: set[ir.Var] = set()  # parameters with text choices
+        self.maps: dict[ir.Var, tuple[ir.Var, dict[int, int]]] = {}  # variables that are functions of another
+        self.journals: list[tuple[int, dict[Box, Any]]] = []  # age at the start, previous content of boxes
 
     # ---- boxes ------------------------------------------------------------------------------
 
     def read(self, box: Box) -> Any:
-        """Return what a box holds."""
+        """Return the content of a box."""
         if box.merged is not None and box.merged.changed:
-            raise Refused("an object that has two names is changed")
+            raise Refused("an object with two names is changed")
         return box.slots
 
     def write(self, box: Box, key: Any, value: Any) -> None:
-        """Change what a box holds at a key."""
+        """Change the content of a box at a key."""
         self.open(box)[key] = value
 
     def open(self, box: Box) -> Any:
-        """Return what a box holds, to be changed."""
+        """Return the content of a box for modification."""
         if box.merged is not None:
-            raise Refused("an object that has two names is changed")
+            raise Refused("an object with two names is changed")
         box.changed = True
         if self.journals:
             since, journal = self.journals[-1]
@@ -120,7 +120,7 @@ class Merging(Lowering):
         return box.slots
 
     def followed(self, body: Callable[[], Any], facts: Facts) -> Path:
-        """Return what a body comes to, with all that it changes taken back."""
+        """Evaluate a body, undo its changes, and return its path."""
         outer, known = self.out, self.facts
         self.out, self.facts = [], facts
         self.journals.append((now(), {}))
@@ -146,7 +146,7 @@ class Merging(Lowering):
     # ---- branches ---------------------------------------------------------------------------
 
     def branch(self, test: ir.Operand, then: Callable[[], Any], orelse: Callable[[], Any]) -> Any:
-        """Return what `then` returns where a condition holds, `orelse` elsewhere."""
+        """Return the value of `then` if a condition is true, else that of `orelse`."""
         known = self.facts.known(test)
         if known is not None:
             return then() if known else orelse()
@@ -161,7 +161,7 @@ class Merging(Lowering):
             live = b if a.dead else a
             rest: list[ir.Statement] = []
             if not live.dead:
-                live.out, rest = [], live.out  # what follows needs no arm of its own
+                live.out, rest = [], live.out  # later statements need not be in the arm
             self.out.append(ir.If(test, a.out, b.out))
             if live.dead:
                 raise Unreachable
@@ -175,7 +175,7 @@ class Merging(Lowering):
         for box in dict.fromkeys((*a.changed, *b.changed)):
             slots_a, slots_b = a.slots(box), b.slots(box)
             if isinstance(slots_a, list) and len(slots_a) != len(slots_b):
-                raise Refused("a list is made longer or shorter on one path only")
+                raise Refused("the length of a list changes on one path only")
             slots_a, slots_b = self.relevant(box, slots_a, slots_b)
             keys = range(len(slots_a)) if isinstance(slots_a, list) else dict.fromkeys((*slots_a, *slots_b))
             merged = {key: join.of(items_of(slots_a, key), items_of(slots_b, key)) for key in keys}
@@ -189,11 +189,11 @@ class Merging(Lowering):
         return value
 
     def relevant(self, box: Box, slots_a: Any, slots_b: Any) -> tuple[Any, Any]:
-        """Return what a box holds on two paths, without what is of no more use on one of them."""
+        """Return the content of a box on two paths, without parts that are no longer used."""
         return slots_a, slots_b
 
     def by_form(self, value: Any, use: Callable[[Any], Any]) -> Any:
-        """Return what `use` makes of the alternative that a value is."""
+        """Apply `use` to the active alternative of a value."""
         if not isinstance(value, Union):
             return use(value)
 
@@ -208,7 +208,7 @@ class Merging(Lowering):
         return from_(self._possible(value, self.facts))
 
     def narrowed(self, value: Any, facts: Facts | None = None) -> Any:
-        """Return the alternative that a value is, if that is known."""
+        """Return the active alternative of a value, if known."""
         if isinstance(value, Union):
             left = self._possible(value, facts or self.facts)
             if len(left) == 1:
@@ -232,7 +232,7 @@ def _values(x: ir.Operand, facts: Facts) -> frozenset[int] | None:
 
 
 class _Join:
-    """The values of two paths, taken together."""
+    """Merge of the values of two paths."""
 
     def __init__(self, machine: Merging, test: ir.Var, a: Path, b: Path) -> None:
         self.machine, self.test, self.a, self.b = machine, test, a, b
@@ -240,12 +240,12 @@ class _Join:
         self.numbers: dict[tuple[Any, Any], ir.Operand] = {}
 
     def finish(self) -> None:
-        """Mark the objects that have become others."""
+        """Mark the objects that have been merged into others."""
         for (a, b), box in self.boxes.items():
             a.merged = b.merged = box
 
     def of(self, a: Any, b: Any) -> Any:
-        """Return what is `a` on one path, `b` on the other."""
+        """Return the merged value of `a` on one path and `b` on the other."""
         a, b = self.machine.narrowed(a, self.a.facts), self.machine.narrowed(b, self.b.facts)
         if a is b or same(a, b) or b is ANY:
             return a
@@ -307,7 +307,7 @@ class _Join:
         return target
 
     def _mapped(self, a: ir.Operand, b: ir.Operand) -> tuple[ir.Var, dict[int, int]] | None:
-        """Return a variable that tells the two paths apart, and the number for each of its values."""
+        """Return a variable that distinguishes the two paths, and the number for each of its values."""
         kind, *of = self.machine.facts.meanings.get(self.test, ("",))
         if kind != "is" or isinstance(a, ir.Var) or not isinstance(a, int):
             return None
@@ -337,7 +337,7 @@ class _Join:
             else:
                 meanings[target] = ("and", first, a) if b is False else ("or", first, b)
         elif a is False or b is True:
-            against = ir.Var(f"not {self.test}", ir.BOOL)  # a meaning only, never computed
+            against = ir.Var(f"not {self.test}", ir.BOOL)  # symbolic, never computed
             meanings[against] = ("not", self.test)
             if a is False and b is True:
                 meanings[target] = ("not", self.test)
@@ -351,7 +351,7 @@ class _Join:
             return self.boxes[a, b]
         slots_a, slots_b = self.a.slots(a), self.b.slots(b)
         if isinstance(a, Ring) or (isinstance(a, List) and len(slots_a) != len(slots_b)):
-            raise Refused("a list is made longer or shorter on one path only")
+            raise Refused("the length of a list changes on one path only")
         made: Box
         if isinstance(a, Instance):
             made = Instance(a.cls)
@@ -369,7 +369,7 @@ class _Join:
         return made
 
     def _by_choice(self, a: Any, b: Any) -> Union | None:
-        """Return a union told by the parameter that tells the two paths apart, if one does."""
+        """Return a union tagged by the parameter that distinguishes the two paths, if there is one."""
         kind, *of = self.machine.facts.meanings.get(self.test, ("",))
         if kind != "is" or of[0] not in self.machine.choosers:
             return None
@@ -406,5 +406,5 @@ class _Join:
                 self.b.out.append(ir.Load(tag_b, tuple(places), b.tag))
         tag = self.number(tag_a, tag_b)
         if not isinstance(tag, ir.Var):
-            raise Refused("two forms that cannot be told apart")
+            raise Refused("two forms that cannot be distinguished")
         return Union(tag, tuple(alternatives))

@@ -1,4 +1,4 @@
-"""Operators, comparisons and comprehensions of a component, evaluated as far as they are known."""
+"""Partial evaluation of operators, comparisons and comprehensions."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ COMPARED = {
     ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
 }  # fmt: skip
 SMALL = 2**20
-"""Below which two integers are known to give one that a double holds."""
+"""Magnitude below which the result of two integers is exact as a double."""
 
 
 class Operating(Evaluation):
-    """Operators and comprehensions."""
+    """Evaluation of operators and comprehensions."""
 
     # ---- comprehensions ---------------------------------------------------------------------
 
@@ -49,7 +49,7 @@ class Operating(Evaluation):
         return go(0, call.frame)
 
     def _within(self, call: Call, frame: Frame, evaluated: Callable[[], Any]) -> Any:
-        """Evaluate a part of a comprehension where it was written, also when its turn comes later."""
+        """Evaluate a part of a comprehension in the scope where it was written, even if evaluated later."""
         self.calls.append(replace(call, frame=frame))
         try:
             return evaluated()
@@ -61,7 +61,7 @@ class Operating(Evaluation):
         for condition in generator.ifs:
             holds = self.facts.known(self.truth_of(self.evaluate(condition)))
             if holds is None:
-                raise Refused("a filter that is known at run time only")
+                raise Refused("a filter that is only known at run time")
             if not holds:
                 return False
         return True
@@ -122,7 +122,7 @@ class Operating(Evaluation):
         raise Refused(f"{op} of a {type(a).__name__} and a {type(b).__name__}")
 
     def _exact(self, op: str, result: ir.Operand, a: ir.Operand, b: ir.Operand) -> ir.Operand:
-        """Raise where an integer becomes larger than a double holds exactly: Python's have no end."""
+        """Emit an exception for integers that are not exact as doubles; Python's integers are unbounded."""
         grows = op in ("+", "-", "*", "**", "//") and isinstance(result, ir.Var) and result.type == ir.INT
         if grows and not (self._is_small(a) and self._is_small(b)):
             size = self.size(result)
@@ -202,7 +202,7 @@ class Operating(Evaluation):
         return go(self.evaluate(node.left), 0)
 
     def compared(self, op: ast.cmpop, a: Any, b: Any) -> ir.Operand:
-        """Return whether a comparison holds."""
+        """Return the result of a comparison."""
         if isinstance(a, Union) or isinstance(b, Union):
             return self.by_form(a, lambda x: self.by_form(b, lambda y: self.compared(op, x, y)))  # type: ignore
         if isinstance(op, (ast.In, ast.NotIn)):
@@ -228,7 +228,7 @@ class Operating(Evaluation):
             if types == {ir.BOOL}:
                 return self.compare("==", a, b)
             if ir.BOOL not in types:
-                raise Refused("whether two numbers are the same object")
+                raise Refused("comparing the identity of two numbers")
         return a is b
 
     def _equal(self, a: Any, b: Any) -> ir.Operand:

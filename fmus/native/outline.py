@@ -1,7 +1,7 @@
-"""Outlining: functions of a component that depend on numbers alone become C functions, each emitted once.
+"""Outlining: functions of a component that depend only on numbers become C functions, each emitted once.
 
-A call is followed apart, with its arguments' numbers as parameters; if it changes nothing and is long enough
-to be worth it, the call stays one. All others are evaluated in place.
+A call is evaluated separately, with the numbers of its arguments as parameters. If it has no side effects and
+is long enough, the function is outlined; all other calls are evaluated in place.
 """
 
 from __future__ import annotations
@@ -32,23 +32,23 @@ from .shapes import (
 from .values import Box, Frame, Picked, Refused, is_plain
 
 SHORTEST = 40
-"""Statements from which a function stays one; chosen: a call with its arguments takes a dozen."""
+"""Smallest number of statements of an outlined function; chosen: a call with its arguments takes a dozen."""
 SMALLEST = 25
-"""Nodes of a syntax tree from which it is tried."""
+"""Smallest number of nodes of the syntax tree for an attempt."""
 MOST_RESULTS = 40
-"""Numbers that a function returns at most."""
+"""Largest number of results of an outlined function."""
 
 
 class Library:
-    """The functions that have been made, for all evaluations that keep the same numbers fixed."""
+    """Outlined functions, for all evaluations with the same fixed numbers."""
 
     def __init__(self) -> None:
         self.made: dict[Any, tuple[ir.Outlined, Shape] | None] = {}
-        self.kept: list[Any] = []  # whose identity is part of a key
+        self.kept: list[Any] = []  # objects whose identity is part of a key
 
 
 class Outlining(Calling):
-    """Calls that become functions."""
+    """Outlining of calls."""
 
     def __init__(self, sources: Sources, fixed: set[ir.Var], library: Library) -> None:
         super().__init__(sources)
@@ -123,7 +123,7 @@ def _is_of_list(statement: ir.Statement) -> bool:
 
 
 def _holds(value: Any, boxes: set[int], machine: Calling) -> bool:
-    """Return whether a value is or holds one of the objects that a function was given."""
+    """Return whether a value is or contains an object that was passed to a function."""
     if isinstance(value, Box):
         if id(value) in boxes:
             return True
@@ -139,7 +139,7 @@ def _holds(value: Any, boxes: set[int], machine: Calling) -> bool:
 
 
 def _key(shape: Shape, seen: dict[int, int]) -> Any:
-    """Return what tells a shape from others, the same for all that are alike throughout."""
+    """Return a key of a shape, equal for equal shapes."""
     if id(shape) in seen:
         return "again", seen[id(shape)]
     if isinstance(shape, Leaf):

@@ -1,4 +1,4 @@
-"""The sources of a component: syntax tree, file and line of every function it uses."""
+"""Sources of a component: syntax tree, file and line of every function that it uses."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ Tree = ast.FunctionDef | ast.Lambda
 
 @dataclass(frozen=True)
 class Source:
-    """A function as it is written.
+    """Source of a function.
 
     Attributes:
         node: its syntax tree.
-        file: as sentences name it, from the folder of the package; "" if they do not.
-        of_package: whether Python names it, too, where it raises (see `components.fmi.component`).
-        names: of the module.
-        cells: variables of the functions around it.
+        file: its path for messages, relative to the folder of the package; "" if not mentioned.
+        of_package: whether messages of Python mention it, too (see `components.fmi.component`).
+        names: names of the module.
+        cells: variables of the enclosing functions.
     """
 
     node: Tree
@@ -51,7 +51,7 @@ def _functions(file: str, content: bytes) -> dict[tuple[int, str], list[Tree]]:
 
 @cache
 def kinds_within(node: ast.AST) -> Counter[type[ast.AST]]:
-    """Return how many nodes of each kind a node consists of."""
+    """Return the number of nodes of each kind within a node."""
     return Counter(map(type, ast.walk(node)))
 
 
@@ -74,19 +74,19 @@ def _codes(file: str, content: bytes) -> dict[tuple[int, str], CodeType]:
 
 
 def content_of(file: str) -> bytes | None:
-    """Return the text of a source file, or of the cell of a notebook; None if there is none."""
+    """Return the text of a source file, or of a cell of a notebook; None if there is none."""
     if Path(file).is_file():
         return Path(file).read_bytes()
     return "".join(linecache.getlines(file)).encode() or None
 
 
 class Sources:
-    """The functions that are followed: of a package, and of other files.
+    """Functions that are translated: those of a package, and of other files.
 
     Args:
         home: folder of the package.
         others: further folders and files.
-        unnamed: a file whose lines sentences do not name.
+        unnamed: a file whose lines are not mentioned in messages.
     """
 
     def __init__(self, home: Path, *others: Path, unnamed: Path | None = None) -> None:
@@ -96,7 +96,7 @@ class Sources:
         self._known: dict[FunctionType, Source] = {}
 
     def contains(self, function: FunctionType) -> bool:
-        """Return whether a function is followed."""
+        """Return whether a function is translated."""
         file = Path(function.__code__.co_filename)
         return any(file.is_relative_to(folder) for folder in (self.home, *self.others))
 
@@ -104,7 +104,7 @@ class Sources:
         """Return the source of a function.
 
         Raises:
-            Refused: it has none, is not the only one in its line, or was edited since it was imported.
+            Refused: it has no source, shares its line with another, or was edited since it was imported.
         """
         if function not in self._known:
             self._known[function] = self._found(function)
@@ -122,13 +122,13 @@ class Sources:
             raise Refused(f"{function.__qualname__} has no source", where)
         nodes = _functions(str(file), content).get((code.co_firstlineno, code.co_name), [])
         if len(nodes) != 1:
-            raise Refused(f"{function.__qualname__} cannot be told from others in its line", where)
+            raise Refused(f"{function.__qualname__} shares its line with another function", where)
         if not of_package and _codes(str(file), content).get((code.co_firstlineno, code.co_name)) != code:
             raise Refused(f"{function.__qualname__} was edited since it was imported", where)
         if code.co_flags & (inspect.CO_GENERATOR | inspect.CO_COROUTINE):
             raise Refused(f"{function.__qualname__} is a generator", where)
         cells = {}
         for name, cell in zip(code.co_freevars, function.__closure__ or (), strict=True):
-            with contextlib.suppress(ValueError):  # not filled yet
+            with contextlib.suppress(ValueError):  # not assigned yet
                 cells[name] = cell.cell_contents
         return Source(nodes[0], shown, of_package, function.__globals__, cells)

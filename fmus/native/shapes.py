@@ -1,7 +1,7 @@
-"""Shapes of values: what a loop carries from one pass to the next, what a component keeps between steps.
+"""Shapes of values that loops carry between passes, and components between steps.
 
-A shape holds what is always the same and has leaves where numbers are; two values have a shape that is wide
-enough for both. A value becomes the list of its leaves' numbers, and is made of such a list again.
+A shape contains the constant parts of a value, and leaves for its numbers; two values have a common shape
+that is wide enough for both. A value is converted to the list of the numbers of its leaves, and back.
 """
 
 from __future__ import annotations
@@ -36,26 +36,26 @@ from .values import (
 
 @dataclass(eq=False)
 class Shape:
-    """A form; those below are its kinds."""
+    """Base class of shapes."""
 
 
 @dataclass(eq=False)
 class Known(Shape):
-    """Always the same value, known at build time, or always the same object."""
+    """Constant: a value known at build time, or always the same object."""
 
     value: Any
 
 
 @dataclass(eq=False)
 class Leaf(Shape):
-    """A number."""
+    """Number that is only known at run time."""
 
     type: str
 
 
 @dataclass(eq=False)
 class Items(Shape):
-    """A tuple like `sample`."""
+    """Tuple of the class of `sample`."""
 
     sample: tuple[Any, ...]
     items: list[Shape]
@@ -63,7 +63,7 @@ class Items(Shape):
 
 @dataclass(eq=False)
 class Held(Shape):
-    """A box of one kind; `blank` makes an empty one."""
+    """Box; `blank` creates an empty box of the same kind."""
 
     kind: Any
     blank: Callable[[], Box]
@@ -74,7 +74,7 @@ class Held(Shape):
 
 @dataclass(eq=False)
 class Made(Shape):
-    """A closure or bound method: `make` of what `inner` is."""
+    """Closure or bound method: `make` applied to `inner`."""
 
     kind: Any
     make: Callable[[Any], Any]
@@ -83,7 +83,7 @@ class Made(Shape):
 
 @dataclass(eq=False)
 class Forms(Shape):
-    """One of several shapes, told by a tag."""
+    """Alternatives of several shapes, distinguished by a tag."""
 
     tag: Shape
     alternatives: list[Shape]
@@ -91,18 +91,18 @@ class Forms(Shape):
 
 @dataclass(eq=False)
 class Growing(Shape):
-    """A list of the state whose length changes."""
+    """List of the state whose length changes."""
 
     number: int
     item: Shape
 
 
 Place = Callable[[Box], Any]
-"""Returns what a box holds, at the time in question."""
+"""Returns the content of a box at a given time."""
 
 
 class Memo(dict[Any, Shape]):
-    """Shapes of objects that have been met, and what is fixed.
+    """Shapes of visited objects, and fixed values.
 
     Attributes:
         fixed: variables that are the same in every call.
@@ -168,7 +168,7 @@ def _kind(box: Box) -> tuple[Any, Callable[[], Box]]:
 
 
 class Widening:
-    """Shapes that are wide enough for two; remembers pairs, so that what is shared stays shared."""
+    """Common shapes of two shapes; remembers pairs, so that shared objects stay shared."""
 
     def __init__(self) -> None:
         self._pairs: dict[tuple[int, int], Shape] = {}
@@ -176,7 +176,7 @@ class Widening:
         self.grew = False
 
     def of(self, a: Shape, b: Shape) -> Shape:
-        """Return a shape for all values of `a` and of `b`; `grew` tells whether it is another than `a`."""
+        """Return a shape for all values of `a` and `b`; `grew` is set if it differs from `a`."""
         if a is b or (isinstance(b, Known) and b.value is ANY):
             return a
         if isinstance(a, Known) and a.value is ANY:
@@ -262,14 +262,14 @@ def _alike(a: Shape, b: Shape) -> bool:
 
 
 def _place(shapes: list[Shape], form: Shape, wanted: int) -> int:
-    """Return which of some shapes is like a form, the wanted one if it is; their number if none is."""
+    """Return the index of a shape that matches a form, preferably `wanted`; their number if none does."""
     if wanted < len(shapes) and _alike(shapes[wanted], form):
         return wanted
     return next((i for i, shape in enumerate(shapes) if _alike(shape, form)), len(shapes))
 
 
 def types_of(shape: Shape) -> Iterator[str]:
-    """Yield the types of a shape's leaves, in their order."""
+    """Yield the types of a shape's leaves, in order."""
     yield from _types(shape, set())
 
 
@@ -292,7 +292,7 @@ def _types(shape: Shape, seen: set[int]) -> Iterator[str]:
 
 
 def build(shape: Shape, leaves: Iterator[Any], memo: dict[int, Any] | None = None) -> Any:
-    """Return the value of a shape whose leaves have these numbers."""
+    """Return the value of a shape with the given numbers at its leaves."""
     memo = {} if memo is None else memo
     if isinstance(shape, Leaf):
         return next(leaves)
@@ -320,7 +320,7 @@ def build(shape: Shape, leaves: Iterator[Any], memo: dict[int, Any] | None = Non
 
 
 def numbers_of(shape: Shape, value: Any, slots: Place, machine: Merging) -> list[ir.Operand]:
-    """Return the numbers of a value at the leaves of a shape that is wide enough for it."""
+    """Return the numbers of a value at the leaves of a shape."""
     operands: list[ir.Operand] = []
     _collect(shape, value, slots, machine, operands, set())
     return operands

@@ -1,7 +1,8 @@
-"""Specialization of a component into four functions: its parameters, its start, a step, and its outputs.
+"""Specialization of a component into four functions: configure, start, advance, output.
 
-What stays on `self` is the component's state. Its form is found by following the functions until it no longer
-widens: what is the same in every step is known, every other number has a place in the instance.
+The attributes on `self` are the component's state. Its shape is found by evaluating the functions until it no
+longer widens: values that are the same in every step are constants, every other number has a place in the
+instance.
 """
 
 from __future__ import annotations
@@ -22,25 +23,25 @@ from .shapes import Growing, Memo, Shape, Widening, build, numbers_of, shape_of,
 from .values import Instance, List, Refused, Union, Unreachable, is_number
 
 WIDEST = 40
-"""Times a step is followed until the state has its form."""
+"""Largest number of evaluations of a step until the shape of the state converges."""
 STACK = 512 * 1024 * 1024
-"""Stack of the thread that translates [bytes]: calls within calls are followed by calls within calls."""
+"""Stack of the translating thread [bytes], since nested calls are evaluated by nested calls."""
 
 
 HOOKS = ("configure", "start", "advance", "output")
-"""Methods of a component that are translated."""
+"""Translated methods of a component."""
 
 
 @dataclass
 class Program:
-    """A component, specialised.
+    """Specialized component.
 
     Attributes:
-        variables: its inputs, outputs and parameters, as it declares them.
+        variables: its declared inputs, outputs and parameters.
         functions: configure, start, advance, output.
-        reads: variable -> place it is read from.
-        configured, state: types of what it keeps of its parameters, and between steps.
-        rings: number of numbers per item, of each list whose length changes.
+        reads: variable -> place from which it is read.
+        configured, state: types of the values derived from parameters, and of the state.
+        rings: number of doubles per item, for each list whose length changes.
     """
 
     variables: Sequence[Any]
@@ -52,14 +53,14 @@ class Program:
 
 
 def specialise(component: type[Any], home: Path, *others: Path, unnamed: Path | None = None) -> Program:
-    """Return a component as a program.
+    """Translate a component to a program.
 
     Args:
         component: its class.
-        home, others, unnamed: where its functions are (see `Sources`).
+        home, others, unnamed: location of its functions (see `Sources`).
 
     Raises:
-        Refused: what cannot be translated, with file and line.
+        Refused: a construct cannot be translated; with file and line.
     """
     _refuse_replaced_life_cycle(component, home)
     outcomes: list[Any] = []
@@ -85,7 +86,7 @@ def specialise(component: type[Any], home: Path, *others: Path, unnamed: Path | 
 
 
 def _refuse_replaced_life_cycle(component: type[Any], home: Path) -> None:
-    """Refuse a component that overrides more of the base class than the `HOOKS`."""
+    """Refuse a component that overrides methods of the base class other than `HOOKS`."""
     mro = component.__mro__
     names = [(cls.__name__, cls.__module__.rpartition(".")[2]) for cls in mro]
     base = names.index(("Component", "component"))
@@ -171,7 +172,7 @@ class _Specialising:
                 break
             state = wide
         else:
-            raise Refused("a state that takes ever new forms")
+            raise Refused("a state that keeps taking new forms")
         program.functions["start"] = ir.Function(
             started.out, _placed("s->s", self._numbers(state, at_start, started, "start"))
         )
@@ -193,10 +194,10 @@ class _Specialising:
         widening.of(state, self._shape(me, fixed))
         after = self._numbers(state, me, machine, "output")
         if widening.grew or any(x is not leaf for x, leaf in zip(after, leaves, strict=True)):
-            raise Refused("output() changes what the component keeps", self._line_of("output"))
+            raise Refused("output() changes the component's state", self._line_of("output"))
         outputs = self.returned
         if isinstance(outputs, Union) or not isinstance(outputs, (tuple, List)):
-            raise Refused("output() returns what has several forms", self._line_of("output"))
+            raise Refused("output() returns a value with several forms", self._line_of("output"))
         values = machine.items(outputs)
         if len(values) != self.outputs or not all(map(is_number, values)):
             raise Refused("output() returns something other than all outputs", self._line_of("output"))
@@ -215,7 +216,7 @@ class _Specialising:
         try:
             self.returned = machine.call(machine.attribute(me, method), list(args), {})
         except Unreachable:
-            raise Refused(f"{method}() fails whatever its inputs are", self._line_of(method)) from None
+            raise Refused(f"{method}() fails for all inputs", self._line_of(method)) from None
         return me, machine
 
     def _shape(self, me: Instance, fixed: set[ir.Var]) -> Shape:
@@ -240,5 +241,5 @@ class _Specialising:
 
 
 def _placed(prefix: str, numbers: list[ir.Operand]) -> list[tuple[str, ir.Operand]]:
-    """Return numbers with their places: prefix0, prefix1, ..."""
+    """Return numbers with their places prefix0, prefix1, ..."""
     return [(f"{prefix}{i}", x) for i, x in enumerate(numbers)]

@@ -1,7 +1,7 @@
-"""Statements of a component: effects, control flow, loops of known and unknown length.
+"""Evaluation of statements: side effects, control flow, assignments.
 
-How a function continues is a value of its frame, `EXIT`, which is joined like any other where two
-paths join, so returns, breaks and continues on one path need nothing of their own.
+The control flow of a function is a value of its frame, `EXIT`, which is merged like any other where two
+paths join, so returns, breaks and continues on a single path need no special treatment.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ from .values import (
 
 EXIT, RESULT = "<exit>", "<result>"
 ON, CONTINUE, BREAK, RETURN, OVER = range(5)
-"""Ends of a block: it goes on, leaves a loop or the function, or the test of a loop fails."""
+"""Ends of a block: it continues, leaves a loop or the function, or the test of a loop fails."""
 
 
 class Execution(Operating):
-    """The execution of statements."""
+    """Evaluation of statements."""
 
     @property
     def frame(self) -> Frame:
@@ -49,11 +49,11 @@ class Execution(Operating):
         return self.frame.slots.get(EXIT, ON)
 
     def leave(self, how: Any) -> None:
-        """Set how the block goes on."""
+        """Set the end of the block."""
         self.write(self.frame, EXIT, how)
 
     def block(self, statements: Sequence[ast.stmt]) -> None:
-        """Execute statements until one of them leaves."""
+        """Evaluate statements until the block is left."""
         for i, statement in enumerate(statements):
             self.statement(statement)
             how = self.exit
@@ -66,7 +66,7 @@ class Execution(Operating):
                 return
 
     def statement(self, node: ast.stmt) -> None:
-        """Execute a statement.
+        """Evaluate a statement.
 
         Raises:
             Refused: with file and line.
@@ -75,7 +75,7 @@ class Execution(Operating):
             self.dispatched("_do_", node)
         except (Promote, Refused, Unreachable):
             raise
-        except Exception as error:  # unforeseen: the component stays in Python
+        except Exception as error:  # unexpected: the component runs in Python
             self.at(node)
             raise Refused(f"not translated: {type(error).__name__}: {error}", self.where()) from error
 
@@ -91,7 +91,7 @@ class Execution(Operating):
 
     def _has_closures(self) -> bool:
         kinds = kinds_within(self.calls[-1].source.node)
-        return kinds[ast.Lambda] + kinds[ast.FunctionDef] > 1  # more than itself
+        return kinds[ast.Lambda] + kinds[ast.FunctionDef] > 1  # more functions than itself
 
     # ---- simple statements ------------------------------------------------------------------
 
@@ -137,7 +137,7 @@ class Execution(Operating):
             return self.operate(op, before, value)
         if before.path is not None or not (op == "+" or (op == "*" and isinstance(value, int))):
             raise Refused(f"{op}= of a list")
-        held = self.open(before)  # whoever else holds the list sees the change, too
+        held = self.open(before)  # other references to the list see the change, too
         held[:] = [*held, *self.items(value)] if op == "+" else held * value
         return before
 
@@ -169,7 +169,7 @@ class Execution(Operating):
         if isinstance(error, type) and issubclass(error, BaseException):
             error = Failure(error, Text(()))
         if not isinstance(error, Failure):
-            raise Refused("raising what is not made in place")
+            raise Refused("raising an exception that is not created in place")
         self.at(node)
         self.fail(error.kind.__name__, *error.message.parts)
         raise Unreachable
@@ -183,17 +183,17 @@ class Execution(Operating):
             self.remove(owner, index, "list assignment index out of range")
 
     def remove(self, owner: Any, index: Any, text: str) -> Any:
-        """Take an item off a list and return it."""
+        """Remove an item from a list and return it."""
         if isinstance(owner, Ring):
             if index != 0 or isinstance(index, (ir.Var, slice)):
-                raise Refused("taking another item than the first off a list whose length changes")
+                raise Refused("removing an item other than the first from a list whose length changes")
             item = self.ring_item(owner, self.ring_index(owner, 0, text))
             self.out.append(ir.Drop(owner.number))
             return item
         if isinstance(owner, Dict) and not isinstance(index, ir.Var):
             return self.open(owner).pop(index)
         if not isinstance(owner, List) or isinstance(index, ir.Var):
-            raise Refused(f"taking an item off a {type(owner).__name__}")
+            raise Refused(f"removing an item from a {type(owner).__name__}")
         self.promote(owner)
         held = self.open(owner)
         if isinstance(index, int) and not -len(held) <= index < len(held):
@@ -204,17 +204,17 @@ class Execution(Operating):
         return item
 
     def promote(self, owner: List, item: Any = UNSET) -> None:
-        """Give up following a list of the state item by item, now that its length changes."""
+        """Stop tracking the items of a list of the state, because its length changes."""
         if owner.path is not None:
             example = item if item is not UNSET else owner.slots[0] if owner.slots else UNSET
             if example is UNSET:
-                raise Refused("a list of the state that loses items before it gets any")
+                raise Refused("a list of the state that loses items before any are added")
             raise Promote(owner.path, shape_of(example, self.read))
 
     # ---- places -----------------------------------------------------------------------------
 
     def assign(self, target: ast.expr, value: Any) -> None:
-        """Give a value to a target."""
+        """Assign a value to a target."""
         if isinstance(target, ast.Name):
             self.write(self.frame, target.id, value)
         elif isinstance(target, (ast.Tuple, ast.List)):
@@ -228,7 +228,7 @@ class Execution(Operating):
 
     def _unpack(self, target: ast.Tuple | ast.List, value: Any) -> None:
         if isinstance(value, Union):
-            raise Refused("taking apart what has several forms")
+            raise Refused("unpacking a value with several forms")
         values = list(value)
         starred = [i for i, t in enumerate(target.elts) if isinstance(t, ast.Starred)]
         if starred:

@@ -1,15 +1,15 @@
-/* A component translated to C: every function of FMI 2.0, around what the translation has made of it.
+/* FMI 2.0 for co-simulation, for components translated to C.
  *
- * The file made of a component includes arithmetic.h, defines Variables, DECLARED, Configured, State and
+ * The generated file of a component includes arithmetic.h, defines Variables, DECLARED, Configured, State and
  *
- *     configure(problem, v, c)                      what follows from the parameters
- *     start(problem, v, c, s, lists, t)             the state at start time
- *     advance(problem, v, c, s, lists, t, h)        the state from t to t + h
- *     output(problem, v, c, s, lists, y, t)         all outputs at t
+ *     configure(problem, v, c)                      derives values from the parameters
+ *     start(problem, v, c, s, lists, t)             sets the state at start time
+ *     advance(problem, v, c, s, lists, t, h)        advances the state from t to t + h
+ *     output(problem, v, c, s, lists, y, t)         computes all outputs at t
  *
  * which return 0, or 1 with the exception that the component would have raised in `problem`, and includes this
- * file last. What it does when is what components/fmi/component.py does, and so are its sentences. Nothing is
- * global, so any number of instances may live in any number of threads. */
+ * file last. Order of calls and messages are those of components/fmi/component.py. There are no global variables,
+ * so instances may run in any number of threads. */
 #include "calling_sequence.h"
 #include "fmi2.h"
 
@@ -19,21 +19,21 @@
 #define FMI2_EXPORT __attribute__((visibility("default")))
 #endif
 
-enum { LONGEST_TEXT = 256 }; /* of a text that is none of a parameter's choices */
+enum { LONGEST_TEXT = 256 }; /* length of a text that is not among a parameter's choices */
 
-/* All that is saved and restored with the state of an instance. */
+/* Everything that is saved and restored with the state of an instance. */
 typedef struct {
     Variables v;
     Configured c;
     State s;
     double y[N_OUTPUTS > 0 ? N_OUTPUTS : 1];
     double start_time;
-    int initializing; /* until initialization ends, outputs follow what is set */
-    int stale;        /* something has been set since the outputs were computed */
-    int configured;   /* since a parameter has been set */
+    int initializing; /* until initialization ends, outputs follow the inputs */
+    int stale;        /* a variable has been set since the outputs were computed */
+    int configured;   /* since the last change of a parameter */
     int failed;
     Progress at;
-    char wrong[LONGEST_TEXT]; /* the last text that was no choice */
+    char wrong[LONGEST_TEXT]; /* the last text that was not a choice */
 } Content;
 
 typedef struct {
@@ -88,7 +88,7 @@ static fmi2Status refuse(const Instance *instance, const Refusal *why)
     return complain(instance, why->text);
 }
 
-/* Log an exception as the component would; the instance is of no more use. */
+/* Log an exception as the component would, and mark the instance as failed. */
 static fmi2Status fail(Instance *instance, const char *what, double t, const Problem *problem)
 {
     static const Problem empty;
@@ -112,7 +112,7 @@ static fmi2Status fail(Instance *instance, const char *what, double t, const Pro
         say(sentence, DECLARED[i].name);
         say(sentence, " = ");
         write_repr(number, *real_at(instance, i));
-        if (sizeof sentence->text - sentence->length < sizeof number + 64) { /* cut where Python would go on */
+        if (sizeof sentence->text - sentence->length < sizeof number + 64) { /* truncated, unlike in Python */
             say(sentence, "...");
             break;
         }
@@ -153,7 +153,7 @@ static void say_name(Problem *problem, fmi2ValueReference r)
     say(problem, r < N_VARIABLES ? DECLARED[r].name : text);
 }
 
-/* ---- what a component does ---- */
+/* ---- functions of the component ---- */
 
 static void say_quoted(Problem *problem, const char *text)
 {
@@ -174,7 +174,7 @@ static void say_quoted(Problem *problem, const char *text)
     say(problem, quote);
 }
 
-/* Say what is wrong with a parameter, if anything is. */
+/* Check a parameter; 1 with the problem if its value is not allowed. */
 static int wrong_parameter(Instance *instance, size_t i, Problem *problem)
 {
     const Declared *d = &DECLARED[i];
@@ -562,7 +562,7 @@ static void forget(Saved *saved)
     }
 }
 
-/* Copy all of a state, its lists from their first items on; false where there is no memory for it. */
+/* Copy a state, with its lists starting at their first items; false if out of memory. */
 static int copy(Saved *to, const Saved *from)
 {
     Saved made = {.content = from->content};
@@ -612,7 +612,7 @@ FMI2_EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
     return fmi2OK;
 }
 
-/* A saved state in bytes: its GUID, its content, then count and items of each list. */
+/* Serialized state: GUID, content, then count and items of each list. */
 FMI2_EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
 {
     UNIT(c)
@@ -697,14 +697,14 @@ FMI2_EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte b
     return fmi2OK;
 }
 
-/* ---- functions that such an FMU does not have ---- */
+/* ---- functions that are not supported ---- */
 
 FMI2_EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String names[])
 {
     UNIT(c)
     (void)on;
     REQUIRE(n == 0 || names != NULL, "fmi2SetDebugLogging: no categories given")
-    return fmi2OK; /* only errors are logged, and they always are */
+    return fmi2OK; /* only errors are logged, and always */
 }
 
 FMI2_EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)

@@ -1,8 +1,8 @@
-"""Values that the evaluation of a component works with, beside plain Python values.
+"""Values of the partial evaluation, other than plain Python values.
 
-Numbers, strings, tuples, classes and functions that are known at build time are themselves. A number that is
-known at run time only is an `ir.Var`. Objects that can change are boxes, so that what one path changes can be
-taken back before the other is followed; a value that has several forms is a `Union` with a tag.
+Numbers, strings, tuples, classes and functions that are known at build time are represented by themselves, a
+number that is only known at run time by an `ir.Var`. Mutable objects are boxes, so that the changes of a path
+can be undone before the other path is evaluated; a value with several forms is a `Union` with a tag.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from . import ir
 
 
 class Refused(Exception):
-    """Error: a construct of the component cannot be translated; the text names it."""
+    """Error: a construct of the component, named in the text, cannot be translated."""
 
     def __init__(self, text: str, where: str = "") -> None:
         super().__init__(text)
@@ -27,12 +27,12 @@ class Refused(Exception):
         return f"{self.text} ({self.where})" if self.where else self.text
 
 
-RESIZED = "a list that grows or shrinks while it is gone through"
-"""Refused: Python's loop would see the list's new length, the translated one the old."""
+RESIZED = "a list that changes its length during iteration"
+"""Message of `Refused`: Python's loop would use the list's new length, the translated loop the old."""
 
 
 class Unreachable(Exception):
-    """The path that is being followed has raised an exception."""
+    """Signal that the current path has raised an exception."""
 
 
 class _Unset:
@@ -41,7 +41,7 @@ class _Unset:
 
 
 UNSET = _Unset()
-"""A name or attribute without value."""
+"""Marker of a name or attribute without value."""
 
 
 class _Any:
@@ -50,30 +50,30 @@ class _Any:
 
 
 ANY = _Any()
-"""A value that is never used."""
+"""Marker of a value that is never used."""
 
 
 _numbers = itertools.count()
 
 
 class Box:
-    """An object that can change; the evaluation writes by its journal alone.
+    """Mutable object; the evaluation changes it only through its journal.
 
     Attributes:
-        age: number in the order in which boxes are made.
-        fixed: it never changes.
+        age: index in the order of creation.
+        fixed: whether it never changes.
     """
 
     def __init__(self) -> None:
         self.age = next(_numbers)
         self.fixed = False
         self.slots: Any = {}
-        self.merged: Box | None = None  # what this and another became where two paths joined
+        self.merged: Box | None = None  # the box into which this was merged where two paths joined
         self.changed = False
 
 
 class Frame(Box):
-    """The names of a call, with those of the function around it."""
+    """Names of a call, and those of the enclosing function."""
 
     def __init__(self, names: dict[str, Any], parent: Frame | None = None) -> None:
         super().__init__()
@@ -82,7 +82,7 @@ class Frame(Box):
 
 
 class Instance(Box):
-    """An instance of a class of the component's package."""
+    """Instance of a class of the component's package."""
 
     def __init__(self, cls: type, attributes: dict[str, Any] | None = None) -> None:
         super().__init__()
@@ -91,19 +91,19 @@ class Instance(Box):
 
 
 class List(Box):
-    """A list whose length is known."""
+    """List of known length."""
 
     def __init__(self, items: Sequence[Any]) -> None:
         super().__init__()
         self.slots = list(items)
-        self.path: str | None = None  # in the state, of a list that was there when the call began
+        self.path: str | None = None  # path in the state, for a list that existed when the call began
 
 
 class Each(Box):
-    """Items of a known number, each made when its turn comes: item(k) for k below `count`.
+    """Iterable of a known number of items, created lazily: item(k) for k below `count`.
 
-    An iterator gives them once, a view of a dictionary (`once` false) again and again. `end` is called
-    where a loop comes to the end: it refuses a list that has grown meanwhile.
+    An iterator yields them once, a view of a dictionary (`once` false) repeatedly. `end` is called when a
+    loop reaches the end, and refuses a list that has grown meanwhile.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class Each(Box):
 
 
 class Dict(Box):
-    """A dictionary with known keys."""
+    """Dictionary with known keys."""
 
     def __init__(self, items: dict[Any, Any]) -> None:
         super().__init__()
@@ -127,10 +127,10 @@ class Dict(Box):
 
 
 class Ring(Box):
-    """A list of the state whose length is known at run time only.
+    """List of the state whose length is only known at run time.
 
     Attributes:
-        number: of the list in the instance.
+        number: index of the list in the instance.
         item: shape of its items.
     """
 
@@ -141,7 +141,7 @@ class Ring(Box):
 
 @dataclass(frozen=True, eq=False)
 class Union:
-    """A value of several forms: alternative `tag`."""
+    """Value with several forms; `tag` is the active alternative."""
 
     tag: ir.Var
     alternatives: tuple[Any, ...]
@@ -149,7 +149,7 @@ class Union:
 
 @dataclass(frozen=True, eq=False)
 class Picked:
-    """The item at an index, known at run time, of items that are alike."""
+    """Item of a table of items of the same shape, at an index known at run time."""
 
     items: tuple[Any, ...]
     index: ir.Var
@@ -157,7 +157,7 @@ class Picked:
 
 @dataclass(frozen=True, eq=False)
 class Closure:
-    """A function or lambda made while a component was being evaluated."""
+    """Function or lambda created during the evaluation of a component."""
 
     node: ast.FunctionDef | ast.Lambda
     frame: Frame
@@ -168,7 +168,7 @@ class Closure:
 
 @dataclass(frozen=True, eq=False)
 class Bound:
-    """A method of an instance or of a list."""
+    """Method bound to an instance or a list."""
 
     function: Any
     owner: Any
@@ -176,21 +176,21 @@ class Bound:
 
 @dataclass(frozen=True, eq=False)
 class Text:
-    """A text with numbers in it that are known at run time only."""
+    """Text that contains numbers only known at run time."""
 
     parts: tuple[ir.Part, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Bytes:
-    """The bytes of a text."""
+    """Bytes of a text."""
 
     text: Text
 
 
 @dataclass(frozen=True, eq=False)
 class Span:
-    """Items of a loop of unknown length: item(k) for k from `first` below `end`."""
+    """Items of a loop of unknown length: item(k) for `first` <= k < `end`."""
 
     first: ir.Operand
     end: ir.Operand
@@ -200,19 +200,19 @@ class Span:
 
 @dataclass(frozen=True, eq=False)
 class Failure:
-    """An exception that has been made."""
+    """Exception instance."""
 
     kind: type[BaseException]
     message: Text
 
 
 def now() -> int:
-    """Return an age between those of the boxes that there are and of those to come."""
+    """Return an age between those of existing and future boxes."""
     return next(_numbers)
 
 
 def is_number(value: Any) -> bool:
-    """Return whether a value is a number, known or not."""
+    """Return whether a value is a number, known at build time or not."""
     return isinstance(value, (ir.Var, int, float))
 
 
@@ -224,7 +224,7 @@ def is_plain(value: Any) -> bool:
 
 
 def same(first: Any, second: Any) -> bool:
-    """Return whether two values known at build time are the same, signs of zeros and types included."""
+    """Return whether two values known at build time are identical, including types and signs of zeros."""
     if first is second:
         return True
     if type(first) is not type(second) or isinstance(first, ir.Var | Box | Union | Closure | Bound):
@@ -245,7 +245,7 @@ def like(value: tuple[Any, ...], items: Sequence[Any]) -> tuple[Any, ...]:
 
 
 def joined_text(parts: Sequence[ir.Part]) -> str | Text:
-    """Return parts as a text, known where all of them are."""
+    """Return the concatenation of parts, as a known text if all parts are known."""
     together: list[ir.Part] = []
     for part in parts:
         if isinstance(part, str) and together and isinstance(together[-1], str):
@@ -258,5 +258,5 @@ def joined_text(parts: Sequence[ir.Part]) -> str | Text:
 
 
 def keys_of(box: Box) -> Iterator[Any]:
-    """Return the keys of all that a box holds."""
+    """Return the keys of the content of a box."""
     return iter(range(len(box.slots)) if isinstance(box, List) else list(box.slots))

@@ -102,7 +102,7 @@ def test_what_is_not_translated_runs_in_python_and_says_why(tmp_path):
     file.write_text(LAW.replace("BODY", "sum(x for x in u if x > 0.0)"))
     made = build_component(file, folder)
     line = file.read_text().splitlines().index("        return (sum(x for x in u if x > 0.0),)") + 1
-    why = f"a filter that is known at run time only (controllers/controller_law.py:{line})"
+    why = f"a filter that is only known at run time (controllers/controller_law.py:{line})"
     assert zipfile.ZipFile(made).read(REASON).decode() == why
     assert runs_as(made) == RunsAs(why)
     assert asked(made)[1:] == [False, True]

@@ -17,45 +17,45 @@ REFUSED = {
     ),
     "a filter": (
         "def output(self, t, u):\n    return (sum(x for x in u if x > 0.0),)",
-        "a filter that is known at run time only",
+        "a filter that is only known at run time",
         2,
     ),
     "a state that output changes": (
         "def start(self, t, u):\n    self.n = 0.0\n"
         "def output(self, t, u):\n    self.n += u[0]\n    return (self.n,)",
-        "output() changes what the component keeps",
+        "output() changes the component's state",
         3,
     ),
-    "a loop without end": (
+    "an endless loop": (
         "def output(self, t, u):\n    x = u[0]\n    while True:\n        x += 1.0\n    return (x,)",
-        "a loop without end",
+        "an endless loop",
         3,
     ),
     "a slice": (
         "def output(self, t, u):\n    return (sum(u[: self.p.count]),)",
-        "a slice whose ends are known at run time only",
+        "a slice whose ends are only known at run time",
         2,
     ),
     "a list that grows in its loop": (
         "def output(self, t, u):\n    a = [u[0]]\n    for x in a:\n        a.append(x)\n    return (sum(a),)",
-        "a list that grows or shrinks while it is gone through",
+        "a list that changes its length during iteration",
         3,
     ),
     "what always fails": (
         "def output(self, t, u):\n    raise ValueError('never')",
-        "output() fails whatever its inputs are",
+        "output() fails for all inputs",
         1,
     ),
     "one list of two": (
         "def start(self, t, u):\n    self.a, self.b = [0.0], [1.0]\n"
         "def advance(self, t, h, u):\n    kept = self.a if u[0] > 0.5 else self.b\n    kept[0] += u[1]\n"
         "def output(self, t, u):\n    return (self.a[0] + self.b[0],)",
-        "an object that has two names is changed",
+        "an object with two names is changed",
         3,
     ),
     "an iterator used up": (
         "def output(self, t, u):\n    z = zip(u, u)\n    a = list(z)\n    return (len(a) + len(list(z)),)",
-        "an iterator that is gone through twice",
+        "an iterator that is used twice",
         4,
     ),
     "a function of another module": (
