@@ -1,1 +1,1 @@
-"""Definitions shared by components and the bench: plain data, copied into the FMUs that use it."""
+"""Definitions shared by components and the bench, copied into the FMUs that use them."""

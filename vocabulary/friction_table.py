@@ -1,13 +1,13 @@
-"""A road's friction as a table over x and y, written as text, as spreadsheets export CSV.
+"""Friction tables: a road's friction over x and y, as text in the CSV format of spreadsheets.
 
     y \\ x,    0,   20,   40
         4,   0.9,  0.9,  0.9
         0,   0.9,  0.3,  0.8
        -4,   0.9,  0.3,  0.8
 
-The first row holds x [m], the first column y [m], in rising or falling order; the corner cell and text
-after `#` are comments. Values are separated by commas, semicolons or tabs. Between the points friction is
-interpolated along x and y; outside the table the road's friction comes from elsewhere.
+The first row contains x [m], the first column y [m], in rising or falling order; the corner cell and text
+after `#` are comments. Values are separated by commas, semicolons or tabs. Friction is interpolated linearly
+between the points along x and y; the table does not define it elsewhere.
 """
 
 import re
@@ -19,7 +19,7 @@ Point = tuple[float, float]
 
 
 class FrictionTable(NamedTuple):
-    """Friction at points: `rows` by y, within a row by x, both rising."""
+    """Friction at grid points: `rows` by y, within a row by x, both rising."""
 
     x: tuple[float, ...]
     y: tuple[float, ...]

@@ -1,4 +1,4 @@
-"""The acceleration of gravity used by all components and evaluations."""
+"""Acceleration of gravity, for all components and evaluations."""
 
 G = 9.81
-"""Acceleration of gravity, rounded as the papers do [m/s2]."""
+"""Acceleration of gravity, rounded as in the papers [m/s2]."""

@@ -1,4 +1,4 @@
-"""The lanes of ISO 3888, double lane changes between cones: part 1, and part 2 to avoid an obstacle.
+"""Lanes of ISO 3888, double lane changes between cones: part 1, and part 2 (obstacle avoidance).
 
     section                1              2        3             4        5 (and 6)
     ISO 3888-1  length    15 m           30 m     25 m          25 m     15 + 15 m
@@ -7,9 +7,8 @@
                 width     1.1 w + 1/4             w + 1                  1.3 w + 1/4, at least 3
 
 with the vehicle width w [m]. The lane offset of part 1, 3.5 m, is measured between the right borders of
-lanes 1 and 3; in part 2 there is 1 m between the left border of lane 1 and the right border of lane 3.
-Lane 5 begins again at the right border of lane 1. y = 0 is the middle of lane 1. A negative offset mirrors
-the track.
+lanes 1 and 3; in part 2 the gap between the left border of lane 1 and the right border of lane 3 is 1 m.
+Lanes 1 and 5 have the same right border. y = 0 is the middle of lane 1. A negative offset mirrors the track.
 
 Source: ISO 3888-1, Passenger cars - Test track for a severe lane-change manoeuvre - Part 1: Double
 lane-change; ISO 3888-2, Part 2: Obstacle avoidance, where the position of lane 5 is our interpretation. Our
@@ -27,7 +26,7 @@ GAP = 1.0
 """Gap between the borders of lanes 1 and 3 of part 2 [m]."""
 
 PARAMETERS = ("vehicle_width", "track_start", "lane_offset", "transition_scale")
-"""Parameters of a driver for such a track; `track_standard` selects the part, by default part 1."""
+"""Parameters of a driver that describe the track; `track_standard` selects the part, by default part 1."""
 
 
 class Lane(NamedTuple):
@@ -40,7 +39,7 @@ class Lane(NamedTuple):
 
     @property
     def middle(self) -> float:
-        """y of the centre line [m]."""
+        """Position y of the centre line [m]."""
         return 0.5 * (self.right + self.left)
 
 
@@ -52,13 +51,13 @@ def lanes(
     transition_scale: float,
     standard: str = PART_1,
 ) -> tuple[Lane, Lane, Lane]:
-    """Return lane 1, lane 3, and lanes 5 and 6 as one.
+    """Return lane 1, lane 3, and lanes 5 and 6 combined.
 
     Args:
         vehicle_width: w [m].
         track_start: x of the first cones [m].
-        lane_offset: of lane 3 to the left [m]; for part 2 only its sign matters.
-        transition_scale: length of the transitions relative to the standard's [1].
+        lane_offset: offset of lane 3 to the left [m]; for part 2 only its sign matters.
+        transition_scale: length of the transitions relative to the standard [1].
         standard: a key of `LENGTHS`.
     """
     entry_length, first_gap, side_length, second_gap, exit_length = LENGTHS[standard]

@@ -1,15 +1,15 @@
-"""Road patches: areas with a different friction coefficient, written as text.
+"""Road patches: areas with another friction coefficient, written as text.
 
     y > 0                                    left of the line y = 0: split friction
     60 < x < 80                              from x = 60 m to 80 m: a jump down and up again
     x % 40 < 20                              20 m of every 40 m
-    x % 10 < 5, y % 3 < 1.5                  where both hold; the same again every 10 m along x, 3 m along y
-    (20 0) (45 0) (30 2)                     a polygon of these corners x y
-    0.3: y > 0; 0.1: 60 < x < 80             several, each with its own friction
+    x % 10 < 5, y % 3 < 1.5                  both conditions, repeated every 10 m along x and 3 m along y
+    (20 0) (45 0) (30 2)                     polygon with these corners x y
+    0.3: y > 0; 0.1: 60 < x < 80             several patches, each with its own friction
 
 Patches are separated by `;` or by line breaks; text after `#` is a comment. A patch without its own friction
-has the road's default for patches. Later patches lie on top of earlier ones. Coordinates are those of the
-road [m], with x = y = 0 where the car starts; the lower edge belongs to the patch.
+has the road's default for patches. Later patches override earlier patches. Coordinates are those of the road
+[m], with x = y = 0 where the car starts; the lower edge belongs to the patch.
 """
 
 import re
@@ -28,7 +28,7 @@ Point = tuple[float, float]
 
 
 class Span(NamedTuple):
-    """A condition: low <= x or y < high, within each period if there is one (0: none) [m]."""
+    """Condition low <= x < high (or y), within each period if there is one (0: none) [m]."""
 
     axis: int  # 0: x, 1: y
     low: float
@@ -37,7 +37,7 @@ class Span(NamedTuple):
 
 
 class Patch(NamedTuple):
-    """An area: the points where all spans hold, and within the polygon if there is one."""
+    """Area of the points that meet all spans and are in the polygon, if there is one."""
 
     friction: float | None  # None: the road's default for patches
     spans: tuple[Span, ...]
@@ -53,7 +53,7 @@ class Patch(NamedTuple):
 
 
 def patches_of(text: str) -> tuple[Patch, ...]:
-    """Parse patches; they are returned in the order of the text.
+    """Parse patches, in the order of the text.
 
     Raises:
         ValueError: a part of the text is not a patch; the message gives examples.
@@ -67,7 +67,7 @@ def friction_at(point: Point, patches: tuple[Patch, ...], *, base: float, patch:
 
     Args:
         base: friction outside all patches.
-        patch: friction of patches without their own.
+        patch: friction of patches without a value of their own.
     """
     for area in reversed(patches):
         if area.holds(point):

@@ -1,7 +1,7 @@
-"""The roles of instances, and the signals that each role must have.
+"""Roles of instances, and the signals that each role requires.
 
-An FMU that has these signals can replace any other FMU of its role. The folder of a component determines
-its role; role and file name make the name of its FMU: `controllers/fnn.py` becomes `controller_fnn`.
+An FMU with these signals can replace any other FMU of its role. The folder of a component determines its
+role; the name of its FMU is composed of role and file name: `controllers/fnn.py` becomes `controller_fnn`.
 """
 
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Role:
-    """A role: its name and the signals that its FMUs must declare (`*` = four wheels)."""
+    """Role: its name, and the signals that its FMUs must declare (`*` = four wheels)."""
 
     name: str
     inputs: tuple[str, ...] = ()
@@ -67,9 +67,7 @@ def without_role(fmu: str) -> str:
 
 
 def role_of(instance: str, fmu: str, declared: str = "") -> str:
-    """Return the role of an instance.
-
-    It is what the FMU declares, else the role in the FMU's name, else the instance's name.
+    """Return the role of an instance: declared by the FMU, else in the FMU's name, else the instance's name.
 
     Args:
         instance: its name in the scenario.

@@ -1,7 +1,7 @@
-"""The signal dictionary: the name, unit, meaning and symbol of the signals that components exchange.
+"""Signal dictionary: name, unit, meaning and symbol of the signals that components exchange.
 
-Axes and signs are those of ISO 8855: x forward, y left, z up; angles and moments positive
-counter-clockwise seen from above. `*` stands for the four wheels fl, fr, rl, rr.
+Axes and signs follow ISO 8855: x forward, y left, z up; angles and moments are positive
+counter-clockwise seen from above. `*` means the four wheels fl, fr, rl, rr.
 """
 
 import math
@@ -15,13 +15,13 @@ class SignalEntry(NamedTuple):
     text: str
     """Meaning: the description of its variables in FMUs."""
     symbol: str = ""
-    """Symbol as used in papers; `_` begins a subscript. That of `x_ref` follows from that of `x`."""
+    """Symbol as used in papers; `_` begins a subscript. The symbol of `x_ref` follows from that of `x`."""
     words: str = ""
-    """Name in headings, if it differs from its identifier in words."""
+    """Name in headings, if it differs from the words of the identifier."""
     minimum: float | None = None
     """Smallest valid value."""
     largest: float | None = None
-    """Largest plausible magnitude in a measurement: a larger value probably has another unit. Chosen."""
+    """Largest plausible magnitude in a measurement; larger values are probably in another unit. Chosen."""
 
 
 SYMBOLS = {
@@ -39,7 +39,7 @@ SYMBOLS = {
     "ax": "acceleration",
     "ay": "acceleration",
 }
-"""Symbol in names of other tools' variables -> the words for it here."""
+"""Symbol in variable names of other tools -> the words used here."""
 
 SIGNALS: dict[str, SignalEntry] = {
     "velocity_x": SignalEntry(
@@ -56,7 +56,7 @@ SIGNALS: dict[str, SignalEntry] = {
         "Lateral velocity",
         largest=70.0,
     ),
-    "yaw_rate": SignalEntry("rad/s", "Yaw rate r", "r", largest=5.0),  # 4 times that of cars here that spin
+    "yaw_rate": SignalEntry("rad/s", "Yaw rate r", "r", largest=5.0),  # 4 times that of a spinning car
     "sideslip": SignalEntry(
         "rad",
         "Sideslip angle beta = atan2(v_y, v_x) of the centre of mass",
@@ -70,7 +70,7 @@ SIGNALS: dict[str, SignalEntry] = {
         "Longitudinal acceleration of the centre of mass, vehicle axes",
         "a_x",
         "Longitudinal acceleration",
-        largest=30.0,  # three times what tyres of the road give
+        largest=30.0,  # three times the grip of road tyres
     ),
     "acceleration_y": SignalEntry(
         "m/s2",
@@ -100,7 +100,7 @@ SIGNALS: dict[str, SignalEntry] = {
         "Hand-wheel angle",
         largest=4.0 * math.pi,  # two turns
     ),
-    "drive_force": SignalEntry("N", "Sum of the longitudinal tyre forces the driver asks for"),
+    "drive_force": SignalEntry("N", "Sum of the longitudinal tyre forces requested by the driver"),
     "friction": SignalEntry(
         "1",
         "Friction coefficient mu of the road, as known to reference and controller",
@@ -117,16 +117,16 @@ SIGNALS: dict[str, SignalEntry] = {
     ),
     "wind_force_y": SignalEntry("N", "Side force of the wind, vehicle axes, at the centre of mass", "F_wind"),
     "wind_moment_z": SignalEntry("N.m", "Moment of the wind about the vertical axis", "M_wind"),
-    "yaw_rate_ref": SignalEntry("rad/s", "Yaw rate the driver asks for"),
-    "sideslip_ref": SignalEntry("rad", "Sideslip angle the driver asks for"),
+    "yaw_rate_ref": SignalEntry("rad/s", "Yaw rate requested by the driver"),
+    "sideslip_ref": SignalEntry("rad", "Sideslip angle requested by the driver"),
     "yaw_acceleration_ref": SignalEntry("rad/s2", "Time derivative of yaw_rate_ref"),
     "sideslip_rate_ref": SignalEntry("rad/s", "Time derivative of sideslip_ref"),
-    "yaw_moment": SignalEntry("N.m", "Yaw moment M_z asked of the wheels' longitudinal forces", "M_z"),
+    "yaw_moment": SignalEntry("N.m", "Requested yaw moment M_z of the longitudinal wheel forces", "M_z"),
     "force_request_*": SignalEntry(
-        "N", "Longitudinal tyre force asked for, wheel axes", "F_x", "Longitudinal force asked for"
+        "N", "Requested longitudinal tyre force, wheel axes", "F_x", "Requested longitudinal force"
     ),
     "torque_request_*": SignalEntry(
-        "N.m", "Wheel torque asked for, positive when driving", "T", "Wheel torque asked for"
+        "N.m", "Requested wheel torque, positive when driving", "T", "Requested wheel torque"
     ),
     "wheel_torque_*": SignalEntry("N.m", "Torque at the wheel, positive when driving", "T"),
     "tyre_force_x_*": SignalEntry(
@@ -139,10 +139,10 @@ SIGNALS: dict[str, SignalEntry] = {
     "tyre_moment_z_*": SignalEntry("N.m", "Moment of the tyre about its vertical axis that turns the car"),
     "overturning_moment_*": SignalEntry("N.m", "Overturning moment of the tyre about its longitudinal axis"),
     "slip_stiffness_*": SignalEntry(
-        "N", "Slope dF_x/dkappa of the tyre's force at tyre_slip_ratio; 0: not told"
+        "N", "Derivative dF_x/dkappa of the tyre force at tyre_slip_ratio; 0: unknown"
     ),
     "tyre_slip_ratio_*": SignalEntry(
-        "1", "Longitudinal slip that the tyre's force and slip_stiffness belong to"
+        "1", "Longitudinal slip to which the tyre force and slip_stiffness belong"
     ),
     "slip_angle_*": SignalEntry("rad", "Slip angle alpha = atan2(v_y, v_x) in wheel axes", "α"),
     "inclination_angle_*": SignalEntry(

@@ -1,8 +1,8 @@
-"""The units of measurement that variables may have, with their SI base exponents, and displayed units.
+"""Units of measurement of variables, with their SI base exponents, and displayed units.
 
 FMI 2.0.4, section 2.2.2: a unit is a product of powers of kg, m, s, A, K, mol, cd and rad.
-Only these spellings are accepted, so that a typo in a unit is found when the class is created, not when a
-wire is checked.
+Only the spellings below are accepted, so that a typo in a unit is found when the class is created, not when
+a wire is checked.
 """
 
 import math
@@ -60,4 +60,4 @@ SHOWN: dict[str, tuple[str, float]] = {
     "1": ("", 1.0),
     "%": ("%", 100.0),
 }
-"""Displayed unit of a unit, and the factor to it; `%` marks a ratio in per cent."""
+"""Unit -> displayed unit and conversion factor; `%` marks a ratio in per cent."""

@@ -1,17 +1,17 @@
-"""The four wheels of a car: their names, their order, and `*` in names of signals."""
+"""The four wheels of a car: names, order, and `*` in signal names."""
 
 Four = tuple[float, float, float, float]
-"""A number per wheel, in the order of `WHEELS`."""
+"""Number per wheel, in the order of `WHEELS`."""
 
 WHEEL_NAMES = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
-"""The wheels in words, always in this order."""
+"""Abbreviation -> wheel in words, in the order used everywhere."""
 
 WHEELS = tuple(WHEEL_NAMES)
-"""The wheels as signals name them: `fl`, `fr`, `rl`, `rr`."""
+"""Suffixes of the wheels in signal names: `fl`, `fr`, `rl`, `rr`."""
 
 
 def wheels(pattern: str) -> tuple[str, ...]:
-    """Return the names that `pattern` stands for: four if it holds a `*`, else itself."""
+    """Return the names that match `pattern`: four if it contains a `*`, else itself."""
     if "*" not in pattern:
         return (pattern,)
     return tuple(pattern.replace("*", wheel) for wheel in WHEELS)
