@@ -133,6 +133,6 @@ def _variables(root: Element) -> Iterator[dict[str, str]]:
             **variable[0].attrib,
             **variable.attrib,
             "meaning": variable.get("description", ""),
-            "follows at once": follows.get(name, ""),
+            "depends directly on": follows.get(name, ""),
             "source": "" if annotation is None else annotation.get("source", ""),
         }

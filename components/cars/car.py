@@ -2,7 +2,7 @@
 
 A plant implements its body in four methods, called in this order:
 
-    rest(signals)               sets the body at start time; returns the extrapolated values (see below)
+    rest(signals)               sets the body at start time; returns the values to extrapolate (see below)
     move(h, delta, signals)     advances body and `self.motion` under held forces; returns the same values
     wheel_velocities()          returns those of the wheels at the current motion and steer angle
     finish(carried)             sets `self.end` (a_x, a_y) and `self.loads` at the current time

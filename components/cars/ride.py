@@ -55,7 +55,7 @@ class Ride(NamedTuple):
     """Constants of body, suspension and tyre springs, in SI units."""
 
     m_s: float
-    m_f: float  # unsprung mass of one front wheel
+    m_f: float  # unsprung mass of a front wheel
     m_r: float
     a: float  # distances of the axles from the sprung mass's centre
     b: float
@@ -70,7 +70,7 @@ class Ride(NamedTuple):
     p_f: float  # slope of the left wheel's path; the right wheel's is -p
     p_r: float
     k_t: float
-    load_f: float  # static load N_0 of one wheel
+    load_f: float  # static load N_0 of a wheel
     load_r: float
     gravity_roll: float  # sum of N_i0 (h - h_ci) [N.m/rad]
     gravity_pitch: float  # m g h
