@@ -15,6 +15,7 @@ from orchestrator.pages.page_parts import packed
 from orchestrator.pages.viewer import SETTINGS, Settings, page
 from orchestrator.pages.viewer import View as Selection
 from orchestrator.safe_files import reason, write_whole
+from orchestrator.scenario.overrides import changed
 
 from . import arguments
 from ._run import Run
@@ -68,7 +69,7 @@ def view(
 
 
 def _labelled(runs: object) -> list[LabelledRun]:
-    """Return runs with labels: those of a mapping, else their titles, numbered if equal."""
+    """Return runs with labels: those of a mapping, else their titles; of equal ones number and overrides."""
     if arguments.is_a(runs, Run):
         runs = [runs]
     if arguments.is_a(runs, Mapping):
@@ -76,11 +77,13 @@ def _labelled(runs: object) -> list[LabelledRun]:
     else:
         several = arguments.items(runs, "runs", "a run, a list of runs, or a mapping of labels to runs")
         titles = [run.title if arguments.is_a(run, Run) else "" for run in several]
-        numbered = len(set(titles)) < len(titles)
-        named = {
-            f"{k + 1}: {title}" if numbered else title: run
-            for k, (title, run) in enumerate(zip(titles, several, strict=True))
-        }
+        if len(set(titles)) < len(titles):
+            changes = [run.changes if arguments.is_a(run, Run) else () for run in several]
+            own = [
+                changed(one for one in made if not all(one in other for other in changes)) for made in changes
+            ]
+            titles = [f"{k + 1}: {own[k] or title}" for k, title in enumerate(titles)]
+        named = dict(zip(titles, several, strict=True))
     return [
         LabelledRun(label, arguments.instance(run, f"runs[{label!r}]", Run, "Scenario.run").results)
         for label, run in named.items()

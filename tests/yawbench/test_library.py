@@ -749,6 +749,7 @@ def test_a_viewer_shows_runs_by_their_labels(base, run, tmp_path):
     frame = shown._repr_html_()
     assert escape(shown.html) in frame and "height: 500px" in frame
     assert repr(yb.view([run, run])) == f"<View of 1: {run.title} and 2: {run.title}>"
+    assert yb.view([free, run]).labels == ("1: controller_off for controller", f"2: {run.title}")
     assert yb.view(run).labels == (run.title,)
 
 
