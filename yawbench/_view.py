@@ -79,9 +79,8 @@ def _labelled(runs: object) -> list[LabelledRun]:
         titles = [run.title if arguments.is_a(run, Run) else "" for run in several]
         if len(set(titles)) < len(titles):
             changes = [run.changes if arguments.is_a(run, Run) else () for run in several]
-            own = [
-                changed(one for one in made if not all(one in other for other in changes)) for made in changes
-            ]
+            shared = [change for change in changes[0] if all(change in made for made in changes)]
+            own = [changed(change for change in made if change not in shared) for made in changes]
             titles = [f"{k + 1}: {own[k] or title}" for k, title in enumerate(titles)]
         named = dict(zip(titles, several, strict=True))
     return [
