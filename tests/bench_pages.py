@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import tempfile
 import threading
-from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager, redirect_stdout
+from io import StringIO
 from pathlib import Path
 from statistics import median
 from time import perf_counter
@@ -70,10 +71,15 @@ def line(what: str, times: Sequence[float], most: str) -> None:
     print(f"  {what:62s}{min(times):7.0f}{median(times):9.0f}   {most}", flush=True)
 
 
-def comparison(browser: Browser, folder: Path) -> None:
-    """Print size and times of the page of a comparison of four runs."""
-    status_of("compare", SCENARIO, "--swap", f"controller={CONTROLLERS}", "--out", folder)
-    page = folder / PAGE
+def made(folder: Path, *command: str) -> Path:
+    """Return the page that a command writes into a folder."""
+    with redirect_stdout(StringIO()):
+        status_of(*command, "--out", folder)
+    return folder / PAGE
+
+
+def comparison(browser: Browser, page: Path) -> None:
+    """Print the times of the page of a comparison of four runs."""
     first = []
     for _ in range(LOADS):
         browser.open(page)
@@ -84,9 +90,14 @@ def comparison(browser: Browser, folder: Path) -> None:
     line("comparison of 4 runs: first curve", first, "600")
     line("zoom of all panels", zoom, "33")
     line("cursor in all panels and on the road", cursor, "16")
-    html = page.read_text(encoding="utf-8")
-    sizes = len(html.encode()) / 1000, size_without_samples(html) / 1000
-    print(f"  its page: {sizes[0]:.0f} kB (at most 1200), without samples {sizes[1]:.0f} kB (at most 250)")
+
+
+def sizes(pages: Mapping[str, tuple[Path, int]]) -> None:
+    """Print the sizes of pages [kB], each beside the largest that it may have, and without samples."""
+    for title, (page, most) in pages.items():
+        html = page.read_text(encoding="utf-8")
+        whole, without = len(html.encode()) / 1000, size_without_samples(html) / 1000
+        print(f"  {f'{title}: kB; without samples':62s}{whole:7.0f}{without:9.0f}   {most}; 250")
 
 
 @contextmanager
@@ -144,9 +155,16 @@ def main() -> None:
     try:
         browser.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": PAINTED})
         print(f"  {'pages in Chromium, ms':62s}{'best':>7s}{'median':>9s}   at most")
-        with tempfile.TemporaryDirectory() as folder:
-            comparison(browser, Path(folder))
-        sliders(browser)
+        with tempfile.TemporaryDirectory() as place:
+            folder = Path(place)
+            compared = made(folder / "compare", "compare", SCENARIO, "--swap", f"controller={CONTROLLERS}")
+            comparison(browser, compared)
+            sliders(browser)
+            sizes({
+                "comparison of 4 runs": (compared, 1200),
+                "quick study": (made(folder / "study", "study", "fnn_sideslip/study", "--quick"), 2500),
+                "quick ranking": (made(folder / "rank", "rank", "--quick"), 400),
+            })  # fmt: skip
     finally:
         browser.driver.quit()
 
