@@ -62,6 +62,11 @@ MAYBE_UNUSED static int undefined_2(double found, double x, double y)
     return isnan(found) && !isnan(x) && !isnan(y);
 }
 
+MAYBE_UNUSED static int zero_power(double a, double b)
+{
+    return a == 0.0 && b < 0.0 && isfinite(b);
+}
+
 MAYBE_UNUSED static int complex_power(double a, double b)
 {
     return a < 0.0 && isfinite(a) && isfinite(b) && b != floor(b);
@@ -144,9 +149,9 @@ MAYBE_UNUSED static const double *item(const List *list, int width, double index
 }
 
 /* Append an item; false if out of memory. */
-MAYBE_UNUSED static int push(List *list, int width, const double *numbers)
+MAYBE_UNUSED static int push(List *list, int width, const void *numbers)
 {
-    size_t size = (size_t)width * sizeof *numbers;
+    size_t size = (size_t)width * sizeof(double);
     if (list->count == list->capacity) {
         size_t capacity = list->capacity > 0 ? 2 * list->capacity : 8;
         double *items = malloc(capacity * size);

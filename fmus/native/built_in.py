@@ -11,6 +11,8 @@ from typing import Any
 
 from . import ir
 from .loops import Looping
+from .lower import COMPENSATED
+from .shapes import push
 from .values import (
     UNSET,
     Bound,
@@ -29,8 +31,10 @@ from .values import (
     Text,
     Union,
     Unreachable,
+    is_mixed,
     is_number,
     is_plain,
+    is_real,
     joined_text,
 )
 
@@ -97,11 +101,8 @@ class BuiltIn(Looping):
         raise Refused(f"the method {name} of a list")
 
     def _of_ring(self, ring: Ring, name: str, args: list[Any]) -> Any:
-        from .shapes import numbers_of
-
         if name == "append":
-            items = numbers_of(ring.item, args[0], self.read, self)
-            self.out.append(ir.Push(ring.number, tuple(items)))
+            push(ring, args[0], self.read, self)
             return None
         if name == "pop" and args:
             return self.remove(ring, args[0], "pop from empty list")
@@ -136,6 +137,10 @@ class BuiltIn(Looping):
             return self._python_chain(*self.items(args[0]))
         if name == "_replace" and isinstance(args[0], tuple):
             return function(*args, **named)
+        if function is math.log and len(args) == 2:
+            return self.operate("/", *[self._built_in(function, [x], {}) for x in args])
+        if getattr(function, "__module__", "") == "math" and name not in ("floor", "ceil", "trunc"):
+            args = [self.real(x) if is_mixed(x) else x for x in args]
         if any(isinstance(x, Union) for x in args) and name not in ("getattr", "isinstance", "bool", "zip"):
             k = next(i for i, x in enumerate(args) if isinstance(x, Union))
             return self.by_form(
@@ -220,24 +225,44 @@ class BuiltIn(Looping):
         items = self.items(args[0]) if len(args) == 1 else list(args)
         if not items and "default" in named:
             return named["default"]
-        if "key" in named or not items or not all(map(is_number, items)):
-            if all(map(self._is_constant, items)) and "key" not in named:
+        if "key" in named or not items or not all(is_number(x) or is_mixed(x) for x in items):
+            if items and all(map(self._is_constant, items)) and "key" not in named:
                 return (max if op == ">" else min)(items)
             raise Refused("min or max of values that are not numbers")
         best = items[0]
         for item in items[1:]:
-            if not isinstance(best, ir.Var) and not isinstance(item, ir.Var):
-                best = (max if op == ">" else min)(best, item)
-                continue
-            type = ir.joined(ir.type_of(best), ir.type_of(item))
-            best = self.let(type, "select", self.compare(op, item, best), item, best)
+            best = self.selected(self._in_order(op, item, best), item, best)
         return best
 
+    def _in_order(self, op: str, a: Any, b: Any) -> ir.Operand:
+        return self.compare(op, *(self.real(x) if is_mixed(x) else x for x in (a, b)))
+
     def _python_sum(self, values: Any, start: Any = 0) -> Any:
-        items = self.items(values)
-        if not all(map(is_number, (*items, start))):
+        """Return sum(values, start), by the summation of the Python that builds."""
+        numbers = [start, *self.items(values)]
+        if not all(is_number(x) or is_mixed(x) for x in numbers):
             raise Refused("a sum of values that are not numbers")
-        return self.total(items, start)
+        if COMPENSATED:
+            return self._compensated(numbers, 0)
+        total = numbers[0]
+        for x in numbers[1:]:
+            total = self.operate("+", total, x)
+        return total
+
+    def _compensated(self, numbers: list[Any], k: int) -> Any:
+        mixed = next((i for i in range(k, len(numbers)) if isinstance(numbers[i], Union)), None)
+        if mixed is not None:
+            before, after = numbers[:mixed], numbers[mixed + 1 :]
+            return self.by_form(numbers[mixed], lambda x: self._compensated([*before, x, *after], mixed))
+        if not any(isinstance(x, ir.Var) for x in numbers):
+            return sum(numbers[1:], numbers[0])
+        first = next((i for i, x in enumerate(numbers) if is_real(x)), len(numbers))
+        whole: Any = 0
+        for x in numbers[:first]:
+            whole = self.operate("+", whole, x)
+        if first == len(numbers):
+            return whole
+        return self.let(ir.REAL, "compensated_sum", whole, *numbers[first:])
 
     def _python_any(self, values: Any) -> Any:
         return self._decided(self.each(values), True)
@@ -254,15 +279,15 @@ class BuiltIn(Looping):
 
     def _python_sorted(self, values: Any) -> Any:
         items = self.items(values)
-        if not any(isinstance(x, ir.Var) for x in items):
+        if not any(isinstance(x, (ir.Var, Union)) for x in items):
             return List(sorted(items))
+        if not all(is_number(x) or is_mixed(x) for x in items):
+            raise Refused("sorting values that are not numbers")
         for end in range(1, len(items)):  # insertion sort, which is stable
             for k in range(end, 0, -1):
                 a, b = items[k - 1], items[k]
-                less = self.compare("<", b, a)
-                type = ir.joined(ir.type_of(a), ir.type_of(b))
-                items[k - 1] = self.let(type, "select", less, b, a)
-                items[k] = self.let(type, "select", less, a, b)
+                less = self._in_order("<", b, a)
+                items[k - 1], items[k] = self.selected(less, b, a), self.selected(less, a, b)
         return List(items)
 
     def _python_zip(self, *values: Any, strict: bool = False) -> Any:
@@ -314,6 +339,8 @@ class BuiltIn(Looping):
         return Each(len(rows), lambda i: rows[i][0].item(rows[i][1]))
 
     def _python_range(self, *ends: Any) -> Any:
+        if any(map(is_real, ends)):
+            self.end("TypeError", "'float' object cannot be interpreted as an integer")
         if not any(isinstance(x, ir.Var) for x in ends):
             return range(*ends)
         if len(ends) > 2:
@@ -357,7 +384,7 @@ class BuiltIn(Looping):
 
     def _python_dist(self, first: Any, second: Any) -> Any:
         pairs = zip(self.items(first), self.items(second), strict=True)
-        return self.function("dist", *[self.binary("-", a, b) for a, b in pairs])
+        return self.function("dist", *[self.binary("-", self.real(a), self.real(b)) for a, b in pairs])
 
     def _python_hypot(self, *values: Any) -> Any:
         return (
@@ -367,9 +394,9 @@ class BuiltIn(Looping):
         )
 
     def _python_prod(self, values: Any) -> Any:
-        product: ir.Operand = 1
+        product: Any = 1
         for item in self.items(values):
-            product = self.binary("*", product, item)
+            product = self.operate("*", product, item)
         return product
 
     def _text(self, args: Sequence[Any]) -> Text:

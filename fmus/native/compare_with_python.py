@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from ..usual_ranges import usual_range
-from .ir import INEXACT
+from .ir import ALONE
 
 STEPS = 2000
 LENGTHS = (0.001, 0.005, 0.02)
@@ -188,7 +188,7 @@ class _Beside:
     def call(self, what: str, *args: Any) -> bool:
         """Call both and return whether they succeeded."""
         native, python = getattr(self.native, what)(*args), getattr(self.twin, what)(*args)
-        if self.extreme and not native[0] and any(INEXACT in text for text in native[1]):
+        if self.extreme and not native[0] and any(ALONE in text for text in native[1]):
             return False
         if native[0] != python[0] or native[1] != python[1] or not _same(native[2], python[2]):
             raise Difference(f"{self.label}{what}{_shown(args)}: {self._apart(native, python)}")

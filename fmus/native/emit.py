@@ -221,9 +221,10 @@ class _Function:
             elif isinstance(s, ir.Raise):
                 lines += self._raise(s, pad)
             elif isinstance(s, ir.Push):
-                items = ", ".join(map(self._real, s.items))
+                items = s.items or (0,)  # of items that are always the same, only the number is kept
+                numbers = ", ".join(map(self._real, items))
                 lines += [
-                    f"{pad}if (!push(&lists[{s.ring}], {len(s.items)}, (const double[]){{{items}}})) {{",
+                    f"{pad}if (!push(&lists[{s.ring}], {len(items)}, (const double[]){{{numbers}}})) {{",
                     f'{pad}    begin_problem(problem, "MemoryError", "");',
                     f"{pad}    return 1;",
                     f"{pad}}}",

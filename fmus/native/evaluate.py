@@ -12,9 +12,10 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from . import ir
-from .merge import Merging, alike
+from .merge import alike
+from .places import Places
 from .read import Source, Sources
-from .shapes import Shape, build, numbers_of, shape_of, types_of
+from .shapes import build, numbers_of, shape_of
 from .values import (
     RESIZED,
     UNSET,
@@ -37,6 +38,7 @@ from .values import (
     Unreachable,
     is_number,
     is_plain,
+    is_real,
     joined_text,
     like,
     same,
@@ -44,14 +46,6 @@ from .values import (
 
 DEEPEST = 60
 """Largest depth of nested calls; chosen: more than components need, to detect infinite recursion."""
-
-
-class Promote(Exception):
-    """Signal that the length of a list of the state changes, which restarts the evaluation."""
-
-    def __init__(self, path: str, item: Shape) -> None:
-        super().__init__(path)
-        self.path, self.item = path, item
 
 
 @dataclass
@@ -64,7 +58,7 @@ class Call:
     line: int = 0
 
 
-class Evaluation(Merging):
+class Evaluation(Places):
     """Evaluation of names, structures, attributes and items; other modules add the rest."""
 
     def __init__(self, sources: Sources) -> None:
@@ -337,52 +331,45 @@ class Evaluation(Merging):
         """Return owner[index]."""
         if owner is None:
             self.end("TypeError", "'NoneType' object is not subscriptable")
-        if isinstance(owner, Ring):
+        if isinstance(owner, Ring) and not is_real(index):
             return self.ring_item(owner, self.ring_index(owner, index, "list index out of range"))
         if isinstance(owner, Dict):
             return self.read(owner)[self._key(index)]
-        if isinstance(owner, Picked):
+        if isinstance(owner, Picked) and not is_real(index):
             return self._of_picked(owner, index)
         items = self.read(owner) if isinstance(owner, List) else owner
+        if is_real(index):
+            self.end("TypeError", f"{_kind_of(items)} indices must be integers or slices, not float")
         if isinstance(index, ir.Var):
             index = self.settled(index, self.facts)
         if isinstance(index, ir.Var):
             if not isinstance(items, (tuple, list)) or not items:
                 raise Refused("an index that is only known at run time")
             return self._at(tuple(items), self.within(index, len(items), _beyond(items)))
-        if (
-            isinstance(items, (tuple, list))
-            and isinstance(index, int)
-            and not -len(items) <= index < len(items)
-        ):
+        known = isinstance(items, (tuple, list)) and isinstance(index, int)
+        if known and not -len(items) <= index < len(items):
             self.end("IndexError", _beyond(items))
         item = items[index]
         return List(item) if isinstance(owner, List) and isinstance(index, slice) else item
-
-    def within(self, index: ir.Operand, count: int, text: str) -> ir.Operand:
-        """Return an index known at run time, counted from the beginning; raises if it is out of range."""
-        from_end = self.compare("<", index, 0)
-        index = self.branch(from_end, lambda: self.binary("+", index, count), lambda: index)
-        self.require(self.compare(">=", index, 0), "IndexError", text)
-        self.require(self.compare("<", index, count), "IndexError", text)
-        return index
 
     def _at(self, items: tuple[Any, ...], index: ir.Operand) -> Any:
         if not isinstance(index, ir.Var):
             return items[int(index)]
         if all(is_number(x) for x in items):
-            try:
-                type = ir.type_of(items[0])
-                for item in items:
-                    type = ir.joined(type, ir.type_of(item))
-            except ValueError as error:
-                raise Refused(str(error)) from None
-            target = self.new(type)
-            self.out.append(ir.Load(target, items, index))
-            return target
+            types = [ir.type_of(x) for x in items]
+            if ir.are_joined(types):
+                return self._load(ir.joined(types), items, index)
+            real = self._load(ir.REAL, items, index)
+            is_real = self._load(ir.INT, tuple(int(type == ir.REAL) for type in types), index)
+            return Union(is_real, (self.let(ir.INT, "copy", real), real))
         if all(same(x, items[0]) for x in items):
             return items[0]
         return Picked(items, index)
+
+    def _load(self, type: str, table: tuple[ir.Operand, ...], index: ir.Operand) -> ir.Var:
+        target = self.new(type)
+        self.out.append(ir.Load(target, table, index))
+        return target
 
     def _of_picked(self, owner: Picked, index: Any) -> Any:
         rows = [self.read(x) if isinstance(x, List) else x for x in owner.items]
@@ -410,36 +397,14 @@ class Evaluation(Merging):
     def _whole(self, value: Any) -> Any:
         return self.loaded(value) if isinstance(value, Picked) else value
 
-    # ---- lists of the state -----------------------------------------------------------------
-
-    def ring_length(self, ring: Ring) -> ir.Var:
-        """Return len(ring)."""
-        return self.let(ir.INT, "ring_length", ring.number)
-
-    def ring_index(self, ring: Ring, index: Any, text: str) -> ir.Operand:
-        """Return an index in a list of the state, counted from the beginning."""
-        length = self.ring_length(ring)
-        if not isinstance(index, ir.Var) and index < 0:
-            index = self.binary("+", length, index)
-            self.require(self.compare(">=", index, 0), "IndexError", text)
-            return index  # type: ignore[no-any-return]
-        if isinstance(index, ir.Var):
-            from_end = self.compare("<", index, 0)
-            place = index
-            index = self.branch(from_end, lambda: self.binary("+", length, place), lambda: place)
-            self.require(self.compare(">=", index, 0), "IndexError", text)
-        self.require(self.compare("<", index, length), "IndexError", text)
-        return index  # type: ignore[no-any-return]
-
-    def ring_item(self, ring: Ring, index: ir.Operand) -> Any:
-        """Return the item at a valid index."""
-        types = list(types_of(ring.item))
-        read = [self.let(type, "ring_item", ring.number, k, index) for k, type in enumerate(types)]
-        return build(ring.item, iter(read))
-
 
 def _beyond(items: Any) -> str:
-    return f"{'tuple' if isinstance(items, tuple) else 'list'} index out of range"
+    return f"{_kind_of(items)} index out of range"
 
 
-__all__ = ["Call", "Evaluation", "Failure", "Promote"]
+def _kind_of(items: Any) -> str:
+    one = items.items[0] if isinstance(items, Picked) else items
+    return "tuple" if isinstance(one, tuple) else "list"
+
+
+__all__ = ["Call", "Evaluation", "Failure"]

@@ -7,7 +7,7 @@ variable before the loop and at the end of its body. Integers are stored as doub
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 REAL, INT, BOOL, WORD, WIDE = "real", "int", "bool", "word", "wide"
@@ -15,8 +15,23 @@ REAL, INT, BOOL, WORD, WIDE = "real", "int", "bool", "word", "wide"
 
 EXACT = 2**53
 """Largest integer up to which doubles are exact."""
-INEXACT = "an integer beyond 2^53, which Python alone computes exactly: set YAWBENCH_UNITS=python"
+ALONE = "Python alone computes"
+"""Part of what a native library says where it gives up, and Python may go on."""
+INEXACT = f"an integer beyond 2^53, which {ALONE} exactly: set YAWBENCH_UNITS=python"
 """Error message of a native library for larger integers."""
+COMPLEX = f"a complex number, with which {ALONE}: set YAWBENCH_UNITS=python"
+"""Error message of a native library for complex powers."""
+
+
+class Refused(Exception):
+    """Error: a construct of the component, named in the text, cannot be translated."""
+
+    def __init__(self, text: str, where: str = "") -> None:
+        super().__init__(text)
+        self.text, self.where = text, where
+
+    def __str__(self) -> str:
+        return f"{self.text} ({self.where})" if self.where else self.text
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,19 +190,21 @@ def type_of(value: Operand) -> str:
     return REAL
 
 
-def joined(first: str, second: str) -> str:
-    """Return the common type of two types.
+def are_joined(types: Iterable[str]) -> bool:
+    """Return whether one type holds the values of all: a whole number stays one, whose zero has no sign.
 
     Raises:
-        ValueError: there is none.
+        Refused: integers of 64 bits and other numbers are among them.
     """
-    if first == second:
-        return first
-    both = {first, second}
-    if WIDE in both:
-        raise ValueError("an integer beyond 64 bits is stored")
-    if WORD in both:
-        if REAL in both:
-            raise ValueError("an integer of 64 bits or a real number")
-        return WORD
-    return REAL if REAL in both else INT
+    every = set(types)
+    if WORD in every and every != {WORD}:
+        raise Refused("an integer of 64 bits or another number")
+    if WIDE in every and every != {WIDE}:
+        raise Refused("an integer beyond 64 bits is stored")
+    return len({type == REAL for type in every}) == 1
+
+
+def joined(types: Iterable[str]) -> str:
+    """Return the type that holds the values of all, which `are_joined`."""
+    every = set(types)
+    return every.pop() if len(every) == 1 else INT

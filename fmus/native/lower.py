@@ -15,6 +15,8 @@ from . import ir
 from .values import Refused, Unreachable
 
 MASK = 2**64 - 1
+LARGEST = 2**1023
+"""An integer that is a real number, too, as all smaller ones are."""
 OPERATORS: dict[str, Callable[[Any, Any], Any]] = {
     "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv, "**": operator.pow,
     "//": operator.floordiv, "%": operator.mod, "&": operator.and_, "|": operator.or_, "^": operator.xor,
@@ -23,6 +25,8 @@ OPERATORS: dict[str, Callable[[Any, Any], Any]] = {
 }  # fmt: skip
 _NAMES = {"+": "add", "-": "sub", "*": "mul", "&": "and", "|": "or", "^": "xor", ">>": "right"}
 _COMPARED = {"<": "lt", "<=": "le", ">": "gt", ">=": "ge", "==": "eq", "!=": "ne"}
+OF_WIDE = ("copy", "word", "add_word", "mul_word")
+"""Operations of which the lowest 64 bits follow from those of the operands."""
 CAN_OVERFLOW = ("exp", "expm1", "sinh", "cosh")
 ALWAYS_DEFINED = ("atan", "atan2", "tanh", "fabs", "copysign", "floor", "ceil", "trunc")
 DOMAIN = ("sqrt", "sin", "cos", "tan", "asin", "acos", "log", "log1p", "log10", "fmod")
@@ -107,6 +111,14 @@ class Facts:
         return None
 
 
+def _in_double(a: ir.Operand) -> ir.Operand:
+    if ir.type_of(a) not in (ir.WORD, ir.WIDE):
+        return a
+    if isinstance(a, ir.Var) or abs(a) > LARGEST or float(a) != a:
+        raise Refused("comparing an integer beyond 2^53")
+    return float(a)
+
+
 class Lowering:
     """Statements emitted so far, and the arithmetic that emits more."""
 
@@ -133,6 +145,8 @@ class Lowering:
 
     def let(self, type: str, op: str, *operands: ir.Operand) -> ir.Var:
         """Return a new variable with the value of an operation."""
+        if op not in OF_WIDE and any(ir.type_of(x) == ir.WIDE for x in operands):
+            raise Refused("an integer beyond 64 bits")
         target = self.new(type)
         self.out.append(ir.Let(target, op, operands))
         return target
@@ -209,6 +223,9 @@ class Lowering:
         a, b = self.settled(a, self.facts), self.settled(b, self.facts)
         if not isinstance(a, ir.Var) and not isinstance(b, ir.Var):
             return bool(OPERATORS[op](a, b))
+        kinds = {ir.type_of(a), ir.type_of(b)}
+        if kinds & {ir.WORD, ir.WIDE} and kinds != {ir.WORD}:
+            a, b = _in_double(a), _in_double(b)
         comparison = self.let(ir.BOOL, _COMPARED[op], a, b)
         if op == "==" and isinstance(a, ir.Var) and isinstance(b, int) and a.type == ir.INT:
             self.facts.meanings[comparison] = ("is", a, int(b))
@@ -229,8 +246,6 @@ class Lowering:
             return result  # type: ignore[no-any-return]
         types = {ir.type_of(a), ir.type_of(b)}
         real = ir.REAL in types
-        if ir.WIDE in types and op not in ("+", "*", "&"):
-            raise Refused("an integer beyond 64 bits")
         if not real and types & {ir.WORD, ir.WIDE} and op != "/":
             return self._of_words(op, a, b)
         if op in ("+", "-", "*"):
@@ -265,14 +280,14 @@ class Lowering:
         if not real and not (isinstance(b, int) and 0 <= b <= 8):
             raise Refused("a power of integers whose exponent is not a small number")
         if isinstance(b, ir.Var) or b < 0:
-            below = self.compare("<", b, 0)
-            zero = self.compare("==", a, 0)
-            bad = self.let(ir.BOOL, "both", below, zero)
+            bad = self.let(ir.BOOL, "zero_power", a, b)
             self.require(self.negation(bad), *complaint(lambda: 0.0**-1.0))
-        if isinstance(b, ir.Var) or b != int(b):
+        if isinstance(b, ir.Var) or (math.isfinite(b) and b != int(b)):
             bad = self.let(ir.BOOL, "complex_power", a, b)
-            self.require(self.negation(bad), "TypeError", "must be real number, not complex")
-        power = self.let(ir.REAL if real else ir.INT, "pow", a, b)
+            self.require(self.negation(bad), "TypeError", ir.COMPLEX)
+        if not real:
+            return self.let(ir.INT, "pow", a, b)
+        power = self.let(ir.REAL, "pow", a, b)
         bad = self.let(ir.BOOL, "overflown", power, a, b)
         self.require(self.negation(bad), *complaint(lambda: 1e200**2.0))
         return power
@@ -336,7 +351,13 @@ class Lowering:
         if name in ("hypot", "dist"):
             return self.let(ir.REAL, "norm", *operands)
         if name == "pow":
-            return self._power(self.as_real(operands[0]), self.as_real(operands[1]), True)
+            for kind in ("zero", "complex"):
+                undefined = self.let(ir.BOOL, f"{kind}_power", *operands)
+                self.require(self.negation(undefined), *complaint(lambda: math.sqrt(-1.0)))
+            power = self.let(ir.REAL, "pow", *operands)
+            too_large = self.let(ir.BOOL, "overflown", power, *operands)
+            self.require(self.negation(too_large), *complaint(lambda: math.exp(1e3)))
+            return power
         if name not in FUNCTIONS:
             raise Refused(f"math.{name}")
         result = self.let(ir.REAL, name, *operands)
@@ -346,17 +367,6 @@ class Lowering:
         elif name in DOMAIN:
             bad = self.let(ir.BOOL, "undefined", result, *operands)
             self.require(self.negation(bad), *complaint(lambda: math.sqrt(-1.0)))
-        return result
-
-    def total(self, items: list[ir.Operand], start: ir.Operand) -> ir.Operand:
-        """Return sum(items, start), with the summation of the Python that runs the build."""
-        if not any(isinstance(x, ir.Var) for x in (*items, start)):
-            return sum(items, start)  # type: ignore[arg-type]
-        if COMPENSATED and any(ir.type_of(x) == ir.REAL for x in (*items, start)):
-            return self.let(ir.REAL, "compensated_sum", start, *items)
-        result = start
-        for item in items:
-            result = self.binary("+", result, item)
         return result
 
 

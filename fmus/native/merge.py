@@ -66,7 +66,7 @@ def alike(a: Any, b: Any) -> bool:
     if a is b or same(a, b):
         return True
     if is_number(a) and is_number(b):
-        return True
+        return ir.are_joined((ir.type_of(a), ir.type_of(b)))
     if isinstance(a, Picked) or isinstance(b, Picked):
         return False
     if isinstance(a, tuple) and isinstance(b, tuple):
@@ -251,7 +251,7 @@ class _Join:
             return a
         if a is ANY:
             return b
-        if is_number(a) and is_number(b):
+        if is_number(a) and is_number(b) and alike(a, b):
             return self.number(a, b)
         if isinstance(a, Picked):
             a = self._loaded(a, self.a)
@@ -287,10 +287,7 @@ class _Join:
         mapped = self._mapped(a, b)
         if mapped is not None and all(k == x for k, x in mapped[1].items()):
             return mapped[0]
-        try:
-            target = self.machine.new(ir.joined(ir.type_of(a), ir.type_of(b)))
-        except ValueError as error:
-            raise Refused(str(error)) from None
+        target = self.machine.new(ir.joined(map(ir.type_of, (a, b))))
         self.a.out.append(ir.Let(target, "copy", (a,)))
         self.b.out.append(ir.Let(target, "copy", (b,)))
         if isinstance(a, int) and isinstance(b, int):

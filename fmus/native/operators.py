@@ -10,7 +10,23 @@ from typing import Any
 from . import ir
 from .evaluate import Call, Evaluation
 from .lower import OPERATORS
-from .values import Box, Closure, Dict, Each, Frame, List, Picked, Refused, Ring, Union, is_number, is_plain
+from .merge import alike
+from .values import (
+    Box,
+    Closure,
+    Dict,
+    Each,
+    Frame,
+    List,
+    Picked,
+    Refused,
+    Ring,
+    Union,
+    is_mixed,
+    is_number,
+    is_plain,
+    is_real,
+)
 
 BINARY = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "//", ast.Mod: "%", ast.Pow: "**",
@@ -100,6 +116,10 @@ class Operating(Evaluation):
 
     def operate(self, op: str, a: Any, b: Any) -> Any:
         """Return a op b."""
+        if is_mixed(a) and is_real(b):
+            a = self.real(a)
+        elif is_mixed(b) and is_real(a):
+            b = self.real(b)
         if isinstance(a, Union) or isinstance(b, Union):
             return self.by_form(a, lambda x: self.by_form(b, lambda y: self.operate(op, x, y)))
         if is_number(a) and is_number(b):
@@ -143,10 +163,24 @@ class Operating(Evaluation):
         if isinstance(node.op, ast.Invert):
             raise Refused("~ is not translated")
         negative = isinstance(node.op, ast.USub)
-        return self.by_form(value, lambda x: self.negative(x) if negative else self.binary("+", x, 0))
+        return self.by_form(value, self.negative if negative else self._positive)
+
+    def _positive(self, value: Any) -> ir.Operand:
+        return value if is_real(value) else self.binary("+", value, 0)
+
+    def real(self, value: Any) -> Any:
+        """Return a number of any form as a real one."""
+        return self.by_form(value, self.as_real)
+
+    def selected(self, test: ir.Operand, a: Any, b: Any) -> Any:
+        """Return one of two values, by a condition."""
+        if is_number(a) and is_number(b) and alike(a, b) and self.facts.known(test) is None:
+            return self.let(ir.joined(map(ir.type_of, (a, b))), "select", test, a, b)
+        return self.branch(test, lambda: a, lambda: b)
 
     def truth_of(self, value: Any) -> ir.Operand:
         """Return whether a value counts as true."""
+        value = self.real(value) if is_mixed(value) else value
         if isinstance(value, Union):
             return self.by_form(value, self.truth_of)  # type: ignore[no-any-return]
         if is_number(value):
@@ -203,6 +237,8 @@ class Operating(Evaluation):
 
     def compared(self, op: ast.cmpop, a: Any, b: Any) -> ir.Operand:
         """Return the result of a comparison."""
+        if is_mixed(a) or is_mixed(b):
+            a, b = (self.real(x) if is_mixed(x) else x for x in (a, b))
         if isinstance(a, Union) or isinstance(b, Union):
             return self.by_form(a, lambda x: self.by_form(b, lambda y: self.compared(op, x, y)))  # type: ignore
         if isinstance(op, (ast.In, ast.NotIn)):

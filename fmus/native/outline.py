@@ -11,7 +11,7 @@ from typing import Any
 
 from . import ir
 from .calls import Calling
-from .evaluate import Call, Promote
+from .evaluate import Call
 from .lower import Facts
 from .read import Sources, kinds_within
 from .shapes import (
@@ -23,6 +23,7 @@ from .shapes import (
     Leaf,
     Made,
     Memo,
+    Promote,
     Shape,
     build,
     numbers_of,

@@ -97,6 +97,19 @@ class Growing(Shape):
     item: Shape
 
 
+class Promote(Exception):
+    """Signal that a list of the state changes its length or the shape of its items; restarts the evaluation.
+
+    Attributes:
+        path: of the list in the state, or its number if it is known that its length changes.
+        item: shape of an item.
+    """
+
+    def __init__(self, path: str | int, item: Shape) -> None:
+        super().__init__(path)
+        self.path, self.item = path, item
+
+
 Place = Callable[[Box], Any]
 """Returns the content of a box at a given time."""
 
@@ -189,11 +202,8 @@ class Widening:
         if isinstance(a, Known) and isinstance(b, Known) and same(a.value, b.value):
             return a
         types = _number_type(a), _number_type(b)
-        if types[0] and types[1]:
-            try:
-                type = ir.joined(types[0], types[1])
-            except ValueError as error:
-                raise Refused(str(error)) from None
+        if all(types) and ir.are_joined(types):
+            type = ir.joined(types)
             if isinstance(a, Leaf) and a.type == type:
                 return a
             self.grew = True
@@ -244,8 +254,9 @@ def _number_type(shape: Shape) -> str:
 
 
 def _alike(a: Shape, b: Shape) -> bool:
-    if _number_type(a) and _number_type(b):
-        return True
+    types = _number_type(a), _number_type(b)
+    if all(types):
+        return ir.are_joined(types)
     if isinstance(a, Known) and isinstance(b, Known):
         return same(a.value, b.value)
     if isinstance(a, Items) and isinstance(b, Items):
@@ -326,6 +337,19 @@ def numbers_of(shape: Shape, value: Any, slots: Place, machine: Merging) -> list
     return operands
 
 
+def push(ring: Growing | Ring, item: Any, slots: Place, machine: Merging) -> None:
+    """Append an item to a list of the state.
+
+    Raises:
+        Promote: the shape of its items is not wide enough.
+    """
+    widening, shape = Widening(), shape_of(item, slots)
+    widening.of(ring.item, shape)
+    if widening.grew:
+        raise Promote(ring.number, shape)
+    machine.out.append(ir.Push(ring.number, tuple(numbers_of(ring.item, item, slots, machine))))
+
+
 def _collect(
     shape: Shape, value: Any, slots: Place, machine: Merging, operands: list[ir.Operand], seen: set[int]
 ) -> None:
@@ -349,8 +373,7 @@ def _collect(
         if isinstance(value, List):
             machine.out.append(ir.Drop(shape.number, every=True))
             for item in slots(value):
-                numbers = numbers_of(shape.item, item, slots, machine)
-                machine.out.append(ir.Push(shape.number, tuple(numbers)))
+                push(shape, item, slots, machine)
     elif isinstance(shape, Made):
         inner = value.frame if isinstance(value, Closure) else value.owner
         _collect(shape.inner, inner, slots, machine, operands, seen)

@@ -16,11 +16,10 @@ from types import FunctionType
 from typing import Any
 
 from . import ir
-from .evaluate import Promote
 from .outline import Library, Outlining
 from .read import Sources
-from .shapes import Growing, Memo, Shape, Widening, build, numbers_of, shape_of, types_of
-from .values import Instance, List, Refused, Union, Unreachable, is_number
+from .shapes import Growing, Memo, Promote, Shape, Widening, build, numbers_of, shape_of, types_of
+from .values import Instance, List, Refused, Union, Unreachable, is_mixed, is_number
 
 WIDEST = 40
 """Largest number of evaluations of a step until the shape of the state converges."""
@@ -139,10 +138,18 @@ class _Specialising:
             try:
                 return self._attempt()
             except Promote as promoted:  # noqa: PERF203 - each attempt follows from the last
-                if promoted.path in self.growing:
-                    raise Refused("a list whose length changes in ways that are not followed") from None
-                self.growing[promoted.path] = Growing(len(self.growing), promoted.item)
+                self._grow(promoted)
         raise Refused("too many lists whose length changes")
+
+    def _grow(self, promoted: Promote) -> None:
+        path = promoted.path if isinstance(promoted.path, str) else list(self.growing)[promoted.path]
+        number, item, widening = len(self.growing), promoted.item, Widening()
+        if path in self.growing:
+            number = self.growing[path].number
+            item = widening.of(self.growing[path].item, item)
+            if not widening.grew:
+                raise Refused("a list whose length changes in ways that are not followed")
+        self.growing[path] = Growing(number, item)
 
     # ---- one attempt ------------------------------------------------------------------------
 
@@ -182,7 +189,7 @@ class _Specialising:
             [change for change, leaf in zip(changes, leaves, strict=True) if change[1] is not leaf],
         )
         program.functions["output"] = self._output(state, leaves, fixed)
-        program.rings = [len(list(types_of(g.item))) for g in self.growing.values()]
+        program.rings = [max(1, len(list(types_of(g.item)))) for g in self.growing.values()]
         for g in self.growing.values():
             if ir.WORD in types_of(g.item):
                 raise Refused("a list of integers of 64 bits whose length changes")
@@ -199,9 +206,9 @@ class _Specialising:
         if isinstance(outputs, Union) or not isinstance(outputs, (tuple, List)):
             raise Refused("output() returns a value with several forms", self._line_of("output"))
         values = machine.items(outputs)
-        if len(values) != self.outputs or not all(map(is_number, values)):
+        if len(values) != self.outputs or not all(is_number(x) or is_mixed(x) for x in values):
             raise Refused("output() returns something other than all outputs", self._line_of("output"))
-        return ir.Function(machine.out, _placed("y", list(map(machine.as_real, values))))
+        return ir.Function(machine.out, _placed("y", list(map(machine.real, values))))
 
     def _line_of(self, method: str) -> str:
         source = self.sources.of(getattr(self.component, method))

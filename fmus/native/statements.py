@@ -11,10 +11,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from . import ir
-from .evaluate import Promote
 from .operators import BINARY, Operating
 from .read import kinds_within
-from .shapes import shape_of
+from .shapes import Promote, shape_of
 from .values import (
     UNSET,
     Box,
@@ -29,7 +28,7 @@ from .values import (
     Text,
     Union,
     Unreachable,
-    is_number,
+    is_real,
 )
 
 EXIT, RESULT = "<exit>", "<result>"
@@ -262,6 +261,8 @@ class Execution(Operating):
         if not isinstance(owner, List):
             raise Refused(f"setting an item of a {type(owner).__name__}")
         held = self.read(owner)
+        if is_real(index):
+            self.end("TypeError", "list indices must be integers or slices, not float")
         if not isinstance(index, ir.Var):
             if isinstance(index, slice):
                 raise Refused("setting a slice")
@@ -272,14 +273,7 @@ class Execution(Operating):
             return
         place = self.within(index, len(held), "list assignment index out of range")
         for k in range(len(held)):
-            if is_number(value) and is_number(held[k]):
-                kind = ir.joined(ir.type_of(value), ir.type_of(held[k]))
-                there = self.compare("==", place, k)
-                self.write(owner, k, self.let(kind, "select", there, value, held[k]))
-            else:
-                there = self.compare("==", place, k)
-                before = held[k]
-                self.write(owner, k, self.branch(there, lambda: value, lambda: before))  # noqa: B023
+            self.write(owner, k, self.selected(self.compare("==", place, k), value, held[k]))
 
     # ---- branches ---------------------------------------------------------------------------
 

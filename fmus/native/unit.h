@@ -669,9 +669,7 @@ static int read_state(Saved *saved, const char *bytes, size_t size)
             return 0;
         }
         for (uint64_t k = 0; k < count; k++, bytes += one) {
-            double numbers[16];
-            memcpy(numbers, bytes, one);
-            if (!push(&saved->lists[i], WIDTHS[i], numbers)) {
+            if (!push(&saved->lists[i], WIDTHS[i], bytes)) {
                 return 0;
             }
         }

@@ -14,18 +14,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from . import ir
-
-
-class Refused(Exception):
-    """Error: a construct of the component, named in the text, cannot be translated."""
-
-    def __init__(self, text: str, where: str = "") -> None:
-        super().__init__(text)
-        self.text, self.where = text, where
-
-    def __str__(self) -> str:
-        return f"{self.text} ({self.where})" if self.where else self.text
-
+from .ir import Refused as Refused
 
 RESIZED = "a list that changes its length during iteration"
 """Message of `Refused`: Python's loop would use the list's new length, the translated loop the old."""
@@ -214,6 +203,18 @@ def now() -> int:
 def is_number(value: Any) -> bool:
     """Return whether a value is a number, known at build time or not."""
     return isinstance(value, (ir.Var, int, float))
+
+
+def is_real(value: Any) -> bool:
+    """Return whether a value is a real number, known or not."""
+    return is_number(value) and ir.type_of(value) == ir.REAL
+
+
+def is_mixed(value: Any) -> bool:
+    """Return whether a value is a number that is whole on some paths, real on others."""
+    return isinstance(value, Union) and all(
+        is_number(x) and ir.type_of(x) in (ir.REAL, ir.INT, ir.BOOL) for x in value.alternatives
+    )
 
 
 def is_plain(value: Any) -> bool:

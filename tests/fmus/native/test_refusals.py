@@ -63,6 +63,16 @@ REFUSED = {
         "math.gamma",
         2,
     ),
+    "an integer of 64 bits or a negative one": (
+        "def output(self, t, u):\n    n = -1 if u[0] > 0.5 else 2**53\n    return (n,)",
+        "an integer of 64 bits or another number",
+        2,
+    ),
+    "an integer beyond 64 bits": (
+        "def output(self, t, u):\n    return (math.sqrt(int(1e300) * int(u[0])),)",
+        "an integer beyond 64 bits",
+        2,
+    ),
     "a generator": (
         "def output(self, t, u):\n    return (sum(self.halves(u)),)\n"
         "def halves(self, u):\n    for x in u:\n        yield 0.5 * x",
