@@ -403,8 +403,8 @@ def _beyond(items: Any) -> str:
 
 
 def _kind_of(items: Any) -> str:
-    one = items.items[0] if isinstance(items, Picked) else items
-    return "tuple" if isinstance(one, tuple) else "list"
+    row = items.items[0] if isinstance(items, Picked) else items
+    return "tuple" if isinstance(row, tuple) else "list"
 
 
 __all__ = ["Call", "Evaluation", "Failure"]

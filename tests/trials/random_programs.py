@@ -63,7 +63,7 @@ COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
 
 @dataclass
 class Scope:
-    """What can be used at a place of a program.
+    """Names and loops at a place of a program.
 
     Attributes:
         numbers: expressions that are numbers.

@@ -40,7 +40,7 @@ VALUES = (0.0, -0.0, 1.0, -1.0, 0.5, -0.5, 1.5, 2.5, 2.0, 3.0, -7.0, 1e-300, 1e1
 
 @dataclass
 class Tally:
-    """What came of programs."""
+    """Programs, counted by outcome."""
 
     counts: Counter[str] = field(default_factory=Counter)
     reasons: Counter[str] = field(default_factory=Counter)

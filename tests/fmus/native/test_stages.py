@@ -150,10 +150,11 @@ def test_a_division_raises_where_its_divisor_is_zero():
 
 
 def test_types_join_as_python_numbers_do():
-    assert ir.joined(ir.INT, ir.BOOL) == ir.INT
-    assert ir.joined(ir.INT, ir.REAL) == ir.REAL
-    with pytest.raises(ValueError, match="64 bits"):
-        ir.joined(ir.WORD, ir.REAL)
+    assert ir.are_joined((ir.INT, ir.BOOL))
+    assert ir.joined((ir.INT, ir.BOOL)) == ir.INT
+    assert not ir.are_joined((ir.INT, ir.REAL))
+    with pytest.raises(ir.Refused, match="64 bits"):
+        ir.are_joined((ir.WORD, ir.REAL))
 
 
 # ---- emit ---------------------------------------------------------------------------------------
