@@ -37,8 +37,9 @@ NATIVE_LIBRARY = "native.so"
 """Name of the native library, in the folder of the launcher, which opens it by this name."""
 FLAGS = ("-std=c11", "-ffp-contract=off", "-frounding-math", "-fno-builtin", "-fno-math-errno", "-w", "-fPIC",
          "-shared", "-fvisibility=hidden")  # fmt: skip
-"""Compiler flags: functions are those of libm, as in CPython, neither replaced nor fused by the compiler. Without
-`-frounding-math`, GCC 12 replaces 0.0 - x by -x if x is an absolute value or was an integer: wrong for 0."""
+"""Compiler flags: functions are those of libm, as in CPython, neither replaced nor fused by the compiler.
+Without `-frounding-math`, GCC 12 replaces 0.0 - x by -x if x is an absolute value or was an integer,
+which is wrong for 0."""
 LINUX = ("-O2", "-Wl,--build-id=none", "-Wl,-z,defs", "-s")
 TO_WINDOWS = "x86_64-w64-mingw32-gcc"
 WINDOWS = ("-O1", "-static", "-Wl,--no-insert-timestamp", "-s")
