@@ -20,7 +20,7 @@ from ..errors import ResultsError
 from ..experiments.axes import RUN, Level, changes_at
 from ..experiments.claim_schema import MetricReference, si_number
 from ..experiments.experiment import Case
-from ..experiments.experiment_result import Each, ExperimentResult, limits_of
+from ..experiments.experiment_result import Each, ExperimentResult, Limit, limits_of
 from ..experiments.jobs import Job
 from ..figures.style import LabelledRun, digits_of, shown, shown_unit
 from ..messages import counted, listed
@@ -73,7 +73,7 @@ def limit_sentences(findings: ExperimentResult) -> list[str]:
     assert planned is not None
     for spec in findings.spec.limits.values():
         unit = planned.axis_unit(spec.of).strip(" []")
-        groups: dict[tuple[str, ...], list[Any]] = {}
+        groups: dict[tuple[str, ...], list[Limit]] = {}
         ranges: dict[str, list[Level]] = {}
         for limit in limits_of(findings, spec):
             named = [k for k in limit.others if k == RUN or not findings.spec.axes[k].numeric]
@@ -95,15 +95,21 @@ def _number(level: Level) -> float:
     return float(level.value)
 
 
-def _reach(limits: Sequence[Any], unit: str) -> str:
-    """Return the values of limits as a range; `at least` where no tried value fails."""
-    known = sorted((limit for limit in limits if limit.largest is not None), key=lambda limit: limit.largest)
+def _reach(limits: Sequence[Limit], unit: str) -> str:
+    """Return the values of limits as a range; `at least` where no value fails, or its run is missing."""
+    tried = [limit for limit in limits if limit.largest is not None or not limit.missing]
+    if not tried:
+        return "unknown, as no run was made"
+    known = [(limit.largest, limit) for limit in tried if limit.largest is not None]
     if not known:
         return "at no value tried"
-    least, most = known[0], known[-1]
-    ends = [most] if least.largest == most.largest else [least, most]
-    texts = [("at least " if limit.beyond is None else "") + digits_of(limit.largest) for limit in ends]
-    if len(known) < len(limits):
+    least, most = (end(known, key=lambda pair: pair[0]) for end in (min, max))
+    ends = [most] if least[0] == most[0] else [least, most]
+    texts = [
+        ("at least " if limit.beyond is None or limit.missing else "") + digits_of(largest)
+        for largest, limit in ends
+    ]
+    if len(known) < len(tried):
         texts = ["from none", texts[-1]]
     return f"{' to '.join(texts)} {unit}".rstrip()
 
@@ -142,6 +148,7 @@ def _data(findings: ExperimentResult, sides: Mapping[int, str]) -> dict[str, Any
         "levels": [places for _, places in axes],
         "statuses": statuses,
         "status": [statuses.index(record.status) for record in records],
+        "made": [record.made for record in records],
         "told": {case.number: why for case in cases if (why := _remark(findings, case))},
         "keys": "".join(job.key[:KEY].ljust(KEY) for job in jobs),
         "sides": [number in sides for number in range(len(cases))],

@@ -272,3 +272,17 @@ def test_chosen_runs_as_csv_are_rows_of_the_table(chromium, sweep):
     assert len(lines) == len(sweep.rows)
     keys = [line[head.index("key")] for line in lines]
     assert keys == [row["key"][:12] for row in sweep.rows]
+
+
+def test_runs_that_were_not_made_are_not_shown_as_failures(chromium, sweep, tmp_path, fmus):
+    (tmp_path / "half.yaml").write_text(HALF_A_CAR)
+    (tmp_path / "sweep.yaml").write_text(SWEEP)
+    out = tmp_path / "out"
+    with pytest.raises(SystemExit):
+        main(["sweep", str(tmp_path / "sweep.yaml"), "--no-run", "--out", str(out), "--fmus", str(fmus)])
+    opened(chromium, out / "report.html")
+    cells = chromium.run(VIEW + "return view.cells().map((cell) => [view.label(cell), cell.within])")
+    assert {tuple(cell) for cell in cells} == {("–", True)}
+    text = chromium.run("return document.querySelector('main').innerText")
+    assert "unknown, as no run was made" in text
+    assert "at no value tried" not in text

@@ -193,7 +193,8 @@ class Sweep extends InAddress {
     for (const cell of found.values()) {
       const values = this.metric ? cell.rows.map(this.metric.at).filter((one) => one !== null) : [];
       cell.value = values.length === cell.rows.length ? values.reduce((sum, one) => sum + one, 0) / values.length : null;
-      cell.within = cell.rows.every((row) => this.within(row));
+      cell.made = cell.rows.every((row) => this.data.made[row]);
+      cell.within = !cell.made || cell.rows.every((row) => this.within(row));
       cell.chosen = cell.rows.some((row) => this.isVisible.has(row));
     }
     return [...found.values()];
@@ -212,7 +213,7 @@ class Sweep extends InAddress {
     while (beside > 1 && (wide / beside - left) / across < 28) beside -= 1;
     const frame = wide / beside;
     const cw = (frame - left - 8) / across;
-    const labels = new Map(cells.map((cell) => [cell, this.inCell(cell.value)]));
+    const labels = new Map(cells.map((cell) => [cell, this.label(cell)]));
     const longest = Math.max(...[...labels.values()].map((label) => label.length), 1);
     const numbers = this.data.grid && longest * 5.7 + 2 <= cw && cells.length <= MOST_NUMBERS;
     const ch = this.data.grid ? Math.max(numbers ? 22 : 9, Math.min(30, 300 / up)) : 300 / up;
@@ -263,6 +264,10 @@ class Sweep extends InAddress {
     holder.innerHTML = `<svg viewBox="0 0 ${wide} ${total + (legend === key ? 18 : 33)}" aria-hidden="true">${paths.join('')}${heads.join('')}${texts.join('')}`
       + `<text class="ys-quiet" x="0" y="${total + 12}">${legend}</text><path class="ys-open"/><path class="ys-cursor"/></svg>`;
     this.mark();
+  }
+
+  label({value, made}) {
+    return made ? this.inCell(value) : '–';
   }
 
   // A number in a cell: short, but never as the limit reads if it is another.
