@@ -124,12 +124,12 @@ MAYBE_UNUSED static double norm(int n, const double *given)
 }
 
 /* sum() since CPython 3.12, after A. Neumaier. */
-MAYBE_UNUSED static double compensated_sum(int n, const double *x)
+MAYBE_UNUSED static double compensated_sum(int n, const double *x, const char *plain)
 {
     double sum = x[0], lost = 0.0;
     for (int i = 1; i < n; i++) {
         double t = sum + x[i];
-        lost += __builtin_fabs(sum) >= __builtin_fabs(x[i]) ? (sum - t) + x[i] : (x[i] - t) + sum;
+        lost += plain[i] ? 0.0 : __builtin_fabs(sum) >= __builtin_fabs(x[i]) ? (sum - t) + x[i] : (x[i] - t) + sum;
         sum = t;
     }
     return lost != 0.0 && isfinite(lost) ? sum + lost : sum;

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from . import ir
+from .lower import WHOLE_ARE_PLAIN
 from .specialise import Program
 
 TYPES = {ir.REAL: "double", ir.INT: "double", ir.BOOL: "int", ir.WORD: "uint64_t", ir.WIDE: "uint64_t"}
@@ -352,7 +353,10 @@ class _Function:
             return reals[0]
         if op == "mul_int":
             return f"{reals[0]} * {reals[1]} + 0.0"
-        if op in ("norm", "compensated_sum"):
+        if op == "compensated_sum":
+            plain = ", ".join(str(int(WHOLE_ARE_PLAIN and ir.type_of(x) != ir.REAL)) for x in args)
+            return f"{op}({len(reals)}, (const double[]){{{', '.join(reals)}}}, (const char[]){{{plain}}})"
+        if op == "norm":
             return f"{op}({len(reals)}, (const double[]){{{', '.join(reals)}}})"
         name = f"__builtin_{op}" if op in _INLINE else op.removesuffix("_int")
         call = f"{name}({', '.join(reals)})"

@@ -372,3 +372,5 @@ class Lowering:
 
 COMPENSATED = sum([1.0, 1e100, 1.0, -1e100]) == 2.0
 """Whether `sum` is compensated, as since CPython 3.12."""
+WHOLE_ARE_PLAIN = sum([1e100, 1, -1e100]) == 0.0
+"""Whether `sum` does not compensate whole numbers after a real one, as in CPython 3.12 and 3.13."""

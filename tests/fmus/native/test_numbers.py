@@ -101,6 +101,11 @@ def output(self, t, u):
 def output(self, t, u):
     return (3.0 * round(20.0 * u[0]) ** 4 + round(u[1]) ** 0,)
 """,
+    "sums of whole and real numbers": """
+def output(self, t, u):
+    n = round(5.0 * u[0])
+    return (sum([1e16 * u[1], n, u[0], True]) + sum((n, 0.1, 0.2, 0.3, n if u[0] > 0.0 else u[1])),)
+""",
     "the sign of zero": """
 def output(self, t, u):
     x = 0.0 * u[0]
