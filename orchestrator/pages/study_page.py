@@ -15,7 +15,7 @@ from typing import Any
 from ..errors import ResultsError
 from ..experiments.claims import ClaimResult
 from ..experiments.confidence import CONFIDENCE
-from ..experiments.experiment import FIGURES
+from ..experiments.experiment import FIGURES, LoadedExperiment
 from ..experiments.experiment_result import Each, ExperimentResult
 from ..experiments.jobs import Job
 from ..experiments.open_value_regions import runs_of as runs_of_claim
@@ -106,10 +106,8 @@ def chapter(
     if spec.axes and findings.planned and len(findings.records) > 1:
         sweep = sweep_view(findings, "sweep", write_sides(findings, folder, each))
 
-    def link(result: ClaimResult) -> str:
-        """Return the state of the viewer that shows a claim's runs; "" if it has none of them."""
-        shown = [numbers[run] for run in runs_of_claim(experiment, result.claim) if run in numbers]
-        return f"{VIEW}?shown={shown}&baseline={shown[0]}".replace(" ", "") if shown else ""
+    def with_link(results: Sequence[ClaimResult]) -> list[dict[str, Any]]:
+        return [judged(result) | {"link": link_to_runs(experiment, result, numbers)} for result in results]
 
     return {
         "id": name,
@@ -119,8 +117,8 @@ def chapter(
         "counts": counts_of(findings.claims),
         "reach": reach(findings),
         "answer": " ".join(filter(None, (answer(findings), sweep and sweep_sentence(findings)))),
-        "claims": [judged(result) | {"link": link(result)} for result in findings.claims],
-        "checks": [judged(result) | {"link": link(result)} for result in findings.checks],
+        "claims": with_link(findings.claims),
+        "checks": with_link(findings.checks),
         "region": region_table(findings) if findings.regions else None,
         "limits": limit_tables(findings),
         "systems": systems(plans, spec.title),
@@ -152,6 +150,18 @@ def chapter(
         "fmus": fmus_of(made),
         "programs": programs_of(made),
     }
+
+
+def link_to_runs(experiment: LoadedExperiment, result: ClaimResult, numbers: Mapping[str, int]) -> str:
+    """Return the state of the viewer that shows a claim's runs; "" if it has none of them.
+
+    Args:
+        experiment: of the claim.
+        result: the judged claim.
+        numbers: run -> its number in the viewer.
+    """
+    shown = [numbers[run] for run in runs_of_claim(experiment, result.claim) if run in numbers]
+    return f"{VIEW}?shown={shown}&baseline={shown[0]}".replace(" ", "") if shown else ""
 
 
 def runs_made(findings: ExperimentResult) -> list[Results | Plan]:

@@ -228,16 +228,7 @@ def make_plan(
     if not isolated:
         _check_instances(system)
     errors = system.errors()
-    of_all = [Diagnostic("fmu-modules-conflict", sentence) for sentence in network.shadowed]
-    of_all += [
-        Diagnostic(
-            "algebraic-loop",
-            f"algebraic loop: {loop}; these values would define each other at one instant, so "
-            "one of these instances has to give an output that does not follow its input directly, or one of "
-            "the connections needs 'delay: 1 step'",
-        )
-        for loop in evaluation.loops
-    ]
+    of_all = _errors_of_network(network)
     instances = {name: _instance(system, name, parameters[name], values[name]) for name in opened}
     if not errors and not of_all:  # all variables are known
         of_all = missing_functions(instances.values(), wires, record)
@@ -269,6 +260,21 @@ def make_plan(
         diagnostics=(*notes, *suspicious_values(scenario, instances)),
         faults=faults,
     )
+
+
+def _errors_of_network(network: Network) -> list[Diagnostic]:
+    """Return the errors that concern all instances: modules in conflict, algebraic loops."""
+    errors = [Diagnostic("fmu-modules-conflict", sentence) for sentence in network.shadowed]
+    errors += [
+        Diagnostic(
+            "algebraic-loop",
+            f"algebraic loop: {loop}; these values would define each other at one instant, so "
+            "one of these instances has to give an output that does not follow its input directly, or one of "
+            "the connections needs 'delay: 1 step'",
+        )
+        for loop in network.evaluation.loops
+    ]
+    return errors
 
 
 def _take_from_tyres(
