@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import operator
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -351,7 +352,7 @@ class Lowering:
         if name in ("hypot", "dist"):
             return self.let(ir.REAL, "norm", *operands)
         if name == "pow":
-            for kind in ("zero", "complex"):
+            for kind in ("pole" if POLE_IS_ERROR else "zero", "complex"):
                 undefined = self.let(ir.BOOL, f"{kind}_power", *operands)
                 self.require(self.negation(undefined), *complaint(lambda: math.sqrt(-1.0)))
             power = self.let(ir.REAL, "pow", *operands)
@@ -372,5 +373,7 @@ class Lowering:
 
 COMPENSATED = sum([1.0, 1e100, 1.0, -1e100]) == 2.0
 """Whether `sum` is compensated, as since CPython 3.12."""
+POLE_IS_ERROR = sys.version_info < (3, 11)
+"""Whether `math.pow(0.0, -inf)` is an error, as before CPython 3.11, where it became infinite."""
 WHOLE_ARE_PLAIN = sum([1e100, 1, -1e100]) == 0.0
 """Whether `sum` does not compensate whole numbers after a real one, as in CPython 3.12 and 3.13."""
