@@ -67,6 +67,11 @@ MAYBE_UNUSED static int zero_power(double a, double b)
     return a == 0.0 && b < 0.0 && isfinite(b);
 }
 
+MAYBE_UNUSED static int pole_power(double a, double b)
+{
+    return a == 0.0 && b < 0.0;
+}
+
 MAYBE_UNUSED static int complex_power(double a, double b)
 {
     return a < 0.0 && isfinite(a) && isfinite(b) && b != floor(b);

@@ -363,8 +363,6 @@ class _Function:
         if op == "undefined":
             name = "undefined_2" if len(reals) == 3 else "undefined_1"
             return f"{name}({', '.join(reals)})"
-        if op == "pole_power":
-            return f"{reals[0]} == 0.0 && {reals[1]} < 0.0"
         if op == "overflown":
             return f"isinf({reals[0]}) && " + " && ".join(f"isfinite({x})" for x in reals[1:])
         return f"{call} + 0.0" if s.target.type == ir.INT else call

@@ -126,9 +126,7 @@ class Lowering:
     def __init__(self) -> None:
         self.out: list[ir.Statement] = []
         self.facts = Facts()
-        self.choices: dict[
-            ir.Var, tuple[ir.Operand, int, int]
-        ] = {}  # choices between constants: condition, then, else
+        self.choices: dict[ir.Var, tuple[ir.Operand, int, int]] = {}  # between constants: test, then, else
         self._count = 0
 
     def where(self) -> str:

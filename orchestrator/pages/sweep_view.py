@@ -21,7 +21,7 @@ from ..experiments.axes import RUN, Level, changes_at
 from ..experiments.claim_schema import MetricReference, si_number
 from ..experiments.experiment import Case
 from ..experiments.experiment_result import Each, ExperimentResult, Limit, limits_of
-from ..experiments.jobs import Job
+from ..experiments.jobs import NOT_MADE, Job
 from ..figures.style import LabelledRun, digits_of, shown, shown_unit
 from ..messages import counted, listed
 from ..metrics.expressions import metric
@@ -148,7 +148,7 @@ def _data(findings: ExperimentResult, sides: Mapping[int, str]) -> dict[str, Any
         "levels": [places for _, places in axes],
         "statuses": statuses,
         "status": [statuses.index(record.status) for record in records],
-        "made": [record.made for record in records],
+        "made": [status != NOT_MADE.status for status in statuses],
         "told": {case.number: why for case in cases if (why := _remark(findings, case))},
         "keys": "".join(job.key[:KEY].ljust(KEY) for job in jobs),
         "sides": [number in sides for number in range(len(cases))],

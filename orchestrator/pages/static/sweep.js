@@ -193,7 +193,7 @@ class Sweep extends InAddress {
     for (const cell of found.values()) {
       const values = this.metric ? cell.rows.map(this.metric.at).filter((one) => one !== null) : [];
       cell.value = values.length === cell.rows.length ? values.reduce((sum, one) => sum + one, 0) / values.length : null;
-      cell.made = cell.rows.every((row) => this.data.made[row]);
+      cell.made = cell.rows.every((row) => this.data.made[this.data.status[row]]);
       cell.within = !cell.made || cell.rows.every((row) => this.within(row));
       cell.chosen = cell.rows.some((row) => this.isVisible.has(row));
     }
