@@ -11,7 +11,7 @@ from vocabulary.lane_change import Lane, lanes_of
 
 from ..figures.style import CHANGED, QUIET, frame, line_style, new_figure
 from ..metrics.verdict import NotJudged, Status
-from .sine_with_dwell import AT, FAR, RATIOS, DwellCourse, course_of, percent
+from .sine_with_dwell import AT, FAR, RATIOS, DwellCourse, conclusion, course_of, percent
 from .standard_tests import Evaluation, TestSeries
 from .steering_tests import CLEAN
 from .trace import Trace, at
@@ -182,8 +182,8 @@ def draw_dwell_series(series: TestSeries, note: str) -> Figure:
         verdicts = "; ".join(
             f"{name} {criterion.status.value}: {criterion.why}" for name, criterion in series.criteria.items()
         )
-        angle, verdict = math.degrees(series.data["A"]), series.data["verdict"].value
-        title = f"Sine with dwell, A = {angle:.1f}°: the series has {verdict}"
+        angle = math.degrees(series.data["A"])
+        title = f"Sine with dwell, A = {angle:.1f}°: the series has {conclusion(series.criteria)}"
         frame(figure, 5.0, handles, title, f"{verdicts} · {note}")
     return figure
 

@@ -31,12 +31,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..figures.style import shown
+from ..messages import listed
 from ..metrics.measures import running_integral
 from ..metrics.verdict import NotJudged, Status, Verdict, apart, compare, not_judged, worst
 from .standard_tests import Evaluation, Limit, Mark, SeriesDriver, SeriesRun, TestSeries, evaluation
@@ -403,8 +404,17 @@ def judge_series(runs: Sequence[Evaluation], angle: float) -> TestSeries:
     status = Status.PASSED if passed else Status.FAILED
     data = {name: verdict.as_data() for name, verdict in criteria.items()}
     series_data = {"A": angle, "verdict": status, "criteria": data}
-    sentence = f"The series has {status.value}, with A = {shown(angle, 'rad')}."
+    sentence = f"The series has {conclusion(criteria)}, with A = {shown(angle, 'rad')}."
     return TestSeries(ordered, sentence, series_data, criteria)
+
+
+def conclusion(criteria: Mapping[str, Verdict]) -> str:
+    """Return whether the criteria of a series are met, with the names of those that are not."""
+    if failed := [name for name, verdict in criteria.items() if verdict.holds is False]:
+        return f"failed ({listed(failed)})"
+    if unknown := [name for name, verdict in criteria.items() if verdict.holds is None]:
+        return f"not passed ({listed(unknown)} not judged)"
+    return "passed"
 
 
 def _over_runs(criterion: str, runs: Sequence[Evaluation], missing: Sequence[float]) -> Verdict:

@@ -309,12 +309,16 @@ def test_a_series_passes_only_if_no_run_is_missing_fails_or_is_not_judged():
             made[5].rule("stability", spoil)
         return [one for k, one in enumerate(made) if k != without]
 
-    assert judge_series(runs(), A).data["verdict"] is Status.PASSED
+    passed = judge_series(runs(), A)
+    assert passed.data["verdict"] is Status.PASSED
+    assert "has passed, with" in passed.summary
     missing = judge_series(runs(without=3), A)
     assert missing.data["verdict"] is Status.FAILED
     assert golden(missing.criteria["stability"].why)
+    assert "has not passed (stability and responsiveness not judged)" in missing.summary
     failed = judge_series(runs(spoil=Verdict(Status.FAILED)), A)
     assert golden(failed.criteria["stability"].why)
+    assert "has failed (stability)" in failed.summary
     assert judge_series(runs(spoil=not_judged("too short")), A).data["verdict"] is Status.FAILED
 
 
