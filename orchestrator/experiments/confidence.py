@@ -30,7 +30,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache, cached_property, lru_cache
-from itertools import accumulate, combinations
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -165,9 +165,9 @@ def shared_places(lows: Sequence[float], highs: Sequence[float]) -> list[int]:
 
 def pairs_apart(resampled: np.ndarray) -> tuple[int, int]:
     """Return how many pairs of columns differ with one sign in 95 % of the rows, and of how many."""
-    pairs = list(combinations(range(resampled.shape[1]), 2))
-    ends = (percentile_bounds(resampled[:, i] - resampled[:, k]) for i, k in pairs)
-    return sum(bool(low > 0.0 or high < 0.0) for low, high in ends), len(pairs)
+    number = resampled.shape[1]
+    ends = (percentile_bounds(resampled[:, [k]] - resampled[:, k + 1 :]) for k in range(number - 1))
+    return sum(int(np.sum((low > 0.0) | (high < 0.0))) for low, high in ends), math.comb(number, 2)
 
 
 class Decision(Enum):
