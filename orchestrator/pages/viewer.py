@@ -15,7 +15,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import distribution
 from importlib.resources import files
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -186,7 +186,7 @@ def carried(
     notes = [notes_of(run.results, road) for run, road in zip(runs, roads, strict=True)]
     every, sparse = packed, [road and without_tyres(road) for road in roads]
     for kept in (roads, sparse):
-        if not 0 < settings.largest < sum(len(run.block) for run in packed):
+        if not settings.largest or all(size <= settings.largest for size in _sizes(packed)):
             break
         roads, needed = kept, _needed(views, kept)
         packed = [run.only(needed) for run in every]
@@ -223,6 +223,11 @@ def carried(
         ],
     }
     return Carried(data, packed)
+
+
+def _sizes(packed: Sequence[PackedRun]) -> Iterator[int]:
+    """Yield the size of the samples, run by run added up, so that no more are compressed than needed."""
+    return accumulate(len(run.block) for run in packed)
 
 
 def assets(*scripts: str) -> Markup:
