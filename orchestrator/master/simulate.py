@@ -113,7 +113,7 @@ def simulate_in_memory(
             "write them to a file",
             code="results-too-large",
         )
-    recorder = MemoryRecorder(*_columns(plan))
+    recorder = MemoryRecorder(*_columns(plan), most=plan.n_steps + 1)
     Simulation(plan, recorder, progress, apart=False).make(opener)
     assert recorder.results is not None
     return recorder.results

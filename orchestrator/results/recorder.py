@@ -280,30 +280,34 @@ class Columns:
     Args:
         order: index of each column in a row of Reals followed by the others; see `RowBlock`.
         reals: number of Reals in a row, time included.
+        most: expected number of rows; more find room, too.
     """
 
-    def __init__(self, order: Sequence[int], reals: int) -> None:
+    def __init__(self, order: Sequence[int], reals: int, most: int = BLOCK) -> None:
         self._order = order
-        self._reals = reals
+        self._room = np.empty((reals, most))
         self.clear()
 
     def clear(self) -> None:
-        """Forget all rows."""
+        """Forget all rows. The next ones take the place of arrays returned before."""
         self.rows = 0
-        self._blocks: list[np.ndarray] = []
         self._others: list[list[Value]] = []
 
     def add(self, block: np.ndarray, others: Sequence[list[Value]]) -> None:
         """Append rows; both arguments are copied."""
-        self._blocks.append(block.T.copy())  # while it is in the processor's cache
+        end, (reals, most) = self.rows + len(block), self._room.shape
+        if end > most:
+            kept, self._room = self._room, np.empty((reals, max(end, 2 * most)))
+            self._room[:, : self.rows] = kept[:, : self.rows]
+        self._room[:, self.rows : end] = block.T
         self._others.extend(others)
-        self.rows += len(block)
+        self.rows = end
 
     def arrays(self) -> list[np.ndarray]:
         """Return the columns in order, time first: float64, int64, bool, or object for text."""
-        reals = list(np.concatenate([np.empty((self._reals, 0)), *self._blocks], axis=1))
+        reals = list(self._room[:, : self.rows])
         return [
-            reals[column] if column < self._reals else self._other(column - self._reals)
+            reals[column] if column < len(reals) else self._other(column - len(reals))
             for column in self._order
         ]
 
@@ -315,17 +319,27 @@ class Columns:
 
 
 class MemoryRecorder(RowBlock):
-    """Records a run in memory only; `results` is what reading the files back would give."""
+    """Records a run in memory only; `results` is what reading the files back would give.
+
+    Args:
+        columns, real, units: see `Recorder`.
+        most: expected number of rows.
+    """
 
     folder = written_to = None
 
     def __init__(
-        self, columns: Sequence[str], real: Sequence[bool], units: Mapping[str, str | None] | None = None
+        self,
+        columns: Sequence[str],
+        real: Sequence[bool],
+        units: Mapping[str, str | None] | None = None,
+        *,
+        most: int = BLOCK,
     ) -> None:
         super().__init__(columns, real)
         self.units = dict(units or {})
         self.results: Results | None = None
-        self._columns = Columns(self._order, self._block.shape[1])
+        self._columns = Columns(self._order, self._block.shape[1], most)
 
     def _take(self, block: np.ndarray, others: list[list[Value]]) -> None:
         self._columns.add(block, others)
