@@ -72,6 +72,7 @@ class _Run(ctypes.Structure):
     _fields_ = [
         *((name, ctypes.c_int64) for name in ("k", "at", "end", "first")),
         ("programs", ctypes.c_void_p),
+        ("n_programs", ctypes.c_int64),
         ("clocks", ctypes.c_void_p),
         *((name, ctypes.c_int64) for name in ("n_clocks", "start", "step", "scale")),
         ("pool", ctypes.c_void_p),
@@ -184,14 +185,15 @@ class CompiledLoop:
         for phase in [phase for phase, (made_of, _) in self._programs.items() if phase not in programs]:
             del self._programs[phase]
         addresses = [self._address(k % cycle, programs[k % cycle]) for k in points[:cycle]]
-        self._table = np.resize(np.array(addresses, np.uint64), len(points))
+        self._table = (ctypes.c_void_p * len(addresses))(*addresses)
         self._rows = rows
         run, n = self._run, len(points)
         ends = [_address_of(row) for row in (*rows[: min(n, 2)], *rows[n - 1 : n])]
         first, second, last = ends[0], ends[-2], ends[-1]
         if len(rows) < n or last - first != (second - first) * (n - 1):
             raise ValueError(f"{n} rows at the same distance are needed")
-        run.programs, run.first, run.k, run.at = _address_of(self._table), points[0], points[0], -1
+        run.programs, run.n_programs = _address_of(self._table), len(addresses)
+        run.first, run.k, run.at = points[0], points[0], -1
         run.rows, run.stride = first, (second - first) // rows[0].itemsize
 
     def _address(self, phase: int, operations: Sequence[Any]) -> int:

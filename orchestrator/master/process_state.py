@@ -271,6 +271,7 @@ _ENVIRONMENT = 64  # bytes; no platform's fenv_t is larger
 
 _c = ctypes.CDLL(None)
 _c.setlocale.restype = ctypes.c_char_p
+_ACTION = 256  # bytes; no platform's struct sigaction is larger
 _HANDLED = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGPIPE") if hasattr(signal, name)]
 
 
@@ -279,6 +280,7 @@ class ProcessState:
 
     def __init__(self) -> None:
         self._arithmetic = _arithmetic()
+        self._actions: list[bytes] = []  # of the signals, once Python's handlers are in place
         self._locale = _c.setlocale(locale.LC_ALL, None)
         self._folder = os.getcwd()
         self._umask = _umask()
@@ -315,10 +317,11 @@ class ProcessState:
         if _umask() != self._umask:
             os.umask(self._umask)
             yield "the mask of file permissions"
-        if threading.current_thread() is threading.main_thread():
+        if threading.current_thread() is threading.main_thread() and _signal_actions() != self._actions:
             for number in _HANDLED:
                 if (handler := signal.getsignal(number)) is not None:  # Python's, whatever C has installed
                     signal.signal(number, handler)
+            self._actions = _signal_actions()
 
 
 class Copies:
@@ -370,6 +373,14 @@ def _control(environment: ctypes.Array[ctypes.c_char]) -> tuple[int, ...]:
     if platform.machine() == "aarch64":
         return struct.unpack_from("<I", environment)
     return (_c.fegetround(),)
+
+
+def _signal_actions() -> list[bytes]:
+    """Return what C has installed for each of the handled signals, which is quick to compare."""
+    actions = [ctypes.create_string_buffer(_ACTION) for _ in _HANDLED]
+    for number, action in zip(_HANDLED, actions, strict=True):
+        _c.sigaction(number, None, action)
+    return [action.raw for action in actions]
 
 
 def _folder() -> str:

@@ -43,6 +43,7 @@ struct run {
     int64_t k, at, end;             /* the point being stepped to, the operation of its program, the last point */
     int64_t first;                  /* point of the first program and row */
     const struct operation *const *programs;
+    int64_t n_programs;             /* after which they repeat */
     const struct clock *clocks;
     int64_t n_clocks;
     int64_t start, step, scale;     /* the k-th point is at (start + k step) / scale */
@@ -144,7 +145,7 @@ static int take_step(const struct operation *op)
 /* Do the rest of a step's program, from `run->at`; return FINISHED, or what Python has to see to first. */
 static enum answer work(struct run *run)
 {
-    const struct operation *program = run->programs[run->k - run->first], *op;
+    const struct operation *program = run->programs[(run->k - run->first) % run->n_programs], *op;
     for (; (op = program + run->at)->kind != END; run->at++) {
         run->status = 0;
         switch ((enum kind)op->kind) {
