@@ -15,7 +15,8 @@ import io
 import itertools
 import json
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -71,6 +72,7 @@ class ColumnFile:
         if path.suffix.lower() not in kinds:
             raise ValueError(f"must be a file of type {', '.join(kinds)}")
         self._table = kinds[path.suffix.lower()](raw)
+        self._clocks: dict[int, np.ndarray] = {}
         self._names: list[str] = []
         self._units: list[str | None] = []
         beside = _units_beside(path)
@@ -87,7 +89,9 @@ class ColumnFile:
         if table.times:
             return FileColumn(table.times(at), table.values(at), "s", self._units[at])
         clock = self._find(time)
-        return FileColumn(table.values(clock), table.values(at), self._units[clock], self._units[at])
+        if clock not in self._clocks:
+            self._clocks[clock] = table.values(clock)
+        return FileColumn(self._clocks[clock], table.values(at), self._units[clock], self._units[at])
 
     def _find(self, name: str) -> int:
         for names in (self._names, self._table.headers):
@@ -109,14 +113,14 @@ def _csv(raw: bytes) -> _Table:
     def rows() -> Iterator[list[str]]:
         text = io.TextIOWrapper(io.BytesIO(raw), encoding=encoding, newline="")
         lines = (line.split() for line in text) if spaced else csv.reader(text, delimiter=separator)
-        return itertools.islice((row for row in lines if row), head, None)
-
-    def number(cell: str) -> float:
-        return float(cell if separator == "," and not spaced else cell.replace(",", "."))
+        return itertools.islice(filter(None, lines), head, None)
 
     def values(at: int) -> np.ndarray:
+        cells: Iterable[str] = map(itemgetter(at), rows())
+        if spaced or separator != ",":
+            cells = (cell.replace(",", ".") for cell in cells)
         try:
-            return np.fromiter((number(row[at]) for row in rows()), float)
+            return np.fromiter(map(float, cells), float)
         except ValueError:
             return np.array([row[at] for row in rows()], dtype=object)
 
