@@ -19,14 +19,16 @@ class Stand:
         self.unit = component(instance_name="stand", resources=None)
         self.reference = {v.name: i for i, v in enumerate(component.variables)}
         self.type = {v.name: v.type.lower() for v in component.variables}
-        self.setter = {name: getattr(self.unit, f"set_{kind}") for name, kind in self.type.items()}
+        self.setters = {kind: getattr(self.unit, f"set_{kind}") for kind in {*self.type.values()}}
         self.answers = {v.name: i for i, v in enumerate(component.variables) if v.causality == "output"}
         self.time = 0.0
         self.set(**parameters)
 
     def set(self, **values: Any) -> None:
-        for name, value in values.items():
-            self.setter[name]([self.reference[name]], [value])
+        for kind, setter in self.setters.items():
+            names = [name for name in values if self.type[name] == kind]
+            if names:
+                setter([self.reference[name] for name in names], [values[name] for name in names])
         self._check()
 
     def start(self, **inputs: float) -> dict[str, float]:
