@@ -12,7 +12,7 @@ from tests.fmu_copies import put_fmus
 from tests.sentences import golden, golden_in
 
 from .browser import DESK, PHONE
-from .flaws import check_whole, flaws, looks, open_all
+from .flaws import check_whole, flaws, looks, open_all, size_without_samples
 from .made_up import data_in, unpacked
 
 ROOT = Path(__file__).parents[2]
@@ -88,6 +88,14 @@ def test_nothing_is_cut_overlapping_or_empty_at_any_width(chromium, page, width,
     check_whole(chromium, page, width, colours)
 
 
+def test_a_row_of_samples_takes_few_bytes_of_the_page(page):
+    text = page.read_text(encoding="utf-8")
+    rows = [run["rows"] for run in data_in(text)["runs"]]
+    assert rows == 3 * [3001]
+    assert len(text.encode()) - size_without_samples(text) <= 15 * sum(rows)
+
+
+@pytest.mark.exhaustive
 def test_the_page_of_four_runs_of_eight_seconds_keeps_its_budget(tmp_path, fmus):
     laws = "controller_off,controller_fuzzy_sideslip,controller_fnn,controller_fnn:learning=false"
     scenario = str(ROOT / "scenarios/fnn_sideslip/25mps.yaml")

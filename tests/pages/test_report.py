@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import base64
+import contextlib
+import io
 import json
 import re
 import shutil
@@ -17,6 +19,7 @@ from orchestrator.errors import ScenarioError
 from orchestrator.experiments.load_experiment import found_studies, load_experiment
 from orchestrator.experiments.result_tables import share
 from orchestrator.pages.page_parts import with_minus
+from tests.commands import status_of
 from tests.orchestrator.recorded import record_text
 from tests.sentences import golden, golden_in, refused
 
@@ -338,22 +341,38 @@ def test_many_failed_runs_are_folded(report, half):
     assert not first
 
 
-def test_several_studies_make_one_page_with_an_overview(report, half):
-    other = half.parent / "whole"
-    shutil.copytree(half, other)
-    (half / "study.yaml").write_text(HALF + FIGURES)
-    (other / "study.yaml").write_text((HALF + FIGURES).replace("Half a paper", "A paper before"))
-    (other / "extra.yaml").write_text(HALF.replace("Half a paper", "A paper before, more"))
-    status, said = report()
-    assert status == 0
-    assert golden(said.splitlines()[-1].partition(" (")[0])
-    tree = html.fromstring(unpacked(Path("results/report.html")))
+@pytest.fixture(scope="module")
+def overview(tmp_path_factory, fmus):
+    """The folder that `yawbench report` makes of three studies, in a place of its own, and what it said."""
+    folder = tmp_path_factory.mktemp("overview")
+    (scenarios := folder / "scenarios").mkdir()
+    before = (HALF + FIGURES).replace("Half a paper", "A paper before")
+    for name, studies in (
+        ("half", {"study": HALF + FIGURES}),
+        ("whole", {"study": before, "extra": HALF.replace("Half a paper", "A paper before, more")}),
+    ):
+        (scenarios / name).mkdir()
+        (scenarios / name / "half.yaml").write_text(HALF_A_CAR)
+        for file, text in studies.items():
+            (scenarios / name / f"{file}.yaml").write_text(text)
+    said = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stderr(said):
+        patch.chdir(folder)
+        assert status_of("report", "--fmus", fmus) == 0
+    results = shutil.move(folder / "results", folder / "copied")  # the folder is all that is needed
+    shutil.rmtree(scenarios)
+    return SimpleNamespace(folder=results, said=said.getvalue())
+
+
+def test_several_studies_make_one_page_with_an_overview(overview):
+    assert golden(overview.said.splitlines()[-1].partition(" (")[0])
+    tree = html.fromstring(unpacked(overview.folder / "report.html"))
     titles = ["A paper before", "A paper before, more", "Half a paper"]
     assert texts(tree, "section > h2") == titles
     claims = len(tree.cssselect("ul.plain > li"))
     assert tree.xpath("string(//p[@class='said'])").startswith(f"Of {claims} claims in 3 studies, ")
     for title, link in zip(titles, tree.cssselect("section > h2 > a"), strict=True):
-        page = Path("results", link.get("href"))
+        page = overview.folder / link.get("href")
         study = html.fromstring(unpacked(page))
         assert study.findtext(".//h1") == title
         places = {element.get("id") for element in study.cssselect("[id]")}
@@ -361,29 +380,22 @@ def test_several_studies_make_one_page_with_an_overview(report, half):
         assert links <= places
         for file in (code for code in texts(study, "details li code") if code.endswith(".svg")):
             assert (page.parent / file).is_file()
-    assert len([*Path("results/data").glob("*.js")]) == 3
+    assert len([*(overview.folder / "data").glob("*.js")]) == 3
 
 
 @pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK))
 def test_a_claim_of_the_overview_shows_its_runs_from_the_side_file_of_its_study(
-    chromium, report, half, tmp_path, width, colours
+    chromium, overview, width, colours
 ):
-    other = half.parent / "whole"
-    shutil.copytree(half, other)
-    (half / "study.yaml").write_text(HALF + FIGURES)
-    (other / "study.yaml").write_text((HALF + FIGURES).replace("Half a paper", "A paper before"))
-    assert report()[0] == 0
-    shutil.copytree("results", tmp_path / "copied")  # the folder is all that is needed
-    shutil.rmtree("results")
-    page = tmp_path / "copied/report.html"
+    page = overview.folder / "report.html"
     assert page.stat().st_size < 250_000
     chromium.open(page, width=width)
     chromium.wait_for("document.querySelector('.choosing').dataset.shown === 'whole-study'")
     chromium.wait_for("document.querySelector('.chosen .yv-ready')")
     assert chromium.run("return document.querySelectorAll('*').length") <= 2000
     links = chromium.run("return [...document.querySelectorAll('ul.plain a')].map((one) => one.hash)")
-    assert len(links) == 4
-    for link in (links[3], links[2], links[1]):
+    assert len(links) == 6
+    for link in (links[5], links[4], links[1]):
         wanted = re.findall(r"shown=(\[[\d,]*\])", link)[0]
         study = re.findall(r"id=([\w-]+)", link)[0]
         chromium.run("document.querySelector(`a[href='${arguments[0]}']`).click()", link)

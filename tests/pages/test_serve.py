@@ -32,7 +32,7 @@ from tests.sentences import golden
 from vocabulary.vehicle import CAR
 
 from .browser import PHONE, Browser
-from .flaws import inaccessible
+from .flaws import COLOURS, inaccessible
 from .made_up import whole_car
 from .test_viewer import labelled
 
@@ -426,7 +426,7 @@ def test_the_bench_fits_a_phone(server, chromium: Browser):
     chromium.driver.get(f"{server.address}bench?scenario={SCENARIO}")
     chromium.wait_for("document.querySelector('form.bench')?.dataset.shown")
     assert chromium.overflow() <= 0
-    assert inaccessible(chromium) == []
+    assert inaccessible(chromium, "dark") == []
 
 
 def test_a_run_is_chosen_by_the_box_on_the_line_of_its_name(server, chromium: Browser):
@@ -439,13 +439,20 @@ def test_a_run_is_chosen_by_the_box_on_the_line_of_its_name(server, chromium: Br
     assert abs(box - name) < 5
 
 
-@pytest.mark.parametrize("address", ["", f"bench?scenario={SCENARIO}", "view?run=runs/one&run=runs/two"])
-def test_every_page_of_the_server_can_be_read_by_everyone(server, chromium: Browser, address):
+@pytest.mark.parametrize(
+    ("address", "colours"),
+    [
+        ("", COLOURS),
+        (f"bench?scenario={SCENARIO}", ["light"]),  # on a phone it was in dark colours
+        ("view?run=runs/one&run=runs/two", COLOURS),
+    ],
+)
+def test_every_page_of_the_server_can_be_read_by_everyone(server, chromium: Browser, address, colours):
     chromium.open(Path("/"))
     chromium.driver.get(f"{server.address}{address}")
     chromium.wait_for("document.querySelectorAll('.yv:not(.yv-ready)').length === 0")
     assert chromium.run("return document.querySelectorAll('*').length") <= 2000
-    assert inaccessible(chromium) == []
+    assert inaccessible(chromium, *colours) == []
 
 
 def test_ctrl_c_ends_the_command_and_its_processes(folder):
