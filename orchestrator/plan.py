@@ -6,8 +6,6 @@ import re
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from math import copysign
-from operator import is_
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
@@ -16,7 +14,7 @@ if TYPE_CHECKING:
 
 from vocabulary.roles import role_of
 
-from .errors import Diagnostic, Location
+from .errors import Diagnostic
 from .fault_kinds import FaultList, FaultySignal
 from .messages import cut
 from .signal_names import SignalName, Target
@@ -398,46 +396,5 @@ class Plan:
         """Return the time [s] of communication point `k`, correctly rounded."""
         return float(self.start + k * self.step)
 
-    def sharing(self, other: Plan | None) -> Plan:
-        """Return this plan with parts of another in place of equal ones, to save memory."""
-        shared: Plan = _shared(self, other)
-        return shared
-
 
 Plan.__module__ = "yawbench"  # where users import it from
-
-
-def _shared(new: Any, old: Any) -> Any:
-    """Return `old` if it has the same content as `new`, else `new` with every part of which this is true."""
-    kind = type(new)
-    if new is old or kind is not type(old):
-        return new
-    if kind in (str, int, bool, Fraction):
-        return old if new == old else new
-    if kind is float:
-        return old if new == old and copysign(1.0, new) == copysign(1.0, old) else new
-    if kind is dict:
-        values = {
-            key: value if value is (other := old.get(key)) else _shared(value, other)
-            for key, value in new.items()
-        }
-        same = list(new) == list(old) and all(map(is_, values.values(), old.values()))
-        return old if same else values
-    if issubclass(kind, tuple):
-        parts = [*map(_shared, new, old), *new[len(old) :]]
-        if len(new) == len(old) and all(map(is_, parts, old)):
-            return old
-        return kind(*parts) if hasattr(kind, "_make") else kind(parts)
-    if kind in (Plan, Instance, Wire, Override, ValueOrigin, ValueSource, Diagnostic, Location, Target):
-        before = vars(old)
-        fields = {
-            name: value if value is (other := before[name]) else _shared(value, other)
-            for name, value in vars(new).items()
-        }
-        if all(map(is_, fields.values(), before.values())):
-            return old
-        copied = object.__new__(kind)
-        for name, value in fields.items():  # attribute by attribute: `vars` would give it a dictionary
-            object.__setattr__(copied, name, value)
-        return copied
-    return new

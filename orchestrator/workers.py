@@ -16,7 +16,6 @@ import signal
 import time
 import traceback
 import warnings
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import fields
 from typing import Any, NamedTuple, TypeVar
@@ -138,15 +137,16 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
 
         Args:
             function: importable by name, as are its arguments' types.
-            calls: arguments of each call.
+            calls: arguments of each call, asked for when a process is idle.
             look: called several times a second; it may raise to end all processes.
         """
-        waiting = deque(enumerate(calls))
+        waiting = enumerate(calls)
+        following = next(waiting, None)
         while True:
             look()
-            while waiting and (worker := self._idle(function.__module__)) is not None:
-                number, arguments = waiting.popleft()
-                worker.give(number, function, arguments)
+            while following and (worker := self._idle(function.__module__)) is not None:
+                worker.give(following[0], function, following[1])
+                following = next(waiting, None)
             busy = [worker for worker in self._workers if worker.busy]
             if not busy:
                 return

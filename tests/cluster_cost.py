@@ -2,14 +2,16 @@
 
 Starts a scheduler and two workers, runs a sweep there by the command line, and prints the memory of the
 command and the scheduler and the scheduler's share of the time as the number of finished runs grows; the
-processor time of the command, the scheduler and the workers with the processes that they start, from the
-first run to the last; and what the scheduler needs without runs, measured while the command plans.
+largest memory of the command, which at its end writes the table and the page; the processor time of the
+command, the scheduler and the workers with the processes that they start, from the first run to the last; and
+what the scheduler needs without runs, measured while the command plans.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import resource
 import subprocess
 import sys
 import tempfile
@@ -103,6 +105,8 @@ def main() -> None:
                     flush=True,
                 )
         assert running.wait() == 0
+        most = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss  # only the command has ended
+    print(f"command: at most {most / 1e3:.0f} MB, from its start to its page")
     print(f"{chosen.runs} runs, planned in {began - planning:.0f} s, made in {wall:.0f} s")
     for what, seconds in (
         ("command, planning", before[0]), ("command, runs", spent[0]), ("scheduler", spent[1]),

@@ -31,7 +31,7 @@ def judge_some(file: Path, out: Path, *runs: str) -> dict[str, Any]:
     experiment = load_experiment(file)
     planned = plan_experiment(experiment, out, fmus=FMUS)
     named = {run.name for run in experiment.matching(runs)}
-    outcomes = execute([job for job in left_to_do(planned.jobs, {}) if job.label in named])
+    outcomes = execute([job for job in left_to_do(planned.jobs, {})[0] if job.label in named])
     assert [outcome.diagnostics for outcome in outcomes if not outcome.ok] == []
     write_findings(judge_results(planned.experiment, out, planned=planned), {}, out)
     return record_of(out)

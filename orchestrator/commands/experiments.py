@@ -124,7 +124,7 @@ def _over_region(
             more = next_jobs(plan, findings, records, progress=planning)
         if not more:
             break
-        if execute.runner is None and (left := left_to_do(more, records)):
+        if execute.runner is None and (left := left_to_do(more, records)[0]):
             say(f"note: {counted(len(left), 'run')} of the region not made yet; the region is omitted")
             return findings
         execute.run(title, more, journaled=True)

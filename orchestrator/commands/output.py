@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..experiments.experiment import PlannedExperiment
-    from ..experiments.jobs import Job, Outcome
+    from ..experiments.jobs import Outcome
     from ..experiments.tables import Table
 
 VERSION = 1
@@ -291,18 +291,14 @@ class Terminal:
             self.noted.add(note)
 
     def running(
-        self, title: str, jobs: Sequence[Job], left: Sequence[Job], *, journaled: bool
+        self, title: str, runs: int, finished: int, left: int, *, journaled: bool
     ) -> contextlib.AbstractContextManager[Callable[[Outcome], None]]:
         """Print how many runs are left, and show a bar; of runs with results, also a line for each."""
-        total = len({(job.key, job.out) for job in jobs})
-        done = total - len(left)
-        before = (
-            "" if not done else ", all finished already" if done == total else f", {done} finished already"
-        )
-        say(f"{title}: {counted(len(jobs), 'run')}{before}")
+        before = "" if not finished else f", {finished if left else 'all'} finished already"
+        say(f"{title}: {counted(runs, 'run')}{before}")
         if not self.making or not left:
             return contextlib.nullcontext(lambda outcome: None)
-        return reported("runs", total, done, each=not journaled)
+        return reported("runs", finished + left, finished, each=not journaled)
 
 
 def say_failed(failed: Mapping[str, str]) -> None:

@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -26,9 +27,10 @@ from ..scenario.schema_validation import StrictModel, Time, exactly_one
 from ..signal_names import INPUTS, OF_RUN, VEHICLE, Target
 from .claim_schema import LEVELS as VALUES
 from .claim_schema import Number, Patterns, is_finite, text_of
+from .on_demand import OnDemand
 
 MOST = 100_000
-"""Largest number of runs in an experiment; chosen: more is a typo, and its plans take more than 0.5 GB."""
+"""Largest number of runs in an experiment; chosen: more is a typo, and planning them takes minutes."""
 
 AxisKind = Literal["setting", "fmu", "file", "variant"]
 
@@ -302,7 +304,7 @@ def axis_of_levels(target: str, levels: Iterable[Level], **more: Any) -> DesignA
     return DesignAxisSpec.model_construct(vary=[Target.parse(target)], values=values, **more)
 
 
-def levels_of(axis: AxisSpec) -> list[Level]:
+def levels_of(axis: AxisSpec) -> Sequence[Level]:
     """Return the levels of an axis with listed values, variants, or a counted range."""
     if axis.variants:
         return [Level(words, words) for words in axis.variants]
@@ -311,16 +313,36 @@ def levels_of(axis: AxisSpec) -> list[Level]:
     assert axis.start is not None
     assert axis.end is not None
     assert axis.count is not None
-    return [_level(number) for number in _spaced(axis.start, axis.end, axis.count, axis.spacing)]
+    last = axis.count - 1
+    if axis.spacing == "log":
+        return OnDemand(range(axis.count), partial(_by_factors, axis.start, axis.end, last))
+    first, step = Fraction(repr(axis.start)), (Fraction(repr(axis.end)) - Fraction(repr(axis.start))) / last
+    common = math.lcm(first.denominator, step.denominator)
+    return OnDemand(range(axis.count), partial(_by_steps, int(first * common), int(step * common), common))
 
 
-def _spaced(start: float, end: float, count: int, spacing: str) -> list[float]:
-    """Return `count` numbers from start to end; exact fractions avoid 0.30000000000000004."""
-    if spacing == "log":
-        inner = [start * (end / start) ** (i / (count - 1)) for i in range(1, count - 1)]
-        return [float(start), *inner, float(end)]
-    first, last = Fraction(repr(start)), Fraction(repr(end))
-    return [float(first + (last - first) * i / (count - 1)) for i in range(count)]
+def _by_factors(start: float, end: float, last: int, number: int) -> Level:
+    if number in (0, last):
+        return _level(float(end if number else start))
+    return _level(start * (end / start) ** (number / last))
+
+
+def _by_steps(first: int, step: int, common: int, number: int) -> Level:
+    """Return a level from numerators over a common denominator, which avoid 0.30000000000000004."""
+    return _level((first + number * step) / common)
+
+
+def grid(levels: Sequence[Sequence[Level]]) -> Sequence[DesignPoint]:
+    """Return all combinations of levels, of which the last varies fastest."""
+    return OnDemand(range(math.prod(map(len, levels))), partial(_in_grid, levels))
+
+
+def _in_grid(levels: Sequence[Sequence[Level]], number: int) -> DesignPoint:
+    point: list[Level] = []
+    for several in reversed(levels):
+        number, place = divmod(number, len(several))
+        point.insert(0, several[place])
+    return tuple(point)
 
 
 def names_of(axis: AxisSpec, level: Level) -> tuple[str, ...]:
@@ -333,17 +355,21 @@ def _level(number: float) -> Level:
     return Level(number, f"{number:.6g}")
 
 
-def latin_hypercube(axes: Sequence[AxisSpec], runs: int, seed: int, *, most: int = 0) -> list[DesignPoint]:
+def latin_hypercube(
+    axes: Sequence[AxisSpec], runs: int, seed: int, *, most: int = 0
+) -> Sequence[DesignPoint]:
     """Return a Latin hypercube: on every axis, each of `runs` equal parts of the range holds one point.
 
     It is extended to `most` points, if these are more. An axis of listed values takes each of them equally
     often, up to the remainder of the division.
     """
     positions = hypercube(len(axes), runs, max(runs, most), seed)
-    return [
-        tuple(level_at(axis, float(position)) for axis, position in zip(axes, row, strict=True))
-        for row in positions
-    ]
+    return OnDemand(range(len(positions)), partial(_in_hypercube, axes, positions))
+
+
+def _in_hypercube(axes: Sequence[AxisSpec], positions: np.ndarray, number: int) -> DesignPoint:
+    pairs = zip(axes, positions[number], strict=True)
+    return tuple(level_at(axis, float(position)) for axis, position in pairs)
 
 
 def hypercube(axes: int, runs: int, most: int, seed: int) -> np.ndarray:

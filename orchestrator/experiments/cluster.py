@@ -102,7 +102,8 @@ class _Batches:
     """The runs that are still to be submitted, in batches that keep a worker busy for `BATCH_TIME`."""
 
     def __init__(self, jobs: Sequence[Job], threads: int) -> None:
-        self._waiting = deque(jobs)
+        self._waiting = iter(jobs)
+        self._left = len(jobs)
         self._alone: deque[Job] = deque()
         self._threads = threads
         self._seconds, self._runs = 0.0, 0  # of finished runs
@@ -114,9 +115,11 @@ class _Batches:
         size = 1.0
         if self._runs:
             in_time = BATCH_TIME * self._runs / max(self._seconds, 1e-9)
-            share = len(self._waiting) / (AHEAD * self._threads)  # lest workers wait for one at the end
+            share = self._left / (AHEAD * self._threads)  # lest workers wait for one at the end
             size = max(1.0, min(in_time, share, LARGEST_BATCH))
-        return [self._waiting.popleft() for _ in range(min(int(size), len(self._waiting)))]
+        batch = [*itertools.islice(self._waiting, int(size))]
+        self._left -= len(batch)
+        return batch
 
     def note(self, outcomes: Sequence[Outcome]) -> None:
         """Learn how long runs take."""

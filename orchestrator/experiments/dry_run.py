@@ -29,6 +29,7 @@ from .experiment import LoadedExperiment, PlannedExperiment
 from .experiment_result import judge_records
 from .jobs import Job
 from .journal import records_in
+from .on_demand import OnDemand
 from .open_value_regions import RegionCell, plan_region
 from .ranking import LoadedRanking, angle_experiment, angles_of, dwell_experiment
 from .tables import Table
@@ -167,9 +168,8 @@ def _add_jobs(
     journaled: bool,
 ) -> None:
     records = {} if execute.fresh or not journaled else records_in(execute.folder)
-    every = {(job.key, job.out): job for job in jobs}
-    left = [*every.values()] if execute.fresh else left_to_do(jobs, records)
-    forecast.finished += len(every) - len(left)
+    left, finished = left_to_do(jobs, records, again=execute.fresh)
+    forecast.finished += finished
     for job in left:
         assert job.plan is not None
         size = LINE * journaled + (expected_size(job.plan, job.format) if job.keep or not journaled else 0)
@@ -232,11 +232,8 @@ def of_ranking(
     angles = _angles(forecast, ranking, execute, pace)
     dwell = dwell_experiment(ranking, angles, execute)
     planned = execute.planned(dwell, keep=False)
-    jobs = [
-        job
-        for case, job in zip(planned.experiment.cases, planned.jobs, strict=True)
-        if not only or case.point[0].value in only
-    ]
+    chosen = [case.number for case in planned.experiment.cases if not only or case.point[0].value in only]
+    jobs = OnDemand(chosen, planned.jobs.__getitem__)
     _add_jobs(forecast, jobs, execute, pace, journaled=True)
     return forecast
 
@@ -252,7 +249,7 @@ def _angles(
     planned = execute.planned(angle_experiment(ranking, execute, cars), keep=False)
     _add_jobs(forecast, planned.jobs, execute, pace, journaled=True)
     records = {} if execute.fresh else records_in(execute.folder)
-    if all(job.key in records for job in planned.jobs):
+    if all(key in records for key in planned.keys):
         return angles_of(ranking, judge_records(planned, records), cars)
     forecast.notes.append(f"A is assumed as {shown(ASSUMED, 'rad')}, which decides the number of amplitudes")
     return dict.fromkeys(ranking.cars if cars is None else cars, ASSUMED)

@@ -10,6 +10,7 @@ round of all of them is one experiment.
 from __future__ import annotations
 
 import functools
+from array import array
 from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
@@ -27,8 +28,9 @@ from ..results.run_folder import RUN_FILE
 from ..workers import Pool
 from .experiment import Case, LoadedExperiment, NamedRun, PlannedExperiment, plan_experiment
 from .experiment_result import Each, ExperimentResult, judge_records, judge_results
-from .jobs import Job, MeasuredRun, OnOutcome, Outcome, execute, pool_for, read_back, ready
+from .jobs import Job, MeasuredRun, OnOutcome, Outcome, execute_each, pool_for, read_back, ready
 from .journal import Journal
+from .on_demand import OnDemand
 
 T = TypeVar("T")
 K = TypeVar("K")
@@ -48,9 +50,16 @@ class Display(Protocol):
         """Show the diagnostics of plans."""
 
     def running(
-        self, title: str, jobs: Sequence[Job], left: Sequence[Job], *, journaled: bool
+        self, title: str, runs: int, finished: int, left: int, *, journaled: bool
     ) -> AbstractContextManager[OnOutcome]:
-        """Show the execution of jobs, of which `left` are missing, while it is called with their outcomes."""
+        """Show the execution of runs while it is called with their outcomes.
+
+        Args:
+            title: describes them.
+            runs: the number of all, with repetitions.
+            finished, left: the numbers of those that are finished and that are to be made.
+            journaled: whether finished ones are in the journal.
+        """
         return nullcontext(lambda outcome: None)
 
 
@@ -108,7 +117,8 @@ class Executor(AbstractContextManager["Executor"]):
         """
         planned = self.planned(experiment, **of_jobs)
         experiment, journaled = planned.experiment, bool(experiment.spec.axes)
-        jobs = [job for case, job in zip(experiment.cases, planned.jobs, strict=True) if only(case)]
+        chosen = array("L", (case.number for case in experiment.cases if only(case)))
+        jobs = OnDemand(chosen, planned.jobs.__getitem__)
         outcomes = self.run(experiment.spec.title, jobs, journaled=journaled)
         if journaled:
             return judge_records(planned, self.journal.records)
@@ -152,9 +162,9 @@ class Executor(AbstractContextManager["Executor"]):
         if self.runner is None and not journaled:
             return []
         journal = self.journal if journaled else None
-        again = self.fresh and not journaled
-        left = list(jobs) if again else left_to_do(jobs, journal.records if journal else {})
-        with self.display.running(title, jobs, left, journaled=journaled) as on_outcome:
+        records, again = journal.records if journal else {}, self.fresh and not journaled
+        left, finished = left_to_do(jobs, records, again=again)
+        with self.display.running(title, len(jobs), finished, len(left), journaled=journaled) as on_outcome:
             return (
                 finish(left, journal, runner=self.runner, on_outcome=on_outcome)
                 if self.runner and left
@@ -171,19 +181,25 @@ class Executor(AbstractContextManager["Executor"]):
             findings: of an experiment with axes.
             numbers: of its cases.
         """
-        assert findings.planned is not None
-        jobs = [
-            replace(job, keep=job.keep or number in numbers)
-            for number, job in enumerate(findings.planned.jobs)
-        ]
-        lacking = {job.out: job for job, record in zip(jobs, findings.records, strict=True)
-                   if job.keep and not _has_results(job, record)}  # fmt: skip
-        if self.runner and lacking:
+        planned = findings.planned
+        assert planned is not None
+
+        def keeping(number: int) -> Job:
+            job = planned.jobs[number]
+            return replace(job, keep=True) if number in numbers else job
+
+        jobs = OnDemand(range(len(planned.jobs)), keeping)
+        lacking = {
+            planned.keys[number]: number
+            for number in sorted(numbers)
+            if not _has_results(jobs[number], findings.records[number])
+        }
+        left = OnDemand([*lacking.values()], keeping)
+        if self.runner and left:
             title = f"{findings.spec.title}: results to keep"
-            left = [*lacking.values()]
-            with self.display.running(title, left, left, journaled=True) as on_outcome:
+            with self.display.running(title, len(left), 0, len(left), journaled=True) as on_outcome:
                 finish(left, None, runner=self.runner, on_outcome=on_outcome)
-        return replace(findings, planned=replace(findings.planned, jobs=jobs))
+        return replace(findings, planned=replace(planned, jobs=jobs))
 
 
 def _has_results(job: Job, record: MeasuredRun) -> bool:
@@ -254,15 +270,26 @@ def side_by_side(
     return returned
 
 
-def left_to_do(jobs: Sequence[Job], records: Mapping[str, MeasuredRun]) -> list[Job]:
-    """Return the jobs that are still to be run, without repetition, in their order.
+def left_to_do(
+    jobs: Sequence[Job], records: Mapping[str, MeasuredRun], *, again: bool = False
+) -> tuple[Sequence[Job], int]:
+    """Return the jobs that are still to be run, in their order, and how many are finished; none twice.
 
     A job with metrics is finished if its key is in `records` and, where results are kept, they can be
     read; any other job is finished if the key in its results matches. Warns of results that were edited.
+
+    Args:
+        jobs: with plans and keys.
+        records: job key -> record of the run.
+        again: whether finished jobs are to be run again.
     """
-    left: dict[tuple[str, Path], Job] = {}
-    for job in jobs:
-        if (job.key, job.out) in left:
+    left, known = array("L"), set[str]()
+    for number, job in enumerate(jobs):
+        if (run := f"{job.key} {job.out}") in known:
+            continue
+        known.add(run)
+        if again:
+            left.append(number)
             continue
         if not (job.metrics or job.test):
             made = job.plan is not None and staleness(job.plan, job.out) is None
@@ -274,10 +301,10 @@ def left_to_do(jobs: Sequence[Job], records: Mapping[str, MeasuredRun]) -> list[
             made = record is not None and not (job.keep and record.ok and isinstance(read_back(job.out), str))
         if made:
             continue
-        left[job.key, job.out] = job
+        left.append(number)
         if words := altered(job.out):
             warn_of_record(f"{job.label} will be repeated: {words}")
-    return list(left.values())
+    return OnDemand(left, jobs.__getitem__), len(known) - len(left)
 
 
 def _other_unit(job: Job, record: MeasuredRun) -> str:
@@ -301,8 +328,11 @@ def finish(
         ResultsError: the journal cannot be written, or the cluster was lost.
     """
     outcomes: list[Outcome] = []
+    made = 0
 
     def done(outcome: Outcome) -> None:
+        nonlocal made
+        made += 1
         final = outcome.ok or (outcome.exit_status == 1 and not outcome.died)  # else try again
         if journal:
             journal.add(outcome.job.key, outcome.record, last=final)
@@ -311,13 +341,13 @@ def finish(
         on_outcome(outcome)
 
     runner(left, done)
-    if journal and any(job.key not in journal.records for job in left):
+    if journal and made < len(left):
         raise ResultsError(f"{journal.folder}: not all runs were made; start it again.", code="runs-missing")
     return outcomes
 
 
 class LocalRunner:
-    """Executes jobs in local worker processes (see `execute`), which the executor ends.
+    """Executes jobs in local worker processes (see `execute_each`), which the executor ends.
 
     Rounds of a search share them, and with them the instances that they keep.
 
@@ -332,7 +362,7 @@ class LocalRunner:
     def __call__(self, jobs: Sequence[Job], on_outcome: OnOutcome) -> None:
         self._pool = self._pool or pool_for(jobs, self._workers)
         try:
-            execute(jobs, done=on_outcome, pool=self._pool)
+            execute_each(jobs, lambda _, outcome: on_outcome(outcome), pool=self._pool)
         except BaseException:
             self.end(terminate=True)
             raise

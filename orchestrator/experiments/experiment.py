@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
@@ -13,17 +13,17 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import Diagnostic, Location, ScenarioError
 from ..metrics.expressions import STANDARD, TimeWindow, metric, results_to_be, unit_in
-from ..plan import DEFAULT, Fmu, Instance, Override, OverrideOrigin, Plan, Variable
-from ..plan import Value as Given
+from ..plan import Fmu, Override, OverrideOrigin, Plan
 from ..planner import Planner
 from ..results.reader import Results
 from ..scenario import quantities
 from ..scenario.yaml_lines import dotted
-from ..signal_names import OF_RUN, SignalName, Target
-from ..wiring.context import FACTS
-from .axes import AxisSpec, DesignAxisSpec, DesignPoint, Level, changes_at, latin_hypercube, levels_of
+from ..signal_names import Target
+from ..wiring.context import FACTS, reached
+from .axes import AxisSpec, DesignAxisSpec, DesignPoint, Level, changes_at, grid, latin_hypercube, levels_of
 from .claim_schema import MetricReference, MetricSpec, ValidationSpec, si_number
-from .jobs import Job, MetricRequests, TestRequest, keyed, ready
+from .jobs import Job, MetricRequests, TestRequest, key_of, plans_of
+from .on_demand import OnDemand
 from .schema import ExperimentSpec
 
 if TYPE_CHECKING:
@@ -59,7 +59,12 @@ class Case:
     number: int  # from 0, in the order of the design
     run: NamedRun
     point: DesignPoint
-    changes: tuple[Override, ...]
+    experiment: LoadedExperiment = field(repr=False, compare=False)
+
+    @property
+    def changes(self) -> tuple[Override, ...]:
+        """The overrides of its scenario."""
+        return self.experiment.changes_of(self.run, self.point)
 
     @property
     def label(self) -> str:
@@ -100,7 +105,7 @@ class LoadedExperiment(LoadedFile):
         return (*self.for_all, *self.by_options)
 
     @cached_property
-    def points(self) -> list[DesignPoint]:
+    def points(self) -> Sequence[DesignPoint]:
         """All points of the design, one without axes; in a grid the last axis varies fastest."""
         if self.design:
             return list(dict.fromkeys(point for _, point in self.design))
@@ -108,17 +113,30 @@ class LoadedExperiment(LoadedFile):
         if self.spec.design == "latin_hypercube":
             assert self.spec.points is not None and self.spec.seed is not None
             return latin_hypercube(axes, self.spec.points, self.spec.seed)
-        levels = map(levels_of, axes)
-        return list(itertools.product(*levels) if self.spec.design == "grid" else zip(*levels, strict=True))
+        levels = [*map(levels_of, axes)]
+        return grid(levels) if self.spec.design == "grid" else list(zip(*levels, strict=True))
+
+    @property
+    def cases(self) -> Sequence[Case]:
+        """All runs at all points, ordered by run, or those of `design`."""
+        number = len(self.design) or len(self.runs) * len(self.points)
+        return OnDemand(range(number), self._case)
 
     @cached_property
-    def cases(self) -> list[Case]:
-        """All runs at all points, ordered by run, or those of `design`."""
-        pairs = self.design or itertools.product(self.runs, self.points)
-        return [
-            Case(number, run, point, (*self.for_all, *run.changes, *self.by_options, *self._at(point, run)))
-            for number, (run, point) in enumerate((self.runs[name], point) for name, point in pairs)
-        ]
+    def _names(self) -> list[str]:
+        return [*self.runs]
+
+    def _case(self, number: int) -> Case:
+        if self.design:
+            name, point = self.design[number]
+        else:
+            run, at = divmod(number, len(self.points))
+            name, point = self._names[run], self.points[at]
+        return Case(number, self.runs[name], point, self)
+
+    def changes_of(self, run: NamedRun, point: DesignPoint) -> tuple[Override, ...]:
+        """Return the overrides of a run at a point."""
+        return (*self.for_all, *run.changes, *self.by_options, *self._at(point, run))
 
     def setting(self, point: DesignPoint) -> DesignPoint:
         """Return a point without the axes of repeats."""
@@ -237,7 +255,8 @@ class PlannedExperiment:
     """An experiment with a plan for every case."""
 
     experiment: LoadedExperiment
-    jobs: list[Job]  # of the cases, in their order
+    jobs: Sequence[Job]  # of the cases, in their order
+    keys: Sequence[str]  # of the jobs
     units: dict[str, str]  # numeric axis -> SI unit in tables; "" if it has none
     metric_units: dict[str, str]  # key of a metric -> its unit
     fmus: dict[str, Fmu]  # SHA-256 -> FMU, of all runs
@@ -284,7 +303,7 @@ def plan_experiment(
     keep: bool = True,
     **of_jobs: Any,
 ) -> PlannedExperiment:
-    """Plan all cases (see `ready`); one without metrics or tests gets the standard metrics it can compute.
+    """Plan all cases (see `plans_of`); one without metrics or tests gets the standard metrics it can compute.
 
     Args:
         experiment: as loaded.
@@ -307,33 +326,36 @@ def plan_experiment(
         where = Location(experiment.path, target=f"axes.{axis[0]}")
         return axis, Diagnostic(error.code, str(error), location=where)
 
-    axes = bool(experiment.spec.axes)
-    jobs = [
-        Job(
-            case.label, case.run.scenario, out / (RUNS if axes else case.run.name), case.changes,
-            keep=keep or not axes, test=case.run.test, **of_jobs,
-        )
-        for case in experiment.cases
-    ]  # fmt: skip
-    jobs = ready(jobs, planner=planner, progress=progress, group=about)
-    plans = [job.plan for job in jobs if job.plan]
-    made_up = list(map(results_to_be, {tuple(plan.record): plan for plan in plans}.values()))
-    if not experiment.spec.metrics and not any(job.test for job in jobs):
+    axes, cases, runs = bool(experiment.spec.axes), experiment.cases, out / RUNS
+
+    def job(case: Case, out: Path, **of_plan: Any) -> Job:
+        return Job(
+            case.label, case.run.scenario, out, case.changes, keep=keep or not axes, test=case.run.test,
+            **of_plan, **of_jobs,
+        )  # fmt: skip
+
+    jobs = (job(case, out) for case in cases)
+    plans = plans_of(jobs, planner=planner, progress=progress, group=about)
+    made_up = [*map(results_to_be, plans.kinds)]
+    if not experiment.spec.metrics and not any(case.run.test for case in cases):
         standard = {
             name: MetricSpec.model_validate({"metric": name})
             for name in STANDARD
             if any(unit_in(results, metric(name)) for results in made_up)
         }
         experiment = replace(experiment, spec=experiment.spec.model_copy(update={"metrics": standard}))
-    units, metric_units = _units(experiment, plans), _metric_units(experiment, made_up)
-    if axes:
-        requests = {name: metrics_of(experiment, run) for name, run in experiment.runs.items()}
-        jobs = [keyed(job, requests[case.run.name]) for job, case in zip(jobs, experiment.cases, strict=True)]
-        jobs = [replace(job, out=job.out / job.key[:12]) for job in jobs]
-    else:
-        jobs = [keyed(job) for job in jobs]
-    used = {instance.fmu.sha256: instance.fmu for plan in plans for instance in plan.instances}
-    return PlannedExperiment(experiment, jobs, units, metric_units, used)
+    units, metric_units = _units(experiment, plans.kinds), _metric_units(experiment, made_up)
+    requests = {name: metrics_of(experiment, run) if axes else () for name, run in experiment.runs.items()}
+    keys = [key_of(plans[case.number], requests[case.run.name], case.run.test) for case in cases]
+
+    def planned(number: int) -> Job:
+        case, key = cases[number], keys[number]
+        folder = runs / key[:12] if axes else out / case.run.name
+        return job(case, folder, plan=plans[number], metrics=requests[case.run.name], key=key)
+
+    used = {instance.fmu.sha256: instance.fmu for plan in plans.kinds for instance in plan.instances}
+    every = OnDemand(range(len(cases)), planned)
+    return PlannedExperiment(experiment, every, keys, units, metric_units, used)
 
 
 def _metric_units(experiment: LoadedExperiment, made_up: list[Results]) -> dict[str, str]:
@@ -398,49 +420,3 @@ def _unit(axis: AxisSpec, plan: Plan) -> str | None:
     if target.kind == "fact":
         return FACTS[target.variable].unit
     return next((variable.unit for _, variable in reached(plan, target)), None)
-
-
-def reached(plan: Plan, target: Target) -> Iterator[tuple[Instance, Variable]]:
-    """Yield the parameters, or the constant inputs, that a target sets in a plan."""
-    by_name = {instance.name: instance for instance in plan.instances}
-    if target.kind == "input":
-        pattern = SignalName.parse_input(target.variable, by_name)
-        for instance in plan.instances:
-            for name, variable in instance.fmu.variables.items():
-                if name in instance.constants and pattern.matches(instance.name, name):
-                    yield instance, variable
-    elif target.kind == "fact":
-        fact = FACTS[target.variable]
-        for instance in plan.instances:
-            for name, variable in instance.fmu.variables.items():
-                if fact.counts(instance, name) or (name in fact.inputs and name in instance.constants):
-                    yield instance, variable
-    elif target.kind in ("parameter", "vehicle_parameter"):
-        for instance in plan.instances:
-            own = instance.fmu.variables.get(target.variable)
-            if target.instance in ("", instance.name) and own and own.causality == "parameter":
-                yield instance, own
-
-
-def found_at(plan: Plan, target: Target) -> tuple[Given, str] | None:
-    """Return the value and unit that an override target has in a plan; None if it has no such target."""
-    instance = next((planned for planned in plan.instances if planned.name == target.instance), None)
-    if target.kind == "fmu":
-        return (instance.fmu.name, "") if instance else None
-    if target.kind == "vehicle_file":
-        return (str(plan.scenario["vehicle"]), "") if plan.scenario.get("vehicle") else None
-    if target.kind == "tyres":
-        files = {axle: str(file["file"]) for axle, file in plan.scenario.get("tyre_files", {}).items()}
-        return (files[target.variable or "front"], "") if files else None
-    if target.kind == "run":
-        times = float(plan.start), plan.time(plan.n_steps), float(plan.step)
-        values: dict[str, Given] = dict(zip(OF_RUN, (*times, plan.algorithm), strict=True))
-        return values[target.variable], "s"
-    if target.kind == "setting" and target.is_time and instance:
-        return float(instance.period * plan.step), "s"
-    for instance, variable in reached(plan, target):
-        value = {**instance.parameters, **instance.constants}.get(variable.name, variable.start)
-        of_vehicle = instance.origins.get(variable.name, DEFAULT).kind == "vehicle"
-        if value is not None and (of_vehicle or target.kind != "vehicle_parameter"):
-            return value, variable.unit or ""
-    return None

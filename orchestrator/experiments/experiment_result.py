@@ -16,6 +16,7 @@ from ..figures.style import digits_of
 from ..messages import counted
 from ..metrics.expressions import MetricValue
 from ..metrics.verdict import Status, Verdict, not_judged, worst
+from ..plan import Plan
 from ..results.reader import Results
 from ..results.run_folder import RUN_FILE
 from .axes import RUN, DesignPoint, Level
@@ -24,6 +25,7 @@ from .claims import ClaimResult, Judgement, MetricTable, Region, correlation, ju
 from .confidence import interval, share_bounds
 from .experiment import Case, LoadedExperiment, NamedRun, PlannedExperiment, metrics_of
 from .jobs import NOT_MADE, MeasuredRun, Outcome, measured, read_back
+from .on_demand import OnDemand
 from .schema import ExperimentSpec
 from .tables import Cell, Table
 
@@ -102,6 +104,18 @@ class ExperimentResult:
             return sorted((fmu.name, digest) for digest, fmu in self.planned.fmus.items())
         recorded = (fmu for results in self.results.values() for fmu in results.record.fmus.values())
         return sorted({(fmu.name, fmu.sha256) for fmu in recorded if fmu.name and fmu.sha256})
+
+    @property
+    def plans_made(self) -> Sequence[Plan]:
+        """The plans of the cases that have been executed."""
+        jobs = self.planned.jobs if self.planned else ()
+
+        def plan(number: int) -> Plan:
+            made = jobs[number].plan
+            assert made is not None
+            return made
+
+        return OnDemand([number for number, record in enumerate(self.records) if record.made], plan)
 
     def words(self, case: Case) -> str:
         """Return the name of a case in messages."""
@@ -255,7 +269,7 @@ class ExperimentResult:
 
 def judge_records(planned: PlannedExperiment, records: Mapping[str, MeasuredRun]) -> ExperimentResult:
     """Return the result of an experiment with axes; `records`: job key -> record of the run."""
-    recorded = [records.get(job.key, NOT_MADE) for job in planned.jobs]
+    recorded = [records.get(key, NOT_MADE) for key in planned.keys]
     return ExperimentResult(planned.experiment, recorded, {}, planned)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 import traceback
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,10 +30,11 @@ from ..messages import printable
 from ..metrics.expressions import evaluate, metric
 from ..plan import Override, Plan
 from ..planner import Planner
-from ..results.freshness import key_of
+from ..results import freshness
 from ..results.reader import Results, load_results
 from ..results.run_folder import RunStatus
 from ..workers import Finished, Pool, retire
+from .on_demand import StoredPlans
 
 if TYPE_CHECKING:
     from ..master.run_lifecycle import OpenInstance
@@ -57,7 +58,7 @@ TestRequest = tuple[str, float | None]
 """Name of a standard test, and its steering angle A [rad] if known."""
 STEP_TIME = "step_time"
 """Metric key of the mean processor time per step of the timed instance [s]."""
-MetricValues = dict[str, tuple[float, str] | None]
+MetricValues = Mapping[str, tuple[float, str] | None]
 """Metric key -> (value, unit); None where the run yields no value."""
 
 
@@ -169,13 +170,13 @@ def planned(job: Job, planner: Planner | None = None) -> tuple[LoadedScenario, P
     return scenario, planner.plan(scenario, fmus=job.fmus, isolated=isolated, record=job.record)
 
 
-def ready(
-    jobs: Sequence[Job],
+def plans_of(
+    jobs: Iterable[Job],
     *,
     planner: Planner | None = None,
     progress: Callable[[int], None] = lambda done: None,
     group: Callable[[Diagnostic], tuple[Hashable, Diagnostic]] = lambda error: (error, error),
-) -> list[Job]:
+) -> StoredPlans:
     """Plan all jobs, so that each of them is known to be able to start.
 
     Args:
@@ -188,35 +189,47 @@ def ready(
     Raises:
         BuildError: stale FMUs cannot be built.
         ScenarioError: some jobs cannot start; lists each error once.
+        ResultsError: the plans cannot be stored.
     """
-    planner, planned_jobs = planner or Planner(), []
+    planner, plans = planner or Planner(), StoredPlans()
     errors: dict[Hashable, Diagnostic] = {}
-    plan: Plan | None = None
     for number, job in enumerate(jobs, start=1):
         try:
-            plan = planned(job, planner)[1].sharing(plan)
-            planned_jobs.append(replace(job, plan=plan))
+            _, plan = planned(job, planner)
         except BuildError:
             raise
         except YawbenchError as error:
             for diagnostic in error.diagnostics:
                 errors.setdefault(*group(diagnostic))
+        else:
+            plans.add(plan)
         progress(number)
     if errors:
         shown = list(errors.values())[:MANY]
         more = f"and {len(errors) - MANY} more problems"
         omitted = [Diagnostic("errors-omitted", more)] if len(errors) > MANY else []
         raise ScenarioError([*shown, *omitted])
-    return planned_jobs
+    return plans
+
+
+def ready(jobs: Sequence[Job], **options: Any) -> list[Job]:
+    """Return jobs with their plans; `options`, and what it raises, as of `plans_of`."""
+    plans = plans_of(jobs, **options)
+    return [replace(job, plan=plans[number]) for number, job in enumerate(jobs)]
 
 
 def keyed(job: Job, metrics: MetricRequests = ()) -> Job:
-    """Return a job with its metrics and key; jobs with equal keys are the same run."""
+    """Return a job with its metrics and key."""
     assert job.plan is not None
+    return replace(job, metrics=metrics, key=key_of(job.plan, metrics, job.test))
+
+
+def key_of(plan: Plan, metrics: MetricRequests = (), test: TestRequest | None = None) -> str:
+    """Return the key of a job; jobs with equal keys are the same run."""
     also: list[Any] | None = [metrics, sources_hash(OF_METRICS)] if metrics else None
-    if job.test:
-        also = [metrics, job.test, sources_hash(OF_TESTS)]
-    return replace(job, metrics=metrics, key=key_of(job.plan, also))
+    if test:
+        also = [metrics, test, sources_hash(OF_TESTS)]
+    return freshness.key_of(plan, also)
 
 
 def run_job(job: Job, opener: OpenInstance | None = None) -> MeasuredRun:
@@ -242,9 +255,8 @@ def run_job(job: Job, opener: OpenInstance | None = None) -> MeasuredRun:
         else:
             results = simulate_in_memory(plan, opener=timed)
         record = measured(results, job.metrics, job.test)
-    if clock.steps:
-        record.values[STEP_TIME] = (clock.mean, "s")
-    return replace(record, id=run)
+    time = {STEP_TIME: (clock.mean, "s")} if clock.steps else {}
+    return replace(record, values={**record.values, **time}, id=run)
 
 
 def recorded(job: Job) -> Results:
@@ -260,7 +272,7 @@ def recorded(job: Job) -> Results:
 
 def measured(results: Results, metrics: MetricRequests, test: TestRequest | None = None) -> MeasuredRun:
     """Compute the metrics of a finished run; of a test its quantities, and its verdicts as 1, 0 or None."""
-    values: MetricValues = {}
+    values: dict[str, tuple[float, str] | None] = {}
     for key, name, window in metrics:
         value = evaluate(results, metric(name), window)
         short = results.ended and not window  # over a shorter time it is another metric
@@ -270,7 +282,7 @@ def measured(results: Results, metrics: MetricRequests, test: TestRequest | None
     return MeasuredRun(values, results.record.course_warnings, results.ended)
 
 
-def _judged(results: Results, name: str, angle: float | None) -> MetricValues:
+def _judged(results: Results, name: str, angle: float | None) -> dict[str, tuple[float, str] | None]:
     from ..evaluation.standard_tests import TESTS
     from ..evaluation.trace import trace_of
 
@@ -305,16 +317,34 @@ def read_back(folder: Path, run: str | None = None) -> Results | str:
     return f"{folder}: this run ended early: {failed.message if failed else 'no reason recorded'}"
 
 
-def execute(
+def execute(jobs: Sequence[Job], *, done: OnOutcome = lambda outcome: None, **options: Any) -> list[Outcome]:
+    """Execute all jobs in worker processes and return their outcomes in order.
+
+    Args:
+        jobs: the runs.
+        done: called with each outcome as it arrives, once per job.
+        options: see `execute_each`, also for what it raises.
+    """
+    outcomes: dict[int, Outcome] = {}
+
+    def keep(number: int, outcome: Outcome) -> None:
+        outcomes[number] = outcome
+        done(outcome)
+
+    execute_each(jobs, keep, **options)
+    return [outcomes[number] for number in range(len(jobs))]
+
+
+def execute_each(
     jobs: Sequence[Job],
+    done: Callable[[int, Outcome], None],
     *,
     workers: int | None = None,
-    done: Callable[[Outcome], None] = lambda outcome: None,
     run: Callable[[Job], Any] = run_job,
     pool: Pool | None = None,
     stop: StopFlag | None = None,
-) -> list[Outcome]:
-    """Execute all jobs in worker processes and return their outcomes in order.
+) -> None:
+    """Execute all jobs in worker processes; as many of them are in memory as are executed at a time.
 
     A worker keeps the instances of native FMUs for its next run, until a run fails or it has made `LASTING`.
     Runs with other FMUs step in a process that it forks, or if they write no results, are the worker's
@@ -323,8 +353,8 @@ def execute(
 
     Args:
         jobs: the runs.
+        done: called with the number and the outcome of each job as it arrives, once per job.
         workers: number of processes; None: one per core.
-        done: called with each outcome as it arrives, once per job.
         run: function that a process calls with its job, importable by name. Its return value becomes the
             outcome's value.
         pool: the worker processes, kept by the caller; default: one that ends with the last run.
@@ -334,43 +364,44 @@ def execute(
         Interrupted: Ctrl-C or SIGTERM, after all processes have ended; or `stop`.
         YawbenchError: the limit of open files is too low.
     """
-    outcomes: dict[int, Outcome] = {}
     stop = stop or StopFlag()
 
     def look() -> None:
         if stop.requested:
             raise Interrupted(number=stop.number)
 
-    left = list(range(len(jobs)))
+    left: Sequence[int] = range(len(jobs))
+    executed: dict[int, Job] = {}
+
+    def calls(keep: bool) -> Iterator[tuple[Job, Callable[[Job], Any], bool]]:
+        for place, number in enumerate(left):
+            executed[place] = jobs[number]
+            yield executed[place], run, keep
+
     own = nullcontext(pool) if pool else pool_for(jobs, workers)
     with interrupts(stop, lambda: None), own as pool:
         for tries in reversed(range(TRIES)):
             again = []
-            keep = tries == TRIES - 1
-            calls = [(jobs[number], run, keep) for number in left]
-            for finished in pool.each(_report_of, calls, look=look):
-                number = left[finished.number]
-                outcome = _outcome(jobs[number], finished)
+            for finished in pool.each(_report_of, calls(tries == TRIES - 1), look=look):
+                number, outcome = left[finished.number], _outcome(executed.pop(finished.number), finished)
                 if outcome.died and tries:
                     again.append(number)
-                    continue
-                outcomes[number] = outcome
-                done(outcome)
+                else:
+                    done(number, outcome)
             left = again
-    return [outcomes[number] for number in range(len(jobs))]
 
 
 def pool_for(jobs: Sequence[Job], workers: int | None = None) -> Pool:
     """Return a pool of worker processes for such jobs.
 
     Args:
-        jobs: what they need is imported once for all processes.
+        jobs: what the first of them needs is imported once for all processes.
         workers: number of processes; None: one per core.
 
     Raises:
         YawbenchError: the limit of open files is too low.
     """
-    preload = (*NEEDED, *(FOR_TESTS if any(job.test for job in jobs) else ()))
+    preload = (*NEEDED, *(FOR_TESTS if any(job.test for job in jobs[:1]) else ()))
     return Pool(workers, preload=preload, lasting=LASTING)
 
 

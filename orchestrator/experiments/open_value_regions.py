@@ -6,7 +6,7 @@ The runs keep no results. At the chosen point the named runs themselves are used
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +20,9 @@ from ..plan import Override
 from ..plan import Value as Given
 from ..planner import Planner
 from ..signal_names import Target
+from ..wiring.context import found_at
 from .axes import (
+    DesignPoint,
     Level,
     OpenValueSpec,
     OpenVariantSpec,
@@ -31,7 +33,7 @@ from .axes import (
 from .claim_schema import Claim, MetricReference
 from .claims import ONE_IN, TIMES, ClaimResult, LevelVerdict, OpenValueScan, Region, judge, ranked
 from .confidence import Decision, SequentialTest
-from .experiment import RUNS, LoadedExperiment, NamedRun, PlannedExperiment, found_at, metrics_of, number_of
+from .experiment import RUNS, LoadedExperiment, NamedRun, PlannedExperiment, metrics_of, number_of
 from .experiment_result import ExperimentResult, derive
 from .jobs import Job, MeasuredRun, keyed, ready
 
@@ -195,7 +197,7 @@ class RegionQuestion:
     claim: Claim
     runs: tuple[str, ...]
     points: list[RegionPoint]  # of the Latin hypercube, as many as may be needed
-    lines: dict[str, list[Level]]  # open value it depends on -> levels
+    lines: dict[str, Sequence[Level]]  # open value it depends on -> levels
 
 
 @dataclass
@@ -334,7 +336,7 @@ def _further_points(
     return []
 
 
-def _asked(runs: RegionRuns, claim: Claim, hypercube: list[tuple[Level, ...]]) -> RegionQuestion:
+def _asked(runs: RegionRuns, claim: Claim, hypercube: Sequence[DesignPoint]) -> RegionQuestion:
     names = runs_of(runs.experiment, claim)
     lines = {
         key: levels_of(open_value.stepped)

@@ -415,7 +415,7 @@ def _ranked_runs(
         runs.append(
             RankedRun(
                 str(at["entry"].value), case.run.name, float(at["amplitude"].value), angles[condition.car],
-                record if record.made else None, repeat, condition.dry, job,
+                record if record.made else None, repeat, condition.dry, replace(job, plan=None),
             )
         )  # fmt: skip
     return runs

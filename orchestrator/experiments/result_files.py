@@ -75,7 +75,7 @@ def columns_of(findings: ExperimentResult) -> Table:
         }
         values = [findings.value(case, key) for case in cases]
         columns.append(column(key, "float64", [value.number if value else None for value in values], about))
-    keys = [job.key for job in planned.jobs] if planned else [None] * len(cases)
+    keys = planned.keys if planned else [None] * len(cases)
     return Table.of_columns([*columns, column("key", "string", keys)])
 
 

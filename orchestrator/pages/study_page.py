@@ -164,12 +164,11 @@ def link_to_runs(experiment: LoadedExperiment, result: ClaimResult, numbers: Map
     return f"{VIEW}?shown={shown}&baseline={shown[0]}".replace(" ", "") if shown else ""
 
 
-def runs_made(findings: ExperimentResult) -> list[Results | Plan]:
+def runs_made(findings: ExperimentResult) -> Sequence[Results | Plan]:
     """Return the results of all runs; along axes, the plans of those that have been made."""
     if not findings.spec.axes or findings.planned is None:
         return [*findings.results.values()]
-    jobs = zip(findings.planned.jobs, findings.records, strict=True)
-    return [job.plan for job, record in jobs if job.plan and record.made]
+    return findings.plans_made
 
 
 def repeats(findings: ExperimentResult) -> str:

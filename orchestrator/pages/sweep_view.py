@@ -141,7 +141,6 @@ def _data(findings: ExperimentResult, sides: Mapping[int, str]) -> dict[str, Any
     cases, for_all, by_options = experiment.cases, experiment.for_all, experiment.by_options
     axes = [*_axes(findings)]
     statuses = list(dict.fromkeys(record.status for record in records))
-    jobs = findings.planned.jobs if findings.planned else []
     return {
         "axes": [axis for axis, _ in axes],
         "metrics": [_metric(findings, key) for key in findings.spec.metrics],
@@ -150,7 +149,7 @@ def _data(findings: ExperimentResult, sides: Mapping[int, str]) -> dict[str, Any
         "status": [statuses.index(record.status) for record in records],
         "made": [status != NOT_MADE.status for status in statuses],
         "told": {case.number: why for case in cases if (why := _remark(findings, case))},
-        "keys": "".join(job.key[:KEY].ljust(KEY) for job in jobs),
+        "keys": "".join(key[:KEY].ljust(KEY) for key in findings.planned.keys) if findings.planned else "",
         "sides": [number in sides for number in range(len(cases))],
         "base": [
             ["yawbench", "run", str(run.scenario), *_words([*for_all, *run.changes, *by_options])]

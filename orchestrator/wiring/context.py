@@ -9,7 +9,7 @@ Facts are values that reach all instances that need them:
 In a scenario file, a value given by its own name takes precedence over a fact; as an override
 (`--set friction=0.3`), a fact takes precedence over the file, so that one override reaches all instances. To
 add a fact, add a row to `FACTS`, its name to `signal_names.FACTS`, and a key to the schema of
-scenarios.
+scenarios. `reached` and `found_at` return what the target of an override, such as a fact, sets in a plan.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from vocabulary.wheels import WHEELS, wheels
 
 from ..errors import Diagnostic, Severity, WiringError
 from ..messages import fold_sentences
-from ..plan import Fmu, Instance, Value, ValueOrigin, Variable
+from ..plan import DEFAULT, Fmu, Instance, Plan, Value, ValueOrigin, Variable
 from ..scenario.loader import LoadedScenario
 from ..scenario.yaml_lines import MOST_ERRORS, Document, KeyPath
 from ..signal_names import FACTS as NAMES
-from ..signal_names import match, matching
+from ..signal_names import OF_RUN, SignalName, Target, match, matching
 
 
 @dataclass(frozen=True)
@@ -157,3 +157,49 @@ class WiringContext:
             ]
             errors += sorted(dict.fromkeys(of_document), key=lambda error: error.location.line or 0)
         return errors
+
+
+def reached(plan: Plan, target: Target) -> Iterator[tuple[Instance, Variable]]:
+    """Yield the parameters, or the constant inputs, that a target sets in a plan."""
+    by_name = {instance.name: instance for instance in plan.instances}
+    if target.kind == "input":
+        pattern = SignalName.parse_input(target.variable, by_name)
+        for instance in plan.instances:
+            for name, variable in instance.fmu.variables.items():
+                if name in instance.constants and pattern.matches(instance.name, name):
+                    yield instance, variable
+    elif target.kind == "fact":
+        fact = FACTS[target.variable]
+        for instance in plan.instances:
+            for name, variable in instance.fmu.variables.items():
+                if fact.counts(instance, name) or (name in fact.inputs and name in instance.constants):
+                    yield instance, variable
+    elif target.kind in ("parameter", "vehicle_parameter"):
+        for instance in plan.instances:
+            own = instance.fmu.variables.get(target.variable)
+            if target.instance in ("", instance.name) and own and own.causality == "parameter":
+                yield instance, own
+
+
+def found_at(plan: Plan, target: Target) -> tuple[Value, str] | None:
+    """Return the value and unit that an override target has in a plan; None if it has no such target."""
+    instance = next((planned for planned in plan.instances if planned.name == target.instance), None)
+    if target.kind == "fmu":
+        return (instance.fmu.name, "") if instance else None
+    if target.kind == "vehicle_file":
+        return (str(plan.scenario["vehicle"]), "") if plan.scenario.get("vehicle") else None
+    if target.kind == "tyres":
+        files = {axle: str(file["file"]) for axle, file in plan.scenario.get("tyre_files", {}).items()}
+        return (files[target.variable or "front"], "") if files else None
+    if target.kind == "run":
+        times = float(plan.start), plan.time(plan.n_steps), float(plan.step)
+        values: dict[str, Value] = dict(zip(OF_RUN, (*times, plan.algorithm), strict=True))
+        return values[target.variable], "s"
+    if target.kind == "setting" and target.is_time and instance:
+        return float(instance.period * plan.step), "s"
+    for instance, variable in reached(plan, target):
+        value = {**instance.parameters, **instance.constants}.get(variable.name, variable.start)
+        of_vehicle = instance.origins.get(variable.name, DEFAULT).kind == "vehicle"
+        if value is not None and (of_vehicle or target.kind != "vehicle_parameter"):
+            return value, variable.unit or ""
+    return None

@@ -360,7 +360,7 @@ def test_every_command_that_makes_runs_isolates_units_if_told(command, folder, f
         raise SystemExit(7)
 
     monkeypatch.setattr("orchestrator.experiments.jobs.ready", ready)
-    monkeypatch.setattr("orchestrator.experiments.experiment.ready", ready)
+    monkeypatch.setattr("orchestrator.experiments.experiment.plans_of", ready)
     with pytest.raises(SystemExit) as exit_:
         main([*command, "--fmus", str(fmus), "--isolate", "--call-limit", "3 s"])
     assert exit_.value.code == 7

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import gc
+import tracemalloc
 from dataclasses import replace
 
 import pytest
 
 from orchestrator import workers
-from orchestrator.errors import ScenarioError
+from orchestrator.errors import ResultsError, ScenarioError
 from orchestrator.experiments.axes import DesignAxisSpec, Level, axis_of_levels
 from orchestrator.experiments.executor import Executor, highest_passing, runner_of, side_by_side
 from orchestrator.experiments.experiment import NamedRun, experiment_of
-from orchestrator.experiments.jobs import Outcome, run_job
+from orchestrator.experiments.jobs import MeasuredRun, Outcome, run_job
 from orchestrator.plan import Override
+from tests.sentences import golden
 
 from .test_repeats import SCENARIO
 
@@ -125,6 +128,47 @@ def test_signals_are_recorded_by_patterns_of_their_names(executor, tmp_path):
         )
         with pytest.raises(ScenarioError):
             replace(execute, of_jobs={**execute.of_jobs, "record": ("yaw_rate",)}).plans([run])
+
+
+def bytes_per_run(folder, fmus, monkeypatch, *, few=100, many=400):
+    """Return how many bytes each run adds to what an experiment holds when all have been planned and made."""
+    monkeypatch.setattr("orchestrator.experiments.on_demand.IN_MEMORY", 1)
+    monkeypatch.setattr("os.fsync", lambda file: None)
+
+    def runner(jobs, done):
+        for job in jobs:
+            done(Outcome(job, value=MeasuredRun({"last": (job.plan.time(job.plan.n_steps), "rad/s")})))
+
+    def held(count):
+        axis = DesignAxisSpec.model_validate({"vary": GAIN, "from": 0.5, "to": 1.5, "count": count})
+        metrics = {"last": {"metric": "final(sensor.yaw_rate)"}}
+        experiment = experiment_of(
+            folder / "e.yaml", named_runs(folder)[:1], title="t", axes={"g": axis}, metrics=metrics
+        )
+        with Executor(folder / f"{count}", "many", runner, of_jobs={"fmus": fmus}) as execute:
+            tracemalloc.start()
+            result = execute(experiment, keep=False)
+            gc.collect()
+            traced, _ = tracemalloc.get_traced_memory()
+            tracemalloc.stop()
+        assert result.not_made == 0
+        return traced
+
+    held(few)  # what is made once for all experiments
+    return (held(many) - held(few)) / (many - few)
+
+
+def test_memory_holds_neither_plans_nor_cases_of_a_campaign(tmp_path, fmus, monkeypatch):
+    assert bytes_per_run(tmp_path, fmus, monkeypatch) < 500  # its key and its record
+
+
+def test_plans_that_cannot_be_stored_are_one_sentence(executor, tmp_path, monkeypatch):
+    monkeypatch.setattr("orchestrator.experiments.on_demand.IN_MEMORY", 1)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "missing"))
+    execute, _ = executor()
+    with execute, pytest.raises(ResultsError) as error:
+        execute.plans(named_runs(tmp_path))
+    assert golden(str(error.value).replace(str(tmp_path), "FOLDER"))
 
 
 def found_by(passing, **bounds):

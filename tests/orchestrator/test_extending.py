@@ -172,7 +172,8 @@ def test_a_figure_on_the_report_is_a_drawing_and_an_entry(steered, monkeypatch):
     sweep = load_experiment(Path("bars.yaml"))
     jobs = [Job("", Path(), Path(), plan=steered.plan(), key=f"{k:032}") for k in range(2)]
     records = [MeasuredRun({"angle": (level.value, "rad")}) for (level,) in sweep.points]
-    planned = PlannedExperiment(sweep, jobs, {"amplitude": "rad"}, {"angle": "rad"}, {})
+    keys = [job.key for job in jobs]
+    planned = PlannedExperiment(sweep, jobs, keys, {"amplitude": "rad"}, {"angle": "rad"}, {})
     drawn, problems = draw_all(ExperimentResult(sweep, records, {}, planned), Path("out"))
     assert (drawn, problems) == ({"bars": "Bars: bars"}, [])
     assert Path("out/figures/bars.svg").is_file()

@@ -17,6 +17,7 @@ from fmus.build import build_component
 from orchestrator.commands.new import begin
 from orchestrator.experiments import jobs as jobs_module
 from orchestrator.experiments.jobs import Job, execute, keyed, ready, run_job
+from orchestrator.experiments.on_demand import StoredPlans
 from orchestrator.fmu.archive import WANTED, is_native
 from orchestrator.master import fmi
 from orchestrator.master.process_state import Log
@@ -116,10 +117,10 @@ def test_plans_share_what_is_equal_and_differ_as_before(fmus, tmp_path):
 def test_plans_do_not_share_numbers_that_only_compare_equal(old, new, fmus, tmp_path):
     plan = ready([Job("", PAPER_A, tmp_path, fmus=fmus)])[0].plan
 
-    def holding(value):
-        return replace(plan, scenario={**plan.scenario, "x": value})
-
-    assert repr(holding(new).sharing(holding(old)).scenario["x"]) == repr(new)
+    plans = StoredPlans()
+    for value in (old, new):
+        plans.add(replace(plan, scenario={**plan.scenario, "x": value}))
+    assert repr(plans[1].scenario["x"]) == repr(new)
 
 
 def shown(job: Job, outcome) -> object:

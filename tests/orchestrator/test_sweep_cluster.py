@@ -71,7 +71,7 @@ def test_runs_travel_in_batches_as_long_as_workers_stay_busy_alike():
 
 def test_runs_in_a_batch_share_what_is_common(moods, fmus, tmp_path, monkeypatch):  # noqa: F811
     experiment = load_experiment(moods(*range(20), count=2))
-    jobs = plan_experiment(experiment, tmp_path, fmus=fmus, keep=False).jobs
+    jobs = [*plan_experiment(experiment, tmp_path, fmus=fmus, keep=False).jobs]
     parcels = cluster_module._Parcels(jobs)
     monkeypatch.setattr(cluster_module, "_UNPACKED", parcels.fmus)
     one, every = parcels.pack(jobs[:1]), parcels.pack(jobs)
@@ -83,7 +83,7 @@ def test_runs_in_a_batch_share_what_is_common(moods, fmus, tmp_path, monkeypatch
 
 def test_as_many_batches_are_submitted_as_keep_the_workers_busy(moods, fmus, cluster, tmp_path, monkeypatch):  # noqa: F811
     experiment = load_experiment(moods(1, 2, 3, 4, 5, 6, count=2))
-    jobs = left_to_do(plan_experiment(experiment, tmp_path, fmus=fmus, keep=False).jobs, {})
+    jobs, _ = left_to_do(plan_experiment(experiment, tmp_path, fmus=fmus, keep=False).jobs, {})
     submitted, finished, ahead = [], [], []
     submit = distributed.Client.submit
 
@@ -129,7 +129,7 @@ def test_a_worker_that_is_killed_costs_no_run(moods, fmus, cluster, tmp_path):  
             client.close()
         told.append(outcome)
 
-    left = left_to_do(planned.jobs, {})
+    left, _ = left_to_do(planned.jobs, {})
     run_on_cluster(left, done, scheduler=cluster.scheduler_address)
     assert sorted(outcome.job.key for outcome in told) == sorted(job.key for job in left)
     assert all(outcome.ok for outcome in told)
@@ -153,7 +153,7 @@ def test_a_cluster_that_dies_is_one_sentence_and_keeps_what_is_finished(moods, f
             told.append(logging.getLogger("distributed.client").isEnabledFor(logging.ERROR))
 
         with pytest.raises(ResultsError, match="the connection lost; finished runs are kept"):
-            run_on_cluster(left_to_do(planned.jobs, {}), done, scheduler=address)
+            run_on_cluster(left_to_do(planned.jobs, {})[0], done, scheduler=address)
     assert 1 <= len(told) < len(planned.jobs)
     assert not any(told)  # Dask would log tracebacks
     assert "Traceback" not in capfd.readouterr().err

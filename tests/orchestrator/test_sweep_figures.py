@@ -79,7 +79,10 @@ def swept(tmp_path):
             )
         units = {"friction": "1", "speed": "m/s"}
         return ExperimentResult(
-            sweep, records, {}, PlannedExperiment(sweep, jobs, units, {"sideslip": "rad"}, {})
+            sweep,
+            records,
+            {},
+            PlannedExperiment(sweep, jobs, [job.key for job in jobs], units, {"sideslip": "rad"}, {}),
         )
 
     return make
