@@ -10,8 +10,11 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+from array import array
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any, ClassVar, NoReturn
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -20,7 +23,7 @@ from ..errors import Diagnostic, ResultsError
 from ..messages import counted
 from ..results.run_record import EARLIER
 from ..safe_files import open_own, reason, write_whole
-from .jobs import MeasuredRun
+from .jobs import MeasuredRun, MetricValues
 
 FILE = "runs.jsonl"
 FORMAT = 2
@@ -82,7 +85,33 @@ class _Entry(_Line):
             *(Diagnostic("run-failed", sentence) for sentence in self.problems),
             *(Diagnostic(EARLIER.get(kind, kind), kind, "warning") for kind in self.findings),
         )
-        return MeasuredRun(self.values, (*map(Diagnostic.of, self.diagnostics), *earlier), self.ended)
+        return MeasuredRun(
+            _Packed(self.values), (*map(Diagnostic.of, self.diagnostics), *earlier), self.ended
+        )
+
+
+class _Packed(Mapping[str, "tuple[float, str] | None"]):
+    """Metric values in little memory: their keys and units are held once for all runs that have the same."""
+
+    __slots__ = ("_numbers", "_units")
+    _known: ClassVar[dict[tuple[tuple[str, str | None], ...], dict[str, str | None]]] = {}
+
+    def __init__(self, values: MetricValues) -> None:
+        units = {key: value[1] if value else None for key, value in values.items()}
+        self._units = self._known.setdefault(tuple(units.items()), units)
+        self._numbers = array("d", [value[0] if value else 0.0 for value in values.values()]).tobytes()
+
+    def __getitem__(self, key: str) -> tuple[float, str] | None:
+        unit = self._units[key]
+        if unit is None:
+            return None
+        return array("d", self._numbers)[[*self._units].index(key)], unit
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._units)
+
+    def __len__(self) -> int:
+        return len(self._units)
 
 
 class Journal:
@@ -189,12 +218,12 @@ class Journal:
             self._append(
                 _Entry(
                     key=key,
-                    values=record.values,
+                    values={**record.values},
                     diagnostics=[diagnostic.record() for diagnostic in record.diagnostics],
                     ended=record.ended,
                 )
             )
-        self.records[key] = record
+        self.records[key] = replace(record, values=_Packed(record.values), id=None)
 
     def _append(self, entry: _Line) -> None:
         try:
