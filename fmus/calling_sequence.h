@@ -10,6 +10,7 @@ enum { BEFORE_INITIALIZATION, DURING_INITIALIZATION, AFTER_INITIALIZATION, AFTER
 
 typedef struct {
     int phase;
+    int failed; /* an error has been logged since the last reset */
     int stop_defined;
     double time; /* reached [s] */
     double stop; /* [s] */
@@ -35,7 +36,7 @@ static inline int not_allowed(const Progress *at, const char *call, Refusal *why
 }
 
 /* Write a refusal with one or two numbers, with a decimal point in every locale. */
-static inline int refuse_step(Refusal *why, const char *format, double x, double y)
+static inline int refuse_times(Refusal *why, const char *format, double x, double y)
 {
     snprintf(why->text, sizeof why->text, format, x, y);
     for (char *c = why->text; *c != '\0'; c++) {
@@ -61,6 +62,9 @@ static inline int set_up(Progress *at, double start, int stop_defined, double st
     if (at->phase != BEFORE_INITIALIZATION) {
         return not_allowed(at, "fmi2SetupExperiment", why);
     }
+    if (!isfinite(start)) {
+        return refuse_times(why, "fmi2SetupExperiment: the start time must be finite (got %.9g s)", start, 0.0);
+    }
     at->time = start, at->stop_defined = stop_defined != 0, at->stop = stop;
     return 1;
 }
@@ -82,14 +86,14 @@ static inline int may_step(const Progress *at, double t, double h, Refusal *why)
         return not_allowed(at, "fmi2DoStep", why);
     }
     if (!(h > 0.0 && h < HUGE_VAL)) {
-        return refuse_step(why, "fmi2DoStep: the step must be positive and finite (got %.9g s)", h, 0.0);
+        return refuse_times(why, "fmi2DoStep: the step must be positive and finite (got %.9g s)", h, 0.0);
     }
     double tolerance = time_tolerance(at, h);
     if (!(fabs(t - at->time) <= tolerance)) {
-        return refuse_step(why, "fmi2DoStep at t = %.9g s: the instance has reached t = %.9g s", t, at->time);
+        return refuse_times(why, "fmi2DoStep at t = %.9g s: the instance has reached t = %.9g s", t, at->time);
     }
     if (at->stop_defined && t + h > at->stop + tolerance) {
-        return refuse_step(why, "fmi2DoStep to t = %.9g s: the stop time is %.9g s", t + h, at->stop);
+        return refuse_times(why, "fmi2DoStep to t = %.9g s: the stop time is %.9g s", t + h, at->stop);
     }
     return 1;
 }

@@ -20,7 +20,15 @@ from orchestrator.errors import BuildError, YawbenchError
 from orchestrator.messages import printable
 
 HERE = Path(__file__).resolve().parent
-SOURCES = ("launcher.c", "calling_sequence.h", "fmi2.h", "find_python.h", "oldest_glibc.h", "text.h")
+SOURCES = (
+    "launcher.c",
+    "calling_sequence.h",
+    "fmi2.h",
+    "find_python.h",
+    "oldest_glibc.h",
+    "seal.h",
+    "text.h",
+)
 FLAGS = ("-std=c11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-Wl,--build-id=none", "-s")
 LIBRARIES = ("-ldl", "-pthread")
 STORE = "launcher"

@@ -32,7 +32,7 @@ typedef struct {
     fmi2ComponentEnvironment componentEnvironment;
 } fmi2CallbackFunctions;
 
-/* Every function that answers with a status: X(name, parameters). */
+/* Functions that answer with a status, and that a library has to provide: X(name, parameters). */
 #define FMI2_STATUS_FUNCTIONS(X)                                                                            \
     X(SetDebugLogging, (fmi2Component, fmi2Boolean, size_t, const fmi2String[]))                            \
     X(SetupExperiment, (fmi2Component, fmi2Boolean, fmi2Real, fmi2Real, fmi2Boolean, fmi2Real))             \
@@ -54,19 +54,22 @@ typedef struct {
     X(SerializedFMUstateSize, (fmi2Component, fmi2FMUstate, size_t *))                                      \
     X(SerializeFMUstate, (fmi2Component, fmi2FMUstate, fmi2Byte[], size_t))                                 \
     X(DeSerializeFMUstate, (fmi2Component, const fmi2Byte[], size_t, fmi2FMUstate *))                       \
-    X(GetDirectionalDerivative, (fmi2Component, const fmi2ValueReference[], size_t,                         \
-                                 const fmi2ValueReference[], size_t, const fmi2Real[], fmi2Real[]))         \
-    X(SetRealInputDerivatives, (fmi2Component, const fmi2ValueReference[], size_t, const fmi2Integer[],     \
-                                const fmi2Real[]))                                                          \
-    X(GetRealOutputDerivatives, (fmi2Component, const fmi2ValueReference[], size_t, const fmi2Integer[],    \
-                                 fmi2Real[]))                                                               \
-    X(DoStep, (fmi2Component, fmi2Real, fmi2Real, fmi2Boolean))                                             \
-    X(CancelStep, (fmi2Component))                                                                          \
-    X(GetStatus, (fmi2Component, const fmi2StatusKind, fmi2Status *))                                       \
-    X(GetRealStatus, (fmi2Component, const fmi2StatusKind, fmi2Real *))                                     \
-    X(GetIntegerStatus, (fmi2Component, const fmi2StatusKind, fmi2Integer *))                               \
-    X(GetBooleanStatus, (fmi2Component, const fmi2StatusKind, fmi2Boolean *))                               \
-    X(GetStringStatus, (fmi2Component, const fmi2StatusKind, fmi2String *))
+    X(DoStep, (fmi2Component, fmi2Real, fmi2Real, fmi2Boolean))
+
+/* Those that FMUs of this project do not support: X(name, parameters). */
+#define FMI2_UNSUPPORTED_FUNCTIONS(X)                                                                       \
+    X(GetDirectionalDerivative,                                                                             \
+      (fmi2Component c, const fmi2ValueReference unknown[], size_t n_unknown,                               \
+       const fmi2ValueReference known[], size_t n_known, const fmi2Real d_known[], fmi2Real d_unknown[]))   \
+    X(SetRealInputDerivatives, (fmi2Component c, const fmi2ValueReference r[], size_t n,                    \
+                                const fmi2Integer order[], const fmi2Real values[]))                        \
+    X(GetRealOutputDerivatives, (fmi2Component c, const fmi2ValueReference r[], size_t n,                   \
+                                 const fmi2Integer order[], fmi2Real values[]))                             \
+    X(CancelStep, (fmi2Component c))                                                                        \
+    X(GetStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Status *value))                           \
+    X(GetIntegerStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value))                   \
+    X(GetBooleanStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value))                   \
+    X(GetStringStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2String *value))
 
 /* fmi2<name>Fn is a pointer to the function fmi2<name>. */
 #define FMI2_POINTER_TYPE(name, parameters) typedef fmi2Status(*fmi2##name##Fn) parameters;

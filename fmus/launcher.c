@@ -11,6 +11,7 @@
  * - after fmi2Fatal the instance has already been released: no further function is called on it;
  * - reset creates a new instance, because the library accesses a freed list if its own reset fails;
  * - arguments that are NULL, empty or not UTF-8 are refused instead of crashing the process;
+ * - functions that are not supported are answered by one sentence, as native libraries do;
  * - a GUID of another FMU, calls out of order and steps from a wrong time are refused (calling_sequence.h).
  */
 #define _GNU_SOURCE
@@ -24,6 +25,7 @@
 
 #include "find_python.h"
 #include "oldest_glibc.h"
+#include "seal.h"
 #include "text.h"
 
 #define EXPORT __attribute__((visibility("default")))
@@ -60,7 +62,6 @@ typedef struct {
     char *guid;
     fmi2Boolean visible;
     bool error_logged; /* during the call in progress */
-    bool failed;       /* an error has been logged since the last reset or restored state */
     bool dead;         /* PythonFMU's instance has been released by a fatal error */
     Progress at;
     bool log_all;
@@ -123,7 +124,7 @@ static void relay(fmi2ComponentEnvironment environment, fmi2String name, fmi2Sta
 static fmi2Status settled(Instance *in, fmi2Status status)
 {
     in->dead = in->dead || status == fmi2Fatal;
-    in->failed = in->failed || in->error_logged;
+    in->at.failed = in->at.failed || in->error_logged;
     bool hidden = in->error_logged && status < fmi2Error;
     in->error_logged = false;
     return hidden ? fmi2Error : status;
@@ -479,7 +480,6 @@ EXPORT fmi2Status fmi2Reset(fmi2Component c)
     }
     library.FreeInstance(in->stock);
     in->stock = fresh;
-    in->failed = false;
     in->at = (Progress){.phase = BEFORE_INITIALIZATION};
     return checked(in, fmi2OK);
 }
@@ -555,7 +555,6 @@ static bool forget(Instance *in, const State *state)
 
 static fmi2Status release(Instance *in, State *state)
 {
-    forget(in, state);
     fmi2Status status = library.FreeFMUstate(in->stock, &state->stock);
     free(state);
     return status;
@@ -608,7 +607,6 @@ EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
     INSTANCE(c)
     REQUIRE(state != NULL, "fmi2SetFMUstate: no state given")
     const State *saved = state;
-    in->failed = false;
     in->at = saved->at;
     return checked(in, library.SetFMUstate(in->stock, saved->stock));
 }
@@ -622,19 +620,20 @@ EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
     if (state == NULL || *state == NULL) {
         return fmi2OK;
     }
+    REQUIRE(forget(in, *state), "fmi2FreeFMUstate: not a state of this instance, or freed before")
     fmi2Status status = release(in, *state);
     *state = NULL;
     return status;
 }
 
-/* Serialized state: the library's serialization, then phase and time of the instance. */
+/* Serialized state: the library's serialization, phase and time of the instance, seal. */
 EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
 {
     INSTANCE(c)
     REQUIRE(state != NULL && size != NULL, "fmi2SerializedFMUstateSize: no state, or no place for its size")
     fmi2Status status = checked(in, library.SerializedFMUstateSize(in->stock, ((State *)state)->stock, size));
     REQUIRE(status != fmi2OK || *size > 0, "fmi2SerializedFMUstateSize: this state cannot be serialized")
-    *size += sizeof(Progress);
+    *size += sizeof(Progress) + sizeof(Seal);
     return status;
 }
 
@@ -649,9 +648,11 @@ EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi
     }
     REQUIRE(size >= needed, "fmi2SerializeFMUstate: the place for the bytes is too small")
     const State *saved = state;
-    needed -= sizeof saved->at;
+    needed -= sizeof saved->at + sizeof(Seal);
+    status = checked(in, library.SerializeFMUstate(in->stock, saved->stock, bytes, needed));
     memcpy(bytes + needed, &saved->at, sizeof saved->at);
-    return checked(in, library.SerializeFMUstate(in->stock, saved->stock, bytes, needed));
+    seal(in->guid, bytes, needed + sizeof saved->at);
+    return status;
 }
 
 EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size,
@@ -661,8 +662,8 @@ EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[
     INSTANCE(c)
     REQUIRE(bytes != NULL && state != NULL, "fmi2DeSerializeFMUstate: no bytes, or no place for the state")
     Progress at;
-    REQUIRE(size > sizeof at, failure)
-    size -= sizeof at;
+    REQUIRE(size > sizeof at + sizeof(Seal) && is_sealed(in->guid, bytes, size), failure)
+    size -= sizeof at + sizeof(Seal);
     memcpy(&at, bytes + size, sizeof at);
     fmi2FMUstate fresh = NULL;
     fmi2Status status = checked(in, library.DeSerializeFMUstate(in->stock, bytes, size, &fresh));
@@ -674,41 +675,12 @@ EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[
 EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_set_state_prior)
 {
     INSTANCE(c)
-    ALLOWED(in->failed || may_step(&in->at, t, h, &why))
+    ALLOWED(in->at.failed || may_step(&in->at, t, h, &why))
     fmi2Status status = checked(in, library.DoStep(in->stock, t, h, no_set_state_prior));
     if (status <= fmi2Warning) {
         in->at.time = t + h;
     }
-    return UNLIKELY(status == fmi2Discard && in->failed) ? fmi2Error : status;
-}
-
-EXPORT fmi2Status fmi2CancelStep(fmi2Component c)
-{
-    INSTANCE(c)
-    return checked(in, library.CancelStep(in->stock));
-}
-
-EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[],
-                                               size_t n_unknown, const fmi2ValueReference known[],
-                                               size_t n_known, const fmi2Real d_known[], fmi2Real d_unknown[])
-{
-    INSTANCE(c)
-    return checked(in, library.GetDirectionalDerivative(in->stock, unknown, n_unknown, known, n_known,
-                                                        d_known, d_unknown));
-}
-
-EXPORT fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
-                                              const fmi2Integer order[], const fmi2Real value[])
-{
-    INSTANCE(c)
-    return checked(in, library.SetRealInputDerivatives(in->stock, vr, n, order, value));
-}
-
-EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
-                                               const fmi2Integer order[], fmi2Real value[])
-{
-    INSTANCE(c)
-    return checked(in, library.GetRealOutputDerivatives(in->stock, vr, n, order, value));
+    return UNLIKELY(status == fmi2Discard && in->at.failed) ? fmi2Error : status;
 }
 
 EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
@@ -720,15 +692,10 @@ EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, 
     return fmi2OK;
 }
 
-#define STATUS(Name, Type)                                                                                   \
-    EXPORT fmi2Status fmi2Get##Name(fmi2Component c, const fmi2StatusKind kind, Type *value)                 \
+#define UNSUPPORTED(name, parameters)                                                                        \
+    EXPORT fmi2Status fmi2##name parameters                                                                  \
     {                                                                                                        \
         INSTANCE(c)                                                                                          \
-        REQUIRE(value != NULL, "fmi2Get" #Name ": no place for the value")                                   \
-        return checked(in, library.Get##Name(in->stock, kind, value));                                       \
+        return refused(in, "fmi2" #name " is not supported");                                                \
     }
-
-STATUS(Status, fmi2Status)
-STATUS(IntegerStatus, fmi2Integer)
-STATUS(BooleanStatus, fmi2Boolean)
-STATUS(StringStatus, fmi2String)
+FMI2_UNSUPPORTED_FUNCTIONS(UNSUPPORTED)

@@ -75,6 +75,11 @@ def _picker(inputs: Sequence[str | VariableSpec]) -> Callable[[list[float]], tup
     return lambda u: tuple([u[place] for place in places])
 
 
+def _unsigned(references: Sequence[int]) -> list[int]:
+    """Return value references as the host passed them; PythonFMU's library makes those from 2^31 negative."""
+    return [reference % 2**32 for reference in references]
+
+
 class Component(Fmi2Slave):
     """A component of the test bench. The first line of a subclass's docstring describes its FMU."""
 
@@ -287,12 +292,13 @@ class Component(Fmi2Slave):
         try:
             if vrs == self._out_refs:
                 return self._values[self._n_in : self._n_io]
-            if vrs and min(vrs) < 0:
-                raise IndexError("value reference out of range")
+            if vrs and not 0 <= min(vrs) <= max(vrs) < self._n_real:
+                wrong = next(vr for vr in vrs if not 0 <= vr < self._n_real)
+                raise TypeError(f"{self._name_of(wrong)} is not of type Real")
             values = self._values
             return [values[vr] for vr in vrs]
         except BaseException:
-            self._fail(f"reading Real {vrs} failed", self._start_time)
+            self._fail(f"reading Real {_unsigned(vrs)} failed", self._start_time)
             return [float("nan")] * len(vrs)
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
@@ -308,7 +314,7 @@ class Component(Fmi2Slave):
                         raise ValueError(f"{self._name_of(vr)} cannot be set after initialization")
                     stored[vr] = value
         except BaseException:
-            self._fail(f"setting Real {vrs} failed", self._start_time)
+            self._fail(f"setting Real {_unsigned(vrs)} failed", self._start_time)
 
     def _set_before_start(
         self, store: list[Any], vrs: list[int], values: list[Any], first: int, end: int
@@ -323,7 +329,7 @@ class Component(Fmi2Slave):
 
     def _name_of(self, vr: int) -> str:
         known = 0 <= vr < len(self.variables)
-        return self.variables[vr].name if known else f"value reference {vr}"
+        return self.variables[vr].name if known else f"value reference {vr % 2**32}"
 
     def _get_other(self, vrs: list[int], kind: str, blank: Any) -> list[Any]:
         try:
@@ -332,7 +338,7 @@ class Component(Fmi2Slave):
                     raise TypeError(f"{self._name_of(vr)} is not of type {kind}")
             return [self._others[vr - self._n_real] for vr in vrs]
         except BaseException:
-            self._fail(f"reading {kind} {vrs} failed", self._start_time)
+            self._fail(f"reading {kind} {_unsigned(vrs)} failed", self._start_time)
             return [blank] * len(vrs)
 
     def _set_other(self, vrs: list[int], values: list[Any], kind: str) -> None:
@@ -345,7 +351,7 @@ class Component(Fmi2Slave):
             end = len(self.variables)
             self._set_before_start(self._others, vrs, values, self._n_real, end)
         except BaseException:
-            self._fail(f"setting {kind} {vrs} failed", self._start_time)
+            self._fail(f"setting {kind} {_unsigned(vrs)} failed", self._start_time)
 
     def get_integer(self, vrs: list[int]) -> list[int]:
         return self._get_other(vrs, "Integer", 0)

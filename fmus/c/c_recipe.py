@@ -33,6 +33,7 @@ SHARED = (
     HERE.parent / "calling_sequence.h",
     HERE.parent / "fmi2.h",
     HERE.parent / "oldest_glibc.h",
+    HERE.parent / "seal.h",
     HERE.parent / "compiler.py",
     HERE.parent / "packing.py",
     HERE.parent / "presentation.py",

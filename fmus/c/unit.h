@@ -21,6 +21,7 @@
 #include "calling_sequence.h"
 #include "fmi2.h"
 #include "oldest_glibc.h"
+#include "seal.h"
 
 #if defined _WIN32
 #define FMI2_EXPORT __declspec(dllexport)
@@ -110,15 +111,19 @@ FMI2_EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2St
                                           fmi2Boolean logging_on)
 {
     (void)resources, (void)visible, (void)logging_on;
-    Instance *instance = calloc(1, sizeof *instance);
+    Instance *instance = host == NULL ? NULL : calloc(1, sizeof *instance);
     if (instance == NULL) {
         return NULL;
     }
     instance->host = *host;
-    snprintf(instance->name, sizeof instance->name, "%s", name);
-    if (type != fmi2CoSimulation || guid == NULL || strcmp(guid, GUID) != 0) {
-        fail(instance, type != fmi2CoSimulation ? "this FMU is for co-simulation"
-                                            : "the GUID is not that of this FMU: the model description is of another build");
+    snprintf(instance->name, sizeof instance->name, "%s", name == NULL ? "" : name);
+    const char *problem = *instance->name == '\0'    ? "fmi2Instantiate needs an instance name in UTF-8"
+                          : type != fmi2CoSimulation ? "this FMU is for co-simulation only"
+                          : guid == NULL || strcmp(guid, GUID) != 0
+                              ? "the GUID is not that of this FMU: the model description is of another build"
+                              : NULL;
+    if (problem != NULL) {
+        fail(instance, "%s", problem);
         free(instance);
         return NULL;
     }
@@ -131,10 +136,22 @@ FMI2_EXPORT void fmi2FreeInstance(fmi2Component c)
     free(c);
 }
 
+/* Return from the calling function unless its instance `c` exists. */
+#define UNIT(c)                                                                                             \
+    Instance *instance = (c);                                                                               \
+    if (instance == NULL) {                                                                                 \
+        return fmi2Error;                                                                                   \
+    }
+
+#define REQUIRE(condition, text)                                                                            \
+    if (!(condition)) {                                                                                     \
+        return fail(instance, "%s", text);                                                                  \
+    }
+
 FMI2_EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance,
                                            fmi2Real start_time, fmi2Boolean stop_defined, fmi2Real stop_time)
 {
-    Instance *instance = c;
+    UNIT(c)
     Refusal why;
     (void)tolerance_defined, (void)tolerance;
     if (!set_up(&instance->now.at, start_time, stop_defined, stop_time, &why)) {
@@ -147,7 +164,7 @@ FMI2_EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranc
 
 FMI2_EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 {
-    Instance *instance = c;
+    UNIT(c)
     Refusal why;
     return pass_on(&instance->now.at, BEFORE_INITIALIZATION, DURING_INITIALIZATION, "fmi2EnterInitializationMode", &why)
                ? fmi2OK
@@ -156,7 +173,7 @@ FMI2_EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 
 FMI2_EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 {
-    Instance *instance = c;
+    UNIT(c)
     Refusal why;
     if (!pass_on(&instance->now.at, DURING_INITIALIZATION, AFTER_INITIALIZATION, "fmi2ExitInitializationMode", &why)) {
         return fail(instance, "%s", why.text);
@@ -169,7 +186,7 @@ FMI2_EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 FMI2_EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean keep)
 {
     (void)keep;
-    Instance *instance = c;
+    UNIT(c)
     Content *now = &instance->now;
     Refusal why;
     if (!may_step(&now->at, t, h, &why)) {
@@ -183,14 +200,15 @@ FMI2_EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2B
 
 FMI2_EXPORT fmi2Status fmi2Terminate(fmi2Component c)
 {
-    Instance *instance = c;
+    UNIT(c)
     Refusal why;
     return terminate(&instance->now.at, &why) ? fmi2OK : fail(instance, "%s", why.text);
 }
 
 FMI2_EXPORT fmi2Status fmi2Reset(fmi2Component c)
 {
-    begin(&((Instance *)c)->now);
+    UNIT(c)
+    begin(&instance->now);
     return fmi2OK;
 }
 
@@ -198,7 +216,8 @@ FMI2_EXPORT fmi2Status fmi2Reset(fmi2Component c)
 
 FMI2_EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2Real values[])
 {
-    Instance *instance = c;
+    UNIT(c)
+    REQUIRE(n == 0 || (r != NULL && values != NULL), "fmi2GetReal: value references or values are missing")
     for (size_t i = 0; i < n; i++) {
         if (r[i] >= N_VARIABLES) {
             return fail(instance, "there is no Real with the value reference %u", r[i]);
@@ -214,7 +233,8 @@ FMI2_EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[]
 
 FMI2_EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Real values[])
 {
-    Instance *instance = c;
+    UNIT(c)
+    REQUIRE(n == 0 || (r != NULL && values != NULL), "fmi2SetReal: value references or values are missing")
     for (size_t i = 0; i < n; i++) {
         if (r[i] >= N_VARIABLES) {
             return fail(instance, "there is no Real with the value reference %u", r[i]);
@@ -235,56 +255,64 @@ FMI2_EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[]
 
 FMI2_EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
-    Instance *instance = c;
+    UNIT(c)
+    REQUIRE(state != NULL, "fmi2GetFMUstate: no place for the state")
     if (*state == NULL) {
         *state = calloc(1, sizeof instance->now);
     }
-    if (*state == NULL) {
-        return fail(instance, "there is no memory for the state");
-    }
+    REQUIRE(*state != NULL, "fmi2GetFMUstate: out of memory")
     memcpy(*state, &instance->now, sizeof instance->now);
     return fmi2OK;
 }
 
 FMI2_EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
 {
-    memcpy(&((Instance *)c)->now, state, sizeof(Content));
+    UNIT(c)
+    REQUIRE(state != NULL, "fmi2SetFMUstate: no state given")
+    memcpy(&instance->now, state, sizeof(Content));
     return fmi2OK;
 }
 
 FMI2_EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
-    (void)c;
-    free(*state);
-    *state = NULL;
+    UNIT(c)
+    if (state != NULL) {
+        free(*state);
+        *state = NULL;
+    }
     return fmi2OK;
 }
 
+/* Serialized state: content, seal. */
 FMI2_EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
 {
-    (void)c, (void)state;
-    *size = sizeof(Content);
+    UNIT(c)
+    REQUIRE(state != NULL && size != NULL, "fmi2SerializedFMUstateSize: no state, or no place for its size")
+    *size = sizeof(Content) + sizeof(Seal);
     return fmi2OK;
 }
 
 FMI2_EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
 {
-    if (size < sizeof(Content)) {
-        return fail(c, "a saved state has %zu bytes, not %zu", sizeof(Content), size);
-    }
+    UNIT(c)
+    REQUIRE(bytes != NULL, "fmi2SerializeFMUstate: no place for the bytes")
+    REQUIRE(state != NULL, "fmi2SerializedFMUstateSize: no state, or no place for its size")
+    REQUIRE(size >= sizeof(Content) + sizeof(Seal), "fmi2SerializeFMUstate: the place for the bytes is too small")
     memcpy(bytes, state, sizeof(Content));
+    seal(GUID, bytes, sizeof(Content));
     return fmi2OK;
 }
 
 FMI2_EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size,
                                                fmi2FMUstate *state)
 {
-    if (size != sizeof(Content)) {
-        return fail(c, "a saved state has %zu bytes, not %zu", sizeof(Content), size);
-    }
+    UNIT(c)
+    REQUIRE(bytes != NULL && state != NULL, "fmi2DeSerializeFMUstate: no bytes, or no place for the state")
+    REQUIRE(size == sizeof(Content) + sizeof(Seal) && is_sealed(GUID, bytes, size),
+            "fmi2DeSerializeFMUstate: not a state of this FMU")
     fmi2Status status = fmi2GetFMUstate(c, state);
     if (status == fmi2OK) {
-        memcpy(*state, bytes, size);
+        memcpy(*state, bytes, sizeof(Content));
     }
     return status;
 }
@@ -294,8 +322,9 @@ FMI2_EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte b
 #define FMI2_NOTHING(name, parameters)                                                                      \
     FMI2_EXPORT fmi2Status fmi2##name parameters                                                            \
     {                                                                                                       \
+        UNIT(c)                                                                                             \
         (void)values;                                                                                       \
-        return n == 0 ? fmi2OK : fail(c, "all variables of this FMU are Real");                            \
+        return n == 0 ? fmi2OK : fail(instance, "all variables of this FMU are Real");                      \
     }
 FMI2_NOTHING(GetInteger, (fmi2Component c, const fmi2ValueReference *r, size_t n, fmi2Integer values[]))
 FMI2_NOTHING(GetBoolean, (fmi2Component c, const fmi2ValueReference *r, size_t n, fmi2Boolean values[]))
@@ -306,30 +335,25 @@ FMI2_NOTHING(SetString, (fmi2Component c, const fmi2ValueReference *r, size_t n,
 
 FMI2_EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String names[])
 {
-    (void)c, (void)on, (void)n, (void)names;
+    UNIT(c)
+    (void)on;
+    REQUIRE(n == 0 || names != NULL, "fmi2SetDebugLogging: no categories given")
     return fmi2OK; /* only errors are logged, and always */
 }
 
 FMI2_EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
 {
-    if (kind != fmi2LastSuccessfulTime) {
-        return fail(c, "fmi2GetRealStatus knows of fmi2LastSuccessfulTime alone");
-    }
-    *value = ((Instance *)c)->now.at.time;
+    UNIT(c)
+    REQUIRE(value != NULL, "fmi2GetRealStatus: no place for the value")
+    REQUIRE(kind == fmi2LastSuccessfulTime, "fmi2GetRealStatus knows of fmi2LastSuccessfulTime alone")
+    *value = instance->now.at.time;
     return fmi2OK;
 }
 
-#define FMI2_UNSUPPORTED(name, parameters)                                                                  \
-    FMI2_EXPORT fmi2Status fmi2##name parameters { return fail(c, "fmi2%s is not supported", #name); }
-FMI2_UNSUPPORTED(GetDirectionalDerivative,
-                 (fmi2Component c, const fmi2ValueReference u[], size_t n_u, const fmi2ValueReference k[], size_t n_k,
-                  const fmi2Real d_k[], fmi2Real d_u[]))
-FMI2_UNSUPPORTED(SetRealInputDerivatives, (fmi2Component c, const fmi2ValueReference r[], size_t n,
-                                           const fmi2Integer order[], const fmi2Real values[]))
-FMI2_UNSUPPORTED(GetRealOutputDerivatives, (fmi2Component c, const fmi2ValueReference r[], size_t n,
-                                            const fmi2Integer order[], fmi2Real values[]))
-FMI2_UNSUPPORTED(CancelStep, (fmi2Component c))
-FMI2_UNSUPPORTED(GetStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Status *value))
-FMI2_UNSUPPORTED(GetIntegerStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value))
-FMI2_UNSUPPORTED(GetBooleanStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value))
-FMI2_UNSUPPORTED(GetStringStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2String *value))
+#define UNSUPPORTED(name, parameters)                                                                       \
+    FMI2_EXPORT fmi2Status fmi2##name parameters                                                            \
+    {                                                                                                       \
+        UNIT(c)                                                                                             \
+        return fail(instance, "fmi2" #name " is not supported");                                            \
+    }
+FMI2_UNSUPPORTED_FUNCTIONS(UNSUPPORTED)

@@ -31,7 +31,7 @@ from .specialise import specialise
 from .values import Refused
 
 HERE = Path(__file__).resolve().parent
-SHARED = [HERE.parent / name for name in ("calling_sequence.h", "fmi2.h", "oldest_glibc.h")]
+SHARED = [HERE.parent / name for name in ("calling_sequence.h", "fmi2.h", "oldest_glibc.h", "seal.h")]
 HEADERS = {file.name: file for file in (HERE / "arithmetic.h", HERE / "unit.h", *SHARED)}
 NATIVE_LIBRARY = "native.so"
 """Name of the native library, in the folder of the launcher, which opens it by this name."""

@@ -12,6 +12,7 @@
  * so instances may run in any number of threads. */
 #include "calling_sequence.h"
 #include "fmi2.h"
+#include "seal.h"
 
 #if defined _WIN32
 #define FMI2_EXPORT __declspec(dllexport)
@@ -31,7 +32,6 @@ typedef struct {
     int initializing; /* until initialization ends, outputs follow the inputs */
     int stale;        /* a variable has been set since the outputs were computed */
     int configured;   /* since the last change of a parameter */
-    int failed;
     Progress at;
     char wrong[LONGEST_TEXT]; /* the last text that was not a choice */
 } Content;
@@ -94,7 +94,7 @@ static fmi2Status fail(Instance *instance, const char *what, double t, const Pro
     static const Problem empty;
     Problem *sentence = malloc(sizeof *sentence);
     char number[64];
-    instance->now.content.failed = 1;
+    instance->now.content.at.failed = 1;
     if (sentence == NULL) {
         return complain(instance, what);
     }
@@ -386,7 +386,7 @@ FMI2_EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2B
     Refusal why;
     Problem problem;
     double y[sizeof now->y / sizeof *now->y];
-    if (now->failed) {
+    if (now->at.failed) {
         return fmi2Error;
     }
     if (!may_step(&now->at, t, h, &why)) {
@@ -422,7 +422,7 @@ FMI2_EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[]
     UNIT(c)
     REQUIRE(n == 0 || (r != NULL && values != NULL), "fmi2GetReal: value references or values are missing")
     fmi2Status status = fmi2OK;
-    for (size_t i = 0; i < n && now->stale && now->initializing && !now->failed; i++) {
+    for (size_t i = 0; i < n && now->stale && now->initializing && !now->at.failed; i++) {
         Problem problem;
         if (r[i] >= N_INPUTS && r[i] < N_INPUTS + N_OUTPUTS && refresh(instance, &problem)) {
             status = fail(instance, "initialization failed", now->start_time, &problem);
@@ -434,8 +434,9 @@ FMI2_EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[]
             for (size_t k = 0; k < n; k++) {
                 values[k] = NAN;
             }
-            begin_problem(&problem, "IndexError", "");
-            say(&problem, "list index out of range");
+            begin_problem(&problem, "TypeError", "");
+            say_name(&problem, r[i]);
+            say(&problem, " is not of type Real");
             return fail_at(instance, "reading", "Real", r, n, &problem);
         }
         int is_output = r[i] >= N_INPUTS && r[i] < N_INPUTS + N_OUTPUTS;
@@ -612,12 +613,12 @@ FMI2_EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
     return fmi2OK;
 }
 
-/* Serialized state: GUID, content, then count and items of each list. */
+/* Serialized state: content, count and items of each list, seal. */
 FMI2_EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
 {
     UNIT(c)
     REQUIRE(state != NULL && size != NULL, "fmi2SerializedFMUstateSize: no state, or no place for its size")
-    *size = sizeof GUID + sizeof(Content);
+    *size = sizeof(Content) + sizeof(Seal);
     for (size_t i = 0; i < (size_t)N_LISTS; i++) {
         size_t count = ((Saved *)state)->lists[i].count;
         *size += sizeof(uint64_t) + count * (size_t)WIDTHS[i] * sizeof(double);
@@ -637,7 +638,6 @@ FMI2_EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state
     REQUIRE(size >= needed, "fmi2SerializeFMUstate: the place for the bytes is too small")
     const Saved *saved = state;
     char *end = bytes;
-    memcpy(end, GUID, sizeof GUID), end += sizeof GUID;
     memcpy(end, &saved->content, sizeof saved->content), end += sizeof saved->content;
     for (size_t i = 0; i < (size_t)N_LISTS; i++) {
         uint64_t count = saved->lists[i].count;
@@ -647,16 +647,16 @@ FMI2_EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state
             memcpy(end, item(&saved->lists[i], WIDTHS[i], (double)k), one), end += one;
         }
     }
+    seal(GUID, bytes, (size_t)(end - bytes));
     return fmi2OK;
 }
 
 static int read_state(Saved *saved, const char *bytes, size_t size)
 {
-    const char *end = bytes + size;
-    if (size < sizeof GUID + sizeof(Content) || memcmp(bytes, GUID, sizeof GUID) != 0) {
+    const char *end = bytes + size - sizeof(Seal);
+    if (!is_sealed(GUID, bytes, size) || size < sizeof(Content) + sizeof(Seal)) {
         return 0;
     }
-    bytes += sizeof GUID;
     memcpy(&saved->content, bytes, sizeof(Content)), bytes += sizeof(Content);
     for (size_t i = 0; i < (size_t)N_LISTS; i++) {
         uint64_t count;
@@ -720,15 +720,4 @@ FMI2_EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind k
         UNIT(c)                                                                                             \
         return complain(instance, "fmi2" #name " is not supported");                                        \
     }
-UNSUPPORTED(GetDirectionalDerivative,
-            (fmi2Component c, const fmi2ValueReference u[], size_t n_u, const fmi2ValueReference k[], size_t n_k,
-             const fmi2Real d_k[], fmi2Real d_u[]))
-UNSUPPORTED(SetRealInputDerivatives, (fmi2Component c, const fmi2ValueReference r[], size_t n,
-                                      const fmi2Integer order[], const fmi2Real values[]))
-UNSUPPORTED(GetRealOutputDerivatives,
-            (fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Integer order[], fmi2Real values[]))
-UNSUPPORTED(CancelStep, (fmi2Component c))
-UNSUPPORTED(GetStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Status *value))
-UNSUPPORTED(GetIntegerStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value))
-UNSUPPORTED(GetBooleanStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value))
-UNSUPPORTED(GetStringStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2String *value))
+FMI2_UNSUPPORTED_FUNCTIONS(UNSUPPORTED)

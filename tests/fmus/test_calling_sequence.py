@@ -188,6 +188,114 @@ def test_the_time_reached_is_saved_and_restored_with_the_state(unit):
     assert golden(step_refused(unit, 2 * H, 4 * H))
 
 
+UNSUPPORTED = {
+    "fmi2GetDirectionalDerivative": (None, ctypes.c_size_t(0), None, ctypes.c_size_t(0), None, None),
+    "fmi2SetRealInputDerivatives": (None, ctypes.c_size_t(0), None, None),
+    "fmi2GetRealOutputDerivatives": (None, ctypes.c_size_t(0), None, None),
+    "fmi2CancelStep": (),
+    "fmi2GetStatus": (0, None),
+    "fmi2GetIntegerStatus": (0, None),
+    "fmi2GetBooleanStatus": (3, None),
+    "fmi2GetStringStatus": (1, None),
+}
+
+
+def test_functions_that_are_not_supported_are_answered_alike_and_change_nothing(unit):
+    said = [refusal(unit, name, *arguments) for name, arguments in UNSUPPORTED.items()]
+    said.append(step_refused(unit, 0.0))  # still, as no call so far counts as a failure of the instance
+    assert golden(said)
+    started(unit)
+    refusal(unit, "fmi2CancelStep")
+    said = step_refused(unit, 0.5)
+    assert said.startswith("fmi2DoStep at t = 0.5 s")
+    unit.step(0.0, H)
+
+
+def test_a_start_time_that_is_not_finite_is_refused(unit):
+    times = [(math.nan, 0, 0.0), (math.inf, 0, 0.0), (-math.inf, 0, 0.0)]
+    said = [
+        refusal(
+            unit, "fmi2SetupExperiment", 0, ctypes.c_double(0), ctypes.c_double(t), stop, ctypes.c_double(x)
+        )
+        for t, stop, x in times
+    ]
+    assert golden(said)
+    started(unit)
+
+
+def test_a_saved_failure_is_restored_as_one(unit, name):
+    if name == IN_C:
+        pytest.skip("components in C do not fail")
+    started(unit)
+    unit.step(0.0, H)
+    sound = unit.save()
+    assert unit.call("fmi2GetReal", (ctypes.c_uint * 1)(10**6), ctypes.c_size_t(1), (ctypes.c_double * 1)())
+    assert unit.try_step(H, H) == ERROR
+    broken = unit.save()
+    for state in (broken, unit.from_bytes(unit.to_bytes(broken))):
+        unit.restore(sound)
+        unit.step(H, H)
+        unit.restore(state)
+        assert unit.try_step(H, H) == ERROR
+    unit.restore(sound)
+    unit.step(H, H)
+
+
+def test_only_whole_states_of_the_same_fmu_are_deserialized(unit, fmu_of, name, runs_as):
+    started(unit)
+    content = unit.to_bytes(unit.save())
+    other = Unit(fmu_of("driver_sine" if name != "driver_sine" else "driver_ramp", runs_as))
+    foreign = other.to_bytes(other.save())
+    other.free()
+    middle = len(content) // 2
+    flipped = content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :]
+    said = []
+    for wrong in (
+        b"",
+        b"x",
+        content[:-1],
+        content + b"x",
+        content[8:],
+        flipped,
+        foreign,
+        bytes(len(content)),
+    ):
+        place = ctypes.c_void_p()
+        size = ctypes.c_size_t(len(wrong))
+        said.append(refusal(unit, "fmi2DeSerializeFMUstate", wrong, size, ctypes.byref(place)))
+        assert not place
+    assert golden(sorted(set(said)))
+    unit.restore(unit.from_bytes(content))
+    unit.step(0.0, H)
+
+
+def test_pointers_that_are_null_are_refused_with_a_sentence(unit):
+    refs, n = (ctypes.c_uint * 1)(0), ctypes.c_size_t(1)
+    state = unit.save()
+    calls = [
+        ("fmi2GetReal", None, n, (ctypes.c_double * 1)()),
+        ("fmi2GetReal", refs, n, None),
+        ("fmi2SetReal", None, n, (ctypes.c_double * 1)()),
+        ("fmi2SetReal", refs, n, None),
+        ("fmi2GetFMUstate", None),
+        ("fmi2SetFMUstate", None),
+        ("fmi2SerializedFMUstateSize", state, None),
+        ("fmi2SerializedFMUstateSize", None, ctypes.byref(ctypes.c_size_t())),
+        ("fmi2SerializeFMUstate", state, None, n),
+        ("fmi2SerializeFMUstate", None, (ctypes.c_char * 1)(), n),
+        ("fmi2SerializeFMUstate", state, (ctypes.c_char * 1)(), n),
+        ("fmi2DeSerializeFMUstate", None, n, ctypes.byref(ctypes.c_void_p())),
+        ("fmi2DeSerializeFMUstate", (ctypes.c_char * 1)(), n, None),
+        ("fmi2GetRealStatus", LAST_SUCCESSFUL_TIME, None),
+        ("fmi2SetDebugLogging", 1, n, None),
+    ]
+    assert golden([refusal(unit, *call) for call in calls])
+    assert unit.call("fmi2FreeFMUstate", None) == OK
+    unit.forget(state)
+    started(unit)
+    unit.step(0.0, H)
+
+
 @pytest.mark.parametrize("times", ["sums", "products", "whole nanoseconds", "single precision"])
 def test_times_that_hosts_round_are_taken(unit, times):
     third, n = 0.001 / 3, 400
