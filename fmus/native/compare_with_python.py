@@ -2,7 +2,8 @@
 
 Both run 2,000 steps at each of three step sizes, with inputs in their usual ranges, a hundredth and three
 times these ranges; with every choice of parameters and with changed parameters; with reset, a second start,
-saved, restored and serialized states; with parameters out of range and inputs that are not finite. Values,
+saved, restored and serialized states; with outputs read, and parameters changed, before initialization ends;
+from other start times; with parameters out of range and inputs that are not finite. Values,
 statuses and messages must be the same, except that for huge inputs a native library may refuse to compute an
 integer beyond 2^53. All NaNs are equal.
 """
@@ -28,8 +29,11 @@ LENGTHS = (0.001, 0.005, 0.02)
 """Step sizes [s]: those of plants, controllers and sensors."""
 FEW, FEWEST, IN_ALL = 100, 2, 3000
 """Steps per other value of a parameter, at most and at least, and approximate number for all values."""
+STARTS = (-1.0, 3600.0)
+"""Further start times [s]."""
 MANY = 60
 """Number of numeric parameters above which each is changed only once."""
+ALL_MOVED = "all parameters moved"
 LIMIT = 240
 """Largest processor time [s] of a comparison, since a wrongly translated loop may never end."""
 _LOGGER = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
@@ -165,11 +169,14 @@ class Twin:
     def step(self, t: float, h: float) -> Answer:
         return self._answer(self.instance.do_step(t, h))
 
-    def save(self) -> bytes:
-        return self.instance._fmu_state_to_bytes(self.instance._get_fmu_state())  # type: ignore[no-any-return]
+    def save(self) -> bytes | dict[str, Any]:
+        """Return the serialized state, or the state itself if it cannot be pickled (a function is in it)."""
+        state = self.instance._get_fmu_state()
+        return self.instance._fmu_state_to_bytes(state) or state  # type: ignore[no-any-return]
 
-    def restore(self, content: bytes) -> Answer:
-        self.instance._set_fmu_state(self.instance._fmu_state_from_bytes(content))
+    def restore(self, content: bytes | dict[str, Any]) -> Answer:
+        state = self.instance._fmu_state_from_bytes(content) if isinstance(content, bytes) else content
+        self.instance._set_fmu_state(state)
         return self._answer()
 
 
@@ -206,13 +213,30 @@ class _Beside:
                 return f"{name} is {a!r} natively, {b!r} in Python"
         return "values differ"
 
-    def start(self, chosen: Callable[[], None], t: float, inputs: Sequence[float]) -> bool:
-        """Reset both, set parameters, and start."""
+    def start(
+        self,
+        chosen: Callable[[], None],
+        t: float,
+        inputs: Sequence[float],
+        early: Iterator[list[float]] | None = None,
+    ) -> bool:
+        """Reset both, set parameters, and start; with `early` inputs, read outputs while initializing."""
         self.call("reset")
+        if early:
+            self._read_early(early)
         chosen()
         if inputs:
             self.call("set", "Real", self.of["input"], inputs)
-        return self.call("begin", t) and self.call("end_initialization") and self.outputs()
+        begun = self.call("begin", t)
+        if early:
+            self._read_early(early)
+        return begun and self.call("end_initialization") and self.outputs()
+
+    def _read_early(self, inputs: Iterator[list[float]]) -> None:
+        for _ in range(2):
+            if self.of["input"]:
+                self.call("set", "Real", self.of["input"], next(inputs))
+            self.outputs()
 
     def outputs(self) -> bool:
         return self.call("get", self.of["output"])
@@ -288,13 +312,24 @@ def compare(library: Path, guid: str, component: type[Any], resources: Path, ste
         beside.label = f"steps of {h:g} s: "
         if beside.start(unchanged, 0.0, first):
             t = beside.steps(steps, h, inputs, 0.0)
-            _restored(beside, inputs, h, t)
-    settings = list(_choices(beside, variables))
+            _restored(beside, inputs, h, t, FEW)
+    for start in STARTS:
+        beside.label = f"start at {start:g} s: "
+        if beside.start(unchanged, start, first):
+            beside.steps(FEW, LENGTHS[0], inputs, start)
+    settings = [*_choices(beside, variables), *_all_moved(beside, variables)]
     few = max(FEWEST, min(FEW, IN_ALL // max(len(settings), 1)))
     for label, choose in settings:
         beside.label = f"{label}: "
         if beside.start(choose, 0.25, next(inputs)):
-            beside.steps(few, random.Random(label).choice(LENGTHS), inputs, 0.25)
+            h = random.Random(label).choice(LENGTHS)
+            t = beside.steps(few, h, inputs, 0.25)
+            if label.startswith(ALL_MOVED):
+                _restored(beside, inputs, h, t, few, reset=True)
+    for label, choose in [("", unchanged), *_all_moved(beside, variables)][:2]:
+        beside.label = f"{label and label + ', '}outputs read before initialization ends: "
+        beside.start(choose, 0.25, next(inputs), inputs)
+        beside.steps(few, LENGTHS[0], inputs, 0.25)
     for i in beside.of["input"]:
         for value in (math.nan, math.inf, -math.inf, 1e300, -0.0):
             beside.label = f"{variables[i].name} = {value}: "
@@ -308,20 +343,25 @@ def compare(library: Path, guid: str, component: type[Any], resources: Path, ste
                 beside.extreme = False
 
 
-def _restored(beside: _Beside, inputs: Iterator[list[float]], h: float, t: float) -> None:
-    """Save both states, continue, restore and continue from there; then restart."""
+def _restored(
+    beside: _Beside, inputs: Iterator[list[float]], h: float, t: float, count: int, *, reset: bool = False
+) -> None:
+    """Save both states, continue, optionally reset, restore and continue from there."""
     kept = beside.native.save(), beside.twin.save()
-    beside.steps(FEW, h, inputs, t)
-    if not kept[1]:  # cannot be pickled, for instance because of a function in it
+    if not kept[1]:  # Python cannot copy it
+        beside.twin.messages.clear()
         return
+    beside.steps(count, h, inputs, t)
+    if reset:
+        beside.call("reset")
     if beside.native.restore(kept[0])[0] != beside.twin.restore(kept[1])[0]:
         raise Difference("a saved state is not restored")
     beside.outputs()
-    beside.steps(FEW, h, inputs, t)
+    beside.steps(count, h, inputs, t)
 
 
 def _choices(beside: _Beside, variables: Sequence[Any]) -> Iterator[tuple[str, Callable[[], None]]]:
-    """Yield settings of parameters: every choice, every number changed, and values out of range."""
+    """Yield settings of one parameter: every choice, every number changed, and values out of range."""
     many = len(beside.of["parameter"]) > MANY
     for i in beside.of["parameter"]:
         v = variables[i]
@@ -340,6 +380,10 @@ def _choices(beside: _Beside, variables: Sequence[Any]) -> Iterator[tuple[str, C
                 values += [x for x in (v.minimum, v.maximum) if x is not None and abs(x) < 1e30]
         for value in values:
             yield f"{v.name} = {value!r}", lambda i=i, k=v.type, x=value: beside.call("set", k, [i], [x])  # type: ignore
+
+
+def _all_moved(beside: _Beside, variables: Sequence[Any]) -> Iterator[tuple[str, Callable[[], None]]]:
+    """Yield settings of all parameters at once, at random near their defaults."""
     reals = [i for i in beside.of["parameter"] if variables[i].type == "Real"]
     others = [i for i in beside.of["parameter"] if variables[i].choices or variables[i].type == "Boolean"]
     for k in range(20):
@@ -354,7 +398,7 @@ def _choices(beside: _Beside, variables: Sequence[Any]) -> Iterator[tuple[str, C
                 v = variables[i]
                 beside.call("set", v.type, [i], [own.choice(v.choices or (True, False))])
 
-        yield f"all parameters moved, {k}", choose
+        yield f"{ALL_MOVED}, {k}", choose
 
 
 def differences(library: Path, guid: str, component: type[Any], resources: Path, limit: int = LIMIT) -> str:

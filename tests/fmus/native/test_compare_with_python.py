@@ -82,3 +82,21 @@ def test_what_does_not_get_through_is_not_packed(tmp_path, monkeypatch):
         again = build.native(component, home, source="small.py", guid="{a}", resources=home.parent)
     assert made.files == {} and made == again
     assert golden(made.why_not)
+
+
+@pytest.mark.parametrize("law", ["count", "attribute", "list", "branch", "later"])
+def test_what_a_start_leaves_to_the_next_start_is_found_out(law, tmp_path):
+    bodies = {
+        "count": "def configure(self):\n    self.n = 0\ndef start(self, t, u):\n    self.n += 1\n",
+        "attribute": "n = 0\ndef start(self, t, u):\n    self.n += 1\n",
+        "list": "def configure(self):\n    self.a = [0.0]\ndef start(self, t, u):\n    self.a[0] += 1\n"
+        "    self.n = self.a[0]\n",
+        "branch": "def start(self, t, u):\n    self.n = getattr(self, 'n', 0.0) + 1.0\n",
+        "later": "def start(self, t, u):\n    self.n = 0\n    if t < 3000.0:\n        self.m = 1\n"
+        "def advance(self, t, h, u):\n    self.n += getattr(self, 'm', 5)\n",
+    }
+    body = bodies[law] + "def output(self, t, u):\n    return (u[0] + self.n,)\n"
+    with component_of(source(body), tmp_path) as (component, home):
+        library = compiled(emit(specialise(component, home), "small.py", "{a}"), tmp_path)
+        found = differences(library, "{a}", component, home.parent)
+    assert found.startswith("start at 3600 s: " if law == "later" else "outputs read before")
