@@ -105,6 +105,7 @@ class PythonRecipe:
                 source="/".join(module) + ".py",
                 guid=description.get("guid", ""),
                 resources=stage.folder,
+                read=stage.read,
                 hurry=hurry,
             )
         packed |= library.files

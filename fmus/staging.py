@@ -8,13 +8,16 @@ The build imports the component, because its class creates the model description
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 import tempfile
 import traceback
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
+from types import FrameType
 from typing import Any
 from xml.etree.ElementTree import Element
 
@@ -98,10 +101,15 @@ def isolated_modules(*packages: str) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class StagingFolder:
-    """Temporary folder with the package of a component, see `staged`."""
+    """Temporary folder with the package of a component, see `staged`.
+
+    Attributes:
+        read: files outside that the package opened when it was imported, each with file and line in it.
+    """
 
     folder: Path
     package: str
+    read: list[tuple[str, str]] = field(default_factory=list)
 
     def component(self, module: Parts) -> type[Any]:
         """Return the component class defined in a module of the package.
@@ -112,7 +120,8 @@ class StagingFolder:
         name = f"{self.package}.{'.'.join(module)}"
         try:
             base = importlib.import_module(f"{self.package}.fmi.component").Component
-            loaded = importlib.import_module(name)
+            with _noting_files(self):
+                loaded = importlib.import_module(name)
         except (Exception, SystemExit) as error:
             raise BuildError(self.explain(error)) from None
         classes = [
@@ -150,6 +159,42 @@ class StagingFolder:
                 if shown not in _MACHINERY:
                     where = f" ({shown}:{frame.lineno})"
         return f"{type(error).__name__}: {error}{where}"
+
+
+_watched: list[StagingFolder] = []
+"""The folder whose imports are watched, if any."""
+
+
+@cache
+def _watch() -> None:
+    """Install the audit hook, which cannot be removed."""
+    sys.addaudithook(_note_file)
+
+
+def _note_file(event: str, args: tuple[Any, ...]) -> None:
+    """Note a file that a watched package opens."""
+    if event != "open" or not _watched or not isinstance(args[0], (str, bytes)):
+        return
+    stage = _watched[-1]
+    package = os.path.join(stage.folder, stage.package, "")
+    opened = os.path.abspath(os.fsdecode(args[0]))
+    frame: FrameType | None = sys._getframe(1)
+    while frame is not None and "importlib._bootstrap" not in frame.f_code.co_filename:
+        file = frame.f_code.co_filename
+        if file.startswith(package) and not opened.startswith(package):
+            stage.read.append((opened, f"{file[len(package) :].replace(os.sep, '/')}:{frame.f_lineno}"))
+            return
+        frame = frame.f_back
+
+
+@contextmanager
+def _noting_files(stage: StagingFolder) -> Iterator[None]:
+    _watch()
+    _watched.append(stage)
+    try:
+        yield
+    finally:
+        _watched.pop()
 
 
 _MACHINERY = ("fmi/component.py", "fmi/variables.py")

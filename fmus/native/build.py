@@ -14,6 +14,7 @@ import platform
 import shutil
 import sys
 import tempfile
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cache
@@ -49,6 +50,9 @@ EFFORTS = "efforts"
 """Folder of the processor times of builds of native libraries, in the cache."""
 LONGEST = 3.0
 """Processor time [s] above which a run does not wait for a native library; chosen: runs start within 3 s."""
+MOST_TEXT, MOST_IN_HURRY = 2_000_000, 200_000
+"""Largest number of characters in C of a component, and of one that a run waits for if it was never built;
+chosen: the longest of this project's has 0.9 million, those from 0.2 million on take more than `LONGEST`."""
 LATER = "its native library takes longer than a run should wait; 'yawbench build' makes it"
 
 
@@ -59,10 +63,12 @@ class Native:
     Attributes:
         files: path in the archive -> content.
         why_not: reason if there are none, else "".
+        new: whether they were compiled, and not in the cache.
     """
 
     files: dict[str, bytes] = field(default_factory=dict)
     why_not: str = ""
+    new: bool = field(default=False, compare=False)
 
 
 def tools() -> list[str]:
@@ -106,6 +112,7 @@ def native(
     resources: Path,
     translated: type[Any] | None = None,
     unnamed: Path | None = None,
+    read: Sequence[tuple[str, str]] = (),
     hurry: bool = False,
     limit: int = compare_with_python.LIMIT,
 ) -> Native:
@@ -119,7 +126,8 @@ def native(
         resources: folder passed to an instance.
         translated: equivalent class for the translator; default: the component.
         unnamed: a file whose lines are not mentioned in the reason.
-        hurry: postpone the build if the last one took longer than `LONGEST`.
+        read: files that its modules read when they are imported, with file and line.
+        hurry: postpone the build if the last one took longer than `LONGEST`, or this one will.
         limit: largest processor time [s] of the comparison.
     """
     if sys.platform != "linux" or platform.machine() != "x86_64":
@@ -127,12 +135,19 @@ def native(
     try:
         compiler_version(compiler_command())
         entry = hashlib.sha256(component.fmu_name.encode()).hexdigest()
-        if hurry and float(recall(EFFORTS, entry) or 0.0) > LONGEST:
+        effort = recall(EFFORTS, entry)
+        if hurry and float(effort or 0.0) > LONGEST:
             return Native(why_not=LATER)
+        for opened, where in read:
+            raise Refused(f"{opened} is read at every import, and may change after the build", where)
         began = _processor_time()
         text = emit(specialise(translated or component, home, *others, unnamed=unnamed), source, guid)
-        made, new = _let_through(text, component, guid, resources, limit)
-        if new:
+        if len(text) > MOST_TEXT:
+            raise Refused(f"its translation to C is too long ({len(text) / 1e6:.1f} million characters)")
+        if hurry and effort is None and len(text) > MOST_IN_HURRY:
+            return Native(why_not=LATER)
+        made = _let_through(text, component, guid, resources, limit, hurry)
+        if made.new:
             keep(EFFORTS, entry, str(_processor_time() - began).encode())
         return made
     except Refused as refused:
@@ -148,9 +163,9 @@ def _processor_time() -> float:
 
 
 def _let_through(
-    text: str, component: type[Any], guid: str, resources: Path, limit: int
-) -> tuple[Native, bool]:
-    """Return the cached result for a C text, or compile and compare it; and whether it was compiled."""
+    text: str, component: type[Any], guid: str, resources: Path, limit: int, hurry: bool
+) -> Native:
+    """Return the cached result for a C text, or compile and compare it."""
     key = hashlib.sha256(f"{text}{_comparison()}{limit}".encode()).hexdigest()[:32]
     kept = recall(STORE, key)
     if kept is not None:
@@ -159,12 +174,17 @@ def _let_through(
         files = {}
         for path, size in record["files"]:
             files[path], rest = rest[:size], rest[size:]
-        return Native(files, record["why_not"]), False
-    made = _made(text, component, guid, resources, limit)
+        return Native(files, record["why_not"])
+    try:
+        made = _made(text, component, guid, resources, min(limit, int(LONGEST)) if hurry else limit)
+    except TimeoutError as error:
+        if hurry:
+            return Native(why_not=LATER, new=True)
+        made = Native(why_not=str(error), new=True)
     header = {"files": [[path, len(data)] for path, data in made.files.items()], "why_not": made.why_not}
     head = json.dumps(header).encode()
     keep(STORE, key, len(head).to_bytes(8, "little") + head + b"".join(made.files.values()))
-    return made, True
+    return made
 
 
 def _made(text: str, component: type[Any], guid: str, resources: Path, limit: int) -> Native:
@@ -182,10 +202,7 @@ def _made(text: str, component: type[Any], guid: str, resources: Path, limit: in
     with tempfile.TemporaryDirectory(prefix="yawbench_") as folder:
         library = Path(folder, f"{name}.so")
         library.write_bytes(files[f"binaries/linux64/{NATIVE_LIBRARY}"])
-        try:
-            difference = compare_with_python.differences(library, guid, component, resources, limit)
-        except TimeoutError as error:
-            return Native(why_not=str(error))
+        difference = compare_with_python.differences(library, guid, component, resources, limit)
     if difference:
-        return Native(why_not=f"the translation is not the same as Python: {difference}")
-    return Native(files)
+        return Native(why_not=f"the translation is not the same as Python: {difference}", new=True)
+    return Native(files, new=True)

@@ -32,6 +32,8 @@ CAN_OVERFLOW = ("exp", "expm1", "sinh", "cosh")
 ALWAYS_DEFINED = ("atan", "atan2", "tanh", "fabs", "copysign", "floor", "ceil", "trunc")
 DOMAIN = ("sqrt", "sin", "cos", "tan", "asin", "acos", "log", "log1p", "log10", "fmod")
 FUNCTIONS = (*CAN_OVERFLOW, *ALWAYS_DEFINED, *DOMAIN)
+MOST_OPERATIONS = 200_000
+"""Largest number of operations of an evaluated function; chosen: twice those of the sensors, the most."""
 
 
 def complaint(call: Callable[[], Any]) -> tuple[str, str]:
@@ -140,6 +142,8 @@ class Lowering:
     def new(self, type: str) -> ir.Var:
         """Return a new variable."""
         self._count += 1
+        if self._count > MOST_OPERATIONS:
+            raise Refused(f"more than {MOST_OPERATIONS:,} operations in a function")
         return ir.Var(f"{type[0]}{self._count}", type)
 
     def let(self, type: str, op: str, *operands: ir.Operand) -> ir.Var:

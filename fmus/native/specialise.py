@@ -23,6 +23,8 @@ from .values import Instance, List, Refused, Union, Unreachable, is_mixed, is_nu
 
 WIDEST = 40
 """Largest number of evaluations of a step until the shape of the state converges."""
+MOST_NUMBERS = 5000
+"""Largest number of numbers in a state of fixed shape; chosen: each is a variable in C."""
 STACK = 512 * 1024 * 1024
 """Stack of the translating thread [bytes], since nested calls are evaluated by nested calls."""
 
@@ -98,10 +100,19 @@ def _refuse_replaced_life_cycle(component: type[Any], home: Path) -> None:
                 raise Refused(f"{cls.__name__} replaces {name} of the base class", f"{place}:{line}")
 
 
+class _Covered(Exception):
+    """Constants of the class that are covered by attributes, which have their values until they are set."""
+
+    def __init__(self, values: dict[str, Any]) -> None:
+        super().__init__()
+        self.values = values
+
+
 class _Specialising:
     def __init__(self, component: type[Any], sources: Sources) -> None:
         self.component, self.sources = component, sources
         self.growing: dict[str, Growing] = {}
+        self.covered: dict[str, Any] = {}
         self.reads: dict[ir.Var, str] = {}
         self.domains: dict[ir.Var, frozenset[int]] = {}
         of = {
@@ -139,6 +150,8 @@ class _Specialising:
                 return self._attempt()
             except Promote as promoted:  # noqa: PERF203 - each attempt follows from the last
                 self._grow(promoted)
+            except _Covered as covered:
+                self.covered |= covered.values
         raise Refused("too many lists whose length changes")
 
     def _grow(self, promoted: Promote) -> None:
@@ -157,7 +170,7 @@ class _Specialising:
         program = Program(self.component.variables, reads=dict(self.reads))
         fixed = self.fixed
         self.libraries = Library(), Library()
-        me, machine = self._run("configure", {})
+        me, machine = self._run("configure", dict(self.covered))
         configured = self._shape(me, fixed)
         program.functions["configure"] = ir.Function(
             machine.out, _placed("c->c", self._numbers(configured, me, machine, "configure"))
@@ -170,6 +183,9 @@ class _Specialising:
         at_start = me
         for _ in range(WIDEST):
             program.state = list(types_of(state))
+            if len(program.state) > MOST_NUMBERS:
+                text = f"a state of {len(program.state)} numbers; at most {MOST_NUMBERS} are translated"
+                raise Refused(text, self._line_of("start"))
             leaves = self._leaves(program, program.state, "s")
             args = self.t, self.h, List(self.inputs)
             me, advanced = self._run("advance", self._attributes(state, leaves), *args)
@@ -224,6 +240,13 @@ class _Specialising:
             self.returned = machine.call(machine.attribute(me, method), list(args), {})
         except Unreachable:
             raise Refused(f"{method}() fails for all inputs", self._line_of(method)) from None
+        values = {
+            name: value
+            for name in me.slots.keys() - attributes.keys() - {"p"}
+            if isinstance(value := getattr(self.component, name, ...), (int, float, str, type(None)))
+        }
+        if not values.keys() <= self.covered.keys():
+            raise _Covered(values)
         return me, machine
 
     def _shape(self, me: Instance, fixed: set[ir.Var]) -> Shape:

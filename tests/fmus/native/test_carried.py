@@ -108,6 +108,23 @@ def test_what_is_not_translated_runs_in_python_and_says_why(tmp_path):
     assert asked(made)[1:] == [False, True]
 
 
+def test_a_component_that_reads_a_file_when_it_is_imported_runs_in_python(tmp_path):
+    folder = tmp_path / "controllers"
+    folder.mkdir()
+    data = tmp_path / "gain.txt"
+    data.write_text("2.0")
+    file = folder / "controller_law.py"
+    law = LAW.replace("BODY", "GAIN * (u[0] - u[1])")
+    file.write_text(law.replace("\n\n\n", f"\n\nGAIN = float(open({str(data)!r}).read())\n\n\n", 1))
+    line = next(k for k, text in enumerate(file.read_text().splitlines(), 1) if text.startswith("GAIN"))
+    made = build_component(file, folder)
+    where = f"(controllers/controller_law.py:{line})"
+    assert runs_as(made) == RunsAs(f"{data} is read at every import, and may change after the build {where}")
+    before = asked(made)
+    data.write_text("4.0")
+    assert asked(made)[0] == 2.0 * before[0]
+
+
 @pytest.mark.parametrize("kind", ["controller", "driver", "plant", "reference", "road", "tyre"])
 @pytest.mark.sampled(2)
 def test_what_yawbench_new_writes_is_native(kind, tmp_path):

@@ -100,3 +100,29 @@ def test_what_a_start_leaves_to_the_next_start_is_found_out(law, tmp_path):
         library = compiled(emit(specialise(component, home), "small.py", "{a}"), tmp_path)
         found = differences(library, "{a}", component, home.parent)
     assert found.startswith("start at 3600 s: " if law == "later" else "outputs read before")
+
+
+@pytest.mark.parametrize("slow", ["by its length", "by its comparison"])
+def test_a_run_waits_neither_for_a_long_translation_nor_for_a_long_comparison(slow, tmp_path, monkeypatch):
+    monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "cache"))
+    asked = []
+
+    def too_long(*args):
+        asked.append(args[-1])
+        raise TimeoutError("it takes long")
+
+    if slow == "by its length":
+        monkeypatch.setattr(build, "MOST_IN_HURRY", 1000)
+    else:
+        monkeypatch.setattr(build.compare_with_python, "differences", too_long)
+    with component_of(source(LAW), tmp_path) as (component, home):
+
+        def made(hurry: bool) -> build.Native:
+            given = {"source": "small.py", "guid": "{a}", "resources": home.parent}
+            return build.native(component, home, hurry=hurry, **given)
+
+        assert made(hurry=True).why_not == build.LATER
+        assert asked == ([] if slow == "by its length" else [int(build.LONGEST)])
+        assert made(hurry=True).why_not == build.LATER  # by now its effort is known, or still expected
+        later = made(hurry=False)
+    assert later.why_not == ("" if slow == "by its length" else "it takes long")

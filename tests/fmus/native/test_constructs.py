@@ -56,6 +56,17 @@ def output(self, t, u):
     factor = u[1]
     return (self.n + sum(late) + any(math.sqrt(x + 4.0) > 2.05 for x in u),)
 """,
+    "constants of the class that attributes cover": """
+total, on, name, never = 0.5, False, "low", 3
+def start(self, t, u):
+    self.on = u[0] > 0.5
+def advance(self, t, h, u):
+    self.total += h * u[0]
+    if u[1] > 0.9:
+        self.name = "high"
+def output(self, t, u):
+    return (self.total + self.on + 10.0 * (self.name == "high") + self.never,)
+""",
     "a list made longer in place": """
 def output(self, t, u):
     a = [u[0]]

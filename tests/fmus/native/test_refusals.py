@@ -53,6 +53,13 @@ REFUSED = {
         "an object with two names is changed",
         3,
     ),
+    "a state of very many numbers": (
+        "def start(self, t, u):\n    self.a = [0.0] * 6000\n"
+        "def advance(self, t, h, u):\n    self.a[int(t / h) % 6000] = u[0]\n"
+        "def output(self, t, u):\n    return (self.a[17],)",
+        "a state of 6000 numbers; at most 5000 are translated",
+        1,
+    ),
     "an iterator used up": (
         "def output(self, t, u):\n    z = zip(u, u)\n    a = list(z)\n    return (len(a) + len(list(z)),)",
         "an iterator that is used twice",
