@@ -35,6 +35,7 @@ Kind = IntEnum(
 """Kinds of operations; CALL: only Python can do it."""
 Answer = IntEnum("Answer", "FINISHED INTERRUPTED PYTHON STATUS NOT_FINITE COPIED PAUSED", start=0)
 """Reasons for a walk's return; STATUS: a call's status needs attention; COPIED: a copy made by `fork`."""
+_ANSWERS = tuple(Answer)  # by number: five times as quick as `Answer(number)`, in every step with a fault
 
 
 class OperationData(ctypes.Structure):
@@ -141,6 +142,7 @@ class CompiledLoop:
             stop=_address_of(stop),
             pause=PAUSE,
         )
+        self._reference = ctypes.byref(self._run)
         self._kept: list[Any] = [pool, clocks, moving, recorded, reached, stop]
         self._programs: dict[int, tuple[Sequence[Any], Any]] = {}  # phase -> operations, and as plain data
         library.begin_process()
@@ -209,7 +211,7 @@ class CompiledLoop:
     def walk(self, end: int) -> Answer:
         """Step to a communication point, or until Python is needed."""
         self._run.end = end
-        return Answer(self._walk(ctypes.byref(self._run)))
+        return _ANSWERS[self._walk(self._reference)]
 
     def pass_operation(self) -> None:
         """Go on behind the current operation: Python has seen to it."""

@@ -92,8 +92,7 @@ def units_of(plan: Plan) -> dict[str, str | None]:
 
 def connections_of(plan: Plan) -> list[ConnectionRecord]:
     """Return the wires of a plan: source, target, and the conversion if there is one."""
-    instances = {instance.name: instance for instance in plan.instances}
-    return [_connection(wire, instances) for wire in plan.wires]
+    return [*_WIRES.of(plan)[0]]
 
 
 def faults_of(plan: Plan) -> list[FaultRecord]:
@@ -197,7 +196,7 @@ def key_of(plan: Plan, also: Any = None) -> str:
         "series": [
             [u.name, name, s.sha256, s.column, s.held] for u in plan.instances for name, s in u.series.items()
         ],
-        "wires": _WIRES.of(plan),
+        "wires": _WIRES.of(plan)[1],
         "faults": [list(astuple(signal)) for signal in plan.faults],
         "record": plan.record,
         "time": [str(plan.start), str(plan.step), plan.n_steps],
@@ -207,24 +206,26 @@ def key_of(plan: Plan, also: Any = None) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
 
 
-class _Described:
-    """The wires of a plan as in keys, kept for the next plan, which often has the same."""
+class _DescribedWires:
+    """The wires of a plan as in records and in keys, kept for the next plan, which often has the same."""
 
     def __init__(self) -> None:
         self._wires: tuple[Wire, ...] = ()
         self._fmus: list[Fmu] = []
-        self._described: list[dict[str, Any]] = []
+        self._described: tuple[list[ConnectionRecord], list[dict[str, Any]]] = [], []
 
-    def of(self, plan: Plan) -> list[dict[str, Any]]:
+    def of(self, plan: Plan) -> tuple[list[ConnectionRecord], list[dict[str, Any]]]:
         fmus = [instance.fmu for instance in plan.instances]
-        if not (plan.wires is self._wires and all(map(is_, fmus, self._fmus))):
+        same = len(fmus) == len(self._fmus) and all(map(is_, fmus, self._fmus))
+        if not (same and plan.wires == self._wires):
             self._wires, self._fmus = plan.wires, fmus
-            records = connections_of(plan)
-            self._described = [wire.model_dump(by_alias=True, exclude_unset=True) for wire in records]
+            instances = {instance.name: instance for instance in plan.instances}
+            records = [_connection(wire, instances) for wire in plan.wires]
+            self._described = records, [wire.model_dump(by_alias=True, exclude_unset=True) for wire in records]
         return self._described
 
 
-_WIRES = _Described()
+_WIRES = _DescribedWires()
 
 COMPARED = {
     "algorithm": "the algorithm has changed",
