@@ -104,6 +104,22 @@ Disturbance = Callable[[float, float], float]
 
 
 @dataclass(frozen=True)
+class LinearDisturbance:
+    """A disturbance x * gain + offset while begin <= t < end; the compiled loop makes it by itself, too.
+
+    The offset of a mere gain is -0.0, which preserves every number, even the sign of zero.
+    """
+
+    begin: float  # [s]
+    end: float  # [s]
+    gain: float
+    offset: float
+
+    def __call__(self, t: float, x: float) -> float:
+        return x * self.gain + self.offset if self.begin <= t < self.end else x
+
+
+@dataclass(frozen=True)
 class FaultKind:
     """A kind of fault: its effect on a signal x, and its options."""
 
@@ -123,6 +139,15 @@ class FaultKind:
 def _value(signal: FaultySignal) -> float:
     assert signal.value is not None  # required by the kind
     return signal.value
+
+
+def _linear(
+    parts: Callable[[float], tuple[float, float]],
+) -> Callable[[FaultySignal, bool], Disturbance]:
+    """Return the disturbance of a linear kind; `parts` returns gain and offset for the fault's value."""
+    return lambda signal, held: LinearDisturbance(
+        signal.fault.begin, signal.fault.end, *parts(_value(signal))
+    )
 
 
 def _changing(change: Callable[[float, float], float]) -> Callable[[FaultySignal, bool], Disturbance]:
@@ -260,8 +285,8 @@ FaultName = Literal[
 """Names of the kinds, for type checkers and editors."""
 
 KINDS: dict[str, FaultKind] = {
-    "bias": FaultKind("x + value", _changing(lambda x, value: x + value), "{x}"),
-    "gain": FaultKind("x * value", _changing(lambda x, value: x * value), "1"),
+    "bias": FaultKind("x + value", _linear(lambda value: (1.0, value)), "{x}"),
+    "gain": FaultKind("x * value", _linear(lambda value: (value, -0.0)), "1"),
     "drift": FaultKind("x + value * (time since the fault began)", _drift, "{x}/s"),
     "noise": FaultKind(
         "x + value * normally distributed numbers, a new one every message",
@@ -282,7 +307,7 @@ KINDS: dict[str, FaultKind] = {
     ),
     "loss": FaultKind(
         "of an actuator: x without this part of it, by default nothing is left",
-        _changing(lambda x, value: x * (1.0 - value)), "1", 1.0, least=0, most=1,
+        _linear(lambda value: (1.0 - value, -0.0)), "1", 1.0, least=0, most=1,
     ),
     "stuck": FaultKind(
         "of an actuator: value, by default the x at which the fault began", _stuck, "{x}", needs=False

@@ -2,11 +2,11 @@
 
 An operation of a step program is described by `OperationData`: which C function with which arguments, which
 indices of the pool, which weights. `step_loop.c` walks these for a block of rows and returns to Python only
-for what it cannot do (a fault, a value that is not Real, an instance in another process), for a status other
-than OK, an output that is not finite, a stop request, and every `PAUSE`, so that Python's signal handlers get
-their turn. The master sees to it with the code of its own loop and has the walk go on, so that both loops
-give the same numbers and sentences. Without a compiler, and if `YAWBENCH_LOOP` is `python`, the master's loop
-in Python makes the run.
+for what it cannot do (a fault that is not linear, a value that is not Real, an instance in another process),
+for a status other than OK, an output that is not finite, a stop request, and every `PAUSE`, so that Python's
+signal handlers get their turn. The master sees to it with the code of its own loop and has the walk go on, so
+that both loops give the same numbers and sentences. Without a compiler, and if `YAWBENCH_LOOP` is `python`,
+the master's loop in Python makes the run.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ EXACT = 2**53
 
 Kind = IntEnum(
     "Kind",
-    "END CALL COPY BLEND CONVERT SERIES EXCHANGE_2 EXCHANGE_3 STEP_2 STEP_3",
+    "END CALL COPY BLEND CONVERT SERIES DISTURB EXCHANGE_2 EXCHANGE_3 STEP_2 STEP_3",
     start=0,
 )
 """Kinds of operations; CALL: only Python can do it."""
@@ -48,6 +48,7 @@ class OperationData(ctypes.Structure):
         ("n_references", ctypes.c_int64),
         *((name, ctypes.c_void_p) for name in ("values", "first", "second", "factors", "terms")),
         *((name, ctypes.c_void_p) for name in ("time", "size", "answers", "row")),
+        *((name, ctypes.c_int64) for name in ("further", "scale")),
     ]
 
     def __init__(self, kind: Kind = Kind.CALL, count: int = 0, **fields: Any) -> None:

@@ -30,10 +30,11 @@ import numpy as np
 
 from ..coupling_algorithms import ALGORITHMS, WireTiming
 from ..errors import SimulationError
-from ..fault_kinds import KINDS, Disturbance
+from ..fault_kinds import KINDS, Disturbance, LinearDisturbance
 from ..fmu.description import integer_limits
 from ..messages import listed
 from ..plan import Instance, Plan, Value, Variable, Wire
+from .compiled_loop import Kind, OperationData
 from .instance import FmuInstance, Status, StepCalls
 from .process_state import OK
 
@@ -334,6 +335,7 @@ class FaultInjector:
         self._at = [(i, begin + ahead * half, disturb) for i, ahead, disturb in at]
         self._further = 2 * period * half
         self._scale = scale
+        self._longest = 2 * plan.n_steps * half
 
     def begin(self, values: np.ndarray) -> None:
         """Disturb values at the start of the run."""
@@ -353,6 +355,24 @@ class FaultInjector:
             return OK
 
         return act
+
+    def data(self, values: np.ndarray) -> OperationData | None:
+        """Return the same for the compiled loop; None if only Python can make one of the disturbances."""
+        linear = [disturb for _, _, disturb in self._at if isinstance(disturb, LinearDisturbance)]
+        latest = max(abs(first) + self._longest for _, first, _ in self._at)
+        if len(linear) < len(self._at) or max(latest, self._further, self._scale) >= EXACT:
+            return None
+        return OperationData(
+            Kind.DISTURB,
+            len(linear),
+            values=values,
+            first=np.array([i for i, _, _ in self._at], np.int64),
+            second=np.array([first for _, first, _ in self._at], np.int64),
+            factors=np.array([(fault.begin, fault.end, fault.gain, fault.offset) for fault in linear]),
+            row=ctypes.c_int64(0),
+            further=self._further,
+            scale=self._scale,
+        )
 
 
 def faulting(signals: SignalPool, s: InstanceSlot, *, of_output: bool) -> FaultInjector | None:

@@ -10,7 +10,7 @@
 #include <stdint.h>
 #include <time.h>
 
-enum kind { END, CALL, COPY, BLEND, CONVERT, SERIES, EXCHANGE_2, EXCHANGE_3, STEP_2, STEP_3 };
+enum kind { END, CALL, COPY, BLEND, CONVERT, SERIES, DISTURB, EXCHANGE_2, EXCHANGE_3, STEP_2, STEP_3 };
 
 enum answer { FINISHED, INTERRUPTED, PYTHON, STATUS, NOT_FINITE, COPIED, PAUSED };
 
@@ -31,7 +31,8 @@ struct operation {
     const double *factors, *terms;  /* gains and offsets, or weights of two samples */
     const double *time, *size;      /* of a step */
     struct step_answers *answers;
-    int64_t *row;                   /* of a series: the next one */
+    int64_t *row;                   /* of a series: the next one; of faults: the time passed, over `scale` */
+    int64_t further, scale;         /* of faults: time of a step, over `scale` */
 };
 
 struct clock {
@@ -126,6 +127,19 @@ static void feed(double *pool, const struct operation *op)
     ++*op->row;
 }
 
+/* Faults, each with its begin, end, gain and offset. */
+static void disturb(const struct operation *op)
+{
+    for (int64_t i = 0; i < op->count; i++) {
+        const double *fault = op->factors + 4 * i;
+        const double time = (double)(op->second[i] + *op->row) / (double)op->scale;
+        double *value = op->values + op->first[i];
+        if (fault[0] <= time && time < fault[1])
+            *value = *value * fault[2] + fault[3];
+    }
+    *op->row += op->further;
+}
+
 static int exchange(const struct operation *op)
 {
     if (op->kind == EXCHANGE_2)
@@ -162,6 +176,9 @@ static enum answer work(struct run *run)
             if (*op->row == op->n_references)
                 return PYTHON;  /* the next rows are to be sampled */
             feed(run->pool, op);
+            continue;
+        case DISTURB:
+            disturb(op);
             continue;
         case EXCHANGE_2:
         case EXCHANGE_3:

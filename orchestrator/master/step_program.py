@@ -272,7 +272,7 @@ def _converting(s: InstanceSlot) -> list[Operation]:
 
 def _acting(s: InstanceSlot, faults: FaultInjector | None, values: np.ndarray) -> list[Operation]:
     """Return the operation, if any, that applies faults to outputs or inputs; all programs share it."""
-    return [] if faults is None else [Operation(s.name, "fault", faults.acting(values))]
+    return [] if faults is None else [Operation(s.name, "fault", faults.acting(values), faults.data(values))]
 
 
 def _keeping_outputs(m: SignalPool, s: InstanceSlot) -> Operation:

@@ -221,7 +221,10 @@ class _DescribedWires:
             self._wires, self._fmus = plan.wires, fmus
             instances = {instance.name: instance for instance in plan.instances}
             records = [_connection(wire, instances) for wire in plan.wires]
-            self._described = records, [wire.model_dump(by_alias=True, exclude_unset=True) for wire in records]
+            self._described = (
+                records,
+                [wire.model_dump(by_alias=True, exclude_unset=True) for wire in records],
+            )
         return self._described
 
 

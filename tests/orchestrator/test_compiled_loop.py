@@ -109,7 +109,16 @@ def test_a_published_scenario_gives_the_same_bytes(both, fmus, name):
     assert (status, record["status"]) == (0, "completed"), said
 
 
-@pytest.mark.parametrize("fault", ["plant.sideslip: noise 0.01", "plant.sideslip -> controller: delay 50 ms"])
+@pytest.mark.parametrize(
+    "fault",
+    [
+        "plant.sideslip: noise 0.01",
+        "plant.sideslip -> controller: delay 50 ms",
+        "plant.sideslip: bias 0.01 from 0.5 until 1",
+        "plant.sideslip -> controller: gain -0.3 from 1; bias 0.002 until 1.5",
+        "wheel_control.torque_request_fl: loss 0.4; saturation 50",
+    ],
+)
 def test_a_fault_acts_alike_in_both_loops(both, fmus, fault):
     given = "--fmus", fmus, "--set", "stop_time=2", "--fault", fault
     status, said, _ = both("fnn_sideslip/25mps", *given)

@@ -232,12 +232,26 @@ def test_the_record_says_what_was_faulty_and_results_are_known_to_be_of_another_
 
 
 def operations(faults, algorithm):
+    return [(op.instance, op.kind) for op in program(faults, algorithm)]
+
+
+def program(faults, algorithm):
     units = {"source": Clock(x=signal), "target": Witness()}
     made = make_plan(units, WIRES, algorithm=algorithm, faults=faults)
     stage = Stage(units)
     log = Log()
     slaves = {unit.name: stage(unit, log, set()) for unit in made.instances}
-    return [(op.instance, op.kind) for op in Master(made, slaves, log, StopFlag()).program.at(1)]
+    return Master(made, slaves, log, StopFlag()).program.at(1)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "compiled"),
+    [(["bias"], True), (["gain", "loss"], True), (["freeze"], False), (["bias", "saturation"], False)],
+)
+def test_the_compiled_loop_makes_faults_by_itself_if_all_of_a_unit_are_linear(kinds, compiled):
+    faults = [faulty(kind, of_output=True, value=0.5) for kind in kinds]
+    made = [op for op in program(faults, "jacobi") if op.kind == "fault"]
+    assert [op.data is not None for op in made] == [compiled]
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
