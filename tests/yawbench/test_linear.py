@@ -25,8 +25,12 @@ def dynamic(base):
 SHOWN = ["reference.sideslip_ref", "reference.yaw_rate_ref"]
 
 
-def test_the_single_track_model_has_its_closed_form(dynamic):
-    model = yb.linearize(dynamic, at=AT, inputs=["driver.steer_angle"], outputs=SHOWN)
+@pytest.fixture(scope="module")
+def model(dynamic):
+    return yb.linearize(dynamic, at=AT, inputs=["driver.steer_angle"], outputs=SHOWN)
+
+
+def test_the_single_track_model_has_its_closed_form(dynamic, model):
     unit = next(unit for unit in dynamic.plan().instances if unit.name == "reference")
     names = ("cg_to_front_axle", "cg_to_rear_axle", "cornering_stiffness_front", "cornering_stiffness_rear")
     car = SingleTrackCar(*(float(unit.parameter(name)) for name in ("mass", "yaw_inertia", *names)))
@@ -50,12 +54,13 @@ def test_the_14_dof_model_has_the_step_response_of_its_run():
     runs = [
         car.fault("driver.steer_angle", kind="bias", value=way * STEP, start=at).run() for way in (1.0, -1.0)
     ]
+    # the master takes the steer angle in a line from one sample to the next: half a step early
+    t = (np.arange(round(1.0 / 1e-3) - round(at / 1e-3)) + 1.5) * 1e-3
+    held = np.array([expm(model.A * end) - np.eye(len(model.A)) for end in t])
+    states = np.linalg.solve(model.A, held @ model.B)[:, :, 0].T
     for name, c, d in zip(outputs, model.C, model.D[:, 0], strict=True):
         moved = ((runs[0][name] - runs[1][name]) / (2.0 * STEP))[round(at / 1e-3) + 1 :]
-        # the master takes the steer angle in a line from one sample to the next: half a step early
-        t = np.arange(len(moved)) * 1e-3 + 1.5e-3
-        held = np.array([expm(model.A * end) - np.eye(len(model.A)) for end in t])
-        response = c @ np.linalg.solve(model.A, held @ model.B)[:, :, 0].T + d
+        response = c @ states + d
         assert np.abs(response - moved).max() < 1e-3 * np.abs(moved).max(), name
 
 
@@ -74,9 +79,8 @@ def test_what_cannot_be_linearized_is_refused(base, code, arguments):
     assert caught.value.code == code
 
 
-def test_python_control_takes_the_model(dynamic):
+def test_python_control_takes_the_model(model):
     control = pytest.importorskip("control")
-    model = yb.linearize(dynamic, at=AT, inputs=["driver.steer_angle"], outputs=SHOWN)
     space = model.to_control()
     assert isinstance(space, control.StateSpace)
     assert space.output_labels == ["reference_sideslip_ref", "reference_yaw_rate_ref"]

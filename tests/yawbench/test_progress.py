@@ -90,21 +90,26 @@ print("rich.progress" in sys.modules)
 """
 
 
+def started(delay: str, switch: str = "", **pipes) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | {"TERM": "xterm", _progress.SWITCH: switch}
+    command = [sys.executable, "-c", PROGRAM, delay]
+    return subprocess.run(command, cwd=ROOT, env=environment, text=True, check=True, **pipes)
+
+
 @pytest.mark.parametrize(
     ("delay", "switch", "seen"), [("0", "", True), ("60", "", False), ("0", "off", False)]
 )
-def test_only_a_terminal_sees_a_bar_and_only_after_the_delay(delay, switch, seen):
+def test_a_terminal_sees_a_bar_after_the_delay_unless_it_is_switched_off(delay, switch, seen):
     leader, follower = pty.openpty()
-    environment = os.environ | {"TERM": "xterm", _progress.SWITCH: switch}
-    command = [sys.executable, "-c", PROGRAM, delay]
-    done = subprocess.run(
-        command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=follower, text=True, check=True
-    )
+    done = started(delay, switch, stdout=subprocess.PIPE, stderr=follower)
     os.close(follower)
     assert done.stdout.split() == [str(seen)]
     os.set_blocking(leader, False)
     shown = os.read(leader, 100_000).decode() if seen else ""
     assert ("Sideslip tracking" in shown) == seen
     os.close(leader)
-    silent = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=True)
+
+
+def test_only_a_terminal_sees_a_bar():
+    silent = started("0", capture_output=True)
     assert (silent.stdout.split(), silent.stderr) == (["False"], "")

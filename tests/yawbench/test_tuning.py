@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import csv
-import subprocess
-import sys
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +11,10 @@ import numpy as np
 import pytest
 
 import yawbench as yb
+from tests.commands import status_of
 from tests.sentences import refused
 
-SMALL = {"population": 5, "generations": 2}
+SMALL = {"population": 5, "generations": 2, "workers": 1}
 ERROR, EFFORT = "rms_error(yaw_rate)", "effort(yaw_moment)"
 TUNING = """
 title: A gain
@@ -66,9 +65,7 @@ class Data:
 def test_the_trials_are_those_of_the_command(tmp_path):
     scenario = yb.load("fuzzy_pid/sine").swap(controller="controller_pid")
     (tmp_path / "tuning.yaml").write_text(TUNING.format(scenario=scenario.path, range="from: 1e4, to: 1e6"))
-    command = [sys.executable, "-m", "yawbench", "tune", str(tmp_path / "tuning.yaml"), "--out", "out"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    assert status_of("tune", tmp_path / "tuning.yaml", "--out", tmp_path / "out") == 0
     rows = list(csv.DictReader((tmp_path / "out" / "trials.csv").open()))
     target = "controller.yaw_rate_proportional_gain"
     tuned = yb.tune(scenario.set({"stop_time": 1.2}), {target: (1e4, 1e6, "log")}, ERROR, seed=3, **SMALL)
@@ -111,7 +108,7 @@ def test_the_objective_is_a_weighted_sum_averaged_over_scenarios(base):
 def test_one_seed_gives_one_search(base):
     scenario, ranges = base.swap(controller=follow), {"controller.gain": (1e3, 1e5)}
     first, again, other = (
-        yb.tune(scenario, ranges, ERROR, seed=seed, workers=workers, **SMALL).table
+        yb.tune(scenario, ranges, ERROR, seed=seed, **{**SMALL, "workers": workers}).table
         for seed, workers in ((1, 1), (1, 2), (2, 2))
     )
     assert first.equals(again)
