@@ -214,7 +214,7 @@ def build_component(
         recipe.name,
         key="",
         source=Path(os.path.relpath(source, target.parent.resolve())).as_posix(),
-        home=target.parent.name,
+        home=target.parent.resolve().name,
         role=recipe.module[0] if isinstance(recipe, PythonRecipe) else "",
         defaults=dict(defaults or {}),
     )

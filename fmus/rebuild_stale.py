@@ -104,7 +104,7 @@ class FmuUpdater:
                 return None  # neither an FMU of ours nor in our folder
             self._recipes = self._recipes or find_recipes()
             return self._recipes.get(stamp.name)
-        source = (archive.parent / stamp.source).resolve()
+        source = (archive.parent.resolve() / stamp.source).resolve()
         if not source.exists() or not _is_at_home(archive, stamp):
             return None
         return recipe_of(source, role=stamp.role or None, name=stamp.name, defaults=stamp.defaults)
@@ -143,4 +143,5 @@ def _built(stamp: BuildStamp, *, current: bool) -> BuildInfo:
 
 def _is_at_home(archive: Path, stamp: BuildStamp) -> bool:
     """Return whether an FMU is still where it was built, according to its stamp."""
-    return archive.parent.resolve() == HERE if stamp.is_component else archive.parent.name == stamp.home
+    folder = archive.parent.resolve()
+    return folder == HERE if stamp.is_component else folder.name == stamp.home

@@ -164,6 +164,12 @@ class Sources:
                 if name not in allowed:
                     is_program = self.user is not None and self.entry is None
                     ways_out = "" if is_program else _WAYS_OUT.format(package=name)
+                    if source.file is not None and source.file.with_name(f"{name}.py").is_file():
+                        raise BuildError(
+                            f"{line}: imports {name}, but {name}.py beside it is a module of its package: "
+                            f"write 'from . import {name}'",
+                            code="component-import-forbidden",
+                        )
                     raise BuildError(
                         f"{line}: imports {name}, {NOT_PACKED}{ways_out}", code="component-import-forbidden"
                     )

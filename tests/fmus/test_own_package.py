@@ -37,6 +37,7 @@ FORBIDDEN = {
     "a name of the package": "from mylab.limit import FACTOR\n",
     "the folder above": "from ... import FACTOR\n",
     "another package": "import numpy, mylab.limits\n",
+    "a module beside, not by a relative name": "import gains\n",
 }
 
 

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from fmus.build import build_component
+from fmus.rebuild_stale import FmuUpdater
 from fmus.source_digests import SourceDigests
 from tests.checkout import ROOT, copy_checkout, run_in
 from tests.sentences import golden, golden_in
@@ -242,6 +244,23 @@ def test_a_copy_of_a_components_fmu_in_another_folder_is_told_of_and_not_touched
     assert done.returncode == 0
     assert golden_in(done.stderr)
     assert (project / "before/driver_sine.fmu").read_bytes() == old
+
+
+@pytest.mark.parametrize("built_into", ["fmus", "linked"])
+def test_a_folder_of_fmus_may_be_opened_through_a_link(built_into, tmp_path, monkeypatch):
+    monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "cache"))
+    source = tmp_path / "drivers" / "steady.py"
+    source.parent.mkdir()
+    text = (ROOT / "components/drivers/steady_turn.py").read_text().replace("from ..", "from components.")
+    source.write_text(text)
+    (tmp_path / "fmus").mkdir()
+    (tmp_path / "linked").symlink_to("fmus")
+    fmu = build_component(source, tmp_path / built_into).name
+    for round, way in enumerate(("fmus", "linked")):
+        source.write_text(f"{text}\nEDITED = {round}\n")
+        lines: list[str] = []
+        place, info = FmuUpdater(lines.append).bring(tmp_path / way / fmu, build=True)
+        assert (place, info and info.current, len(lines)) == (tmp_path / way / fmu, True, 1)
 
 
 def test_nobody_waits_for_the_builder_if_everything_is_current(project):
