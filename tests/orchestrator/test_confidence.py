@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from orchestrator.experiments.confidence import bootstrap, interval, percentile_bounds, resample, share_bounds
 
 
 def test_the_interval_is_that_of_students_t_test():
+    from scipy import stats  # not at the top: it takes long, and few tests need it
+
     numbers = [3.1, 2.9, 3.4, 3.3, 2.7, 3.0, 3.2, 2.8, 3.1, 3.6]
     found = interval(numbers)
     theirs = stats.ttest_1samp(numbers, 0.0).confidence_interval(0.95)
@@ -36,6 +37,8 @@ def test_numbers_without_chance_in_them_have_no_interval():
 
 @pytest.mark.parametrize("count, number", [(0, 20), (1, 46), (10, 10), (7, 30)])
 def test_bounds_of_a_share_are_those_of_the_exact_binomial_test(count, number):
+    from scipy import stats  # not at the top: it takes long, and few tests need it
+
     theirs = stats.binomtest(count, number).proportion_ci(0.95, method="exact")
     assert share_bounds(count, number) == pytest.approx(tuple(theirs))
 

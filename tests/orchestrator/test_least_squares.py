@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
 from orchestrator.measured.least_squares import (
     NotIdentifiable,
@@ -239,6 +238,8 @@ def coverage(half_widths: Any, trials: int = 100) -> float:
     rows = int(40 * RATE)
 
     def slow(*shape: int) -> np.ndarray:
+        from scipy.signal import lfilter  # not at the top: it takes long, and few tests need it
+
         white = chance.standard_normal((*shape, rows + 500))
         return lfilter([np.sqrt(1 - decay**2)], [1, -decay], white)[..., 500:]
 

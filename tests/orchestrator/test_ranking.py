@@ -13,7 +13,6 @@ from math import radians
 from pathlib import Path
 
 import pytest
-from scipy.stats import binom
 
 from orchestrator.errors import Diagnostic, RecordWarning
 from orchestrator.experiments.jobs import MeasuredRun
@@ -97,6 +96,8 @@ def test_places_go_by_conditions_passed_then_runs_then_sideslip():
 
 
 def test_entries_whose_intervals_overlap_share_a_place_and_those_far_apart_do_not():
+    from scipy.stats import binom  # not at the top: it takes long, and few tests need it
+
     def passing(name: str, count: int) -> EntryScore:
         return standing(name, *([driven(stability=float(k < count))] for k in range(12)))
 

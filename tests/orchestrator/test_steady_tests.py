@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.signal import lsim
 
 import yawbench as yb
 from components.drivers.sine_sweep import SineSweepParameters, sweep
@@ -243,6 +242,8 @@ def test_a_braked_turn_gives_the_ratios_of_its_closed_form(sampling):
 
 @as_sampled
 def test_a_sweep_gives_the_frequency_response_of_an_oscillator(sampling):
+    from scipy.signal import lsim  # not at the top: it takes long, and few tests need it
+
     omega, damping, gain = 2 * pi * 1.2, 0.5, 0.3
     p = SineSweepParameters(amplitude=0.5)
     fine = np.arange(0.0, 36.0, 0.001)

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import qmc
 
 from orchestrator.errors import ScenarioError
 from orchestrator.experiments.axes import AxisSpec, level_at
@@ -116,6 +115,8 @@ metrics:
 
 
 def test_a_latin_hypercube_has_one_point_in_each_part_of_every_axis(sweep):
+    from scipy.stats import qmc  # not at the top: it takes long, and few tests need it
+
     found = values(sweep(text=HYPERCUBE.format(seed=1)))
     amplitude = np.array([point[0] for point in found]) / 0.06
     frequency = (np.log10([point[1] for point in found]) + 1) / 2

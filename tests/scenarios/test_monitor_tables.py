@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 import yaml
-from scipy.stats import chi2
 
 import yawbench as yb
 from docs.generate import monitor_tables
@@ -182,6 +181,8 @@ def test_published_runs_are_what_runs_come_to(fault, tmp_path: Path):
 
 @pytest.mark.exhaustive
 def test_false_alarms_in_two_hours_are_what_the_page_says(tmp_path):
+    from scipy.stats import chi2  # not at the top: it takes long, and few tests need it
+
     assert status_of("sweep", "real_signals/false_alarms", "--out", tmp_path / "out") == 0
     alarms = yb.open(tmp_path / "out").table
     hours = 81 * 90.0 / 3600.0
