@@ -310,12 +310,16 @@ def _of_object(program: Any) -> tuple[type[Component], type[Component]]:
     def configure(self: Any) -> None:
         self._program = _parameters.fresh(program, own, self.p)
 
+    def start(self: Any, t: float, u: Sequence[float]) -> None:
+        configure(self)  # an object is started once, also if outputs are read while the run initializes
+        self._program.start(t, self._named(*u))
+
     members = {"configure": configure, "_fail": _fail}
     for method in ("output", "advance", "start"):
         if hasattr(program, method):
             if not callable(getattr(program, method)):
                 arguments.refuse(method, "a method", getattr(program, method))
-            members[method] = _passing_on(method)
+            members[method] = start if method == "start" else _passing_on(method)
     both = members, of_object(program, own)
     checked, bare = (_class(program, program.inputs, program.outputs, each, own) for each in both)
     return checked, bare

@@ -259,7 +259,8 @@ class _Form:
             attributes += [f"        made.__init__({', '.join(passed)})\n"]
         parts = ["\n    def configure(self):\n", made, *attributes, "        self.program = made\n"]
         if hasattr(program, "start"):
-            parts.append("\n    def start(self, t, u):\n        self.program.start(t, Inputs(*u))\n")
+            parts.append("\n    def start(self, t, u):\n        self.configure()  # an object is started once\n")
+            parts.append("        self.program.start(t, Inputs(*u))\n")
         if hasattr(program, "advance"):
             parts.append(
                 "\n    def advance(self, t, h, u):\n        self.program.advance(t, h, Inputs(*u))\n"

@@ -82,6 +82,7 @@ def of_object(program: Any, own: ProgramParameters) -> dict[str, Any]:
         self._program = fresh(self)
 
     def start(self: Any, t: float, u: Sequence[float]) -> None:
+        self._program = fresh(self)
         self._program.start(t, self._named(*u))
 
     def advance(self: Any, t: float, h: float, u: Sequence[float]) -> None:

@@ -86,6 +86,31 @@ def test_a_parameter_that_is_set_counts_as_if_python_had_been_given_it(what, bas
     assert not np.array_equal(moments(base.swap(controller=KINDS[what])), wanted)
 
 
+class Counted:
+    """Controller that counts its starts."""
+
+    inputs, outputs = ("yaw_rate",), ("yaw_moment",)
+
+    def __init__(self, gain: float = 1e4) -> None:
+        self.gain, self.starts = gain, 0
+
+    def start(self, t, u):
+        self.starts += 1
+
+    def output(self, t, u):
+        return -self.gain * u.yaw_rate + self.starts
+
+
+@pytest.mark.parametrize("units", ["native", "python"])
+def test_an_object_is_started_once_however_often_outputs_are_read_before(units, base, monkeypatch, tmp_path):
+    monkeypatch.setenv("YAWBENCH_UNITS", units)
+    exported = yb.export_fmu(Counted(), tmp_path / "controller_counted.fmu")
+    for program in (Counted(), exported):
+        run = base.swap(controller=program).run()
+        assert run["controller.yaw_moment"][0] == 1.0 - 1e4 * run["plant.yaw_rate"][0]
+        assert (run.record["fmus"]["controller"]["runs_as"] == "native") == (units == "native")
+
+
 @pytest.mark.parametrize("what", ["a function", "an object", "a dataclass"])
 def test_parameters_are_translated_with_the_law(what, base):
     run = base.swap(controller=KINDS[what]).set({"controller.gain": 3e4}).run()
