@@ -300,26 +300,19 @@ def _of_object(program: Any) -> tuple[type[Component], type[Component]]:
     """Return component classes; each instance of the first uses a copy of the object."""
     for wanted in ("inputs", "outputs"):
         if not hasattr(program, wanted):
-            raise ScenarioError(
-                f"{_name(program)} has no {wanted}: name its signals, as in ('yaw_rate',)",
-                code="controller-invalid",
-            )
-
+            text = f"{_name(program)} has no {wanted}: name its signals, as in ('yaw_rate',)"
+            raise ScenarioError(text, code="controller-invalid")
     own = _parameters.of_object(program, _names(program))
 
     def configure(self: Any) -> None:
         self._program = _parameters.fresh(program, own, self.p)
-
-    def start(self: Any, t: float, u: Sequence[float]) -> None:
-        configure(self)  # an object is started once, also if outputs are read while the run initializes
-        self._program.start(t, self._named(*u))
 
     members = {"configure": configure, "_fail": _fail}
     for method in ("output", "advance", "start"):
         if hasattr(program, method):
             if not callable(getattr(program, method)):
                 arguments.refuse(method, "a method", getattr(program, method))
-            members[method] = start if method == "start" else _passing_on(method)
+            members[method] = _passing_on(method)
     both = members, of_object(program, own)
     checked, bare = (_class(program, program.inputs, program.outputs, each, own) for each in both)
     return checked, bare
@@ -328,10 +321,12 @@ def _of_object(program: Any) -> tuple[type[Component], type[Component]]:
 def _passing_on(method: str) -> Callable[..., Any]:
     def call(self: Any, t: float, *rest: Any) -> Any:
         *step, u = rest
+        if method == "start":
+            self.configure()  # each object is started once, also if outputs are read before the first step
         result = getattr(self._program, method)(t, *step, self._named(*u))
-        if method != "output":
-            return None
-        return _numbers(result, [variable.name for variable in self.variables[self._n_in : self._n_io]])
+        if method == "output":
+            return _numbers(result, [variable.name for variable in self.variables[self._n_in : self._n_io]])
+        return None
 
     return call
 

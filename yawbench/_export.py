@@ -259,7 +259,7 @@ class _Form:
             attributes += [f"        made.__init__({', '.join(passed)})\n"]
         parts = ["\n    def configure(self):\n", made, *attributes, "        self.program = made\n"]
         if hasattr(program, "start"):
-            parts.append("\n    def start(self, t, u):\n        self.configure()  # an object is started once\n")
+            parts.append("\n    def start(self, t, u):\n        self.configure()  # each is started once\n")
             parts.append("        self.program.start(t, Inputs(*u))\n")
         if hasattr(program, "advance"):
             parts.append(
