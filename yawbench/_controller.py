@@ -291,7 +291,7 @@ def _of_function(function: Callable[..., Any], role: str) -> tuple[type[Componen
         return self._returned  # type: ignore[no-any-return]
 
     checks = {"start": start, "advance": advance, "output": compute, "_fail": _fail}
-    both = checks, of_function(function, inputs, "t" in names, list(called.values), made)
+    both = checks, of_function(function, inputs, outputs, "t" in names, list(called.values), made)
     checked, bare = (_class(function, inputs, known[role], members, own) for members in both)
     return checked, bare
 
@@ -313,7 +313,8 @@ def _of_object(program: Any) -> tuple[type[Component], type[Component]]:
             if not callable(getattr(program, method)):
                 arguments.refuse(method, "a method", getattr(program, method))
             members[method] = _passing_on(method)
-    both = members, of_object(program, own)
+    outputs = _names_of(program.outputs, "outputs")
+    both = members, of_object(program, outputs, own)
     checked, bare = (_class(program, program.inputs, program.outputs, each, own) for each in both)
     return checked, bare
 
@@ -356,8 +357,12 @@ def _class(
 
 def _names(program: Any) -> list[str]:
     """Return the names of an object's inputs and outputs."""
-    declared = (*_signals(program.inputs, "inputs"), *_signals(program.outputs, "outputs"))
-    return [name for item in declared for name in wheels(item if isinstance(item, str) else item.name)]
+    return [*_names_of(program.inputs, "inputs"), *_names_of(program.outputs, "outputs")]
+
+
+def _names_of(signals: Any, name: str) -> list[str]:
+    declared = _signals(signals, name)
+    return [x for item in declared for x in wheels(item if isinstance(item, str) else item.name)]
 
 
 def _reporting(component: type[Component]) -> type[Component]:

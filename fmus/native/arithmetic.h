@@ -77,6 +77,17 @@ MAYBE_UNUSED static int complex_power(double a, double b)
     return a < 0.0 && isfinite(a) && isfinite(b) && b != floor(b);
 }
 
+/* round(x, digits): through the shortest exact text, so of two decimals that are equally near, the even one. */
+MAYBE_UNUSED static double rounded(double x, double digits)
+{
+    char text[400];
+    if (!isfinite(x)) {
+        return x;
+    }
+    snprintf(text, sizeof text, "%.*f", (int)digits, x);
+    return strtod(text, NULL);
+}
+
 /* math.hypot and math.dist: square root of a compensated sum of squares, corrected once. */
 MAYBE_UNUSED static double norm(int n, const double *given)
 {

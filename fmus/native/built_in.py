@@ -10,15 +10,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from . import ir
-from .loops import Looping
-from .lower import COMPENSATED
+from .of_numbers import OfNumbers
 from .shapes import push
 from .values import (
+    EITHER,
     UNSET,
-    Bound,
     Box,
     Bytes,
-    Closure,
     Dict,
     Each,
     Failure,
@@ -66,7 +64,7 @@ class Repeated:
         self.value = value
 
 
-class BuiltIn(Looping):
+class BuiltIn(OfNumbers):
     """Calls of built-in functions and methods."""
 
     # ---- methods of lists, texts and dictionaries -------------------------------------------
@@ -97,7 +95,10 @@ class BuiltIn(Looping):
         if name == "copy":
             return List(self.read(owner))
         if name in ("index", "count") and all(map(is_plain, (*self.read(owner), *args))):
-            return getattr(self.read(owner), name)(*args)
+            try:
+                return getattr(self.read(owner), name)(*args)
+            except ValueError as error:
+                self.end("ValueError", str(error))
         raise Refused(f"the method {name} of a list")
 
     def _of_ring(self, ring: Ring, name: str, args: list[Any]) -> Any:
@@ -146,6 +147,8 @@ class BuiltIn(Looping):
             return self.by_form(
                 args[k], lambda x: self._built_in(function, [*args[:k], x, *args[k + 1 :]], named)
             )
+        if name == "get" and isinstance(function.__self__, dict):
+            return self._of_dict(Dict(function.__self__), name, args)
         own = getattr(self, f"_python_{name}", None)
         if own is not None and getattr(function, "__module__", "") in (
             "builtins", "itertools", "math", "_bisect", "bisect", "functools", "_functools",
@@ -167,11 +170,6 @@ class BuiltIn(Looping):
                 raise Unreachable from None
         raise Refused(f"a call of {name or type(function).__name__}")
 
-    def _is_constant(self, value: Any) -> bool:
-        if isinstance(value, tuple):
-            return all(map(self._is_constant, value))
-        return not isinstance(value, (ir.Var, Box, Union, Picked, Closure, Bound, Text, Bytes, Span))
-
     def _python_setattr(self, owner: Any, name: str, value: Any) -> None:
         self.set_attribute(owner, name, value)
 
@@ -181,23 +179,6 @@ class BuiltIn(Looping):
         if isinstance(value, Picked):
             return len(value.items[0])
         return len(self.read(value) if isinstance(value, Box) else value)
-
-    def _python_abs(self, value: Any) -> Any:
-        return self.size(value)
-
-    def _python_fabs(self, value: Any) -> Any:
-        return self.function("fabs", value)
-
-    def _python_float(self, value: Any) -> Any:
-        return self.as_real(value) if is_number(value) else float(value)
-
-    def _python_int(self, value: Any) -> Any:
-        return self.whole("trunc", value) if is_number(value) else int(value)
-
-    def _python_round(self, value: Any, digits: Any = None) -> Any:
-        if digits is not None and isinstance(value, ir.Var):
-            raise Refused("round to a number of digits")
-        return self.whole("rint", value) if digits is None else round(value, digits)
 
     def _python_bool(self, value: Any) -> Any:
         return self.truth_of(value)
@@ -215,55 +196,6 @@ class BuiltIn(Looping):
         held = self.read(value) if isinstance(value, Dict) else dict(map(self.items, self.items(value)))
         return Dict({**held, **named})
 
-    def _python_max(self, *args: Any, **named: Any) -> Any:
-        return self._extreme(">", args, named)
-
-    def _python_min(self, *args: Any, **named: Any) -> Any:
-        return self._extreme("<", args, named)
-
-    def _extreme(self, op: str, args: Sequence[Any], named: dict[str, Any]) -> Any:
-        items = self.items(args[0]) if len(args) == 1 else list(args)
-        if not items and "default" in named:
-            return named["default"]
-        if "key" in named or not items or not all(is_number(x) or is_mixed(x) for x in items):
-            if items and all(map(self._is_constant, items)) and "key" not in named:
-                return (max if op == ">" else min)(items)
-            raise Refused("min or max of values that are not numbers")
-        best = items[0]
-        for item in items[1:]:
-            best = self.selected(self._in_order(op, item, best), item, best)
-        return best
-
-    def _in_order(self, op: str, a: Any, b: Any) -> ir.Operand:
-        return self.compare(op, *(self.real(x) if is_mixed(x) else x for x in (a, b)))
-
-    def _python_sum(self, values: Any, start: Any = 0) -> Any:
-        """Return sum(values, start), by the summation of the Python that builds."""
-        numbers = [start, *self.items(values)]
-        if not all(is_number(x) or is_mixed(x) for x in numbers):
-            raise Refused("a sum of values that are not numbers")
-        if COMPENSATED:
-            return self._compensated(numbers, 0)
-        total = numbers[0]
-        for x in numbers[1:]:
-            total = self.operate("+", total, x)
-        return total
-
-    def _compensated(self, numbers: list[Any], k: int) -> Any:
-        mixed = next((i for i in range(k, len(numbers)) if isinstance(numbers[i], Union)), None)
-        if mixed is not None:
-            before, after = numbers[:mixed], numbers[mixed + 1 :]
-            return self.by_form(numbers[mixed], lambda x: self._compensated([*before, x, *after], mixed))
-        if not any(isinstance(x, ir.Var) for x in numbers):
-            return sum(numbers[1:], numbers[0])
-        first = next((i for i, x in enumerate(numbers) if is_real(x)), len(numbers))
-        whole: Any = 0
-        for x in numbers[:first]:
-            whole = self.operate("+", whole, x)
-        if first == len(numbers):
-            return whole
-        return self.let(ir.REAL, "compensated_sum", whole, *numbers[first:])
-
     def _python_any(self, values: Any) -> Any:
         return self._decided(self.each(values), True)
 
@@ -276,19 +208,6 @@ class BuiltIn(Looping):
         test = self.truth_of(each.item(k))
         on = lambda: self._decided(each, by, k + 1)  # noqa: E731
         return self.branch(test, *((lambda: True, on) if by else (on, lambda: False)))
-
-    def _python_sorted(self, values: Any) -> Any:
-        items = self.items(values)
-        if not any(isinstance(x, (ir.Var, Union)) for x in items):
-            return List(sorted(items))
-        if not all(is_number(x) or is_mixed(x) for x in items):
-            raise Refused("sorting values that are not numbers")
-        for end in range(1, len(items)):  # insertion sort, which is stable
-            for k in range(end, 0, -1):
-                a, b = items[k - 1], items[k]
-                less = self._in_order("<", b, a)
-                items[k - 1], items[k] = self.selected(less, b, a), self.selected(less, a, b)
-        return List(items)
 
     def _python_zip(self, *values: Any, strict: bool = False) -> Any:
         rows = [x if isinstance(x, Repeated) else self.each(x) for x in values]
@@ -375,29 +294,14 @@ class BuiltIn(Looping):
             return self.by_form(value, lambda x: self._python_isinstance(x, kinds))
         if isinstance(value, ir.Var):
             of = {ir.REAL: float, ir.BOOL: bool}.get(value.type, int)
+            if value.type == ir.EITHER and issubclass(bool, kinds) != issubclass(int, kinds):
+                raise Refused(EITHER)
             return issubclass(of, kinds)
         if isinstance(value, Instance):
             return issubclass(value.cls, kinds)
         if isinstance(value, (List, Ring, Dict)):
             return issubclass(dict if isinstance(value, Dict) else list, kinds)
         return isinstance(value, kinds)
-
-    def _python_dist(self, first: Any, second: Any) -> Any:
-        pairs = zip(self.items(first), self.items(second), strict=True)
-        return self.function("dist", *[self.binary("-", self.real(a), self.real(b)) for a, b in pairs])
-
-    def _python_hypot(self, *values: Any) -> Any:
-        return (
-            self.function("hypot", *values)
-            if any(isinstance(x, ir.Var) for x in values)
-            else math.hypot(*values)
-        )
-
-    def _python_prod(self, values: Any) -> Any:
-        product: Any = 1
-        for item in self.items(values):
-            product = self.operate("*", product, item)
-        return product
 
     def _text(self, args: Sequence[Any]) -> Text:
         if len(args) > 1:

@@ -128,6 +128,7 @@ class Calling(BuiltIn):
 
     def _inlined(self, function: types.FunctionType, args: list[Any], named: dict[str, Any]) -> Any:
         source = self.sources.of(function)
+        self.entered = f"{source.file}:{source.node.lineno}" if source.file else self.entered
         names = self._bound(
             source.node.args, args, named, function.__defaults__ or (), function.__kwdefaults__ or {}
         )

@@ -10,7 +10,10 @@ from . import ir
 from .lower import WHOLE_ARE_PLAIN
 from .specialise import Program
 
-TYPES = {ir.REAL: "double", ir.INT: "double", ir.BOOL: "int", ir.WORD: "uint64_t", ir.WIDE: "uint64_t"}
+TYPES = {
+    ir.REAL: "double", ir.INT: "double", ir.BOOL: "int", ir.EITHER: "double",
+    ir.WORD: "uint64_t", ir.WIDE: "uint64_t",
+}  # fmt: skip
 _INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 _COMPARED = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
 _WORDS = {
@@ -298,7 +301,7 @@ class _Function:
     def _real(self, x: ir.Operand) -> str:
         if not isinstance(x, ir.Var):
             return constant(x)
-        return x.name if x.type in (ir.REAL, ir.INT) else f"(double){x.name}"
+        return x.name if x.type in (ir.REAL, ir.INT, ir.EITHER) else f"(double){x.name}"
 
     def _bool(self, x: ir.Operand) -> str:
         if not isinstance(x, ir.Var):

@@ -17,6 +17,7 @@ from .places import Places
 from .read import Source, Sources
 from .shapes import build, numbers_of, shape_of
 from .values import (
+    EITHER,
     RESIZED,
     UNSET,
     Bound,
@@ -65,6 +66,7 @@ class Evaluation(Places):
         super().__init__()
         self.sources = sources
         self.calls: list[Call] = []
+        self.entered = ""  # file and line of the last function that was entered
 
     def where(self) -> str:
         named = next((call for call in reversed(self.calls) if call.source.file), None)
@@ -162,6 +164,8 @@ class Evaluation(Places):
         if isinstance(value, Text):
             return list(value.parts)
         if isinstance(value, ir.Var):
+            if value.type == ir.EITHER and not spec:
+                raise Refused(EITHER)
             if spec != "" and not re.fullmatch(r"(\.\d)?g", spec):
                 raise Refused(f"the format {spec!r}")
             return [(value, spec or "r")]
@@ -361,7 +365,8 @@ class Evaluation(Places):
                 return self._load(ir.joined(types), items, index)
             real = self._load(ir.REAL, items, index)
             is_real = self._load(ir.INT, tuple(int(type == ir.REAL) for type in types), index)
-            return Union(is_real, (self.let(ir.INT, "copy", real), real))
+            whole = ir.joined(type for type in types if type != ir.REAL)
+            return Union(is_real, (self.let(whole, "copy", real), real))
         if all(same(x, items[0]) for x in items):
             return items[0]
         return Picked(items, index)

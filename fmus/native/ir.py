@@ -10,8 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-REAL, INT, BOOL, WORD, WIDE = "real", "int", "bool", "word", "wide"
-"""Types. A WORD is an unsigned 64-bit integer, a WIDE an integer known only modulo 2^64."""
+REAL, INT, BOOL, EITHER, WORD, WIDE = "real", "int", "bool", "int or bool", "word", "wide"
+"""Types. EITHER is True or False on some paths, another integer on others; a WORD is an unsigned 64-bit
+integer, a WIDE an integer known only modulo 2^64."""
 
 EXACT = 2**53
 """Largest integer up to which doubles are exact."""
@@ -207,4 +208,4 @@ def are_joined(types: Iterable[str]) -> bool:
 def joined(types: Iterable[str]) -> str:
     """Return the type that holds the values of all, which `are_joined`."""
     every = set(types)
-    return every.pop() if len(every) == 1 else INT
+    return every.pop() if len(every) == 1 else EITHER

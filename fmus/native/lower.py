@@ -329,7 +329,7 @@ class Lowering:
                 self.fail(type(error).__name__, str(error))
                 raise Unreachable from None
         if a.type != ir.REAL:
-            return a if a.type != ir.BOOL else self.let(ir.INT, "real", a)
+            return a if a.type == ir.INT else self.let(ir.INT, "real", a)
         bad = self.let(ir.BOOL, "isnan", a)
         self.require(self.negation(bad), *complaint(lambda: by(math.nan)))
         bad = self.let(ir.BOOL, "isinf", a)

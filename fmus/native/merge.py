@@ -285,13 +285,14 @@ class _Join:
         if key in self.numbers:
             return self.numbers[key]
         mapped = self._mapped(a, b)
-        if mapped is not None and all(k == x for k, x in mapped[1].items()):
-            return mapped[0]
-        target = self.machine.new(ir.joined(map(ir.type_of, (a, b))))
+        type = ir.joined(map(ir.type_of, (a, b)))
+        if mapped is not None and type != ir.EITHER and all(k == x for k, x in mapped[1].items()):
+            return self.machine.truth(mapped[0]) if type == ir.BOOL else mapped[0]
+        target = self.machine.new(type)
         self.a.out.append(ir.Let(target, "copy", (a,)))
         self.b.out.append(ir.Let(target, "copy", (b,)))
         if isinstance(a, int) and isinstance(b, int):
-            self.machine.choices[target] = (self.test, int(a), int(b))
+            self.machine.choices[target] = (self.test, a, b)
         if mapped is not None:
             self.machine.maps[target] = mapped
         if target.type == ir.INT:

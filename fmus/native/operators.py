@@ -11,7 +11,9 @@ from . import ir
 from .evaluate import Call, Evaluation
 from .lower import OPERATORS
 from .merge import alike
+from .read import kinds_within
 from .values import (
+    EITHER,
     Box,
     Closure,
     Dict,
@@ -44,13 +46,23 @@ class Operating(Evaluation):
 
     # ---- comprehensions ---------------------------------------------------------------------
 
-    def _comprehended(self, generators: list[ast.comprehension], make: Callable[[], Any]) -> list[Any]:
-        call = self.calls[-1]
-        return [self._within(call, frame, make) for frame in self._frames(generators)]
+    def _comprehended(
+        self, generators: list[ast.comprehension], make: Callable[[], Any], element: ast.expr
+    ) -> list[Any]:
+        call, kinds = self.calls[-1], kinds_within(element)
+        together = bool(kinds[ast.Lambda] or kinds[ast.GeneratorExp])
+        return [self._within(call, frame, make) for frame in self._frames(generators, together)]
 
-    def _frames(self, generators: list[ast.comprehension]) -> Iterator[Frame]:
-        """Yield the names of each element of a comprehension."""
+    def _frames(self, generators: list[ast.comprehension], together: bool) -> Iterator[Frame]:
+        """Yield the names of each element of a comprehension.
+
+        Args:
+            generators: its loops.
+            together: whether the elements share their names, so that a function made by one of them sees
+                those of the last; otherwise elements can be evaluated later.
+        """
         call = self.calls[-1]
+        shared = Frame({}, call.frame)
 
         def go(k: int, frame: Frame) -> Iterator[Frame]:
             if k == len(generators):
@@ -58,7 +70,7 @@ class Operating(Evaluation):
                 return
             each = self.each(self._within(call, frame, lambda: self.evaluate(generators[k].iter)))
             for i in range(each.count):
-                inner = Frame({}, frame)
+                inner = shared if together else Frame({}, frame)
                 if self._within(call, inner, lambda: self._passes(generators[k], each.item(i))):  # noqa: B023
                     yield from go(k + 1, inner)
 
@@ -83,12 +95,14 @@ class Operating(Evaluation):
         return True
 
     def _listcomp(self, node: ast.ListComp) -> Any:
-        return List(self._comprehended(node.generators, lambda: self.evaluate(node.elt)))
+        return List(self._comprehended(node.generators, lambda: self.evaluate(node.elt), node.elt))
 
     def _generatorexp(self, node: ast.GeneratorExp) -> Any:
         call, generator = self.calls[-1], node.generators[0]
+        if kinds_within(node.elt)[ast.Lambda] or isinstance(node.elt, ast.GeneratorExp):
+            raise Refused("functions or generators made by a generator expression")
         if len(node.generators) > 1 or generator.ifs:
-            frames = list(self._frames(node.generators))
+            frames = list(self._frames(node.generators, together=False))
             return Each(len(frames), lambda k: self._within(call, frames[k], lambda: self.evaluate(node.elt)))
         each = self.each(self.evaluate(generator.iter))
 
@@ -99,13 +113,15 @@ class Operating(Evaluation):
         return Each(each.count, lambda k: self._within(call, Frame({}, call.frame), lambda: element(k)))
 
     def _setcomp(self, node: ast.SetComp) -> Any:
-        return frozenset(self._comprehended(node.generators, lambda: self._key(self.evaluate(node.elt))))
+        return frozenset(
+            self._comprehended(node.generators, lambda: self._key(self.evaluate(node.elt)), node.elt)
+        )
 
     def _dictcomp(self, node: ast.DictComp) -> Any:
         def make() -> tuple[Any, Any]:
             return self._key(self.evaluate(node.key)), self.evaluate(node.value)
 
-        return Dict(dict(self._comprehended(node.generators, make)))
+        return Dict(dict(self._comprehended(node.generators, make, node.value)))
 
     # ---- operators --------------------------------------------------------------------------
 
@@ -261,6 +277,8 @@ class Operating(Evaluation):
     def _same(self, a: Any, b: Any) -> ir.Operand:
         if is_number(a) and is_number(b) and (isinstance(a, ir.Var) or isinstance(b, ir.Var)):
             types = {ir.type_of(a), ir.type_of(b)}
+            if ir.EITHER in types:
+                raise Refused(EITHER)
             if types == {ir.BOOL}:
                 return self.compare("==", a, b)
             if ir.BOOL not in types:
@@ -302,5 +320,7 @@ class Operating(Evaluation):
 
 def _type_name(value: Any) -> str:
     if isinstance(value, ir.Var):
+        if value.type == ir.EITHER:
+            raise Refused(EITHER)
         return {ir.REAL: "float", ir.BOOL: "bool"}.get(value.type, "int")
     return type(value).__name__

@@ -29,6 +29,8 @@ STACK = 512 * 1024 * 1024
 """Stack of the translating thread [bytes], since nested calls are evaluated by nested calls."""
 
 
+BASE = "fmi/"
+"""Folder of the base class of components, whose lines say nothing about a component."""
 HOOKS = ("configure", "start", "advance", "output")
 """Translated methods of a component."""
 
@@ -113,6 +115,7 @@ class _Specialising:
         self.component, self.sources = component, sources
         self.growing: dict[str, Growing] = {}
         self.covered: dict[str, Any] = {}
+        self.last_line = ""  # of the last function, for reasons without a line of their own
         self.reads: dict[ir.Var, str] = {}
         self.domains: dict[ir.Var, frozenset[int]] = {}
         of = {
@@ -152,7 +155,9 @@ class _Specialising:
                 self._grow(promoted)
             except _Covered as covered:
                 self.covered |= covered.values
-        raise Refused("too many lists whose length changes")
+            except Refused as refused:
+                raise Refused(refused.text, refused.where or self.last_line) from None
+        raise Refused("too many lists whose length changes", self.last_line)
 
     def _grow(self, promoted: Promote) -> None:
         path = promoted.path if isinstance(promoted.path, str) else list(self.growing)[promoted.path]
@@ -161,7 +166,7 @@ class _Specialising:
             number = self.growing[path].number
             item = widening.of(self.growing[path].item, item)
             if not widening.grew:
-                raise Refused("a list whose length changes in ways that are not followed")
+                raise Refused("a list whose length changes in ways that are not followed", self.last_line)
         self.growing[path] = Growing(number, item)
 
     # ---- one attempt ------------------------------------------------------------------------
@@ -171,7 +176,7 @@ class _Specialising:
         fixed = self.fixed
         self.libraries = Library(), Library()
         me, machine = self._run("configure", dict(self.covered))
-        configured = self._shape(me, fixed)
+        configured = shape_of(me, lambda box: box.slots, "self", Memo(fixed))  # its lists are of fixed length
         program.functions["configure"] = ir.Function(
             machine.out, _placed("c->c", self._numbers(configured, me, machine, "configure"))
         )
@@ -239,7 +244,11 @@ class _Specialising:
         try:
             self.returned = machine.call(machine.attribute(me, method), list(args), {})
         except Unreachable:
-            raise Refused(f"{method}() fails for all inputs", self._line_of(method)) from None
+            where = self._line_of(method) or machine.entered
+            raise Refused(f"{method}() fails for all inputs", where) from None
+        finally:
+            line = self._line_of(method) or machine.entered
+            self.last_line = self.last_line if line.startswith(BASE) else line or self.last_line
         values = {
             name: value
             for name in me.slots.keys() - attributes.keys() - {"p"}

@@ -120,7 +120,7 @@ class Execution(Operating):
             self.assign(target, self._in_place(op, before, value))
         elif isinstance(target, ast.Attribute):
             owner = self.evaluate(target.value)
-            before = self.attribute(owner, target.attr)
+            before = self.by_form(owner, lambda x: self.attribute(x, target.attr))
             value = self.evaluate(node.value)
             self.at(node)
             self.set_attribute(owner, target.attr, self._in_place(op, before, value))

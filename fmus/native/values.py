@@ -20,6 +20,10 @@ RESIZED = "a list that changes its length during iteration"
 """Message of `Refused`: Python's loop would use the list's new length, the translated loop the old."""
 
 
+EITHER = "a number that is True or False on some paths, another integer on others"
+"""Message of `Refused` where the difference matters."""
+
+
 class Unreachable(Exception):
     """Signal that the current path has raised an exception."""
 
@@ -213,7 +217,7 @@ def is_real(value: Any) -> bool:
 def is_mixed(value: Any) -> bool:
     """Return whether a value is a number that is whole on some paths, real on others."""
     return isinstance(value, Union) and all(
-        is_number(x) and ir.type_of(x) in (ir.REAL, ir.INT, ir.BOOL) for x in value.alternatives
+        is_number(x) and ir.type_of(x) in (ir.REAL, ir.INT, ir.BOOL, ir.EITHER) for x in value.alternatives
     )
 
 

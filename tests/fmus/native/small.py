@@ -67,13 +67,13 @@ def component_of(text: str, folder: Path) -> Iterator[tuple[type[Any], Path]]:
         yield stage.component(recipe.module), stage.folder / "yawbench_small"
 
 
-def compiled(text: str, folder: Path) -> Path:
+def compiled(text: str, folder: Path, optimization: str = "-O0") -> Path:
     """Compile C text as a unit is, but fast."""
     (folder / "unit.c").write_text(text)
     for name, file in HEADERS.items():
         (folder / name).write_bytes(file.read_bytes())
-    command = [*compiler_command(), "-O0", *FLAGS, "unit.c", "-o", "unit.so", "-lm"]
-    subprocess.run(command, cwd=folder, check=True)
+    command = [*compiler_command(), optimization, *FLAGS, "unit.c", "-o", "unit.so", "-lm"]
+    subprocess.run(command, cwd=folder, check=True, stderr=subprocess.PIPE, text=True)
     return folder / "unit.so"
 
 

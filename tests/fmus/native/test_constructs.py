@@ -246,6 +246,34 @@ def output(self, t, u):
         return f(f(x))
     return (twice(moved, self.law(u[0])),)
 """,
+    "functions made by a comprehension, which see its last names": """
+def output(self, t, u):
+    laws = [lambda x: x - k for k in (1.0, 2.0, u[0])]
+    kept = [lambda x, k=k: x - k for k in (1.0, 2.0, u[0])]
+    late = [(k * x for x in u) for k in (1.0, 3.0)]
+    named = {k: (lambda x: x * k) for k in (5.0, 7.0)}
+    return (laws[0](u[1]) + 2.0 * kept[1](3.0) + 4.0 * sum(late[0]) + 8.0 * named[5.0](0.3),)
+""",
+    "a dictionary of the module that is asked": """
+def output(self, t, u):
+    return (WEIGHTS.get(self.p.mode, u[0]) + WEIGHTS.get("second", u[1]),)
+""",
+    "an attribute of one of two objects": """
+def start(self, t, u):
+    self.one, self.other = Held(1.0), Held(u[0])
+    self.count = 0
+def advance(self, t, h, u):
+    self.count += 1
+    made = Held(u[0]) if u[1] > 0.0 else Other(u[1])
+    made.x += 0.5
+    self.one = made
+def output(self, t, u):
+    return (self.one.x + self.other.x,)
+""",
+    "the place of an item": """
+def output(self, t, u):
+    return ([1, 0.5, 3].index(0.5) + u[0] if u[0] < 0.9 else [1, 2].index(5),)
+""",
     "a choice of laws": """
 def configure(self):
     laws = {"first": math.sin, "second": math.cos, "third": self.third}
@@ -373,6 +401,20 @@ def output(self, t, u):
 }
 
 
+BEFORE = """
+WEIGHTS = {"first": 2, "third": -0.5}
+
+
+class Held:
+    def __init__(self, x):
+        self.x = x
+
+
+class Other(Held):
+    pass
+"""
+
+
 @pytest.mark.parametrize("name", CONSTRUCTS)
 def test_a_construct_gives_the_same_bits(name, tmp_path):
-    compare(source(CONSTRUCTS[name]), tmp_path)
+    compare(source(CONSTRUCTS[name], BEFORE), tmp_path)

@@ -137,6 +137,41 @@ def output(self, t, u):
     below = self.n < 2**60, self.n > -(2**60), u[0] < 2**70, u[0] == 10**20
     return (sum(below) + self.n,)
 """,
+    "decimals, nearness and division with a rest": """
+def output(self, t, u):
+    a, b = u
+    if b > 0.9:
+        return (sum(divmod(a, a - a)),)
+    if b > 0.8:
+        return (sum(divmod(self.p.count, self.p.count - 3)),)
+    tenths = round(a, 1) + 3.0 * round(1e15 * b, 2) + 5.0 * round(self.p.count, 2) + round(0.5 * round(a), 0)
+    eighth = round(0.125 * round(8.0 * a), 2)
+    near = math.isclose(a, b, rel_tol=0.5), math.isclose(a, 0.0, abs_tol=0.3), math.isclose(a, math.inf)
+    quotient, rest = divmod(a, -0.3)
+    return (tenths + eighth + 2.0 * sum(near) + 7.0 * quotient + rest + sum(divmod(round(9 * b), -4)),)
+""",
+    "order by a key": """
+def output(self, t, u):
+    a, b = u
+    rows = sorted([a, b, -a, 0.1], key=abs), sorted([a, 0, -0.0, b], reverse=True), sorted((3, -1), key=abs)
+    best = min(a, b, key=abs), max([a, -a, b], key=lambda x: x * x), max((1.0, -1.0), key=abs)
+    weighted = [sum(2.0**k * x for k, x in enumerate(row)) for row in rows]
+    return (sum(weighted) + sum(best) + math.copysign(0.5, rows[1][2]),)
+""",
+    "distances of constants": """
+def output(self, t, u):
+    return (u[0] * math.dist((0.0, 1.0), (3, 4)) + math.dist((u[0], 1), (True, u[1])),)
+""",
+    "truth values among numbers": """
+def configure(self):
+    self.second = True if self.p.mode == "second" else False
+def output(self, t, u):
+    a, b = u
+    n = a > 0.0 if b > 0.0 else 3
+    if b > 0.8:
+        raise ValueError(f"{a > 0.5} and {self.second}")
+    return (-n + abs(n) * 2 + math.copysign(1.0, -(n * 0)) + round(n) + max(n, a > b) + self.second,)
+""",
     "chained comparisons": """
 def output(self, t, u):
     a, b = u

@@ -80,6 +80,33 @@ REFUSED = {
         "an integer beyond 64 bits",
         2,
     ),
+    "a number that may be True": (
+        "def output(self, t, u):\n    n = u[0] > 0.5 if u[1] > 0.5 else 3\n    return (isinstance(n, bool),)",
+        "a number that is True or False on some paths, another integer on others",
+        3,
+    ),
+    "a text with a number that may be True": (
+        "def output(self, t, u):\n    n = max(u[0] > 0.5, 3)\n    if n > u[1]:\n"
+        "        raise ValueError(f'{n}')\n    return (n,)",
+        "a number that is True or False on some paths, another integer on others",
+        4,
+    ),
+    "an item of a table that may be True": (
+        "def output(self, t, u):\n    x = (0.5, 1, True)[int(u[0]) % 3]\n    return (isinstance(x, bool),)",
+        "a number that is True or False on some paths, another integer on others",
+        3,
+    ),
+    "functions made by a generator expression": (
+        "def output(self, t, u):\n    return (next(iter((lambda: x) for x in u))(),)",
+        "functions or generators made by a generator expression",
+        2,
+    ),
+    "an integer of 64 bits in the state": (
+        "def start(self, t, u):\n    self.n = 2**60\ndef advance(self, t, h, u):\n    self.n = -1\n"
+        "def output(self, t, u):\n    return (u[0] if self.n else 0.0,)",
+        "an integer of 64 bits or another number",
+        3,
+    ),
     "a generator": (
         "def output(self, t, u):\n    return (sum(self.halves(u)),)\n"
         "def halves(self, u):\n    for x in u:\n        yield 0.5 * x",

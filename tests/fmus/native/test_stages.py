@@ -151,7 +151,7 @@ def test_a_division_raises_where_its_divisor_is_zero():
 
 def test_types_join_as_python_numbers_do():
     assert ir.are_joined((ir.INT, ir.BOOL))
-    assert ir.joined((ir.INT, ir.BOOL)) == ir.INT
+    assert ir.joined((ir.INT, ir.BOOL)) == ir.joined((ir.EITHER, ir.INT)) == ir.EITHER
     assert not ir.are_joined((ir.INT, ir.REAL))
     with pytest.raises(ir.Refused, match="64 bits"):
         ir.are_joined((ir.WORD, ir.REAL))

@@ -1,0 +1,184 @@
+"""Evaluation of Python's built-in functions of numbers: rounding, sums, extremes and order."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from . import ir
+from .loops import Looping
+from .lower import COMPENSATED, complaint
+from .values import (
+    Bound,
+    Box,
+    Bytes,
+    Closure,
+    List,
+    Picked,
+    Refused,
+    Span,
+    Text,
+    Union,
+    is_mixed,
+    is_number,
+    is_real,
+)
+
+MOST_DIGITS = 15
+"""Largest number of digits to which numbers are rounded."""
+
+
+class OfNumbers(Looping):
+    """Calls of functions of numbers."""
+
+    def _python_abs(self, value: Any) -> Any:
+        return self.size(value)
+
+    def _python_fabs(self, value: Any) -> Any:
+        return self.function("fabs", value)
+
+    def _python_float(self, value: Any) -> Any:
+        return self.as_real(value) if is_number(value) else float(value)
+
+    def _python_int(self, value: Any) -> Any:
+        return self.whole("trunc", value) if is_number(value) else int(value)
+
+    def _python_round(self, value: Any, digits: Any = None) -> Any:
+        if digits is None:
+            return self.whole("rint", value) if is_number(value) else round(value)
+        if not isinstance(value, ir.Var):
+            return round(value, digits)
+        if not isinstance(digits, int) or not 0 <= digits <= MOST_DIGITS:
+            raise Refused(f"round to other than 0 to {MOST_DIGITS} digits")
+        return self.let(ir.REAL, "rounded", value, digits) if is_real(value) else self.whole("rint", value)
+
+    def _python_divmod(self, a: Any, b: Any) -> Any:
+        if is_number(a) and is_number(b):
+            unit: Any = 1.0 if is_real(a) or is_real(b) else 1
+            self.require(self.compare("!=", b, 0), *complaint(lambda: divmod(unit, 0 * unit)))
+        return self.operate("//", a, b), self.operate("%", a, b)
+
+    def _python_isclose(self, a: Any, b: Any, *, rel_tol: Any = 1e-09, abs_tol: Any = 0.0) -> Any:
+        if not all(isinstance(x, (int, float)) and x >= 0.0 for x in (rel_tol, abs_tol)):
+            raise Refused("math.isclose with tolerances that are only known at run time, or negative")
+        a, b = self.real(a), self.real(b)
+        finite = [self.negation(self.function("isinf", x)) for x in (a, b)]
+        apart = self.size(self.binary("-", b, a))
+        bounds = [self.size(self.binary("*", float(rel_tol), x)) for x in (b, a)]
+
+        def near() -> Any:
+            return self._one_of([self.compare("<=", apart, bound) for bound in (*bounds, float(abs_tol))])
+
+        def of_finite() -> Any:
+            return self.branch(finite[0], lambda: self.branch(finite[1], near, lambda: False), lambda: False)
+
+        return self.branch(self.compare("==", a, b), lambda: True, of_finite)
+
+    def _one_of(self, conditions: list[ir.Operand]) -> ir.Operand:
+        first, *rest = conditions
+        return self.branch(first, lambda: True, lambda: self._one_of(rest)) if rest else first
+
+    def _python_hypot(self, *values: Any) -> Any:
+        return (
+            self.function("hypot", *values)
+            if any(isinstance(x, ir.Var) for x in values)
+            else math.hypot(*values)
+        )
+
+    def _python_dist(self, first: Any, second: Any) -> Any:
+        pairs = list(zip(self.items(first), self.items(second), strict=True))
+        if not any(isinstance(x, (ir.Var, Union)) for pair in pairs for x in pair):
+            return math.dist(*zip(*pairs, strict=True))
+        return self.function("dist", *[self.binary("-", self.real(a), self.real(b)) for a, b in pairs])
+
+    def _python_prod(self, values: Any) -> Any:
+        product: Any = 1
+        for item in self.items(values):
+            product = self.operate("*", product, item)
+        return product
+
+    def _python_sum(self, values: Any, start: Any = 0) -> Any:
+        """Return sum(values, start), by the summation of the Python that builds."""
+        numbers = [start, *self.items(values)]
+        if not all(is_number(x) or is_mixed(x) for x in numbers):
+            raise Refused("a sum of values that are not numbers")
+        if COMPENSATED:
+            return self._compensated(numbers, 0)
+        total = numbers[0]
+        for x in numbers[1:]:
+            total = self.operate("+", total, x)
+        return total
+
+    def _compensated(self, numbers: list[Any], k: int) -> Any:
+        mixed = next((i for i in range(k, len(numbers)) if isinstance(numbers[i], Union)), None)
+        if mixed is not None:
+            before, after = numbers[:mixed], numbers[mixed + 1 :]
+            return self.by_form(numbers[mixed], lambda x: self._compensated([*before, x, *after], mixed))
+        if not any(isinstance(x, ir.Var) for x in numbers):
+            return sum(numbers[1:], numbers[0])
+        first = next((i for i, x in enumerate(numbers) if is_real(x)), len(numbers))
+        whole: Any = 0
+        for x in numbers[:first]:
+            whole = self.operate("+", whole, x)
+        if first == len(numbers):
+            return whole
+        return self.let(ir.REAL, "compensated_sum", whole, *numbers[first:])
+
+    def _python_max(self, *args: Any, **named: Any) -> Any:
+        return self._extreme(">", args, named)
+
+    def _python_min(self, *args: Any, **named: Any) -> Any:
+        return self._extreme("<", args, named)
+
+    def _extreme(self, op: str, args: Sequence[Any], named: dict[str, Any]) -> Any:
+        items = self.items(args[0]) if len(args) == 1 else list(args)
+        if not items and "default" in named:
+            return named["default"]
+        key = named.get("key")
+        if items and key is None and all(map(self._is_constant, items)):
+            return (max if op == ">" else min)(items)
+        if not items:
+            raise Refused("min or max of nothing")
+        best, *others = self._keyed(items, key, "min or max of values that are not numbers")
+        for other in others:
+            better = self._in_order(op, other[0], best[0])
+            best = tuple(self.selected(better, x, y) for x, y in zip(other, best, strict=True))
+        return best[-1]
+
+    def _python_sorted(self, values: Any, key: Any = None, reverse: Any = False) -> Any:
+        items = self.items(values)
+        if not isinstance(reverse, (bool, int)):
+            raise Refused("an order that is only known at run time")
+        if key is None and not any(isinstance(x, (ir.Var, Union)) for x in items):
+            return List(sorted(items, reverse=bool(reverse)))
+        rows = self._keyed(items, key, "sorting values that are not numbers")
+        rows = rows[::-1] if reverse else rows  # of equal ones, the first stays first
+        for end in range(1, len(rows)):  # insertion sort, which is stable
+            for k in range(end, 0, -1):
+                a, b = rows[k - 1], rows[k]
+                less = self._in_order("<", b[0], a[0])
+                both = list(zip(a, b, strict=True))
+                pairs = [(self.selected(less, y, x), self.selected(less, x, y)) for x, y in both]
+                rows[k - 1], rows[k] = (tuple(column) for column in zip(*pairs, strict=True))
+        items = [row[-1] for row in rows]
+        return List(items[::-1] if reverse else items)
+
+    def _keyed(self, items: Sequence[Any], key: Any, text: str) -> list[tuple[Any, ...]]:
+        """Return items with their keys before them, if there are keys; refused with a text if not numbers."""
+        if not all(is_number(x) or is_mixed(x) for x in items):
+            raise Refused(text)
+        if key is None:
+            return [(x,) for x in items]
+        keys = [self.call(key, [x], {}) for x in items]
+        if not all(is_number(x) or is_mixed(x) for x in keys):
+            raise Refused("keys that are not numbers")
+        return list(zip(keys, items, strict=True))
+
+    def _in_order(self, op: str, a: Any, b: Any) -> ir.Operand:
+        return self.compare(op, *(self.real(x) if is_mixed(x) else x for x in (a, b)))
+
+    def _is_constant(self, value: Any) -> bool:
+        if isinstance(value, tuple):
+            return all(map(self._is_constant, value))
+        return not isinstance(value, (ir.Var, Box, Union, Picked, Closure, Bound, Text, Bytes, Span))
