@@ -6,27 +6,54 @@ from collections.abc import Sequence
 
 import pytest
 
-from .random_programs import program
-from .translated import REFUSED, SAME, trial, tried
+from .random_programs import FUNCTION, KINDS, OBJECT, program
+from .translated import REFUSED, SAME, kind_of, trial, tried
 
-FEW = (0, 5, 7, 10)
-"""Seeds of programs that are translated, not refused."""
+FEW = (3, 7, 14, 39)
+"""Seeds of programs of all kinds that are translated, not refused."""
 
 
 def check(seeds: Sequence[int], same: int) -> None:
     """Check that no program is wrong, and that enough of them are translated."""
     tally = trial(seeds)
-    assert not tally.bad, "\n".join(f"{seed}: {why}\n{program(seed)}" for seed, why in tally.bad)
+    assert not tally.bad, "\n".join(
+        f"{seed}: {why}\n{program(seed, kind_of(seed))}" for seed, why in tally.bad
+    )
     assert tally.counts[SAME] >= same
 
 
 def test_a_few_random_programs_give_the_same_bytes() -> None:
+    assert {kind_of(seed) for seed in FEW} == set(KINDS)
     check(FEW, len(FEW))
 
 
 @pytest.mark.exhaustive
 def test_random_programs_give_the_same_bytes() -> None:
     check(range(100, 400), 100)
+
+
+LAW = """
+class Law:
+    inputs, outputs = ("yaw_rate", "sideslip"), ("yaw_moment",)
+    def __init__(self, gain=2.0):
+        self.gain, self.seen, self.kept = gain, [1.0], Kept(2)
+    def advance(self, t, h, u):
+        self.seen.append(u.yaw_rate)
+        self.kept.raised(Pair(u[0], 1).both)
+        if len(self.seen) > 4:
+            self.seen.pop(0)
+    def output(self, t, u):
+        return sum(Pair(1, 2)._replace(one=u[0])) + self.seen[0] + self.kept.level * self.gain
+"""
+
+
+def test_a_law_with_a_growing_list_a_dataclass_and_a_named_tuple_is_translated() -> None:
+    assert tried(LAW, 1, OBJECT) == (SAME, "")
+
+
+def test_a_law_that_may_return_true_is_refused() -> None:
+    law = "def law(yaw_rate, sideslip, t):\n    return yaw_rate > 0 if t > 1 else 3\n"
+    assert tried(law, 1, FUNCTION)[0] == REFUSED
 
 
 def test_a_program_that_is_not_translated_is_refused() -> None:

@@ -7,34 +7,66 @@ from __future__ import annotations
 
 import argparse
 import ast
+import importlib.util
+import json
 import math
 import os
 import random
 import re
-import resource
 import signal
 import struct
+import sys
 import tempfile
-import time
+import warnings
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import yawbench._native
 from fmus.native.compare_with_python import Native, Twin
 from fmus.native.emit import emit
 from fmus.native.ir import ALONE
-from fmus.native.specialise import specialise
+from fmus.native.specialise import Program, specialise
 from fmus.native.values import Refused
+from yawbench._controller import PythonComponent
+from yawbench._native import folders_of
 
-from ..fmus.native.small import compiled, component_of, source
-from .random_programs import BEFORE, program
+from ..fmus.native.small import HEAD, component_of, source
+from .grammar import BEFORE
+from .random_programs import CALLED, COMPONENT, FUNCTION, OBJECT, program
+from .together import choose, library_of, parts_of
 
 SAME, REFUSED, WRONG = "the same", "refused", "wrong"
 SECONDS = 20
-"""Processor time [s] that a program may take."""
-VALUES = (0.0, -0.0, 1.0, -1.0, 0.5, -0.5, 1.5, 2.5, 2.0, 3.0, -7.0, 1e-300, 1e17, -1e300, math.inf, math.nan)
+"""Processor time [s] that a program may take, and the compiler for many."""
+TOGETHER = 20
+"""Programs that are compiled together."""
+KEPT = ("start", "advance", "output", "law", "__call__", "__init__", "Law")
+"""Functions and classes that a smaller program has, too."""
+LITERAL = 'from typing import Literal\n\nMode = Literal["first", "second", "third"]\n'
+"""Type of the text parameter of laws."""
+VALUES = (
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    0.5,
+    -0.5,
+    1.5,
+    2.5,
+    2.0,
+    3.0,
+    -7.0,
+    1e-300,
+    5e-324,
+    1e17,
+    2.0**53,
+    -1e300,
+    math.inf,
+    math.nan,
+)
 """Inputs that meet limits, among those that are drawn."""
 
 
@@ -88,7 +120,7 @@ def _inputs(chance: random.Random) -> list[float]:
     ]  # fmt: skip
 
 
-def drive(library: Path, component: type[Any], folder: Path, seed: int, starts: int = 40) -> None:
+def drive(library: Path, component: type[Any], folder: Path, seed: int, starts: int = 30) -> None:
     """Take both through starts, steps, and states that are saved and restored.
 
     Raises:
@@ -97,136 +129,277 @@ def drive(library: Path, component: type[Any], folder: Path, seed: int, starts: 
     chance = random.Random(seed)
     pair = _Pair(Native(library, "{a}"), Twin(component, folder))
     variables = component.variables
+    inputs, outputs = ([i for i, v in enumerate(variables) if v.causality == x] for x in ("input", "output"))
     reals = [i for i, v in enumerate(variables) if v.causality == "parameter" and v.type == "Real"]
     others = [i for i, v in enumerate(variables) if v.causality == "parameter" and v.type != "Real"]
     for k in range(starts):
         pair.call("reset")
         if k % 2:
             pair.call(
-                "set", "Real", reals, [chance.choice((0.0, -0.0, 1.0, -3.0, chance.uniform(-9.0, 9.0)))]
+                "set",
+                "Real",
+                reals,
+                [chance.choice((0.0, -0.0, 1.0, -3.0, chance.uniform(-9.0, 9.0))) for _ in reals],
             )
             for i in others:
                 v = variables[i]
                 value: Any = chance.randint(-3, 9) if v.type == "Integer" else chance.choice((True, False))
                 pair.call("set", v.type, [i], [chance.choice(v.choices) if v.type == "String" else value])
-        pair.call("set", "Real", [0, 1], _inputs(chance))
-        if not (pair.call("begin", 0.25 * k) and pair.call("end_initialization") and pair.call("get", [2])):
+        pair.call("set", "Real", inputs, _inputs(chance)[: len(inputs)])
+        if not (
+            pair.call("begin", 0.25 * k) and pair.call("end_initialization") and pair.call("get", outputs)
+        ):
             continue
         t, kept = 0.25 * k, None
         for i in range(12):
-            pair.call("set", "Real", [0, 1], _inputs(chance))
+            pair.call("set", "Real", inputs, _inputs(chance)[: len(inputs)])
             h = chance.choice((0.001, 0.01, 1.0))
-            if not pair.call("step", t, h) or not pair.call("get", [2]):
+            if not pair.call("step", t, h) or not pair.call("get", outputs):
                 break
             t += h
             if i == 4:
                 kept = t, pair.native.save(), pair.twin.save()
-            if i == 9 and kept:
+            if i == 9 and kept and kept[2]:  # the state of some laws cannot be saved in Python
                 t = kept[0]
                 pair.trace.append("restore")
                 if pair.native.restore(kept[1])[0] != pair.twin.restore(kept[2])[0]:
                     raise AssertionError("a saved state is not restored")
-                pair.call("get", [2])
+                pair.call("get", outputs)
 
 
-def came_to(body: str, seed: int, folder: Path) -> tuple[str, str]:
-    """Translate and drive a program; return what came of it, and why."""
-    with component_of(source(body, BEFORE), folder) as (component, home):
-        try:
-            text = emit(specialise(component, home), "small.py", "{a}")
-        except Refused as refused:
-            if not re.search(r"\(.+:\d+\)$", str(refused)):
-                return WRONG, f"refused without file and line: {refused}"
-            if refused.text.startswith("not translated"):
-                return WRONG, str(refused)
-            return REFUSED, refused.text
-        drive(compiled(text, folder), component, home.parent, seed)
-    return SAME, ""
+@dataclass(frozen=True)
+class Tried:
+    """A program, and the seed of what it is driven with."""
+
+    text: str
+    seed: int
+    kind: str = COMPONENT
 
 
-def tried(body: str, seed: int) -> tuple[str, str]:
-    """Return what comes of a program in a process of its own, which may take `SECONDS`."""
+class _Translating:
+    """Translation of programs, all in one staged package."""
+
+    def __init__(self, home: Path, folder: Path) -> None:
+        self.home, self.folder = home, folder
+        self.count = 0
+
+    def made(self, tried: Tried) -> tuple[type[Any], Callable[[], Program]]:
+        """Return the component class of a program, and what translates it."""
+        self.count += 1
+        name = f"trial_{self.count}"
+        if tried.kind == COMPONENT:
+            (self.home / "controllers" / f"{name}.py").write_text(source(tried.text, BEFORE))
+            module = importlib.import_module(f"{self.home.name}.controllers.{name}")
+            return module.Unit, lambda: specialise(module.Unit, self.home)
+        file = self.folder / f"{name}.py"
+        file.write_text(HEAD.partition("from ..fmi")[0] + LITERAL + BEFORE + tried.text)
+        spec = importlib.util.spec_from_file_location(name, file)
+        assert spec is not None and spec.loader is not None
+        module = sys.modules[name] = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        law = module.law if tried.kind == FUNCTION else module.Law()
+        made = PythonComponent(law, instance="law", role="controller")
+        homes, unnamed = folders_of(law, made._translated), Path(yawbench._native.__file__)
+        return made.component, lambda: specialise(made._translated, *homes, unnamed=unnamed)
+
+
+def _translated(translating: _Translating, tried: Tried) -> tuple[str, Any]:
+    """Return `SAME` with class and text, or how and why a program is not translated."""
+    try:
+        component, translate = translating.made(tried)
+    except Exception as error:
+        return REFUSED, f"no component is made: {type(error).__name__}"
+    try:
+        return SAME, (component, emit(translate(), "small.py", "{a}"))
+    except Refused as refused:
+        if not re.search(r"\(.+:\d+\)$", str(refused)):
+            return WRONG, f"refused without file and line: {refused}"
+        if refused.text.startswith("not translated"):
+            return WRONG, str(refused)
+        return REFUSED, refused.text
+    except Exception as error:
+        return WRONG, f"{type(error).__name__}: {error}"
+
+
+def _come_to(every: Sequence[Tried], optimization: str, folder: Path, tell: Callable[..., None]) -> None:
+    """Translate and drive programs; tell what comes of each."""
+    with component_of(source("def output(self, t, u):\n    return u[:1]\n"), folder) as (_, home):
+        translating = _Translating(home, folder)
+        groups: dict[str, list[tuple[int, type[Any], str]]] = {}
+        for k, tried in enumerate(every):
+            tell(k)
+            how, made = _translated(translating, tried)
+            if how == SAME:
+                groups.setdefault(parts_of(made[1])[0], []).append((k, *made))
+            else:
+                tell(k, how, made)
+        for number, group in enumerate(groups.values()):
+            tell(-1)
+            place = folder / str(number)
+            place.mkdir()
+            library = library_of([text for _, _, text in group], place, optimization)
+            for place_in, (k, component, _) in enumerate(group):
+                tell(k)
+                choose(library, place_in)
+                try:
+                    drive(library, component, home.parent, every[k].seed)
+                except AssertionError as error:
+                    tell(k, WRONG, str(error))
+                except Exception as error:
+                    tell(k, WRONG, f"{type(error).__name__}: {error}")
+                else:
+                    tell(k, SAME, "")
+
+
+def _in_a_process(every: Sequence[Tried], optimization: str) -> tuple[dict[int, tuple[str, str]], int, str]:
+    """Return what comes of programs in a process, until one takes more than `SECONDS` or kills it.
+
+    The others are the number of the program that was tried last, -1 for the compiler, and how it ended.
+    """
     reading, writing = os.pipe()
     child = os.fork()
     if child == 0:
-        how = WRONG, "it ends"
         try:
             os.close(reading)
-            resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 1))
+            warnings.simplefilter("ignore")  # of literals in random programs
+
+            def tell(*news: Any) -> None:
+                signal.setitimer(signal.ITIMER_PROF, SECONDS)
+                os.write(writing, json.dumps(news).encode() + b"\n")
+
             with tempfile.TemporaryDirectory() as folder:
-                how = came_to(body, seed, Path(folder))
+                _come_to(every, optimization, Path(folder), tell)
         except BaseException as error:
-            how = WRONG, f"{type(error).__name__}: {error}"
+            os.write(writing, json.dumps([f"{type(error).__name__}: {error}"]).encode() + b"\n")
         finally:
-            os.write(writing, "\0".join(how).encode()[:4000])
             os._exit(0)
     os.close(writing)
-    with open(reading, "rb") as answers:
-        content = answers.read().decode("utf-8", "replace")
+    results, last, end = {}, -1, ""
+    with open(reading, encoding="utf-8") as answers:
+        for line in answers:
+            news = json.loads(line)
+            if isinstance(news[0], str):
+                end = news[0]
+            elif len(news) == 1:
+                last = news[0]
+            else:
+                results[news[0]] = news[1], news[2]
     _, status = os.waitpid(child, 0)
-    if not content:
-        return WRONG, f"it dies of {signal.Signals(os.WTERMSIG(status)).name}"
-    how, _, why = content.partition("\0")
-    return how, why
+    if os.WIFSIGNALED(status):
+        end = f"it dies of {signal.Signals(os.WTERMSIG(status)).name}"
+    return results, last, end
 
 
-def trial(seeds: Iterator[int] | range) -> Tally:
-    """Try programs."""
+def tried_all(every: Sequence[Tried], optimization: str = "-O0") -> list[tuple[str, str]]:
+    """Return what comes of programs, and why."""
+    results: dict[int, tuple[str, str]] = {}
+    waiting = list(range(len(every)))
+    while waiting:
+        made, last, end = _in_a_process([every[k] for k in waiting], optimization)
+        results |= {waiting[k]: result for k, result in made.items()}
+        if last >= 0 and last not in made:
+            results[waiting[last]] = WRONG, end
+        rest = [k for k in waiting if k not in results]
+        if len(rest) == len(waiting) or (last == -1 and len(rest) == 1):
+            if len(waiting) == 1:
+                return [*[results[k] for k in results], (WRONG, end)]
+            return [
+                result
+                for k in range(len(every))
+                for result in ([results[k]] if k in results else tried_all([every[k]], optimization))
+            ]
+        waiting = rest
+    return [results[k] for k in range(len(every))]
+
+
+def tried(body: str, seed: int, kind: str = COMPONENT) -> tuple[str, str]:
+    """Return what comes of a program, and why."""
+    return tried_all([Tried(body, seed, kind)])[0]
+
+
+def kind_of(seed: int) -> str:
+    """Return the kind of the program of a seed: two of five are laws."""
+    return (COMPONENT, COMPONENT, FUNCTION, COMPONENT, (CALLED, OBJECT)[seed // 5 % 2])[seed % 5]
+
+
+def trial(seeds: Sequence[int]) -> Tally:
+    """Try programs, `TOGETHER` at a time, one time in four as optimized as units are."""
     tally = Tally()
-    for seed in seeds:
-        how, why = tried(program(seed), seed)
-        tally.counts[how] += 1
-        if how == REFUSED:
-            tally.reasons[why] += 1
-        elif how == WRONG:
-            tally.bad.append((seed, why))
+    for first in range(0, len(seeds), TOGETHER):
+        some = seeds[first : first + TOGETHER]
+        optimization = "-O2" if first // TOGETHER % 4 == 3 else "-O0"
+        results = tried_all([Tried(program(x, kind_of(x)), x, kind_of(x)) for x in some], optimization)
+        for seed, (how, why) in zip(some, results, strict=True):
+            tally.counts[how] += 1
+            if how == REFUSED:
+                tally.reasons[why] += 1
+            elif how == WRONG:
+                tally.bad.append((seed, why))
     return tally
 
 
-def shrunk(body: str, seed: int, why: str) -> str:
-    """Return a program with fewer statements that is wrong in the same way."""
-    kind = why.split(":")[0][:30]
-    best = body
-    progress = True
-    while progress:
-        progress = False
-        count = sum(isinstance(x, ast.stmt) for x in ast.walk(ast.parse(best)))
-        for k in reversed(range(count)):
-            tree = ast.parse(best)
-            if not _drop(tree, k):
-                continue
-            shorter = ast.unparse(tree) + "\n"
-            how, reason = tried(shorter, seed)
-            if how == WRONG and reason.split(":")[0][:30] == kind and "NameError" not in reason:
-                best, progress = shorter, True
+def alike(one: str, other: str) -> bool:
+    """Return whether two programs are wrong in the same way."""
+    one, other = (re.sub(r"[\d.]+", "", x)[:24] for x in (one, other))
+    return one == other
+
+
+def shrunk(text: str, seed: int, kind: str, why: str) -> str:
+    """Return a program with fewer statements and expressions that is wrong in the same way."""
+    while True:
+        queue = sorted({x for x in _shorter(text) if len(x) < len(text)}, key=len)
+        found = None
+        for first in range(0, len(queue), TOGETHER):
+            some = queue[first : first + TOGETHER]
+            results = tried_all([Tried(x, seed, kind) for x in some])
+            found = next(
+                (
+                    x
+                    for x, (how, reason) in zip(some, results, strict=True)
+                    if how == WRONG and alike(reason, why)
+                ),
+                None,
+            )
+            if found:
                 break
-    return best
+        if not found:
+            return text
+        text = found
 
 
-def _drop(tree: ast.Module, k: int) -> bool:
-    n = 0
-    for node in ast.walk(tree):
+def _shorter(text: str) -> Iterator[str]:
+    """Yield programs with a statement less, or with a part of an expression instead of it."""
+    nodes = list(ast.walk(ast.parse(text)))
+    for k in range(len(nodes)):
+        tree = ast.parse(text)
+        node = list(ast.walk(tree))[k]
+        for name, held in ast.iter_fields(node):
+            if isinstance(held, list):
+                for i, part in enumerate(held):
+                    for instead in _parts(part, at_most=len(held) - 1):
+                        held[i : i + 1] = instead
+                        yield ast.unparse(ast.fix_missing_locations(tree)) + "\n"
+                        held[i : i + len(instead)] = [part]
+            elif isinstance(held, ast.expr):
+                for (part,) in filter(None, _parts(held)):
+                    setattr(node, name, part)
+                    yield ast.unparse(ast.fix_missing_locations(tree)) + "\n"
+                setattr(node, name, held)
+
+
+def _parts(node: Any, at_most: int = 0) -> Iterator[list[Any]]:
+    """Yield what may stand for a node: nothing, its blocks, or its parts."""
+    if isinstance(node, ast.stmt) and not (
+        isinstance(node, (ast.FunctionDef, ast.ClassDef)) and node.name in KEPT
+    ):
+        yield [] if at_most else [ast.Pass()]
         for name in ("body", "orelse"):
-            block = getattr(node, name, None)
-            if not isinstance(block, list):
-                continue
-            for i, statement in enumerate(block):
-                if n == k:
-                    if (
-                        isinstance(statement, (ast.Return, ast.FunctionDef))
-                        and name == "body"
-                        and len(block) == 1
-                    ):
-                        return False
-                    inner = getattr(statement, "body", [])
-                    block[i : i + 1] = (
-                        inner if isinstance(statement, (ast.If, ast.For, ast.While)) and False else []
-                    )
-                    if not block and name == "body":
-                        block.append(ast.Pass())
-                    return True
-                n += 1
-    return False
+            if getattr(node, name, None) and not isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+                yield getattr(node, name)
+    elif isinstance(node, ast.expr) and isinstance(getattr(node, "ctx", ast.Load()), ast.Load):
+        yield from ([x] for x in ast.iter_child_nodes(node) if isinstance(x, ast.expr))
+        if not isinstance(node, (ast.Constant, ast.Name)):
+            yield [ast.Constant(1.5)]
 
 
 def main() -> None:
@@ -236,22 +409,23 @@ def main() -> None:
     parser.add_argument("--shrink", action="store_true", help="show wrong programs with fewest statements")
     parser.add_argument("--until", type=int, default=10**9, help="wrong programs after which it ends")
     args = parser.parse_args()
-    began, total = time.monotonic(), Tally()
-    first = args.seed * 1_000_000
-    for seed in range(first, first + args.programs):
-        one = trial(range(seed, seed + 1))
-        total.counts += one.counts
-        total.reasons += one.reasons
-        total.bad += one.bad
-        for number, why in one.bad:
-            text = program(number)
+    began, total = sum(os.times()[:4]), Tally()
+    seeds = range(args.seed * 1_000_000, args.seed * 1_000_000 + args.programs)
+    for first in range(0, len(seeds), 4 * TOGETHER):
+        some = trial(seeds[first : first + 4 * TOGETHER])
+        total.counts += some.counts
+        total.reasons += some.reasons
+        total.bad += some.bad
+        for seed, why in some.bad:
+            kind = kind_of(seed)
+            text = program(seed, kind)
             if args.shrink:
-                text = shrunk(text, number, why)
-                why = tried(text, number)[1]
-            print(f"==== {number}\n{text}\n{why}\n", flush=True)
+                text = shrunk(text, seed, kind, why)
+                why = tried(text, seed, kind)[1]
+            print(f"==== {seed}, {kind}\n{text}\n{why}\n", flush=True)
         if len(total.bad) >= args.until:
             break
-    print(dict(total.counts), f"in {time.monotonic() - began:.0f} s")
+    print(dict(total.counts), f"in {sum(os.times()[:4]) - began:.0f} s of processor time")
     for reason, count in total.reasons.most_common(25):
         print(f"{count:6d} {reason}")
 
