@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -25,7 +25,6 @@ from .claims import ClaimResult, Judgement, MetricTable, Region, correlation, ju
 from .confidence import interval, share_bounds
 from .experiment import Case, LoadedExperiment, NamedRun, PlannedExperiment, metrics_of
 from .jobs import NOT_MADE, MeasuredRun, Outcome, measured, read_back
-from .on_demand import OnDemand
 from .schema import ExperimentSpec
 from .tables import Cell, Table
 
@@ -106,16 +105,17 @@ class ExperimentResult:
         return sorted({(fmu.name, fmu.sha256) for fmu in recorded if fmu.name and fmu.sha256})
 
     @property
-    def plans_made(self) -> Sequence[Plan]:
-        """The plans of the cases that have been executed."""
-        jobs = self.planned.jobs if self.planned else ()
-
-        def plan(number: int) -> Plan:
-            made = jobs[number].plan
-            assert made is not None
-            return made
-
-        return OnDemand([number for number, record in enumerate(self.records) if record.made], plan)
+    def kinds_made(self) -> list[tuple[Plan, int]]:
+        """Plans of executed cases, one for all with the same FMUs and time grid, each with their number."""
+        kinds: dict[Hashable, Plan] = {}
+        numbers: Counter[Hashable] = Counter()
+        for job, record in zip(self.planned.jobs if self.planned else (), self.records, strict=True):
+            if job.plan is not None and record.made:
+                grid = job.plan.algorithm, job.plan.step, job.plan.start, job.plan.n_steps
+                kind = (*((unit.name, unit.fmu.sha256) for unit in job.plan.instances), *grid)
+                kinds.setdefault(kind, job.plan)
+                numbers[kind] += 1
+        return [(plan, numbers[kind]) for kind, plan in kinds.items()]
 
     def words(self, case: Case) -> str:
         """Return the name of a case in messages."""

@@ -99,7 +99,8 @@ def chapter(
     name = anchor(f"{experiment.path.absolute().parent.name} {experiment.path.stem}")
     plans = plans_of(findings)
     groups = groups_of([(record_of(job, plan), plan) for job, (_, plan) in plans])
-    made = runs_made(findings)
+    runs = runs_made(findings)
+    kinds = [kind for kind, _ in runs]
     failed = findings.failed
     content, numbers = viewer_of(findings, views, measured)
     sweep = None
@@ -138,7 +139,7 @@ def chapter(
         "command": command,
         "folder": str(folder),
         "settings": settings(findings),
-        "grid": grid_of_times(made),
+        "grid": grid_of_times(runs),
         "runs": len(findings.records),
         "not_made": findings.not_made,
         "comparison": None,
@@ -147,8 +148,8 @@ def chapter(
             validation_facts(validation, f"validation-{number}")
             for number, validation in enumerate(findings.validations, start=1)
         ],
-        "fmus": fmus_of(made),
-        "programs": programs_of(made),
+        "fmus": fmus_of(kinds),
+        "programs": programs_of(kinds),
     }
 
 
@@ -164,11 +165,11 @@ def link_to_runs(experiment: LoadedExperiment, result: ClaimResult, numbers: Map
     return f"{VIEW}?shown={shown}&baseline={shown[0]}".replace(" ", "") if shown else ""
 
 
-def runs_made(findings: ExperimentResult) -> Sequence[Results | Plan]:
-    """Return the results of all runs; along axes, the plans of those that have been made."""
+def runs_made(findings: ExperimentResult) -> Sequence[tuple[Results | Plan, int]]:
+    """Return the results of all runs; along axes, a plan of each kind that was made; with their numbers."""
     if not findings.spec.axes or findings.planned is None:
-        return [*findings.results.values()]
-    return findings.plans_made
+        return [(results, 1) for results in findings.results.values()]
+    return findings.kinds_made
 
 
 def repeats(findings: ExperimentResult) -> str:
@@ -380,16 +381,16 @@ def settings(findings: ExperimentResult) -> Table:
     return Table("", [headings[k] for k in kept], [[row[k] for k in kept] for row in rows], [], numbers)
 
 
-def grid_of_times(runs: Iterable[Results | Plan]) -> list[str]:
+def grid_of_times(runs: Iterable[tuple[Results | Plan, int]]) -> list[str]:
     """Return each combination of algorithm, step size and stop time that occurs in plans or records."""
     counts: Counter[str] = Counter()
-    for run in runs:
+    for run, number in runs:
         algorithm: str
         if isinstance(run, Plan):
             algorithm, step, end = run.algorithm, float(run.step), run.time(run.n_steps)
         else:
             algorithm, step, end = run.record.algorithm, run.record.step_size, run.record.stop_time
-        counts[f"{algorithm}, {1000 * step:g} ms, until {end:g} s"] += 1
+        counts[f"{algorithm}, {1000 * step:g} ms, until {end:g} s"] += number
     return [f"{text} ({counted(count, 'run')})" for text, count in counts.items()]
 
 
