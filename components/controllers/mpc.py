@@ -33,9 +33,14 @@ class MpcParameters(LqrParameters):
     prediction_step: float = parameter(
         0.02, "s", "Prediction step", "chosen: a tenth of the car's time constants", minimum=1e-4
     )
-    steps_per_move: int = parameter(4, None, "Steps per held moment", "chosen: 80 ms", minimum=1)
+    steps_per_move: int = parameter(4, None, "Steps per held moment", "chosen: 80 ms", minimum=1, maximum=100)
     moves: int = parameter(
-        5, None, "Moments in the horizon", "chosen: 0.4 s in all, half a yaw oscillation", minimum=1
+        5,
+        None,
+        "Moments in the horizon",
+        "chosen: 0.4 s in all, half a yaw oscillation",
+        minimum=1,
+        maximum=50,
     )
     sideslip_penalty: float = parameter(
         10.0, "1", "Weight of the excess over the sideslip bound", "chosen: ten errors", minimum=1e-6
