@@ -14,6 +14,8 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..cache import changed_since, warn_of_record, with_checksums
 from ..errors import ResultsError
 from ..figures.plots import draw
@@ -35,6 +37,7 @@ from .schema import FigureSpec
 from .tables import Table, column, to_csv
 
 if TYPE_CHECKING:
+    import pyarrow as pa
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -137,11 +140,26 @@ def _parquet(findings: ExperimentResult, table: Table) -> bytes:
         for column, kind in zip(table.columns, kinds, strict=True)
     ]
     schema = pa.schema(fields, metadata={"experiment": _encodable(_description(findings))})
-    arrays = [pa.array(map(_encodable, table.values(k)), type=kind) for k, kind in enumerate(kinds)]
+    arrays = [_arrow_column(table.values(k), table.kind(k)) for k in range(len(table.columns))]
     content = pa.BufferOutputStream()
     pq.write_table(pa.Table.from_arrays(arrays, schema=schema), content, compression="zstd")
     written: bytes = content.getvalue().to_pybytes()
     return written
+
+
+def _arrow_column(values: Sequence[Any], kind: str) -> pa.Array:
+    """Return a column of a table for Arrow, without `pyarrow.array`, which imports pandas first."""
+    import pyarrow as pa
+
+    present = np.array([value is not None for value in values], bool)
+    if kind == "string":
+        texts = [b"" if value is None else _encodable(value).encode() for value in values]
+        ends = np.cumsum([0, *map(len, texts)]).astype(np.int32)
+        memory = [pa.py_buffer(ends), pa.py_buffer(b"".join(texts))]
+    else:
+        memory = [pa.py_buffer(np.array([0 if value is None else value for value in values], kind))]
+    validity = None if present.all() else pa.py_buffer(np.packbits(present, bitorder="little"))
+    return pa.Array.from_buffers(getattr(pa, kind)(), len(values), [validity, *memory])
 
 
 def _encodable(value: Any) -> Any:
