@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +62,11 @@ def lane_changes(seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 def recording(seed: int, car: Car = SALOON, driven: Drive = drive) -> dict[str, np.ndarray]:
     """Return a drive of a single-track car with noise of production sensors, in SI."""
+    return {name: signal.copy() for name, signal in _recording(seed, car, driven).items()}
+
+
+@cache
+def _recording(seed: int, car: Car, driven: Drive) -> dict[str, np.ndarray]:
     noise = np.random.default_rng(seed)
     hand, v = driven(seed)
     most = car.friction * car.mass * 9.81 / (car.a + car.b) * np.array([car.b, car.a])
