@@ -137,7 +137,8 @@ def test_declared_dependencies_are_exactly_those_found(name):
         probe = Probe(component, source, vary=trial % 4 != 0)
         try:
             at_once = probe.at_a_step(0.0)
-            later = probe.at_a_step(0.002)
+            proves = component.sampled or not expected <= seen | at_once
+            later = probe.at_a_step(0.002) if proves else set()
         except AssertionError:
             assert trial % 4 != 0  # the component may refuse parameters, but not its own defaults
             continue

@@ -246,9 +246,15 @@ def test_a_copy_of_a_components_fmu_in_another_folder_is_told_of_and_not_touched
     assert (project / "before/driver_sine.fmu").read_bytes() == old
 
 
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A cache with the native libraries that a test before has compiled of the same sources."""
+    return tmp_path_factory.mktemp("compiled")
+
+
 @pytest.mark.parametrize("built_into", ["fmus", "linked"])
-def test_a_folder_of_fmus_may_be_opened_through_a_link(built_into, tmp_path, monkeypatch):
-    monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "cache"))
+def test_a_folder_of_fmus_may_be_opened_through_a_link(built_into, compiled, tmp_path, monkeypatch):
+    monkeypatch.setenv("YAWBENCH_CACHE", str(compiled))
     source = tmp_path / "drivers" / "steady.py"
     source.parent.mkdir()
     text = (ROOT / "components/drivers/steady_turn.py").read_text().replace("from ..", "from components.")
