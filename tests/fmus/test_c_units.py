@@ -25,11 +25,15 @@ pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no 
 @pytest.fixture
 def root(tmp_path):
     """A folder of components with one controller in C, `idea`."""
+    return begun(tmp_path)
+
+
+def begun(folder: Path) -> Path:
     for path, text in begin("controller", "idea", "c", in_checkout=True).files.items():
-        file = tmp_path / path
+        file = folder / path
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(text)
-    return tmp_path / "components"
+    return folder / "components"
 
 
 @pytest.fixture
@@ -37,10 +41,17 @@ def folder(root):
     return root / "controllers" / "idea"
 
 
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory, unpack):
+    """Its FMU as it is begun, and its library loaded."""
+    folder = tmp_path_factory.mktemp("begun")
+    return Fmu(unpack(build_component(begun(folder) / "controllers" / "idea", folder / "out")))
+
+
 @pytest.fixture
-def unit(folder, tmp_path, unpack):
-    """An instance of it, and its library loaded."""
-    return Unit(Fmu(unpack(build_component(folder, tmp_path / "out"))), logging_on=True)
+def unit(fmu):
+    """An instance of it."""
+    return Unit(fmu, logging_on=True)
 
 
 def edited(file: Path, old: str, new: str) -> None:
@@ -170,9 +181,8 @@ def test_what_it_cannot_do_is_an_error_with_a_message_not_a_crash(unit):
     assert unit.call("fmi2GetInteger", None, 0, None) == OK
 
 
-def test_it_runs_in_a_c_host_without_python(folder, tmp_path, unpack, host):
-    unpacked = Fmu(unpack(build_component(folder, tmp_path / "out")))
-    program = [str(host), str(unpacked.binary), (unpacked.folder / "resources").as_uri(), unpacked.guid]
+def test_it_runs_in_a_c_host_without_python(fmu, tmp_path, host):
+    program = [str(host), str(fmu.binary), (fmu.folder / "resources").as_uri(), fmu.guid]
     done = run([*program, "0", "6", "0=0.1"], tmp_path)
     assert done.returncode == 0, done.stderr
     moment = float(done.stdout.split()[2])
@@ -213,7 +223,6 @@ def test_a_unit_in_c_gets_a_library_for_windows_where_a_compiler_makes_one(folde
 
 
 @in_windows
-def test_the_library_for_windows_steps_as_the_one_for_linux(folder, tmp_path, unpack, wine_prefix):
-    fmu = Fmu(unpack(build_component(folder, tmp_path / "a")))
+def test_the_library_for_windows_steps_as_the_one_for_linux(fmu, tmp_path, wine_prefix):
     inputs = {"yaw_rate_ref": 0.1, "yaw_rate": 0.02}
     assert in_wine([(fmu, inputs)], tmp_path, wine_prefix) == [ten_steps(fmu, inputs)]
