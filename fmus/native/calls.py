@@ -15,6 +15,7 @@ from typing import Any
 from . import ir
 from .built_in import BuiltIn
 from .evaluate import DEEPEST, Call
+from .read import names_set_by
 from .statements import EXIT, ON, RESULT, RETURN
 from .values import (
     ANY,
@@ -88,7 +89,9 @@ class Calling(BuiltIn):
             function = self.loaded(function)
         if isinstance(function, Closure):
             names = self._bound(function.node.args, args, named, function.defaults, function.named_defaults)
-            return self._run(Call(function.source, Frame(names, function.frame)), function.node)
+            frame = Frame(names, function.frame)
+            call = Call(function.source, frame, base=frame, own=names_set_by(function.node))
+            return self._run(call, function.node)
         if isinstance(function, Bound):
             if isinstance(function.function, str):
                 return self._method(function.owner, function.function, args, named)

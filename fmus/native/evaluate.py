@@ -57,6 +57,8 @@ class Call:
     frame: Frame
     cls: type | None = None
     line: int = 0
+    base: Frame | None = None  # of an inner function
+    own: frozenset[str] = frozenset()  # names that an inner function sets
 
 
 class Evaluation(Places):
@@ -125,10 +127,14 @@ class Evaluation(Places):
     def _name(self, node: ast.Name) -> Any:
         call = self.calls[-1]
         frame: Frame | None = call.frame
+        outside = False
         while frame is not None:
             value = self.read(frame).get(node.id, UNSET)
             if value is not UNSET:
+                if outside and node.id in call.own:
+                    raise Refused(f"{node.id} is read before the inner function sets it")
                 return self.present(value, "UnboundLocalError", node.id)
+            outside = outside or frame is call.base
             frame = frame.parent
         for names in (call.source.cells, call.source.names, vars(builtins)):
             if node.id in names:

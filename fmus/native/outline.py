@@ -7,6 +7,7 @@ is long enough, the function is outlined; all other calls are evaluated in place
 from __future__ import annotations
 
 import ast
+from dataclasses import replace
 from typing import Any
 
 from . import ir
@@ -93,7 +94,7 @@ class Outlining(Calling):
             facts.others[tag] = facts.domains[tag] - left
 
         def run() -> Any:
-            value = self.inside(Call(call.source, frame), node)
+            value = self.inside(replace(call, frame=frame, base=frame), node)
             form = shape_of(value, self.read, "", Memo(self.fixed))
             return form, tuple(numbers_of(form, value, self.read, self)), value
 

@@ -62,6 +62,20 @@ def names_within(node: ast.AST) -> Counter[tuple[str, type[ast.expr_context]]]:
 
 
 @cache
+def names_set_by(function: Tree) -> frozenset[str]:
+    """Return the names that a function sets, without those of comprehensions and of functions within it."""
+    names: set[str] = set()
+    waiting: list[ast.AST] = [function.body] if isinstance(function, ast.Lambda) else [*function.body]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            names.add(node.id)
+        if not isinstance(node, (ast.FunctionDef, ast.Lambda, ast.comprehension)):
+            waiting += ast.iter_child_nodes(node)
+    return frozenset(names)
+
+
+@cache
 def _codes(file: str, content: bytes) -> dict[tuple[int, str], CodeType]:
     """Return the code of every function in a file, by its first line and name."""
     codes: dict[tuple[int, str], CodeType] = {}

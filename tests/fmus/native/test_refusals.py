@@ -91,6 +91,12 @@ REFUSED = {
         "a number that is True or False on some paths, another integer on others",
         4,
     ),
+    "a name of an inner function that is not set yet": (
+        "def output(self, t, u):\n    x = u[0]\n    def f(y):\n        x = x + y\n        return x\n"
+        "    return (f(u[1]),)",
+        "x is read before the inner function sets it",
+        4,
+    ),
     "an item of a table that may be True": (
         "def output(self, t, u):\n    x = (0.5, 1, True)[int(u[0]) % 3]\n    return (isinstance(x, bool),)",
         "a number that is True or False on some paths, another integer on others",
