@@ -151,6 +151,84 @@ MAYBE_UNUSED static double compensated_sum(int n, const double *x, const char *p
     return lost != 0.0 && isfinite(lost) ? sum + lost : sum;
 }
 
+/* ---- sorted(): with NaNs, the order depends on the algorithm, which is CPython's ---- */
+
+enum { MOST_SORTED = 63 }; /* from 64 items on, CPython merges several runs */
+
+#define LESS(i, k) (keys[order[i]] < keys[order[k]])
+
+MAYBE_UNUSED static void reverse(int *first, int *end)
+{
+    while (first < --end) {
+        int number = *first;
+        *first++ = *end, *end = number;
+    }
+}
+
+/* Make the first run ascending, and return its length: until CPython 3.12. */
+MAYBE_UNUSED static int strict_run(const double *keys, int *order, int n)
+{
+    int end = 2, descending = LESS(1, 0);
+    while (end < n && LESS(end, end - 1) == descending) {
+        end++;
+    }
+    if (descending) {
+        reverse(order, order + end);
+    }
+    return end;
+}
+
+/* The same since CPython 3.13: items of a descending run may be equal, and keep their order. */
+MAYBE_UNUSED static int run_with_ties(const double *keys, int *order, int n)
+{
+    int end = 1, equal = 0;
+    while (end < n && !LESS(end, end - 1)) {
+        end++;
+    }
+    if (end == n || LESS(0, end - 1)) {
+        return end;
+    }
+    reverse(order, order + end);
+    for (end++; end < n && !LESS(end - 1, end); end++) {
+        equal++;
+        if (LESS(end, end - 1)) {
+            reverse(order + end - equal, order + end);
+            equal = 0;
+        }
+    }
+    reverse(order + end - equal - 1, order + end);
+    reverse(order, order + end);
+    while (end < n && !LESS(end, end - 1)) {
+        end++;
+    }
+    return end;
+}
+
+#undef LESS
+
+/* Number of the item that sorted() puts into a place; `ties`: as since CPython 3.13. */
+MAYBE_UNUSED static double sorted_item(int place, int ties, int n, const double *keys)
+{
+    int order[MOST_SORTED];
+    for (int k = 0; k < n; k++) {
+        order[k] = k;
+    }
+    for (int end = ties ? run_with_ties(keys, order, n) : strict_run(keys, order, n); end < n; end++) {
+        int number = order[end], low = 0, high = end;
+        while (low < high) {
+            int middle = (low + high) / 2;
+            if (keys[number] < keys[order[middle]]) {
+                high = middle;
+            } else {
+                low = middle + 1;
+            }
+        }
+        memmove(order + low + 1, order + low, (size_t)(end - low) * sizeof *order);
+        order[low] = number;
+    }
+    return order[place];
+}
+
 /* ---- growing lists: ring buffers of items with a fixed number of doubles ---- */
 
 typedef struct {

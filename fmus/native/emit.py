@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from . import ir
-from .lower import WHOLE_ARE_PLAIN
+from .lower import TIES, WHOLE_ARE_PLAIN
 from .specialise import Program
 
 TYPES = {
@@ -359,6 +359,9 @@ class _Function:
         if op == "compensated_sum":
             plain = ", ".join(str(int(WHOLE_ARE_PLAIN and ir.type_of(x) != ir.REAL)) for x in args)
             return f"{op}({len(reals)}, (const double[]){{{', '.join(reals)}}}, (const char[]){{{plain}}})"
+        if op == "sorted_item":
+            keys = ", ".join(reals[1:])
+            return f"{op}({args[0]}, {int(TIES)}, {len(reals) - 1}, (const double[]){{{keys}}})"
         if op == "norm":
             return f"{op}({len(reals)}, (const double[]){{{', '.join(reals)}}})"
         name = f"__builtin_{op}" if op in _INLINE else op.removesuffix("_int")

@@ -379,3 +379,5 @@ POLE_IS_ERROR = sys.version_info < (3, 11)
 """Whether `math.pow(0.0, -inf)` is an error, as before CPython 3.11, where it became infinite."""
 WHOLE_ARE_PLAIN = sum([1e100, 1, -1e100]) == 0.0
 """Whether `sum` does not compensate whole numbers after a real one, as in CPython 3.12 and 3.13."""
+TIES = sorted([math.nan, 2.0, 1.0])[0] == 1.0
+"""Whether sorted() takes equal items into descending runs, as since CPython 3.13."""

@@ -27,6 +27,8 @@ from .values import (
 
 MOST_DIGITS = 15
 """Largest number of digits to which numbers are rounded."""
+MOST_SORTED = 63
+"""Largest number of numbers that are sorted natively; see `arithmetic.h`."""
 
 
 class OfNumbers(Looping):
@@ -153,16 +155,21 @@ class OfNumbers(Looping):
         if key is None and not any(isinstance(x, (ir.Var, Union)) for x in items):
             return List(sorted(items, reverse=bool(reverse)))
         rows = self._keyed(items, key, "sorting values that are not numbers")
+        if len(rows) > MOST_SORTED:
+            raise Refused(f"sorting more than {MOST_SORTED} numbers that are only known at run time")
         rows = rows[::-1] if reverse else rows  # of equal ones, the first stays first
-        for end in range(1, len(rows)):  # insertion sort, which is stable
-            for k in range(end, 0, -1):
-                a, b = rows[k - 1], rows[k]
-                less = self._in_order("<", b[0], a[0])
-                both = list(zip(a, b, strict=True))
-                pairs = [(self.selected(less, y, x), self.selected(less, x, y)) for x, y in both]
-                rows[k - 1], rows[k] = (tuple(column) for column in zip(*pairs, strict=True))
-        items = [row[-1] for row in rows]
-        return List(items[::-1] if reverse else items)
+        keys = [self.real(row[0]) if is_mixed(row[0]) else row[0] for row in rows]
+        if any(ir.type_of(x) in (ir.WORD, ir.WIDE) for x in keys):
+            raise Refused("sorting integers of 64 bits")
+        places = [self.let(ir.INT, "sorted_item", k, *keys) for k in range(len(keys))] if keys[1:] else [0]
+        ordered = [self._numbered(place, [row[-1] for row in rows]) for place in places]
+        return List(ordered[::-1] if reverse else ordered)
+
+    def _numbered(self, number: ir.Operand, items: Sequence[Any]) -> Any:
+        chosen = items[0]
+        for k, item in enumerate(items[1:], start=1):
+            chosen = self.selected(self.compare("==", number, k), item, chosen)
+        return chosen
 
     def _keyed(self, items: Sequence[Any], key: Any, text: str) -> list[tuple[Any, ...]]:
         """Return items with their keys before them, if there are keys; refused with a text if not numbers."""

@@ -158,6 +158,15 @@ def output(self, t, u):
     weighted = [sum(2.0**k * x for k, x in enumerate(row)) for row in rows]
     return (sum(weighted) + sum(best) + math.copysign(0.5, rows[1][2]),)
 """,
+    "order of numbers some of which are NaN": """
+def output(self, t, u):
+    a, b = u
+    nan = math.nan if b > 0.0 else 0.0
+    row = [a, b, -a, nan * a, 0.3, a + nan, 2.0 * b, 0.3]
+    rows = sorted(row), sorted(row[:4]), sorted(row[1:4], reverse=True), sorted(row, key=lambda x: -x)
+    plain = [-9.0 - k if x != x else x for row in rows for k, x in enumerate(row)]
+    return (sum([1.1**k * x for k, x in enumerate(plain)]),)
+""",
     "distances of constants": """
 def output(self, t, u):
     return (u[0] * math.dist((0.0, 1.0), (3, 4)) + math.dist((u[0], 1), (True, u[1])),)
