@@ -33,7 +33,7 @@ typedef struct {
     int stale;        /* a variable has been set since the outputs were computed */
     int configured;   /* since the last change of a parameter */
     Progress at;
-    char wrong[LONGEST_TEXT]; /* the last text that was not a choice */
+    char wrong[N_VARIABLES > N_REALS ? N_VARIABLES - N_REALS : 1][LONGEST_TEXT]; /* texts, if not choices */
 } Content;
 
 typedef struct {
@@ -187,7 +187,7 @@ static int wrong_parameter(Instance *instance, size_t i, Problem *problem)
             say(problem, d->choices[k]);
         }
         say(problem, " (got ");
-        say_quoted(problem, instance->now.content.wrong);
+        say_quoted(problem, instance->now.content.wrong[i - N_REALS]);
         say(problem, ")");
         return 1;
     }
@@ -508,14 +508,14 @@ static int code_of(Instance *instance, size_t i, const char *text)
             return k;
         }
     }
-    snprintf(instance->now.content.wrong, LONGEST_TEXT, "%s", text);
+    snprintf(instance->now.content.wrong[i - N_REALS], LONGEST_TEXT, "%s", text);
     return -1;
 }
 
 static const char *text_of(Instance *instance, size_t i)
 {
     int code = *other_at(instance, i);
-    return code < 0 ? instance->now.content.wrong : DECLARED[i].choices[code];
+    return code < 0 ? instance->now.content.wrong[i - N_REALS] : DECLARED[i].choices[code];
 }
 
 #define GET_AND_SET(Type, TYPE, BLANK, READ, WRITE)                                                         \

@@ -31,7 +31,7 @@ STEPS = (0.0, -0.001, math.nan, math.inf, -math.inf, 1e-320, 5.0)
 STATES = (0, 1, 2)
 INTEGERS = (0, 1, 2, 5, -1, 2**31 - 1, -(2**31))
 TEXTS = (
-    b"", b"none", b"\xc3\xa4", b"\xff", b"a'b", b'a"b\n', b"x" * 400, b"50%", None,
+    b"", b"none", b"\xc3\xa4", b"\xff", b"a'b", b'a"b\n', b"x" * 255, b"50%", None,
     "\u00fc\u2028\u00a0\U0001f600\u0085\u0301".encode(),
 )  # fmt: skip
 NAMES = (None, b"", b"fahr\xc3\xa4\xf0\x9f\x98\x80", b"\xff\xfe", b"%s%n%d", b"x" * 5000)
@@ -46,6 +46,8 @@ PLACES = (
     b"\xff",
     b"file:///" + b"a" * 6000,
 )
+MOST = 40
+"""References of a call. Chosen: sentences that list more, and all inputs, are cut natively."""
 REFERENCES = (0, 1, 10**6, 2**31 - 1, 2**31, 2**32 - 1)
 CATEGORIES = ((), (b"logAll",), (b"unknown",), (b"logStatusError", None), (b"\xff",))
 
@@ -183,7 +185,8 @@ class Writer:
             return kind, tuple(chance.choices(every, k=chance.randint(1, 4)))
         kind = self.fmu.type[self.name_of[chance.choice(some)]]
         own = [reference for reference in some if self.fmu.type[self.name_of[reference]] == kind]
-        return kind, tuple(own if chance.random() < 0.3 else chance.sample(own, chance.randint(1, len(own))))
+        count = len(own) if chance.random() < 0.3 else chance.randint(1, len(own))
+        return kind, tuple(chance.sample(own, min(count, MOST)))
 
     def _get(self, instance: int) -> None:
         some = self.outputs if self.chance.random() < 0.5 else list(self.name_of)
