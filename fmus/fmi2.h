@@ -56,20 +56,27 @@ typedef struct {
     X(DeSerializeFMUstate, (fmi2Component, const fmi2Byte[], size_t, fmi2FMUstate *))                       \
     X(DoStep, (fmi2Component, fmi2Real, fmi2Real, fmi2Boolean))
 
-/* Those that FMUs of this project do not support: X(name, parameters). */
+/* Those that FMUs of this project do not support: X(name, parameters, how the parameters are left unused). */
 #define FMI2_UNSUPPORTED_FUNCTIONS(X)                                                                       \
     X(GetDirectionalDerivative,                                                                             \
       (fmi2Component c, const fmi2ValueReference unknown[], size_t n_unknown,                               \
-       const fmi2ValueReference known[], size_t n_known, const fmi2Real d_known[], fmi2Real d_unknown[]))   \
-    X(SetRealInputDerivatives, (fmi2Component c, const fmi2ValueReference r[], size_t n,                    \
-                                const fmi2Integer order[], const fmi2Real values[]))                        \
-    X(GetRealOutputDerivatives, (fmi2Component c, const fmi2ValueReference r[], size_t n,                   \
-                                 const fmi2Integer order[], fmi2Real values[]))                             \
-    X(CancelStep, (fmi2Component c))                                                                        \
-    X(GetStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Status *value))                           \
-    X(GetIntegerStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value))                   \
-    X(GetBooleanStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value))                   \
-    X(GetStringStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2String *value))
+       const fmi2ValueReference known[], size_t n_known, const fmi2Real d_known[], fmi2Real d_unknown[]),   \
+      (void)unknown, (void)n_unknown, (void)known, (void)n_known, (void)d_known, (void)d_unknown)           \
+    X(SetRealInputDerivatives,                                                                              \
+      (fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Integer order[],                  \
+       const fmi2Real values[]),                                                                            \
+      (void)r, (void)n, (void)order, (void)values)                                                          \
+    X(GetRealOutputDerivatives,                                                                             \
+      (fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Integer order[],                  \
+       fmi2Real values[]),                                                                                  \
+      (void)r, (void)n, (void)order, (void)values)                                                          \
+    X(CancelStep, (fmi2Component c), (void)c)                                                               \
+    X(GetStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Status *value), (void)kind, (void)value)  \
+    X(GetIntegerStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value),                   \
+      (void)kind, (void)value)                                                                              \
+    X(GetBooleanStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value),                   \
+      (void)kind, (void)value)                                                                              \
+    X(GetStringStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2String *value), (void)kind, (void)value)
 
 /* fmi2<name>Fn is a pointer to the function fmi2<name>. */
 #define FMI2_POINTER_TYPE(name, parameters) typedef fmi2Status(*fmi2##name##Fn) parameters;

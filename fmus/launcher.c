@@ -692,9 +692,10 @@ EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, 
     return fmi2OK;
 }
 
-#define UNSUPPORTED(name, parameters)                                                                        \
+#define UNSUPPORTED(name, parameters, ...)                                                                   \
     EXPORT fmi2Status fmi2##name parameters                                                                  \
     {                                                                                                        \
+        __VA_ARGS__;                                                                                         \
         INSTANCE(c)                                                                                          \
         return refused(in, "fmi2" #name " is not supported");                                                \
     }

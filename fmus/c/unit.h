@@ -350,9 +350,10 @@ FMI2_EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind k
     return fmi2OK;
 }
 
-#define UNSUPPORTED(name, parameters)                                                                       \
+#define UNSUPPORTED(name, parameters, ...)                                                                  \
     FMI2_EXPORT fmi2Status fmi2##name parameters                                                            \
     {                                                                                                       \
+        __VA_ARGS__;                                                                                        \
         UNIT(c)                                                                                             \
         return fail(instance, "fmi2" #name " is not supported");                                            \
     }
