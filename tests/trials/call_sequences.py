@@ -32,7 +32,7 @@ STATES = (0, 1, 2)
 INTEGERS = (0, 1, 2, 5, -1, 2**31 - 1, -(2**31))
 TEXTS = (
     b"", b"none", b"\xc3\xa4", b"\xff", b"a'b", b'a"b\n', b"x" * 255, b"50%", None,
-    "\u00fc\u2028\u00a0\U0001f600\u0085\u0301".encode(),
+    "\u00fc\U0001f600\u0301".encode(),
 )  # fmt: skip
 NAMES = (None, b"", b"fahr\xc3\xa4\xf0\x9f\x98\x80", b"\xff\xfe", b"%s%n%d", b"x" * 5000)
 GUIDS = (fmi.OURS, None, b"", b"{x}", b"g" * 5000, b"\xff")
@@ -117,6 +117,8 @@ class Writer:
         self.at[instance] = Progress()
         values = plausible(self.fmu.names("input"), self.chance)
         self.calls.append(fmi.Set(instance, "Real", (*self.inputs,), (*values.values(),), len(values)))
+        for _ in range(self.chance.choice((0, 1, 3))):
+            self._set(instance)
         self._setup(instance)
         self._pass_on(instance)
         if self.chance.random() < 0.5:
@@ -183,7 +185,7 @@ class Writer:
             every = [*self.name_of, len(self.name_of), *REFERENCES]
             kind = chance.choice(("Real", "Integer", "Boolean", "String"))
             return kind, tuple(chance.choices(every, k=chance.randint(1, 4)))
-        kind = self.fmu.type[self.name_of[chance.choice(some)]]
+        kind = chance.choice(sorted({self.fmu.type[self.name_of[reference]] for reference in some}))
         own = [reference for reference in some if self.fmu.type[self.name_of[reference]] == kind]
         count = len(own) if chance.random() < 0.3 else chance.randint(1, len(own))
         return kind, tuple(chance.sample(own, min(count, MOST)))
@@ -199,13 +201,17 @@ class Writer:
         before = self.at[instance].phase == BEFORE and self.chance.random() < 0.5
         some = [self.fmu.reference[name] for name in self.fmu.names("parameter")] if before else self.inputs
         kind, references = self._references(instance, some)
-        values = tuple(self._value(instance, kind, self.name_of.get(reference)) for reference in references)
+        share = 0.5 if self._wrong(instance) else 0.0
+        values = tuple(
+            self._value(kind, self.name_of.get(reference), wrong=self.chance.random() < share)
+            for reference in references
+        )
         right = fmi.Set(instance, kind, references, values, len(references))
         changes: list[dict[str, Any]] = [{"references": None}, {"count": 0}, {"values": None}]
         self.calls.append(replace(right, **self.chance.choice(changes)) if self._wrong(instance) else right)
 
-    def _value(self, instance: int, kind: str, name: str | None) -> Any:
-        pick, wrong = self.chance.choice, self._wrong(instance)
+    def _value(self, kind: str, name: str | None, *, wrong: bool) -> Any:
+        pick = self.chance.choice
         start = (self.fmu.start.get(name) if name else None) or ""
         if kind == "Boolean":
             return pick((2, -1) if wrong else (0, 1))
