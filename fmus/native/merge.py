@@ -385,8 +385,9 @@ class _Join:
             return chosen
         alternatives = list(forms(a))
         places: list[int] = []
-        for value in forms(b):
-            place = next((i for i, x in enumerate(alternatives) if alike(x, value)), None)
+        for value in forms(b):  # each has a place of its own, so that no two of them are merged
+            free = (i for i, x in enumerate(alternatives) if i not in places and alike(x, value))
+            place = next(free, None)
             if place is None:
                 alternatives.append(value)
                 places.append(len(alternatives) - 1)

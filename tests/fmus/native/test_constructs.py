@@ -215,6 +215,13 @@ def output(self, t, u):
         total += x
     return (total,)
 """,
+    "one of several numbers by a choice, returned from a loop": """
+def output(self, t, u):
+    for x in u:
+        if x > 0.0:
+            return (SHARES[self.p.mode],)
+    return (0,)
+""",
     "or and and as values": """
 def output(self, t, u):
     a, b = u
@@ -403,6 +410,7 @@ def output(self, t, u):
 
 BEFORE = """
 WEIGHTS = {"first": 2, "third": -0.5}
+SHARES = {"first": 2, "second": -0.5, "third": 0.0}
 
 
 class Held:
