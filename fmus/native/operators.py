@@ -302,8 +302,12 @@ class Operating(Evaluation):
         if not pairs:
             return True
         return self.branch(  # type: ignore[no-any-return]
-            self._equal(*pairs[0]), lambda: self._all_equal(pairs[1:]), lambda: False
+            self._same_item(*pairs[0]), lambda: self._all_equal(pairs[1:]), lambda: False
         )
+
+    def _same_item(self, a: Any, b: Any) -> ir.Operand:
+        """Return whether items are equal, as `in` and lists compare them: NaN is the same as itself."""
+        return True if a is b else self._equal(a, b)
 
     def _contained(self, a: Any, b: Any) -> ir.Operand:
         if is_plain(a) and isinstance(b, (str, dict, set, frozenset, range)):
@@ -313,7 +317,8 @@ class Operating(Evaluation):
         def go(k: int) -> ir.Operand:
             if k == each.count:
                 return False
-            return self.branch(self._equal(a, each.item(k)), lambda: True, lambda: go(k + 1))  # type: ignore
+            found = self._same_item(a, each.item(k))
+            return self.branch(found, lambda: True, lambda: go(k + 1))  # type: ignore[no-any-return]
 
         return go(0)
 

@@ -158,6 +158,13 @@ def output(self, t, u):
     weighted = [sum(2.0**k * x for k, x in enumerate(row)) for row in rows]
     return (sum(weighted) + sum(best) + math.copysign(0.5, rows[1][2]),)
 """,
+    "NaN among items": """
+def output(self, t, u):
+    x = math.nan if u[0] > 0.0 else u[0]
+    y = 2.0 * x
+    found = x in (0.5, x), y in [x, 0.5], [x, 1.0] == [x, 1], (y,) == (2.0 * x,), x == x
+    return (sum(2.0**k * one for k, one in enumerate(found)),)
+""",
     "order of numbers some of which are NaN": """
 def output(self, t, u):
     a, b = u
