@@ -15,10 +15,10 @@ REAL, INT, BOOL, EITHER, WORD, WIDE = "real", "int", "bool", "int or bool", "wor
 integer, a WIDE an integer known only modulo 2^64."""
 
 EXACT = 2**53
-"""Largest integer up to which doubles are exact."""
+"""Smallest positive integer that may be a larger one, rounded to a double."""
 ALONE = "Python alone computes"
 """Part of what a native library says where it gives up, and Python may go on."""
-INEXACT = f"an integer beyond 2^53, which {ALONE} exactly: set YAWBENCH_UNITS=python"
+INEXACT = f"an integer of 2^53 or more, which {ALONE} exactly: set YAWBENCH_UNITS=python"
 """Error message of a native library for larger integers."""
 COMPLEX = f"a complex number, with which {ALONE}: set YAWBENCH_UNITS=python"
 """Error message of a native library for complex powers."""

@@ -159,10 +159,11 @@ class Operating(Evaluation):
 
     def _exact(self, op: str, result: ir.Operand, a: ir.Operand, b: ir.Operand) -> ir.Operand:
         """Emit an exception for integers that are not exact as doubles; Python's integers are unbounded."""
-        grows = op in ("+", "-", "*", "**", "//") and isinstance(result, ir.Var) and result.type == ir.INT
+        grows = op in ("+", "-", "*", "**", "//", "%") and isinstance(result, ir.Var) and result.type == ir.INT
         if grows and not (self._is_small(a) and self._is_small(b)):
-            size = self.size(result)
-            self.require(self.compare("<=", size, float(ir.EXACT)), "OverflowError", ir.INEXACT)
+            for x in (a, result) if op == "//" else (result,):  # the quotient of a larger one may be rounded
+                inside = self.compare("<", self.size(x), float(ir.EXACT))  # 2^53 may be 2^53 + 1, rounded
+                self.require(inside, "OverflowError", ir.INEXACT)
         return result
 
     def _is_small(self, a: ir.Operand) -> bool:

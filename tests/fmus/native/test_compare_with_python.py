@@ -46,15 +46,32 @@ def test_a_translation_that_is_wrong_is_found_out(what, tmp_path):
     assert BROKEN[what][2] in found
 
 
-def test_an_integer_beyond_2_to_53_is_an_error_and_no_wrong_number(tmp_path):
-    law = """
+HUGE = {
+    "a product": """
 def start(self, t, u):
     self.n = 12345
 def advance(self, t, h, u):
     self.n = (self.n * 1103515245 + 12345) % 2**31
 def output(self, t, u):
     return (self.n / 2**31,)
-"""
+""",
+    "a quotient": """
+def output(self, t, u):
+    return (int(1e16 * u[0]) // 3 % 1000,)
+""",
+    "a sum that is rounded to 2^53": """
+def output(self, t, u):
+    return ((2**52 + 1 + int(2.0**52 * abs(u[0] / u[0]))) % 1000,)
+""",
+    "a rest": """
+def output(self, t, u):
+    return (-1 % int(1e16 + 2.0 * abs(u[0])) % 1000,)
+""",
+}
+
+
+@pytest.mark.parametrize("law", HUGE.values(), ids=HUGE)
+def test_an_integer_of_2_to_53_is_an_error_and_no_wrong_number(law, tmp_path):
     with component_of(source(law), tmp_path) as (component, home):
         library = compiled(emit(specialise(component, home), "small.py", "{a}"), tmp_path)
         assert INEXACT in differences(library, "{a}", component, home.parent)
