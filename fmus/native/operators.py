@@ -159,8 +159,8 @@ class Operating(Evaluation):
 
     def _exact(self, op: str, result: ir.Operand, a: ir.Operand, b: ir.Operand) -> ir.Operand:
         """Emit an exception for integers that are not exact as doubles; Python's integers are unbounded."""
-        grows = op in ("+", "-", "*", "**", "//", "%") and isinstance(result, ir.Var) and result.type == ir.INT
-        if grows and not (self._is_small(a) and self._is_small(b)):
+        whole = isinstance(result, ir.Var) and result.type == ir.INT
+        if whole and not (self._is_small(a) and self._is_small(b)):
             for x in (a, result) if op == "//" else (result,):  # the quotient of a larger one may be rounded
                 inside = self.compare("<", self.size(x), float(ir.EXACT))  # 2^53 may be 2^53 + 1, rounded
                 self.require(inside, "OverflowError", ir.INEXACT)
