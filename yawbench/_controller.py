@@ -115,14 +115,9 @@ class PythonComponent:
             self.parameters = _parameters.brought_along(program, self.component)
         except ScenarioError as error:
             raise ScenarioError(f"{instance}: {error}", code="controller-invalid") from None
-        except (TypeError, ValueError) as error:
-            raise ScenarioError(
-                f"{instance}: {_name(program)}: {error}", code="controller-invalid"
-            ) from error
         except Exception as error:  # the user's code may raise anything while its declarations are read
-            raise ScenarioError(
-                f"{instance}: {_name(program)}: {arguments.error_text(error)}", code="controller-invalid"
-            ) from error
+            text = str(error) if isinstance(error, (TypeError, ValueError)) else arguments.error_text(error)
+            raise ScenarioError(f"{instance}: {_name(program)}: {text}", code="controller-invalid") from error
         name = self.component.fmu_name
         self.path = HOME / instance / f"{quote(label, safe=' ') or name}.fmu"
         digest = hashlib.sha256(self._xml + _parameters.text_of(program)).hexdigest()

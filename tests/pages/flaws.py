@@ -128,10 +128,10 @@ axe.run(document, {resultTypes: ['violations']}).then(({violations}) => {
       .map((node) => `${one.id}: ${node.target}: ${node.failureSummary.split('\\n')[1] || ''}`))]);
 });
 """
-"""Runs axe-core on all rows of tables but those like two before them, texts apart: it takes seconds for many.
+"""Runs axe-core without the rows of tables that differ from two before them by texts only, which saves seconds.
 
-Links to places of the page are no texts. A link whose fragment holds the state of a view, #view?shown=[0],
-is no link to skip to.
+Targets of links within the page count as differences. A link whose fragment holds the state of a view,
+#view?shown=[0], does not skip to a place of the page.
 """
 
 

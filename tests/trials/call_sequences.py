@@ -27,7 +27,7 @@ NUMBERS = (math.nan, math.inf, -math.inf, 1e300, -0.0, 0.0)
 TIMES = (math.nan, math.inf, -1.0, 1e300)
 STARTS = (math.nan, math.inf, -math.inf, -1.0, 1e6)
 STEPS = (0.0, -0.001, math.nan, math.inf, -math.inf, 1e-320, 5.0)
-"""Start times and steps of 1e300 s are no part of it: units that sample messages would not come to an end."""
+"""Without start times and steps of 1e300 s, in which units that sample messages would never end."""
 STATES = (0, 1, 2)
 INTEGERS = (0, 1, 2, 5, -1, 2**31 - 1, -(2**31))
 TEXTS = (
