@@ -128,7 +128,7 @@ axe.run(document, {resultTypes: ['violations']}).then(({violations}) => {
       .map((node) => `${one.id}: ${node.target}: ${node.failureSummary.split('\\n')[1] || ''}`))]);
 });
 """
-"""Runs axe-core without the rows of tables that differ from two before them by texts only, which saves seconds.
+"""Runs axe-core, which is slow on long tables, without rows that differ from two before them by texts only.
 
 Targets of links within the page count as differences. A link whose fragment holds the state of a view,
 #view?shown=[0], does not skip to a place of the page.
