@@ -318,8 +318,8 @@ class Operating(Evaluation):
         def go(k: int) -> ir.Operand:
             if k == each.count:
                 return False
-            found = self._same_item(a, each.item(k))
-            return self.branch(found, lambda: True, lambda: go(k + 1))  # type: ignore[no-any-return]
+            equal = self._same_item(a, each.item(k))
+            return self.branch(equal, lambda: True, lambda: go(k + 1))  # type: ignore[no-any-return]
 
         return go(0)
 
