@@ -5,7 +5,7 @@ times these ranges; with every choice of parameters and with changed parameters;
 saved, restored and serialized states; with outputs read, and parameters changed, before initialization ends;
 from other start times; with parameters out of range and inputs that are not finite. Values,
 statuses and messages must be the same, except that for huge inputs a native library may refuse to compute an
-integer beyond 2^53. All NaNs are equal.
+integer of 2^53 or more. All NaNs are equal.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Intermediate form between Python and C: typed variables with static single assignment.
 
 Two exceptions: a variable in which the paths of an `If` join is assigned in both arms, and a loop-carried
-variable before the loop and at the end of its body. Integers are stored as doubles, exact up to 2^53, except
+variable before the loop and at the end of its body. Integers are stored as doubles, exact below 2^53, except
 64-bit words.
 """
 
