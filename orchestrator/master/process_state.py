@@ -272,6 +272,9 @@ _ENVIRONMENT = 64  # bytes; no platform's fenv_t is larger
 _c = ctypes.CDLL(None)
 _c.setlocale.restype = ctypes.c_char_p
 _ACTION = 256  # bytes; no platform's struct sigaction is larger
+_HANDLER, _FLAGS = 16, slice(136, 140)
+"""The parts of a struct sigaction that are compared: the handler with the mask of all signals there are, and on
+Linux the flags; on macOS they are in the first part, and the second is empty."""
 _HANDLED = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGPIPE") if hasattr(signal, name)]
 
 
@@ -376,11 +379,15 @@ def _control(environment: ctypes.Array[ctypes.c_char]) -> tuple[int, ...]:
 
 
 def _signal_actions() -> list[bytes]:
-    """Return what C has installed for each of the handled signals, which is quick to compare."""
-    actions = [ctypes.create_string_buffer(_ACTION) for _ in _HANDLED]
-    for number, action in zip(_HANDLED, actions, strict=True):
+    """Return what C has installed for each of the handled signals, which is quick to compare.
+
+    Most of a mask is larger than what the kernel fills in: it differs from call to call.
+    """
+    action, installed = ctypes.create_string_buffer(_ACTION), []
+    for number in _HANDLED:
         _c.sigaction(number, None, action)
-    return [action.raw for action in actions]
+        installed.append(action[:_HANDLER] + action[_FLAGS])
+    return installed
 
 
 def _folder() -> str:
