@@ -273,8 +273,8 @@ _c = ctypes.CDLL(None)
 _c.setlocale.restype = ctypes.c_char_p
 _ACTION = 256  # bytes; no platform's struct sigaction is larger
 _HANDLER, _FLAGS = 16, slice(136, 140)
-"""The parts of a struct sigaction that are compared: the handler with the mask of all signals there are, and on
-Linux the flags; on macOS they are in the first part, and the second is empty."""
+"""The parts of a struct sigaction that are compared: the handler with the mask of all signals there are, and
+on Linux the flags; on macOS they are in the first part, and the second is empty."""
 _HANDLED = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGPIPE") if hasattr(signal, name)]
 
 
@@ -386,7 +386,8 @@ def _signal_actions() -> list[bytes]:
     action, installed = ctypes.create_string_buffer(_ACTION), []
     for number in _HANDLED:
         _c.sigaction(number, None, action)
-        installed.append(action[:_HANDLER] + action[_FLAGS])
+        raw = action.raw
+        installed.append(raw[:_HANDLER] + raw[_FLAGS])
     return installed
 
 
