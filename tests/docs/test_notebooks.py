@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import os
 import re
 import subprocess
@@ -10,9 +11,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import nbformat
 import pytest
-from nbclient import NotebookClient
 
 import yawbench as yb
 from tests.checkout import ROOT
@@ -25,7 +24,8 @@ FIRST = "first_steps"
 
 @pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
 def test_a_notebook_is_kept_without_outputs(file):
-    cells = nbformat.read(file, as_version=4).cells
+    cells = json.loads(file.read_text(encoding="utf-8"))["cells"]
+    assert cells
     assert not any(cell.get("outputs") or cell.get("execution_count") for cell in cells)
 
 
@@ -34,6 +34,9 @@ def test_a_notebook_is_kept_without_outputs(file):
     [pytest.param(f, id=f.stem, marks=[pytest.mark.exhaustive] * (f.stem != FIRST)) for f in NOTEBOOKS],
 )
 def test_a_notebook_runs_to_its_end_and_shows_what_it_draws(file, tmp_path, monkeypatch):
+    import nbformat
+    from nbclient import NotebookClient
+
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     notebook = nbformat.read(file, as_version=4)
     NotebookClient(notebook, timeout=600, kernel_name="python3").execute(cwd=str(tmp_path))

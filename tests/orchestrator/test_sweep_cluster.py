@@ -18,18 +18,25 @@ from orchestrator.experiments.executor import left_to_do
 from orchestrator.experiments.experiment import plan_experiment
 from orchestrator.experiments.jobs import Job, Outcome
 from orchestrator.experiments.load_experiment import load_experiment
+from tests.sentences import golden, golden_in
 
 from .test_sweep import UNITS, moods, rows, yawbench  # noqa: F401
 
-distributed = pytest.importorskip("distributed")
-from orchestrator.experiments import cluster as cluster_module  # noqa: E402
-from orchestrator.experiments.cluster import AHEAD, BATCH_TIME, _Batches  # noqa: E402
-from tests.sentences import golden, golden_in  # noqa: E402
+
+@pytest.fixture(scope="module", autouse=True)
+def cluster_module():
+    """The module of clusters; imported late, as Dask takes a second of all who collect the tests."""
+    pytest.importorskip("distributed")
+    from orchestrator.experiments import cluster
+
+    return cluster
 
 
 @pytest.fixture(scope="module")
 def cluster():
     """A scheduler and two workers, each a process."""
+    import distributed
+
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
     ) as made:
@@ -49,6 +56,8 @@ def test_a_cluster_gives_the_table_of_this_machine_to_the_byte(moods, yawbench, 
 
 
 def test_runs_travel_in_batches_as_long_as_workers_stay_busy_alike():
+    from orchestrator.experiments.cluster import AHEAD, BATCH_TIME, _Batches
+
     jobs = [Job(str(number), Path("made_up.yaml"), Path()) for number in range(1000)]
     batches = _Batches(jobs, threads=2)
     first = batches.next()
@@ -69,7 +78,7 @@ def test_runs_travel_in_batches_as_long_as_workers_stay_busy_alike():
     assert sizes[-1] == 1
 
 
-def test_runs_in_a_batch_share_what_is_common(moods, fmus, tmp_path, monkeypatch):  # noqa: F811
+def test_runs_in_a_batch_share_what_is_common(moods, fmus, cluster_module, tmp_path, monkeypatch):  # noqa: F811
     experiment = load_experiment(moods(*range(20), count=2))
     jobs = [*plan_experiment(experiment, tmp_path, fmus=fmus, keep=False).jobs]
     parcels = cluster_module._Parcels(jobs)
@@ -81,28 +90,39 @@ def test_runs_in_a_batch_share_what_is_common(moods, fmus, tmp_path, monkeypatch
     assert (len(every) - len(one)) / (len(jobs) - 1) < whole / 40
 
 
-def test_as_many_batches_are_submitted_as_keep_the_workers_busy(moods, fmus, cluster, tmp_path, monkeypatch):  # noqa: F811
+def test_as_many_batches_are_submitted_as_keep_the_workers_busy(
+    moods,  # noqa: F811
+    fmus,
+    cluster,
+    cluster_module,
+    tmp_path,
+    monkeypatch,
+):
+    from distributed import Client
+
     experiment = load_experiment(moods(1, 2, 3, 4, 5, 6, count=2))
     jobs, _ = left_to_do(plan_experiment(experiment, tmp_path, fmus=fmus, keep=False).jobs, {})
     submitted, finished, ahead = [], [], []
-    submit = distributed.Client.submit
+    submit = Client.submit
 
     def counting(client, make, parcel, **options):
         submitted.append(parcel)
         ahead.append(len(submitted) - len(finished))
         return submit(client, make, parcel, **options)
 
-    monkeypatch.setattr(distributed.Client, "submit", counting)
+    monkeypatch.setattr(Client, "submit", counting)
     monkeypatch.setattr(cluster_module, "LARGEST_BATCH", 1)
     cluster_module.run_on_cluster(jobs, finished.append, scheduler=cluster.scheduler_address)
     assert len(submitted) == len(finished) == len(jobs) == 12
-    assert max(ahead) == 2 * AHEAD
+    assert max(ahead) == 2 * cluster_module.AHEAD
     assert all(type(parcel) is bytes for parcel in submitted)
 
 
 @pytest.mark.exhaustive
 def test_a_run_that_kills_its_process_leaves_the_workers_alone(moods, yawbench, cluster, tmp_path):  # noqa: F811
-    client = distributed.Client(cluster)
+    from distributed import Client
+
+    client = Client(cluster)
     before = client.run(os.getpid)
     status, _, err = yawbench(moods(10, 30, 40), "out", "--scheduler", cluster.scheduler_address)
     assert status == 1, err
@@ -116,6 +136,8 @@ def test_a_run_that_kills_its_process_leaves_the_workers_alone(moods, yawbench, 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
 @pytest.mark.exhaustive
 def test_a_worker_that_is_killed_costs_no_run(moods, fmus, cluster, tmp_path):  # noqa: F811
+    from distributed import Client
+
     from orchestrator.experiments.cluster import run_on_cluster
 
     experiment = load_experiment(moods(1, 2, 3, 4, 5, 6))
@@ -124,7 +146,7 @@ def test_a_worker_that_is_killed_costs_no_run(moods, fmus, cluster, tmp_path):  
 
     def done(outcome):
         if not told:
-            client = distributed.Client(cluster, set_as_default=False)
+            client = Client(cluster, set_as_default=False)
             os.kill(min(client.run(os.getpid).values()), signal.SIGKILL)
             client.close()
         told.append(outcome)
@@ -137,6 +159,8 @@ def test_a_worker_that_is_killed_costs_no_run(moods, fmus, cluster, tmp_path):  
 
 @pytest.mark.exhaustive
 def test_a_cluster_that_dies_is_one_sentence_and_keeps_what_is_finished(moods, fmus, capfd, tmp_path):  # noqa: F811
+    from distributed import Client
+
     from orchestrator.errors import ResultsError
     from orchestrator.experiments.cluster import run_on_cluster
 
@@ -144,7 +168,7 @@ def test_a_cluster_that_dies_is_one_sentence_and_keeps_what_is_finished(moods, f
     planned = plan_experiment(experiment, tmp_path, fmus=fmus, keep=False)
     told, file = [], str(tmp_path / "scheduler.json")
     with _dask("scheduler", file, "--host", "127.0.0.1", "--port", "0") as scheduler, _dask("worker", file):
-        with distributed.Client(scheduler_file=file, set_as_default=False) as client:
+        with Client(scheduler_file=file, set_as_default=False) as client:
             client.wait_for_workers(1)
             address = client.scheduler.address
 
@@ -186,7 +210,9 @@ def test_a_scheduler_that_does_not_answer_is_one_sentence(address, moods, yawben
 
 @pytest.mark.exhaustive
 def test_a_scheduler_without_workers_is_one_sentence(moods, yawbench, tmp_path):  # noqa: F811
-    with distributed.LocalCluster(n_workers=0, dashboard_address=":0", silence_logs=50) as empty:
+    from distributed import LocalCluster
+
+    with LocalCluster(n_workers=0, dashboard_address=":0", silence_logs=50) as empty:
         status, _, err = yawbench(moods(10), "out", "--scheduler", empty.scheduler_address)
     assert status == 2
     assert golden_in(err.splitlines()[-1])
@@ -212,8 +238,10 @@ class _Restarting:
         return {"tcp://a": 1, "tcp://b": 1}
 
     def run(self, function, *, on_error):
+        from distributed.comm import CommClosedError
+
         assert on_error == "return"
-        return {"tcp://a": distributed.comm.CommClosedError("in <TCP>"), "tcp://b": function()}
+        return {"tcp://a": CommClosedError("in <TCP>"), "tcp://b": function()}
 
 
 def test_a_worker_that_begins_anew_is_not_taken_for_one_without_this_program():

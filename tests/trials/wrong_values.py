@@ -11,11 +11,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 
 class Raised(Exception):
     """Error that hostile objects raise: no caller may let it pass."""
+
+
+def _pandas() -> Any:
+    """Return pandas, which takes half a second of all who import this module."""
+    import pandas
+
+    return pandas
 
 
 def _raises(*_: Any, **__: Any) -> Any:
@@ -221,10 +227,10 @@ OTHERS: dict[str, Callable[[], Any]] = {
     "link to itself": lambda: Path("loop.yaml"),
     "link to a folder": lambda: Path("linked"),
     "device": lambda: Path("/dev/zero"),
-    "series": lambda: pd.Series([None, 1]),
-    "frame": lambda: pd.DataFrame({"a": [1]}),
-    "pandas NA": lambda: pd.NA,
-    "pandas NaT": lambda: pd.NaT,
+    "series": lambda: _pandas().Series([None, 1]),
+    "frame": lambda: _pandas().DataFrame({"a": [1]}),
+    "pandas NA": lambda: _pandas().NA,
+    "pandas NaT": lambda: _pandas().NaT,
     "file": lambda: open("/dev/null", "rb"),  # noqa: SIM115
 }  # fmt: skip
 WRONG = TEXTS | NUMBERS | OTHERS
