@@ -281,15 +281,20 @@ def compare(path: Path, inputs: str = "start", *, validate: bool = True) -> Comp
             return Comparison(name, version, theirs, ours)
         values = np.load(folder / "theirs.npy")
         results = load_results(folder / "ours")
-        differing, example = 0, ""
-        for column, expected in zip(job.record, values.T, strict=True):
-            actual = np.asarray(results[f"u.{column}"], float)
-            same = len(actual) == len(expected) and actual.view(np.int64) == expected.copy().view(np.int64)
-            if not np.all(same):
-                gap = np.abs(actual - expected).max() if len(actual) == len(expected) else math.inf
-                example = example or f" ({column} by {gap:.1e})"
-                differing += int(np.size(expected) - np.sum(same))
-    return Comparison(name, version, theirs, ours, differing, values.size, example)
+        own = [np.asarray(results[f"u.{column}"], float) for column in job.record]
+    return Comparison(name, version, theirs, ours, *differences(job.record, values, own))
+
+
+def differences(names: list[str], values: np.ndarray, own: list[np.ndarray]) -> tuple[int, int, str]:
+    """Return how many values differ from our own, of how many, and an example."""
+    differing, example = 0, ""
+    for name, expected, actual in zip(names, values.T, own, strict=True):
+        same = len(actual) == len(expected) and actual.view(np.int64) == expected.copy().view(np.int64)
+        if not np.all(same):
+            gap = np.abs(actual - expected).max() if len(actual) == len(expected) else math.inf
+            example = example or f" ({name} by {gap:.1e})"
+            differing += int(np.size(expected) - np.sum(same))
+    return differing, values.size, example
 
 
 def compared(folder: Path, inputs: str, *, validate: bool) -> Iterator[Comparison]:

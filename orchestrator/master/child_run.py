@@ -267,6 +267,8 @@ INITIALIZATION_LIMIT = 60.0
 tables from a slow disk, as `isolation.START_LIMIT`. --isolate --call-limit allows more."""
 ASKED = 1.0
 """Time for an answer to the question where the child is [s]; chosen: far longer than an answer takes."""
+ASK_EVERY = 0.1
+"""Time between questions to a child that is to stop [s]; chosen: it may have come to another instance."""
 KILL_AFTER = 3.0
 """Time from a stop request until the child is killed [s]; chosen: far longer than a step."""
 END_LIMIT = 10.0
@@ -298,6 +300,7 @@ class ChildRun(RunLifecycle, FmuProcess):
         self._sealed = False  # no more rows are written
         self._limit = INITIALIZATION_LIMIT
         self._asked_at: float | None = None  # when a call of initialization exceeded its limit
+        self._stopped_at = -math.inf  # when the child was last asked to stop
 
     def inputs_of(self, instance: str) -> dict[str, Value]:
         """Return the inputs with which the failed instance was last stepped."""
@@ -375,7 +378,8 @@ class ChildRun(RunLifecycle, FmuProcess):
     def check_time(self) -> None:
         """Pass a stop request on to the child; kill it if it does not stop, or takes too long to end."""
         now, requested = time.monotonic(), stop_requested_at()
-        if requested is not None:
+        if requested is not None and now - self._stopped_at > ASK_EVERY:  # not after each of its answers
+            self._stopped_at = now
             self._ask(bytes([self._stop.number]))
         if self._shared.completed.value < 0 and now - self._shared.returned.value > self._limit:
             self._end_hanging(now)

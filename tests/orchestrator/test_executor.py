@@ -130,7 +130,7 @@ def test_signals_are_recorded_by_patterns_of_their_names(executor, tmp_path):
             replace(execute, of_jobs={**execute.of_jobs, "record": ("yaw_rate",)}).plans([run])
 
 
-def bytes_per_run(folder, fmus, monkeypatch, *, few=100, many=400):
+def bytes_per_run(folder, fmus, monkeypatch, *, few=50, many=150):
     """Return how many bytes each run adds to what an experiment holds when all have been planned and made."""
     monkeypatch.setattr("orchestrator.experiments.on_demand.IN_MEMORY", 1)
     monkeypatch.setattr("os.fsync", lambda file: None)

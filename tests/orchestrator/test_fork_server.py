@@ -37,8 +37,8 @@ def yawbench(folder, *arguments):
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("second-opinion", SCENARIO, "--no-one-core", "--master", "fmpy"),
         ("run", SCENARIO, "--isolate"),
+        ("second-opinion", SCENARIO, "--no-one-core", "--master", "fmpy"),
         ("compare", SCENARIO, "--swap", "controller=controller_off"),
     ],
 )
@@ -114,8 +114,11 @@ def test_a_server_that_is_killed_takes_its_children_along_and_is_replaced(starte
         os.close(descriptor)
 
 
-def test_a_program_finds_what_this_one_finds(tmp_path, monkeypatch):
-    (tmp_path / "told.py").write_text("def main(*words):\n    print(*words)\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    done = subprocess.run(python("told", 1, "b c"), capture_output=True, text=True, check=True, cwd="/")
+def test_a_program_finds_what_this_one_finds(trap, tmp_path, monkeypatch):
+    (tmp_path / "modules").mkdir()
+    program = "import json, socket\ndef main(*words):\n    print(*words)\n"
+    (tmp_path / "modules" / "told.py").write_text(program)
+    monkeypatch.syspath_prepend(tmp_path / "modules")
+    monkeypatch.setattr(sys, "path", [folder for folder in sys.path if folder])
+    done = subprocess.run(python("told", 1, "b c"), capture_output=True, text=True, check=True, cwd=trap)
     assert done.stdout == "1 b c\n"

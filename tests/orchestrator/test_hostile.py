@@ -35,10 +35,15 @@ TOGETHER = (
     "free:_exit", "free:thread", "free:log_after", "value:nan", "value:huge_text",
 )  # fmt: skip
 OF_EACH_KIND = (
-    "step:_exit", "enter:segfault", "step:fork", "step:garbage", "step:close", "step:rounding", "set:flood",
-    "free:thread", "value:nan",
-)  # fmt: skip
-"""A few of them, for the first tier; one that does not come back is in test_run.py."""
+    "step:_exit",
+    "step:garbage",
+    "step:close",
+    "step:rounding",
+    "step:escape",
+    "free:thread",
+    "value:nan",
+)
+"""A few of them, for the first tier; one that does not come back is in test_run.py, copies are below."""
 APART = (
     "load:exit", "enter:segfault", "step:_exit", "step:hang", "step:daemon", "step:child_crash", "step:fork",
     "step:garbage", "step:zeros", "step:endless", "step:pickle", "step:close", "get:stop", "set:flood",
@@ -162,7 +167,9 @@ def test_a_record_that_is_too_long_or_cannot_be_written_is_refused():
     channel.close()
 
 
-@pytest.mark.parametrize("does", ["instantiate:fork", "step:fork"])
+@pytest.mark.parametrize(
+    "does", ["step:fork", pytest.param("instantiate:fork", marks=pytest.mark.exhaustive)]
+)
 def test_a_unit_that_copies_the_process_of_its_run_ends_it_before_there_are_many(does, tmp_path):
     scenario = make_files(tmp_path)
     command = ["run", str(scenario), "--out", "out", "--set", "stop_time=0.3"]

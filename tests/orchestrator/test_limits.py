@@ -42,7 +42,10 @@ def lines_run(function: Callable[[], object]) -> int:
     return count
 
 
-@pytest.mark.parametrize("follows", ["nothing", "one", "all", "unsaid"])
+@pytest.mark.parametrize(
+    "follows",
+    ["all", *(pytest.param(word, marks=pytest.mark.exhaustive) for word in ("nothing", "one", "unsaid"))],
+)
 def test_twice_the_units_and_variables_take_twice_the_work(
     follows: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

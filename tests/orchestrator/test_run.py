@@ -308,7 +308,7 @@ def run_process(*arguments):
 @pytest.mark.parametrize("loop", ["compiled", "python"])
 def test_ctrl_c_ends_a_component_that_never_comes_back(loop, faulty, fmus, tmp_path, monkeypatch):
     monkeypatch.setenv("YAWBENCH_LOOP", loop)
-    scenario = faulty("os.kill(os.getppid(), signal.SIGINT)\n            while True: pass")
+    scenario = faulty("os.kill(os.getppid(), signal.SIGINT)\n            while True: signal.pause()")
     done = run_process("run", scenario, "--fmus", fmus, "--out", tmp_path / "out")
     assert done.returncode == 130
     assert golden(done.stderr)
@@ -318,10 +318,10 @@ def test_ctrl_c_ends_a_component_that_never_comes_back(loop, faulty, fmus, tmp_p
 
 
 def test_output_to_a_pipe_has_no_progress_bar(fmus, tmp_path):
-    done = run_process("run", car(tmp_path, stop=1), "--fmus", fmus, "--out", tmp_path / "out")
+    done = run_process("run", car(tmp_path, stop=0.5), "--fmus", fmus, "--out", tmp_path / "out")
     assert done.returncode == 0
     assert done.stdout == ""
-    assert done.stderr.startswith(f"{tmp_path / 'out'}: 1001 rows of ")
+    assert done.stderr.startswith(f"{tmp_path / 'out'}: 501 rows of ")
     assert "\x1b" not in done.stderr
 
 
@@ -332,7 +332,7 @@ def test_a_terminal_shows_a_progress_bar_and_keeps_only_the_last_line(columns, s
     import pty
 
     leader, follower = pty.openpty()
-    scenario = car(tmp_path, stop=4)
+    scenario = car(tmp_path, stop=2)
     text = scenario.read_text(encoding="utf-8")
     scenario.write_text(text.replace("on a slalom", "on a slalom of the [second] kind"), encoding="utf-8")
     command = [sys.executable, "-m", "orchestrator.cli", "run", scenario, "--fmus", fmus,
@@ -354,7 +354,7 @@ def test_a_terminal_shows_a_progress_bar_and_keeps_only_the_last_line(columns, s
     assert shown.encode() in seen
     assert "━".encode() in seen
     assert b"100%" in seen
-    assert b"4001 rows of " in seen.splitlines()[-1]
+    assert b"2001 rows of " in seen.splitlines()[-1]
 
 
 def calls_of(action):

@@ -43,8 +43,25 @@ def cluster():
         yield made
 
 
-def test_a_cluster_gives_the_table_of_this_machine_to_the_byte(moods, yawbench, cluster, tmp_path):  # noqa: F811
-    file = moods(5, 20, 60, count=2)
+@pytest.fixture(scope="module")
+def cluster_of_threads():
+    """A scheduler and two workers in this process, which talk over the network all the same."""
+    import distributed
+
+    with distributed.LocalCluster(
+        n_workers=2,
+        threads_per_worker=1,
+        processes=False,
+        protocol="tcp",
+        host="127.0.0.1",
+        dashboard_address=None,
+        silence_logs=50,
+    ) as made:
+        yield made
+
+
+def table_of(file, yawbench, cluster, tmp_path):  # noqa: F811
+    """Make runs here and on the cluster; compare the tables, and return the words of a second call."""
     yawbench(file, "here")
     status, _, err = yawbench(file, "there", "--scheduler", cluster.scheduler_address)
     assert status == 1, err  # level 20 fails
@@ -52,7 +69,16 @@ def test_a_cluster_gives_the_table_of_this_machine_to_the_byte(moods, yawbench, 
     assert (tmp_path / "here" / "table.parquet").read_bytes() == (
         tmp_path / "there" / "table.parquet"
     ).read_bytes()
-    assert golden_in(yawbench(file, "there", "--scheduler", cluster.scheduler_address)[2])
+    return yawbench(file, "there", "--scheduler", cluster.scheduler_address)[2]
+
+
+def test_a_cluster_gives_the_table_of_this_machine_to_the_byte(moods, yawbench, cluster_of_threads, tmp_path):  # noqa: F811
+    assert golden_in(table_of(moods(5, 20, 60, count=2), yawbench, cluster_of_threads, tmp_path))
+
+
+@pytest.mark.exhaustive
+def test_so_does_a_cluster_of_processes(moods, yawbench, cluster, tmp_path):  # noqa: F811
+    assert "6 runs, all finished" in table_of(moods(5, 20, 60, count=2), yawbench, cluster, tmp_path)
 
 
 def test_runs_travel_in_batches_as_long_as_workers_stay_busy_alike():
@@ -93,7 +119,7 @@ def test_runs_in_a_batch_share_what_is_common(moods, fmus, cluster_module, tmp_p
 def test_as_many_batches_are_submitted_as_keep_the_workers_busy(
     moods,  # noqa: F811
     fmus,
-    cluster,
+    cluster_of_threads,
     cluster_module,
     tmp_path,
     monkeypatch,
@@ -112,7 +138,7 @@ def test_as_many_batches_are_submitted_as_keep_the_workers_busy(
 
     monkeypatch.setattr(Client, "submit", counting)
     monkeypatch.setattr(cluster_module, "LARGEST_BATCH", 1)
-    cluster_module.run_on_cluster(jobs, finished.append, scheduler=cluster.scheduler_address)
+    cluster_module.run_on_cluster(jobs, finished.append, scheduler=cluster_of_threads.scheduler_address)
     assert len(submitted) == len(finished) == len(jobs) == 12
     assert max(ahead) == 2 * cluster_module.AHEAD
     assert all(type(parcel) is bytes for parcel in submitted)
@@ -218,13 +244,13 @@ def test_a_scheduler_without_workers_is_one_sentence(moods, yawbench, tmp_path):
     assert golden_in(err.splitlines()[-1])
 
 
-def test_workers_of_another_version_are_refused(moods, yawbench, cluster, monkeypatch):  # noqa: F811
+def test_workers_of_another_version_are_refused(moods, yawbench, cluster_of_threads, monkeypatch):  # noqa: F811
     from orchestrator.experiments import cluster as module
 
     theirs = module.versions()
     ours = {**theirs, "yawbench": "99.0"}
     monkeypatch.setattr(module, "ours", lambda: ours)
-    status, _, err = yawbench(moods(10), "out", "--scheduler", cluster.scheduler_address)
+    status, _, err = yawbench(moods(10), "out", "--scheduler", cluster_of_threads.scheduler_address)
     assert status == 2
     assert f"yawbench {theirs['yawbench']}" in err.splitlines()[-1]
     assert "99.0" in err.splitlines()[-1]

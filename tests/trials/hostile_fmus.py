@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import csv
 import faulthandler
+import functools
 import itertools
 import json
 import mmap
@@ -29,7 +30,8 @@ from pathlib import Path
 import fmpy
 
 from orchestrator.cli import main
-from orchestrator.master import isolation  # noqa: F401  imported once, before the forks
+from orchestrator.commands import run as _run_command  # noqa: F401  imported once, before the forks
+from orchestrator.master import isolation  # noqa: F401
 from orchestrator.master.simulate import simulate  # noqa: F401
 from orchestrator.wiring.make_plan import make_plan  # noqa: F401
 
@@ -177,6 +179,7 @@ def make_files(folder: Path) -> Path:
 def start(case: Case, scenario: Path, folder: Path) -> Running:
     """Fork a command line that makes the run of a case."""
     folder.mkdir()
+    behaviour = {"HOSTILE": case.does, "HOSTILE_RUN": str(folder), "HOSTILE_LOCALE": _comma_locale()}
     process = os.fork()
     if process:
         return Running(case, folder, process)
@@ -187,7 +190,7 @@ def start(case: Case, scenario: Path, folder: Path) -> Running:
         with (folder / "mark").open("rb") as file:
             mark = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)  # noqa: F841  see left_over
         faulthandler.disable()  # it is for the tests that this may be part of
-        os.environ |= {"HOSTILE": case.does, "HOSTILE_RUN": str(folder), "HOSTILE_LOCALE": _comma_locale()}
+        os.environ |= behaviour
         for descriptor, name in ((1, "stdout"), (2, "stderr")):
             file = os.open(folder / name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
             os.dup2(file, descriptor)
@@ -207,6 +210,7 @@ def start(case: Case, scenario: Path, folder: Path) -> Running:
         os._exit(status)
 
 
+@functools.cache
 def _comma_locale() -> str:
     """Return a locale that writes decimal commas, if there is one."""
     listed = subprocess.run(["locale", "-a"], capture_output=True, text=True, check=False).stdout.split()
