@@ -34,9 +34,9 @@ from yawbench._controller import PythonComponent
 from yawbench._native import folders_of
 
 from ..fmus.native.small import HEAD, component_of, source
+from ..fmus.native.together import choose, library_of, parts_of
 from .grammar import BEFORE
 from .random_programs import CALLED, COMPONENT, FUNCTION, OBJECT, program
-from .together import choose, library_of, parts_of
 
 SAME, REFUSED, WRONG = "the same", "refused", "wrong"
 SECONDS = 20

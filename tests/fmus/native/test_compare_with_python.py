@@ -11,7 +11,9 @@ from fmus.native.ir import INEXACT
 from fmus.native.specialise import specialise
 from tests.sentences import golden
 
-from .small import compiled, component_of, source
+from .small import compiled, component_of, fewer_steps, source
+
+pytestmark = pytest.mark.usefixtures("quick")
 
 LAW = """
 def output(self, t, u):
@@ -25,6 +27,15 @@ BROKEN = {
     "a status": ("return 1;\n    }\n    ", "}\n    ", "Python does not"),
     "a life": ("y[0] = n0;", "abort();", "it dies of signal"),
 }
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Fewer steps, and libraries for Linux that are compiled fast."""
+    monkeypatch.setattr(build, "LINUX", ("-O0",))
+    monkeypatch.setattr(build, "TO_WINDOWS", "no compiler")
+    with fewer_steps():
+        yield
 
 
 def broken(text: str, what: str) -> str:

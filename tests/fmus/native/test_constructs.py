@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from .small import compare, source
+from .together import comparisons
 
 CONSTRUCTS = {
     "a list changed while it is gone through": """
@@ -423,6 +423,12 @@ class Other(Held):
 """
 
 
+@pytest.fixture(scope="module")
+def compare(tmp_path_factory):
+    with comparisons(CONSTRUCTS, BEFORE, tmp_path_factory.mktemp("laws")) as compare:
+        yield compare
+
+
 @pytest.mark.parametrize("name", CONSTRUCTS)
-def test_a_construct_gives_the_same_bits(name, tmp_path):
-    compare(source(CONSTRUCTS[name], BEFORE), tmp_path)
+def test_a_construct_gives_the_same_bits(name, compare):
+    compare(name)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from .small import compare, source
+from .together import comparisons
 
 OBJECTS = '''class Lane(NamedTuple):
     """A tuple with a property."""
@@ -65,6 +65,12 @@ def output(self, t, u):
 }
 
 
+@pytest.fixture(scope="module")
+def compare(tmp_path_factory):
+    with comparisons(WITH_OBJECTS, OBJECTS, tmp_path_factory.mktemp("laws")) as compare:
+        yield compare
+
+
 @pytest.mark.parametrize("name", WITH_OBJECTS)
-def test_objects_give_the_same_bits(name, tmp_path):
-    compare(source(WITH_OBJECTS[name], OBJECTS), tmp_path)
+def test_objects_give_the_same_bits(name, compare):
+    compare(name)

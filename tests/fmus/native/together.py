@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import ctypes
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 
-from ..fmus.native.small import compiled
+from fmus.native import compare_with_python
+from fmus.native.emit import emit
+from fmus.native.specialise import specialise
+
+from .small import compiled, component_of, fewer_steps, source
 
 CHOSEN = "chosen"
 """Variable of a library that holds the number of the program that it is."""
@@ -73,3 +79,31 @@ def library_of(programs: Sequence[str], folder: Path, optimization: str) -> Path
 def choose(library: Path, number: int) -> None:
     """Make a library the program of this number, until another is chosen."""
     ctypes.c_int.in_dll(ctypes.CDLL(str(library)), CHOSEN).value = number
+
+
+@contextmanager
+def comparisons(laws: Mapping[str, str], before: str, folder: Path) -> Iterator[Callable[[str], None]]:
+    """Translate and compile laws; yield a function that drives the one of a name beside Python.
+
+    What is wrong with the translation of a law is raised when it is to be driven.
+    """
+    made = {}
+    failed = {}
+    with component_of(source("def output(self, t, u):\n    return u[:1]\n"), folder) as (_, home):
+        for k, (name, law) in enumerate(laws.items()):
+            (home / "controllers" / f"small_{k}.py").write_text(source(law, before))
+            component = import_module(f"{home.name}.controllers.small_{k}").Unit
+            try:
+                made[name] = component, emit(specialise(component, home), "small.py", "{a}")
+            except Exception as error:
+                failed[name] = error
+        library = library_of([text for _, text in made.values()], folder, "-O0")
+
+        def compare(name: str) -> None:
+            if name in failed:
+                raise failed[name]
+            choose(library, list(made).index(name))
+            with fewer_steps():
+                compare_with_python.compare(library, "{a}", made[name][0], home.parent)
+
+        yield compare
