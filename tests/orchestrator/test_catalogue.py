@@ -38,7 +38,7 @@ def test_every_command_that_takes_a_scenario_takes_a_name(yawbench):
     assert golden(text.splitlines()[-1])
     assert yawbench("export-ssp", NAME)[0] == 0
     assert yawbench("list", "signals", NAME)[0] == 0
-    assert yawbench("plot", NAME, "--set", "stop_time=0.01")[0] == 0
+    assert yawbench("plot", NAME, "--panel", "yaw_rate", "--set", "stop_time=0.01")[0] == 0
 
 
 def test_the_nearest_folder_of_scenarios_comes_before_the_one_that_comes_along(tmp_path, monkeypatch):
@@ -111,8 +111,8 @@ KINDS = ("a scenario", "a study file", "a sweep file", "a tuning file", "a vehic
     ("words", "completed"),
     [
         ("run fuzzy_pid/", ["fuzzy_pid/double_lane_change", "fuzzy_pid/ramp", "fuzzy_pid/sine"]),
-        ("study fnn", ["fnn_sideslip/laws", "fnn_sideslip/study"]),
         ("sweep fnn", ["fnn_sideslip/sweep", "fnn_sideslip/sweep_slip_control"]),
+        pytest.param("study fnn", ["fnn_sideslip/laws", "fnn_sideslip/study"], marks=pytest.mark.exhaustive),
         ("second", ["second-opinion"]),
     ],
 )

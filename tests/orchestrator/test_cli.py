@@ -69,7 +69,7 @@ BUFFERED = {name: value for name, value in os.environ.items() if name != "PYTHON
 def test_a_full_disk_behind_the_output_is_a_sentence_and_no_success():
     with open("/dev/full", "w") as full:
         done = subprocess.run(
-            [PROGRAM, "list", "scenarios"], stdout=full, stderr=subprocess.PIPE, text=True, env=BUFFERED
+            [PROGRAM, "list", "metrics"], stdout=full, stderr=subprocess.PIPE, text=True, env=BUFFERED
         )
     assert done.returncode == 1
     assert golden(done.stderr)
@@ -79,7 +79,7 @@ def test_a_reader_who_has_seen_enough_is_told_nothing():
     reading, writing = os.pipe()
     os.close(reading)
     done = subprocess.run(
-        [PROGRAM, "list", "scenarios"], stdout=writing, stderr=subprocess.PIPE, text=True, env=BUFFERED
+        [PROGRAM, "list", "metrics"], stdout=writing, stderr=subprocess.PIPE, text=True, env=BUFFERED
     )
     os.close(writing)
     assert (done.returncode, done.stderr) == (1, "")

@@ -163,6 +163,7 @@ def test_that_flaw_is_named_and_no_other(spoil, kind, name, value, within, seed,
     assert flaw.value == pytest.approx(value, abs=within)
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("driven", [drive, lane_changes])
 @pytest.mark.parametrize("car", CARS)
 def test_flaws_of_other_cars_and_drives_are_named_and_no_other(car, driven, tmp_path):

@@ -125,9 +125,9 @@ def test_a_damaged_cache_entry_is_put_right(fmu: Path, harm: str) -> None:
 def test_processes_that_unpack_at_the_same_time_do_not_collide(fmu: Path, cache: Path) -> None:
     code = "import sys; from orchestrator.fmu.archive import open_fmu; print(open_fmu(sys.argv[1]).directory)"
     command = [sys.executable, "-c", code, str(fmu)]
-    started = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(4)]
+    started = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]
     said = {process.communicate()[0].strip() for process in started}
-    assert [process.returncode for process in started] == [0] * 4
+    assert [process.returncode for process in started] == [0] * 2
     assert said == {str(open_fmu(fmu).directory)}
     assert len(list(cache.iterdir())) == 1
 

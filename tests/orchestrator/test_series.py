@@ -359,7 +359,7 @@ def test_what_nobody_foresaw_in_a_series_is_a_sentence(
 
 
 def test_a_long_series_takes_little_more_memory_than_its_file(folder: Path) -> None:
-    rows = (f"{i / 1e4},{i % 90},1,2,3,4,1,0,{'x' * 20},a,b,c,d,e,f\n" for i in range(20_000))
+    rows = (f"{i / 4e3},{i % 90},1,2,3,4,1,0,{'x' * 20},a,b,c,d,e,f\n" for i in range(8_000))
     heading = "time,delta,t_fl,t_fr,t_rl,t_rr,gear,on,note,a,b,c,d,e,f\n"
     Path("runs/data.csv").write_text(heading + "".join(rows))
     path = scenario()

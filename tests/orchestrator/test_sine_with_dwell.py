@@ -585,6 +585,7 @@ def test_equal_runs_have_equal_figures_wherever_their_results_are(tmp_path):
     files = []
     for place in ("here", "somewhere/else"):
         run = trace(folder=tmp_path / place / "runs" / "0123", title="A run")
-        files.append(save(TESTS["sine-with-dwell"].draw(run, evaluate_dwell(run, A)), tmp_path / place))
+        figure = TESTS["sine-with-dwell"].draw(run, evaluate_dwell(run, A))
+        files.append(save(figure, tmp_path / place, ["svg"]))
     for one, other in zip(*files, strict=True):
         assert one.read_bytes() == other.read_bytes()

@@ -136,21 +136,22 @@ SLOW = Override.of("plant.initial_speed", "50 km/h", "--set")
 
 
 def test_an_overlay_names_what_was_changed_for_all_and_for_each():
-    figure = draw([LabelledRun("a", made(ICE, OFF)), LabelledRun("b", made(ICE, SLOW))])
+    figure = draw([LabelledRun("a", made(ICE, OFF)), LabelledRun("b", made(ICE, SLOW))], ["yaw_rate"])
     said = "inputs.friction* = 0.3; a: controller_off for controller; b: plant.initial_speed = 50 km/h"
     assert f"changed: {said}" in texts(figure)
 
 
 def test_a_figure_with_a_title_of_its_own_names_changes_at_its_foot():
-    figure = draw([LabelledRun("a", made(ICE)), LabelledRun("b", made(OFF))], title="Figure 7")
+    runs = [LabelledRun("a", made(ICE)), LabelledRun("b", made(OFF))]
+    figure = draw(runs, ["yaw_rate"], title="Figure 7")
     foot = flat(figure.texts[-1].get_text())
     assert golden_in(foot)
 
 
 def test_a_long_list_of_changes_is_wrapped_and_never_cut(tmp_path):
     many = [Override.of(f"controller.gain_{k}", k / 7, "--set") for k in range(40)]
-    figure = draw([LabelledRun("a", made(*many))])
-    save(figure, tmp_path / "long")
+    figure = draw([LabelledRun("a", made(*many))], ["yaw_rate"])
+    save(figure, tmp_path / "long", ["svg"])
     assert all(f"controller.gain_{k} = " in texts(figure) for k in range(40))
     assert max(len(line) for text in figure.texts for line in text.get_text().splitlines()) <= 165
 
@@ -159,7 +160,7 @@ def test_dollars_in_titles_and_labels_are_no_formulas(tmp_path):
     results = [made(Override.of("driver.name", "$x_{", "--set")), made()]
     for one in results:
         one.record.title = r"Costs $5_{ and $\frac"
-    figure = draw([LabelledRun("$a_{$", results[0]), LabelledRun(r"$\b$", results[1])])
+    figure = draw([LabelledRun("$a_{$", results[0]), LabelledRun(r"$\b$", results[1])], ["yaw_rate"])
     save(figure, tmp_path / "dollars")
     assert (tmp_path / "dollars.png").stat().st_size > 0
 
