@@ -12,6 +12,7 @@ import pytest
 from fmus.build import HERE as FMUS
 from fmus.build import build_all, build_component
 from fmus.build_stamp import read_stamp
+from fmus.c import c_recipe
 from fmus.c.c_recipe import TO_WINDOWS
 from orchestrator.commands.new import begin
 from orchestrator.errors import BuildError
@@ -23,8 +24,11 @@ pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no 
 
 
 @pytest.fixture
-def root(tmp_path):
-    """A folder of components with one controller in C, `idea`."""
+def root(tmp_path, monkeypatch):
+    """A folder of components with one controller in C, `idea`, that is compiled for Linux, and fast."""
+    flags = ["-O0" if flag == "-O2" else flag for flag in c_recipe.FLAGS]
+    monkeypatch.setattr(c_recipe, "FLAGS", flags)
+    monkeypatch.setattr(c_recipe, "TO_WINDOWS", "no compiler")
     return begun(tmp_path)
 
 
@@ -192,14 +196,15 @@ def test_it_runs_in_a_c_host_without_python(fmu, tmp_path, host):
         assert run([*strict, *program, "0", "6", "0=0.1"], tmp_path).returncode == 0
 
 
-def test_the_shared_part_compiles_without_warnings(folder, tmp_path, capfd):
-    build_component(folder, tmp_path / "out")
+def test_the_shared_part_compiles_without_warnings(tmp_path, capfd):
+    build_component(begun(tmp_path) / "controllers" / "idea", tmp_path / "out")
     assert capfd.readouterr().err == ""
     assert (FMUS / "c" / "unit.h").is_file()
 
 
 @pytest.mark.skipif(shutil.which(TO_WINDOWS) is None, reason=f"there is no {TO_WINDOWS}")
-def test_a_unit_in_c_gets_a_library_for_windows_where_a_compiler_makes_one(folder, tmp_path):
+def test_a_unit_in_c_gets_a_library_for_windows_where_a_compiler_makes_one(tmp_path):
+    folder = begun(tmp_path) / "controllers" / "idea"
     first = build_component(folder, tmp_path / "a")
     with zipfile.ZipFile(first) as fmu:
         names = {name for name in fmu.namelist() if name.startswith("binaries/")}
