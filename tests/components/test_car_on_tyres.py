@@ -110,7 +110,7 @@ def single_track(frequency, v=SPEED):
     return r, v_y / v
 
 
-@pytest.mark.parametrize("frequency", [0.25, 0.5, 1.0, 2.0, 4.0])
+@pytest.mark.parametrize("frequency", [4.0, 2.0, 1.0, 0.5, 0.25])
 def test_frequency_response_at_small_angles_is_that_of_the_linear_single_track_model(frequency):
     amplitude, settle, periods = 1e-4, 3.0, 4
     settle = round(settle * frequency) / frequency or 1.0 / frequency
@@ -155,21 +155,22 @@ def sine_run(algorithm, h, start=0.5, **options):
     return found[:: round(0.004 / h)]
 
 
-def errors(algorithm, h, start=0.5, **options):
+@cache
+def errors(algorithm, h, start):
     """Return the largest errors of yaw rate and sideslip, relative to their peaks."""
     v_x, v_y, r = exact(start)[:3]
-    found = sine_run(algorithm, h, start, **options)
+    found = sine_run(algorithm, h, start)
     beta = np.arctan2(v_y, v_x)
     return tuple(np.abs(found[:, i] - y).max() / np.abs(y).max() for i, y in enumerate((r, beta)))
 
 
-@pytest.mark.parametrize("start", [0.0, 0.5])
+@pytest.mark.parametrize("start", [0.5, 0.0])
 def test_extrapolated_is_within_a_ten_thousandth_of_the_exact_solution_at_1_ms(start):
     found = max(errors("extrapolated", 0.001, start))
     measured("cars", f"plant_seven_dof, tyre_dugoff, sine from {start} s", SCIPY, found, at_most=1e-4)
 
 
-@pytest.mark.parametrize("start", [0.0, 0.5])
+@pytest.mark.parametrize("start", [0.5, 0.0])
 def test_extrapolated_is_of_second_order(start):
     orders = []
     for coarse, fine in zip(
@@ -182,14 +183,14 @@ def test_extrapolated_is_of_second_order(start):
 
 @pytest.mark.parametrize("algorithm", ["gauss_seidel", "jacobi"])
 def test_held_inputs_are_of_first_order(algorithm):
-    pairs = zip(errors(algorithm, 0.002), errors(algorithm, 0.001), strict=True)
+    pairs = zip(errors(algorithm, 0.002, 0.5), errors(algorithm, 0.001, 0.5), strict=True)
     orders = [log2(coarse / fine) for coarse, fine in pairs]
     assert max(orders) < 1.1
     measured("order", f"`{algorithm}`, held inputs", SCIPY, min(orders), at_least=0.9)
 
 
 def test_extrapolated_beats_gauss_seidel_a_hundredfold_at_1_ms():
-    assert errors("gauss_seidel", 0.001)[0] > 100 * errors("extrapolated", 0.001)[0]
+    assert errors("gauss_seidel", 0.001, 0.5)[0] > 100 * errors("extrapolated", 0.001, 0.5)[0]
 
 
 def test_wheel_loads_accelerations_and_path_are_of_second_order_too():
@@ -223,7 +224,7 @@ def test_smooth_driving_and_braking_in_a_turn_is_of_second_order_with_split_fric
     def torque(t):
         return [swell(t) * x for x in (-200.0, -100.0, 100.0, 50.0)]
 
-    exact_r = monolith.solve(times, steer=steer, speed=20.0, mu=mu, torque=torque)[2]
+    exact_r = monolith.solve(times, steer=steer, speed=20.0, mu=mu, torque=torque, tolerance=1e-8)[2]
     sine = {"amplitude": 0.03, "frequency": 0.5, "start_time": 0.0, "periods": 100.0}
     units = [(Sine, sine), (SwellingTorque, {}), (SevenDof, {"initial_speed": 20.0}), (Dugoff, {})]
     split = {f"friction_{w}": x for w, x in zip(WHEELS, mu, strict=True)}
@@ -253,7 +254,7 @@ def test_the_mirrored_manoeuvre_gives_the_mirrored_motion_to_the_last_bit():
     def run(sign):
         sine = {"amplitude": sign * 0.06, "frequency": 0.5, "start_time": 0.1}
         units = [(Sine, sine), (SevenDof, {"initial_speed": SPEED}), (Dugoff, {})]
-        return drive(units, until=3.0, read=("yaw_rate", "sideslip", "velocity_x", "position_y"))
+        return drive(units, until=1.5, read=("yaw_rate", "sideslip", "velocity_x", "position_y"))
 
     left, right = run(1.0), run(-1.0)
     difference = np.abs(left - right * [-1.0, -1.0, 1.0, -1.0]).max()

@@ -193,6 +193,7 @@ def test_roll_angle_is_within_six_per_cent_of_the_multi_body_model():
     measured("cars", "the CommonRoad car's roll angle", MULTI_BODY, max(late, peak), at_most=0.06)
 
 
+@pytest.mark.exhaustive
 def test_the_stiff_car_is_within_one_and_a_half_per_cent_of_the_single_track_drift_model():
     stiff = ours(1000.0)
     assert at(LATE, stiff[0]) == pytest.approx(at(LATE, drift_model()), rel=0.015)

@@ -159,6 +159,7 @@ def test_coasting_down_matches_the_closed_form_of_drag_and_rolling_resistance():
 
 
 @pytest.mark.parametrize("tyre", [Dugoff, MagicFormula])
+@pytest.mark.sampled(1)
 def test_rolling_resistance_stops_the_car_and_does_not_drive_it_back(tyre):
     names = ["velocity_x", *four("wheel_speed", 0.0)]
     speed, *spins = drive(tyre, until=4.0, record=names, initial_speed=0.2)
@@ -189,14 +190,14 @@ def test_stiff_in_roll_the_car_is_the_one_with_seven_degrees_of_freedom():
     stiff |= {"roll_centre_height_front": 0.0, "roll_centre_height_rear": 0.0, "roll_inertia": 2000.0}
     stiff |= {"roll_stiffness": 8e9, "roll_damping": 5e6, **FREE}
     names = [*four("vertical_load", 0.0), "yaw_rate", "sideslip", "acceleration_y"]
-    record = {"steer": 0.05, "until": 2.0, "h": 2e-4, "record": names, "mu": 0.65}
+    record = {"steer": 0.05, "until": 1.2, "h": 2e-4, "record": names, "mu": 0.65}
     eight = drive(Dugoff, **record, **shared, **stiff)
     seven = drive(Dugoff, plant=SevenDof, **record, **shared)
     assert np.abs(seven[4]).max() > 0.2  # the car slides
     for name, e, s in zip(names, eight, seven, strict=True):
         peak = np.abs(s - s[0]).max()
         assert np.abs(e - s).max() < 1e-3 * peak, name  # at the corner where steering begins
-        assert np.abs(e - s)[-5000:].max() < 1e-4 * peak, name  # roll follows forces half a step late
+        assert np.abs(e - s)[-4000:].max() < 1e-4 * peak, name  # roll follows forces half a step late
 
 
 def magic(alpha: float, kappa: float, load: float, mu: float) -> tuple[float, float]:
@@ -226,7 +227,7 @@ def test_the_extrapolated_loop_agrees_with_an_independent_solution(component, ty
         speed=speed,
         mu=[mu] * 4,
         kinks=[0.2, 2.7],
-        tolerance=1e-9,
+        tolerance=1e-8,
     )
     peak = np.abs(exact).max(axis=1)
     errors = {}
@@ -250,7 +251,7 @@ def test_braking_agrees_with_an_independent_solution():
         mu=[0.8] * 4,
         torque=lambda t: torque,
         kinks=[0.2],
-        tolerance=1e-9,
+        tolerance=1e-8,
     )
     run = drive(
         MagicFormula,
@@ -269,7 +270,7 @@ def test_braking_agrees_with_an_independent_solution():
 def test_left_and_right_are_mirrored_to_the_last_bit():
     names = ["velocity_x", "yaw_rate", "roll_angle", "position_y", "vertical_load_fl", "wheel_speed_rl"]
     mirrored = ["velocity_x", "yaw_rate", "roll_angle", "position_y", "vertical_load_fr", "wheel_speed_rr"]
-    setting = {"mu": 0.9, "until": 3.0, "torque": (-200.0,), "initial_speed": 25.0}
+    setting = {"mu": 0.9, "until": 1.5, "torque": (-200.0,), "initial_speed": 25.0}
     left = drive(Dugoff, steer=0.08, record=names, **setting)
     right = drive(Dugoff, steer=-0.08, record=mirrored, **setting)
     difference = np.abs(left - right * np.array([[1.0], [-1.0], [-1.0], [-1.0], [1.0], [1.0]])).max()
@@ -363,8 +364,8 @@ def test_a_car_at_rest_stays_at_rest(torque):
 
 @pytest.mark.parametrize("tyre", [Dugoff, MagicFormula])
 @pytest.mark.parametrize("front, rear", [(-700.0, -300.0), (-3000.0, -3000.0)], ids=["rolling", "locked"])
-@pytest.mark.parametrize("steer", [0.0, 0.02])
-@pytest.mark.sampled(2)
+@pytest.mark.parametrize("steer", [0.02, 0.0])
+@pytest.mark.sampled(1)
 def test_braking_to_standstill_has_no_limit_cycle(tyre, front, rear, steer):
     names = ["velocity_x", "velocity_y", "yaw_rate", *four("wheel_speed", 0.0)]
     run = drive(

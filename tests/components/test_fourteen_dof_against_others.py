@@ -51,7 +51,7 @@ def test_stiff_in_heave_and_pitch_the_car_is_the_one_with_eight_degrees_of_freed
     springs["sprung_pitch_inertia"] = 790.0
     springs["front_unsprung_share"] = 1.56 / 2.6  # no product of inertia of roll and yaw
     names = ["yaw_rate", "roll_angle", *four("vertical_load", 0.0), *four("slip_angle", 0.0)]
-    setting = {"steer": 0.03, "mu": 0.65, "until": 4.0, "frequency": 0.4, "record": names}
+    setting = {"steer": 0.03, "mu": 0.65, "until": 2.5, "frequency": 0.4, "record": names}
     fourteen = drive(Dugoff, **setting, **shared, **springs)
     eight = drive(Dugoff, plant=EightDof, **setting, **shared)
     assert SPEED * np.abs(eight[0]).max() > 4.0  # two thirds of the grip
@@ -162,7 +162,7 @@ def test_the_mirrored_manoeuvre_gives_the_mirrored_motion():
     names = ["velocity_x", "heave", "pitch_angle", "vertical_load_fl", "wheel_speed_rl"]
     odd = ["yaw_rate", "roll_angle", "position_y", "velocity_y", "acceleration_y"]
     mirrored = [*names[:3], "vertical_load_fr", "wheel_speed_rr", *odd]
-    setting = {"mu": 0.9, "until": 3.0, "torque": (-200.0,), "initial_heave": 0.02}
+    setting = {"mu": 0.9, "until": 1.5, "torque": (-200.0,), "initial_heave": 0.02}
     left = drive(Dugoff, steer=0.08, record=[*names, *odd], **setting)
     right = drive(Dugoff, steer=-0.08, record=mirrored, **setting)
     right[len(names) :] *= -1.0

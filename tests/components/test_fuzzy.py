@@ -78,7 +78,7 @@ def uneven() -> Mamdani:
 
 
 SYSTEMS = [standard_seven, standard_five, paper_b, paper_c, uneven]
-LARGE = [standard_seven, paper_c]
+LARGE = [standard_seven, standard_five, paper_c]
 """Systems that scikit-fuzzy takes long for; five sets and several outputs are in smaller ones, too."""
 
 

@@ -63,6 +63,7 @@ def demand() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("plant", ["plant_seven_dof", "plant_eight_dof", "plant_fourteen_dof"])
+@pytest.mark.sampled(1)
 def test_a_noisy_lap_is_driven_within_a_tenth_of_a_metre_per_second(plant, tmp_path):
     write_lap(tmp_path, *demand())
     truth = drive(tmp_path, "plant_fourteen_dof")
@@ -106,6 +107,7 @@ def steady(folder: Path, tyre: str, extra: str = "", values: dict[str, float] | 
 
 
 @pytest.mark.parametrize("tyre", ["tyre_linear", "tyre_dugoff"])
+@pytest.mark.sampled(1)
 def test_the_stiffness_of_each_axle_gives_the_understeer_of_the_formula(tyre, tmp_path):
     run = steady(tmp_path, tyre)
     given = run.record["fmus"]["plant"]["parameters"]

@@ -39,6 +39,7 @@ def steady_turn(plant, e_f, e_r):
 
 
 @PLANTS
+@pytest.mark.sampled(1)
 def test_the_understeer_that_camber_adds_is_that_of_the_tyres_camber_stiffness(plant):
     """delta - L r / v grows by phi (e_f C_gf / C_f - e_r C_gr / C_r), C_g the slope of -F_y over camber."""
     added = {}

@@ -45,7 +45,7 @@ def stand(**parameters):
     return Stand(MagicFormula62Transient, wheel_radius=RADIUS, low_speed=LOW, **parameters)
 
 
-@pytest.mark.parametrize("steps", [1, 2, 7, 1000])
+@pytest.mark.parametrize("steps", [1, 2, 7, 100])
 @pytest.mark.parametrize(("v", "kappa", "alpha"), [(20.0, 0.0, 0.05), (3.0, 0.0, -0.2), (20.0, -0.06, 0.0)])
 def test_after_the_relaxation_length_a_step_has_come_to_1_less_1_over_e(v, kappa, alpha, steps):
     tyre = stand()
@@ -174,14 +174,14 @@ def driven(plant, until, steps, *, torque=0.0, mu=None, each=lambda _: None, h=N
 
 @pytest.mark.parametrize("plant", [SevenDof, FourteenDof])
 @pytest.mark.parametrize("mu", [(1.0,) * 4, (0.2, 0.8, 0.2, 0.8)])
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(1)
 def test_a_braked_car_comes_to_rest_and_stays_without_a_limit_cycle(plant, mu):
     speeds = []
 
     def see(loop):
         speeds.append(loop["velocity_x"])
 
-    loop, _ = driven(plant, 9.0, 9000, torque=-350.0, mu=mu, initial_speed=12.0, each=see)
+    loop, _ = driven(plant, 5.0, 5000, torque=-350.0, mu=mu, initial_speed=5.0, each=see)
     last = np.array(speeds[-500:])
     assert np.max(np.abs(last)) < 1e-3
     assert abs(sum(loop[name] for name in wheels("tyre_force_x_*"))) < 20.0  # wheels may pull at each other
@@ -205,10 +205,10 @@ def test_a_car_that_slides_to_rest_on_locked_wheels_springs_back_by_what_their_c
 def test_a_braked_wheel_follows_its_equations_however_long_the_step_is():
     """One millisecond against a twentieth of it, from the first bite of the brake to steady slip."""
     courses = []
-    for steps in (400, 8000):
+    for steps in (200, 4000):
         brake = {"torque": -400.0, "initial_speed": 25.0}
-        _, course = driven(SevenDof, 0.4, steps, each=lambda loop: loop["wheel_speed_fl"], **brake)
-        courses.append(np.array(course[:: steps // 400]))
+        _, course = driven(SevenDof, 0.2, steps, each=lambda loop: loop["wheel_speed_fl"], **brake)
+        courses.append(np.array(course[:: steps // 200]))
     coarse, fine = courses
     rolled_only = fine[0] + (fine[-1] - fine[0]) * np.linspace(0, 1, len(fine))
     assert np.max(np.abs(fine - rolled_only)) > 0.2  # there is something to follow
@@ -216,7 +216,7 @@ def test_a_braked_wheel_follows_its_equations_however_long_the_step_is():
 
 
 def test_a_car_runs_straight_and_lags_in_its_first_turn():
-    loop, _ = driven(SevenDof, 5.0, 5000)
+    loop, _ = driven(SevenDof, 1.0, 1000)
     assert abs(loop["position_y"]) < 1e-9
     rates = {}
     for tyre in (MagicFormula62, MagicFormula62Transient):
@@ -227,7 +227,7 @@ def test_a_car_runs_straight_and_lags_in_its_first_turn():
         loop.constants["steer_angle"] = 0.02
         loop.run(0.04, 40, lambda _: None)
         early = loop["yaw_rate"]
-        loop.run(3.0, 3000, lambda _: None)
+        loop.run(2.0, 2000, lambda _: None)
         rates[tyre] = early, loop["yaw_rate"]
     (early, steady), (early_lagging, steady_lagging) = rates.values()
     assert early_lagging < 0.8 * early
@@ -245,7 +245,7 @@ def test_slip_angle_of_the_patch_never_leaves_its_quadrant():
 def test_the_coupling_with_the_car_is_of_second_order_in_the_step():
     """Loads move from side to side while the car turns in, and relaxation lengths with them."""
     rates = []
-    for steps in (125, 250, 4000):
+    for steps in (125, 250, 2000):
         loop, _ = driven(SevenDof, 0.5, steps, steer=0.05)
         rates.append(loop["yaw_rate"])
     coarse, half, fine = rates

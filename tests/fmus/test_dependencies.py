@@ -121,7 +121,8 @@ def declared(component):
 
 
 @pytest.mark.parametrize("name", list(COMPONENTS))
-def test_declared_dependencies_are_exactly_those_found(name):
+@pytest.mark.parametrize("trials", [4, pytest.param(21, marks=pytest.mark.exhaustive)])
+def test_declared_dependencies_are_exactly_those_found(name, trials):
     """A rate over the step, and what is learnt in it, show at a step of some length only.
 
     For a unit that samples, all that shows there is direct: it knows nothing of what happens in
@@ -145,19 +146,20 @@ def test_declared_dependencies_are_exactly_those_found(name):
         direct = at_once | later if component.sampled else at_once
         assert direct <= expected, f"not declared: {sorted(direct - expected)}"
         seen |= at_once | later
-        if (expected <= seen or name in SLOW) and trial > 20:
+        if (expected <= seen or name in SLOW) and trial >= trials:
             return
     assert expected <= seen, f"declared, but never seen: {sorted(expected - seen)}"
 
 
 @pytest.mark.parametrize("name", list(COMPONENTS))
-def test_initial_values_depend_on_nothing_else(name):
+@pytest.mark.parametrize("trials", [3, pytest.param(10, marks=pytest.mark.exhaustive)])
+def test_initial_values_depend_on_nothing_else(name, trials):
     """But for a plant's, whose accelerations and wheel loads start from the forces there are, a
     closed-loop driver's, whose delays and limits start where the road they see has them settled, a road's
     delayed friction, and a tyre's with relaxation, whose deflections start settled at the slips there are."""
     component = component_class(name)
     source = random.Random(name)
-    for _ in range(10):
+    for _ in range(trials):
         extra = Probe(component, source).at_initialization() - declared(component)
         if name.startswith("plant_"):
             extra = {(i, o) for i, o in extra if i not in FORCES}

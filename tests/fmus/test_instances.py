@@ -13,6 +13,7 @@ import pytest
 from fmus.build import COMPONENTS, build_component
 from tests.fmus.bare import Fmu, Unit
 from tests.fmus.programs import python_libraries
+from tests.fmus.test_rebuild_stale import without_native_libraries
 
 TESTS = Path(__file__).resolve().parent
 
@@ -44,7 +45,8 @@ def test_two_builds_of_a_component_with_other_defaults_keep_their_own_results(tm
     assert angles["driver_large"] == pytest.approx(4 * angles["driver_small"], rel=1e-12)
 
 
-def test_two_builds_of_the_fnn_with_other_weights_differ_in_one_process(tmp_path, unpack):
+def test_two_builds_of_the_fnn_with_other_weights_differ_in_one_process(tmp_path, unpack, monkeypatch):
+    without_native_libraries(monkeypatch)
     source = COMPONENTS / "controllers" / "fnn.py"
     results = []
     for folder, gain in (("first", 5000.0), ("second", 1000.0)):
@@ -58,7 +60,8 @@ def test_two_builds_of_the_fnn_with_other_weights_differ_in_one_process(tmp_path
     assert results[1] != results[0]
 
 
-def test_the_defaults_of_a_variant_stand_in_its_model_description(tmp_path, unpack):
+def test_the_defaults_of_a_variant_stand_in_its_model_description(tmp_path, unpack, monkeypatch):
+    without_native_libraries(monkeypatch)
     source = COMPONENTS / "drivers" / "sine.py"
     fmu = Fmu(unpack(build_component(source, tmp_path, name="driver_other", defaults={"amplitude": 0.02})))
     natural = Fmu(unpack(build_component(source, tmp_path)))
