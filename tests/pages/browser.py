@@ -52,15 +52,26 @@ class Browser:
         self.width = DESK
 
     def open(
-        self, file: Path, fragment: str = "", *, width: int = DESK, height: int = 900, calm: bool = True
+        self,
+        file: Path,
+        fragment: str = "",
+        *,
+        width: int = DESK,
+        height: int = 900,
+        density: int = 1,
+        calm: bool = True,
     ) -> None:
-        """Open a page in a window of that size; `calm`: the reader has asked for less motion."""
+        """Open a page in a window of that size; `calm`: the reader has asked for less motion.
+
+        `density`: pixels of the screen in one of the page's; a second one makes drawing dearer by a quarter.
+        """
         self.width = width
-        metrics = {"width": width, "height": height, "deviceScaleFactor": 2, "mobile": width < 600}
+        metrics = {"width": width, "height": height, "deviceScaleFactor": density, "mobile": width < 600}
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
         wish = {"name": "prefers-reduced-motion", "value": "reduce" if calm else "no-preference"}
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": [wish]})
-        self.driver.get("about:blank")  # where the fragment alone differs, nothing would be loaded
+        if fragment:  # where the fragment alone differs, nothing would be loaded
+            self.driver.get("about:blank")
         self.driver.get(file.resolve().as_uri() + (fragment and f"#{fragment.removeprefix('#')}"))
 
     def reload(self) -> None:

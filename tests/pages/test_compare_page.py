@@ -81,7 +81,7 @@ def test_it_shows_the_system_its_parameters_and_how_to_repeat_it(tree):
     assert golden(command)
 
 
-@pytest.mark.parametrize(("width", "colours"), looks(PHONE, 768, DESK))
+@pytest.mark.parametrize(("width", "colours"), looks(PHONE, 768, DESK, narrow=False))
 def test_nothing_is_cut_overlapping_or_empty_at_any_width(chromium, page, width, colours):
     chromium.open(page, width=width)
     assert flaws(chromium) == []

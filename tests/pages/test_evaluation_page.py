@@ -100,7 +100,7 @@ def test_a_test_without_criteria_has_its_quantities(traces):
     assert "The test has no criteria." in page and "yaw-rate gain" in page
 
 
-@pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK))
+@pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK, narrow=True))
 def test_the_page_has_no_flaws(chromium: Browser, traces, tmp_path: Path, width: int, colours: str):
     file = tmp_path / "evaluation.html"
     runs = [judged("slow", 0.1, 2.0), judged("fast", 0.42)]

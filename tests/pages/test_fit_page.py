@@ -78,6 +78,6 @@ def test_its_views_are_histories_and_cross_plots_of_the_car_and_both_models(page
     assert data["runs"][0]["label"] == "made up" and len(data["runs"]) == 3
 
 
-@pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK))
+@pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK, narrow=False))
 def test_the_page_has_no_flaws_and_stays_within_its_budget(chromium: Browser, page, width, colours):
     check_whole(chromium, page, width, colours)

@@ -14,7 +14,7 @@ from orchestrator.pages.ranking_page import result_of_threats
 from tests.orchestrator.test_ranking import SMALL
 
 from .browser import DESK, HELD, PHONE, Browser
-from .flaws import check_print, inaccessible, looks
+from .flaws import flaws_in_print, inaccessible, looks
 from .made_up import unpacked
 from .test_sweep_page import MOST_ELEMENTS
 
@@ -32,7 +32,7 @@ def page(tmp_path_factory) -> Path:
     return folder / "out" / "report.html"
 
 
-@pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK))
+@pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK, narrow=True))
 def test_the_first_cell_is_open_and_all_of_it_can_be_read_by_everyone(
     chromium: Browser, page, width, colours
 ):
@@ -42,7 +42,7 @@ def test_the_first_cell_is_open_and_all_of_it_can_be_read_by_everyone(
     assert chromium.overflow() <= 0
     assert chromium.run("return document.querySelectorAll('main').length") == 1
     assert inaccessible(chromium, colours) == []
-    check_print(chromium, colours)
+    assert flaws_in_print(chromium) == []
     chromium.open(page, width=width)
     chromium.wait_for("document.querySelector('.chosen .yv-ready')")
     chromium.run("document.querySelector(\"td.cell a[href$='none-in-low']\").click()")

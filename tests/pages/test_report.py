@@ -233,7 +233,7 @@ def test_the_page_needs_nothing_from_elsewhere(paper):
     assert paper.page.stat().st_size <= 2_500_000
 
 
-@pytest.mark.parametrize(("width", "colours"), looks(PHONE, 768, 900, DESK))
+@pytest.mark.parametrize(("width", "colours"), looks(PHONE, 768, 900, DESK, narrow=True))
 def test_nothing_is_cut_overlapping_or_empty_at_any_width(chromium, paper, width, colours):
     chromium.open(paper.page, width=width)
     assert flaws(chromium) == []
@@ -383,7 +383,7 @@ def test_several_studies_make_one_page_with_an_overview(overview):
     assert len([*(overview.folder / "data").glob("*.js")]) == 3
 
 
-@pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK))
+@pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK, narrow=False))
 def test_a_claim_of_the_overview_shows_its_runs_from_the_side_file_of_its_study(
     chromium, overview, width, colours
 ):

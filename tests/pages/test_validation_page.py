@@ -140,7 +140,7 @@ def test_the_band_is_filled_behind_the_points(chromium: Browser, page):
     assert chromium.run(lines) == 5 * [False]  # a band has no times
 
 
-@pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK))
+@pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK, narrow=True))
 def test_the_page_has_no_flaws_and_stays_within_its_budget(chromium: Browser, page, width, colours):
     check_whole(chromium, page, width, colours)
 
@@ -155,7 +155,7 @@ def test_validate_writes_the_page_when_asked(made, tmp_path, capsys):
     assert "tolerance" in (tmp_path / "out/validation.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK))
+@pytest.mark.parametrize(("width", "colours"), looks(PHONE, DESK, narrow=False))
 def test_a_study_has_a_chapter_on_its_validations(chromium: Browser, tmp_path, width, colours):
     write_study(tmp_path, more_bands="steer_angle: {offset: 0.5 deg, gain: 0}, ")
     run = whole_car()
