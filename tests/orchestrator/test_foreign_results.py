@@ -48,7 +48,7 @@ metrics: {moment: {metric: peak(yaw_moment)}}
 claims:
   - {says: There is no moment., holds_if: [{run: a/off, metric: moment, at_most: 0}]}
 figures:
-  - {name: moments, runs: ["*"], panels: [steer_angle, yaw_moment]}
+  - {name: moments, runs: ["*"], panels: [yaw_moment]}
 """
 SWEEP = """
 title: Half a sweep
@@ -339,29 +339,48 @@ def projects(tmp_path: Path, work: Path, fmus: Path, yawbench: Callable[..., tup
     return call
 
 
-@pytest.mark.parametrize("command", MAKES)
-def test_a_command_that_makes_runs_follows_no_link_where_it_writes(command, projects, work, home):
-    assert projects(command, "--out", "clean")[0] == 0
-    made = _products(work / "clean")
-    files = [path for path in made if (work / "clean" / path).is_file()]
-    folders = [path for path in made if (work / "clean" / path).is_dir()]
+@pytest.fixture(scope="module")
+def known() -> dict[str, dict[Path, bool]]:
+    """Command -> what it makes below its folder of results, and whether it is a file, once it was called."""
+    return {}
 
-    def planted(name: str, suffix: str = "") -> Path:
+
+@pytest.fixture
+def products(command, projects, work, known):
+    """Return what a command makes, and whether it is a file."""
+    if command not in known:
+        assert projects(command, "--out", "clean")[0] == 0
+        known[command] = {path: (work / "clean" / path).is_file() for path in _products(work / "clean")}
+    return known[command]
+
+
+@pytest.fixture
+def planted(products, work, home):
+    """Plant links out of the folder in place of all files that a command makes, or of their drafts."""
+
+    def plant(name: str, *suffixes: str) -> Path:
         folder = work / name
-        for path in folders:
-            (folder / path).mkdir(parents=True)
-        folder.mkdir(exist_ok=True)
-        for number, path in enumerate(files):
-            target = home / f"{name}{number}"
-            target.write_text("own\n")
-            (folder / f"{path}{suffix}").symlink_to(target)
+        folder.mkdir()
+        for number, path in enumerate(path for path, is_file in products.items() if is_file):
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            for suffix in suffixes:
+                target = home / f"{name}{number}{suffix}"
+                target.write_text("own\n")
+                (folder / f"{path}{suffix}").symlink_to(target)
         return folder
 
-    links = planted("links")
+    return plant
+
+
+@pytest.mark.parametrize("command", MAKES)
+def test_a_command_that_makes_runs_follows_no_link_where_it_writes(
+    command, projects, products, planted, work, home
+):
+    links = planted("links", "")
     before = snapshot(home)
     status, said = projects(command, "--out", "links")
     assert snapshot(home) == before
-    if "runs.jsonl" in map(str, files):  # a journal is gone on with, not replaced
+    if Path("runs.jsonl") in products:  # a journal is gone on with, not replaced
         assert status == 2
         assert golden_in(said)
         (links / "runs.jsonl").unlink()
@@ -370,13 +389,22 @@ def test_a_command_that_makes_runs_follows_no_link_where_it_writes(command, proj
     assert snapshot(home) == before
     assert not [path for path in links.rglob("*") if path.is_symlink()]
 
-    for suffix in (NEW, ".part"):
-        planted(suffix.strip("."), suffix)
-        before = snapshot(home)
-        projects(command, "--out", suffix.strip("."))
-        assert snapshot(home) == before
 
-    for number, path in enumerate(folders):
+@pytest.mark.parametrize(
+    "command",
+    [
+        "run",
+        "sweep",
+        *(pytest.param(name, marks=pytest.mark.exhaustive) for name in MAKES if name not in ("run", "sweep")),
+    ],
+)
+def test_nor_where_it_writes_drafts_and_folders(command, projects, products, planted, work, home):
+    planted("drafts", NEW, ".part")
+    before = snapshot(home)
+    projects(command, "--out", "drafts")
+    assert snapshot(home) == before
+
+    for number, path in enumerate(path for path, is_file in products.items() if not is_file):
         place = work / f"folder{number}"
         (place / path.parent).mkdir(parents=True)
         (home / f"folder{number}").mkdir()

@@ -38,6 +38,20 @@ class Follow(Component):
 Install = Callable[..., Path]
 
 
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory) -> Path:
+    """A cache for all tests: what is compiled of the sample is the same in most."""
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture
+def cache(shared, monkeypatch) -> Path:
+    """A cache without FMUs, in place of the user's."""
+    shutil.rmtree(shared / "fmus", ignore_errors=True)
+    monkeypatch.setenv("YAWBENCH_CACHE", str(shared))
+    return shared
+
+
 @pytest.fixture
 def install(tmp_path, monkeypatch, cache) -> Iterator[Install]:
     """Install a sample package, as an installer would leave it on Python's path."""

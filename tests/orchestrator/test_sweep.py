@@ -189,10 +189,10 @@ def test_a_sweep_with_a_stop_time_of_its_own_tells_it_in_the_table_and_warns_of_
 
 
 def test_the_table_is_the_same_to_the_byte_however_many_workers(moods, yawbench, tmp_path):
-    file = moods(5, 20, 60, count=2)
-    for workers in ("1", "2", "3"):
+    file = moods(5, 20, count=2)
+    for workers in ("1", "3"):
         assert yawbench(file, workers, "--jobs", workers)[0] == 1  # level 20 fails
-    tables = {(tmp_path / workers / "table.parquet").read_bytes() for workers in "123"}
+    tables = {(tmp_path / workers / "table.parquet").read_bytes() for workers in "13"}
     assert len(tables) == 1
 
 
@@ -298,7 +298,7 @@ def kept_levels(folder) -> list[tuple[float, bool]]:
     [
         ("", (10, 33, 38, 45), [33, 38]),  # the last within the limit, the first beyond
         ("limits", (1, 2, 20, 45), [2, 20]),  # twenty fails
-        ("all", (10, 33), [10, 33]),
+        pytest.param("all", (10, 33), [10, 33], marks=pytest.mark.exhaustive),
         ("none", (10, 20), []),
     ],
 )
@@ -516,7 +516,7 @@ def test_runs_that_were_never_made_are_not_called_failed(moods, yawbench, tmp_pa
 
 
 def test_every_count_on_the_page_of_a_sweep_is_that_of_its_runs(moods, yawbench, tmp_path):
-    assert yawbench(moods(1, 2, 20, count=4), "out")[0] == 1
+    assert yawbench(moods(1, 20, count=3), "out")[0] == 1
     page = page_of(tmp_path / "out")
     told = {
         words_of(one).split()[0]: int(words_of(one).split()[-1])
