@@ -31,8 +31,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class WireTiming:
+class WireTiming(NamedTuple):
     """The properties of a wire that its weights depend on; periods in communication steps."""
 
     source_period: int

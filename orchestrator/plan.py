@@ -85,7 +85,7 @@ class Variable:
     elements: int = 1  # of the whole array
     alias_of: str | None = None  # of an input: the input of which this is another name (FMI 3.0)
 
-    @property
+    @cached_property
     def ref(self) -> ValueRef:
         """Its reference in the FMU. The functions of FMI 2.0 treat an enumeration as an Integer."""
         kind = self.encoding or {"Enumeration": "Integer"}.get(self.type, self.type)

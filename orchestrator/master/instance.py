@@ -309,13 +309,14 @@ class CtypesInstance(FmuInstance, ABC):
         kind, (references, at, count) = refs[0].type, _layout(refs)
         if not self._has(verb + kind):
             return self._impossible(f"the library lacks {self.prefix}{verb}{kind}"), [0] * len(refs)
-        buffer = (self.c_types[kind] * count)()
+        buffer, whole = (self.c_types[kind] * count)(), kind in (*INTEGERS, "Integer")
         for i, value in zip(at, values, strict=False):  # empty when getting
             buffer[i] = value
-            if kind in (*INTEGERS, "Integer") and buffer[i] != value:
+            if whole and buffer[i] != value:
                 sentence = f"{value} does not fit into a variable of type {kind}"
                 return self._impossible(sentence), list(values)
-        return self._call(verb + kind, references, buffer)(), [buffer[i] for i in at]
+        status, exchanged = self._call(verb + kind, references, buffer)(), buffer[:]
+        return status, [exchanged[i] for i in at]
 
     def _impossible(self, sentence: str) -> Status:
         self._log.add(self.name, ERROR, "", sentence)
@@ -326,7 +327,7 @@ class CtypesInstance(FmuInstance, ABC):
 
     def _function(self, name: str) -> Any:
         """Return a C function; it takes C objects and, of Python's numbers, only integers."""
-        function = self._library[self.prefix + name]
+        function = getattr(self._library, self.prefix + name)  # looked up once, unlike by index
         function.restype = ctypes.c_int
         return function
 

@@ -267,6 +267,7 @@ def _decoded(text: bytes | None) -> str:
     return _CONTROLS.sub("", (text or b"").decode("utf-8", errors="replace"))
 
 
+_MACHINE = platform.machine()
 _ENVIRONMENT = 64  # bytes; no platform's fenv_t is larger
 
 _c = ctypes.CDLL(None)
@@ -283,6 +284,7 @@ class ProcessState:
 
     def __init__(self) -> None:
         self._arithmetic = _arithmetic()
+        self._control = _control(self._arithmetic)
         self._actions: list[bytes] = []  # of the signals, once Python's handlers are in place
         self._locale = _c.setlocale(locale.LC_ALL, None)
         self._folder = os.getcwd()
@@ -291,7 +293,7 @@ class ProcessState:
 
     def arithmetic_changed(self) -> bool:
         """Return whether rounding, flush-to-zero or traps differ from the snapshot."""
-        return _control(_arithmetic()) != _control(self._arithmetic)
+        return _control(_arithmetic()) != self._control
 
     def restore(self, instance: str, log: Log) -> None:
         """Restore state that an instance has changed; log a warning the first time."""
@@ -371,9 +373,9 @@ def _arithmetic() -> ctypes.Array[ctypes.c_char]:
 
 def _control(environment: ctypes.Array[ctypes.c_char]) -> tuple[int, ...]:
     """Return the part that affects results, without the flags that any operation may raise."""
-    if platform.machine() in ("x86_64", "AMD64"):
+    if _MACHINE in ("x86_64", "AMD64"):
         return struct.unpack_from("<H", environment)[0], struct.unpack_from("<I", environment, 28)[0] & ~0x3F
-    if platform.machine() == "aarch64":
+    if _MACHINE == "aarch64":
         return struct.unpack_from("<I", environment)
     return (_c.fegetround(),)
 

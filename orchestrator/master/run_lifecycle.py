@@ -163,11 +163,11 @@ class RunLifecycle:
             SimulationError: they cannot be written.
         """
         self.handed_over += count
-        time = self.plan.time(max(0, self.handed_over - 1))
         self.writing = True
         try:
             self._rows.write(count)
         except ResultsError as error:
+            time = self.plan.time(max(0, self.handed_over - 1))
             kept = "; the rows that fit are kept" if getattr(self._rows, "rows_stay", False) else ""
             sentence = f"{str(error.diagnostics[0]).rstrip('.')} (at t = {time:.9g} s){kept}."
             raise SimulationError(sentence, instance=None, time=time, code=error.code) from None

@@ -188,7 +188,8 @@ class Master:
         while self.completed < end:
             answer = loop.walk(self.completed + 1 if self._recorded_others else end)
             self.completed, k = self._reached.value, loop.k
-            self._copies.end()
+            if answer is not Answer.PYTHON:  # which may be in every step; the next walk notices a copy
+                self._copies.end()
             if answer == Answer.FINISHED:
                 if self._recorded_others:
                     others.append(self._values_of_others())

@@ -115,7 +115,7 @@ class StepProgram:
         self._algorithm = ALGORITHMS[signals.plan.algorithm]
         self.cycle = math.lcm(*(s.instance.period for s in signals.slots))
         self._made: dict[int, list[Operation]] = {}
-        self._gathers: dict[tuple[Any, ...], list[Operation]] = {}
+        self._gathers: dict[tuple[str, int], list[Operation]] = {}
         feeds = {s.name: SeriesFeed(signals, s) for s in signals.slots if s.instance.series}
         self._feeds = {name: Operation(name, "gather", feed, feed.data) for name, feed in feeds.items()}
         self._delayed = {wire.source for wire in signals.plan.wires if wire.delayed}  # instances
@@ -126,6 +126,14 @@ class StepProgram:
     def _timings(self) -> dict[str, list[WireTiming | None]]:
         """Instance -> timing of the wire of each Real input; every phase needs the same."""
         return {s.name: self._signals.timings(s) for s in self._signals.slots}
+
+    @functools.cached_property
+    def _cycles(self) -> dict[str, int]:
+        """Instance -> number of communication points after which the weights of all its wires repeat."""
+        return {
+            s.name: math.lcm(s.instance.period, *(t.source_period for t in self._timings[s.name] if t))
+            for s in self._signals.slots
+        }
 
     def at(self, k: int) -> list[Operation]:
         """Return the operations that lead from communication point `k` - 1 to `k`."""
@@ -162,34 +170,43 @@ class StepProgram:
         for s in self._signals.slots:
             if k % s.instance.period == 0:
                 operations += [self._feeds[s.name]] if s.instance.series else []
-                operations += [*self._gathering(s, k), *self._of_inputs[s.name]]
-                operations += _setting(self._signals, s)
-                operations.append(_of_fmu(s, "step", s.calls.step))
-                if (self._algorithm.needs_before or s.name in self._delayed) and s.samples.size:
-                    operations.append(_keeping_outputs(self._signals, s))
-                operations += [*getting(self._signals, s), *self._of_outputs[s.name]]
+                operations += [*self._gathering(s, k), *self._of_inputs[s.name], *self._stepping[s.name]]
         return operations
+
+    @functools.cached_property
+    def _stepping(self) -> dict[str, list[Operation]]:
+        """Instance -> the operations of its step after its inputs are gathered, the same in every phase."""
+        m, stepping = self._signals, {}
+        for s in m.slots:
+            stepping[s.name] = [*_setting(m, s), _of_fmu(s, "step", s.calls.step)]
+            if (self._algorithm.needs_before or s.name in self._delayed) and s.samples.size:
+                stepping[s.name].append(_keeping_outputs(m, s))
+            stepping[s.name] += [*getting(m, s), *self._of_outputs[s.name]]
+        return stepping
 
     def _gathering(self, s: InstanceSlot, k: int) -> list[Operation]:
         m = self._signals
         if not s.driven:
             return []
-        per_input = []
-        for wire, timing in zip(s.wires, self._timings[s.name], strict=True):
-            if wire is None or timing is None:
-                per_input.append(CouplingWeights())
-            else:
-                weights = delayed if wire.delayed else self._algorithm.weights
-                # `k` is a phase; shifted so that no sample lies before the start
-                per_input.append(weights(timing, k + 2 * self.cycle))
-        key = (s.name, *per_input)
+        key = s.name, k % self._cycles[s.name]
         if key not in self._gathers:
             _make_room(self._gathers)
+            per_input = [*self._weights(s, k)]
             operations = [_gather(m, s, per_input), *_converting(s)]
             if any(w.kept for w in per_input):
                 operations.append(_copying(m, s.name, s.sources, s.kept)._replace(kind="keep"))
             self._gathers[key] = operations
         return self._gathers[key]
+
+    def _weights(self, s: InstanceSlot, k: int) -> Iterator[CouplingWeights]:
+        """Yield the weights of each Real input of an instance."""
+        for wire, timing in zip(s.wires, self._timings[s.name], strict=True):
+            if wire is None or timing is None:
+                yield CouplingWeights()
+            else:
+                weights = delayed if wire.delayed else self._algorithm.weights
+                # `k` is a phase; shifted so that no sample lies before the start
+                yield weights(timing, k + 2 * self.cycle)
 
 
 def _make_room(kept: dict[Any, list[Operation]]) -> None:

@@ -266,11 +266,13 @@ def evaluate(results: Results, chosen: Metric, window: TimeWindow | None = None)
     if window and not time[0] - 1e-9 <= first <= last <= time[-1] + 1e-9:
         return None
     if first == last:  # a point in time: the nearest recorded row
-        inside = np.array([np.argmin(np.abs(time - first))])
+        inside: np.ndarray | slice = np.array([np.argmin(np.abs(time - first))])
     else:
-        inside = np.flatnonzero((time >= first - 1e-9) & (time <= last + 1e-9))
-        if inside.size < 2:
+        rows = np.flatnonzero((time >= first - 1e-9) & (time <= last + 1e-9))
+        if rows.size < 2:
             return None
+        together = rows.size == 1 + rows[-1] - rows[0]
+        inside = slice(rows[0], rows[-1] + 1) if together else rows  # a slice needs no copies
     t = time[inside]
     numbers = []
     for columns in signals:

@@ -10,12 +10,11 @@ import hashlib
 import json
 import math
 import platform
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import asdict, astuple
 from datetime import datetime, timezone
 from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
-from operator import is_
 from pathlib import Path
 from typing import Any
 
@@ -207,25 +206,28 @@ def key_of(plan: Plan, also: Any = None) -> str:
 
 
 class _DescribedWires:
-    """The wires of a plan as in records and in keys, kept for the next plan, which often has the same."""
+    """The wires of plans as in records and in keys, kept for further plans, which often have the same."""
+
+    MOST = 100
+    """Largest number of networks that are kept. Chosen: more than a study has, little memory."""
 
     def __init__(self) -> None:
-        self._wires: tuple[Wire, ...] = ()
-        self._fmus: list[Fmu] = []
-        self._described: tuple[list[ConnectionRecord], list[dict[str, Any]]] = [], []
+        self._known: dict[Hashable, tuple[list[ConnectionRecord], list[dict[str, Any]]]] = {}
+        self._fmus: list[list[Fmu]] = []  # of the plans, so that no other object gets their numbers
 
     def of(self, plan: Plan) -> tuple[list[ConnectionRecord], list[dict[str, Any]]]:
         fmus = [instance.fmu for instance in plan.instances]
-        same = len(fmus) == len(self._fmus) and all(map(is_, fmus, self._fmus))
-        if not (same and plan.wires == self._wires):
-            self._wires, self._fmus = plan.wires, fmus
+        key = plan.wires, *map(id, fmus)
+        if key not in self._known:
+            if len(self._known) == self.MOST:
+                self._known.clear()
+                self._fmus.clear()
             instances = {instance.name: instance for instance in plan.instances}
             records = [_connection(wire, instances) for wire in plan.wires]
-            self._described = (
-                records,
-                [wire.model_dump(by_alias=True, exclude_unset=True) for wire in records],
-            )
-        return self._described
+            said = [wire.model_dump(by_alias=True, exclude_unset=True) for wire in records]
+            self._known[key] = records, said
+            self._fmus.append(fmus)
+        return self._known[key]
 
 
 _WIRES = _DescribedWires()

@@ -221,9 +221,14 @@ class Results:
         ]
         return [column for column in dict.fromkeys(feeding) if column in self.columns]
 
+    @cached_property
+    def _roles(self) -> dict[str, str]:
+        """Instance -> its role."""
+        return {name: fmu.role_as(name) for name, fmu in self.record.fmus.items()}
+
     def instances_of_role(self, role: str) -> list[str]:
         """Return the names of the instances that have the role, in evaluation order."""
-        return [name for name, fmu in self.record.fmus.items() if fmu.role_as(name) == role]
+        return [name for name, known in self._roles.items() if known == role]
 
     def _unknown(self, variable: str, role: str | None = None) -> str:
         of = f" of a {role}" if role else ""

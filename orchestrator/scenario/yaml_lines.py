@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -205,6 +206,7 @@ def _keep_comments(document: Document, text: str, scalars: Sequence[tuple[int, i
         begin += len(line) + 1
 
 
+@lru_cache(1024)
 def scalar(text: str) -> Any:
     """Return the value that `text` would have as a scalar in a YAML file."""
     try:
