@@ -224,8 +224,8 @@ class _DescribedWires:
                 self._fmus.clear()
             instances = {instance.name: instance for instance in plan.instances}
             records = [_connection(wire, instances) for wire in plan.wires]
-            said = [wire.model_dump(by_alias=True, exclude_unset=True) for wire in records]
-            self._known[key] = records, said
+            fields = [wire.model_dump(by_alias=True, exclude_unset=True) for wire in records]
+            self._known[key] = records, fields
             self._fmus.append(fmus)
         return self._known[key]
 
