@@ -7,6 +7,7 @@ every parametrized test in the first tier, evenly spread; the others are marked 
 from __future__ import annotations
 
 import gc
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -25,6 +26,10 @@ LONGEST_FIRST = (
     "components",
 )
 """Beginnings of paths: long runs come first, so that no worker is left alone with one at the end."""
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+"""numpy and scipy, imported later, use no threads: these would wait for a small matrix in loops that cost as
+much again."""
 
 gc.set_threshold(50_000, 20, 20)
 """Python looks for garbage less often: thousands of tests keep much, and leave little."""

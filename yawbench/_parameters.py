@@ -19,6 +19,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import CellType, CodeType, FunctionType, MethodType, ModuleType
 from typing import Any, Literal, get_args, get_origin
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -37,6 +38,8 @@ INSTALLED = tuple({sysconfig.get_path(name) for name in ("stdlib", "purelib", "p
 """Folders of Python and of installed packages."""
 UNIT = "1"
 """Placeholder for undeclared units, until `without_units` removes it."""
+_SOURCES: WeakKeyDictionary[CodeType, bytes] = WeakKeyDictionary()
+"""Code of a function -> its source text."""
 
 
 @dataclass(frozen=True)
@@ -188,10 +191,7 @@ def text_of(program: Any) -> bytes:
     parts = []
     for value in _reached([program], named=True):
         if isinstance(value, FunctionType):
-            try:
-                parts.append(inspect.getsource(value).encode())
-            except Exception:  # there is none
-                parts.append(value.__code__.co_code + _pickled(value.__code__.co_consts))
+            parts.append(_source_of(value))
             parts += map(
                 _pickled, [value.__defaults__, value.__kwdefaults__, *_closed_over(value), *_used(value)]
             )
@@ -200,6 +200,30 @@ def text_of(program: Any) -> bytes:
         else:
             parts.append(_pickled(value))
     return b"".join(parts)
+
+
+def _source_of(function: FunctionType) -> bytes:
+    """Return a function's source text, or its code where there is none.
+
+    It is kept by the code of the innermost function, whose source `inspect` shows: finding it takes a
+    millisecond, and a component has hundreds of functions.
+    """
+    try:
+        inner = inspect.unwrap(function)
+    except ValueError:  # wrapped in itself
+        inner = function
+    if not isinstance(inner, FunctionType):
+        return _found_source(function)
+    if inner.__code__ not in _SOURCES:
+        _SOURCES[inner.__code__] = _found_source(inner)
+    return _SOURCES[inner.__code__]
+
+
+def _found_source(function: FunctionType) -> bytes:
+    try:
+        return inspect.getsource(function).encode()
+    except Exception:  # there is none
+        return function.__code__.co_code + _pickled(function.__code__.co_consts)
 
 
 def functions_of(*programs: Any) -> list[FunctionType]:
