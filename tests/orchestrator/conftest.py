@@ -9,6 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from fmus.build import build_component
+from fmus.c import c_recipe
+
 HERE = Path(__file__).parent
 
 
@@ -18,6 +21,13 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "cache"
     monkeypatch.setenv("YAWBENCH_CACHE", str(folder))
     return folder
+
+
+def build_here(source: Path, folder: Path) -> Path:
+    """Build a component in C without its library for Windows, which takes as long as that for Linux."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(c_recipe, "TO_WINDOWS", "no-compiler-for-windows")
+        return build_component(source, folder)
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fmus.build import build_component
 from orchestrator.cli import main
 from orchestrator.commands.new import begin
 from orchestrator.errors import SimulationError
@@ -21,6 +20,8 @@ from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.sentences import golden_in
+
+from .conftest import build_here
 
 ROOT = Path(__file__).parents[2]
 CAR = ROOT / "scenarios" / "fnn_sideslip" / "25mps.yaml"
@@ -48,7 +49,7 @@ def foreign(tmp_path):
                 text = text.replace(STEP, f"if (t > 0.0495) {{ {act} }}\n    {STEP}")
                 text = f"#include <signal.h>\n#include <stdlib.h>\n#include <unistd.h>\n{text}"
             file.write_text(text)
-        return build_component(tmp_path / "components" / "controllers" / "idea", tmp_path / "built")
+        return build_here(tmp_path / "components" / "controllers" / "idea", tmp_path / "built")
 
     return build
 
@@ -59,7 +60,7 @@ def run(fmus, tmp_path, capsys):
 
     def go(controller, *arguments, isolate=True):
         out = tmp_path / "out"
-        options = ["--fmus", str(fmus), "--out", str(out), "--set", "stop_time=0.1"]
+        options = ["--fmus", str(fmus), "--no-build", "--out", str(out), "--set", "stop_time=0.1"]
         options += ["--swap", f"controller={controller}", *arguments, *(["--isolate"] if isolate else [])]
         with pytest.raises(SystemExit) as exit_:
             main(["run", str(CAR), *options])
