@@ -25,18 +25,25 @@ Tyre = Callable[[float, float, float, float], tuple[float, float]]
 
 
 def balance(
-    state: Sequence[float], delta: float, mu: Sequence[float], tyre: Tyre
+    state: Sequence[float],
+    delta: float,
+    mu: Sequence[float],
+    tyre: Tyre,
+    near: list[float] | None = None,
 ) -> tuple[np.ndarray, list[float], list[float]]:
-    """Return (dv_x, dv_y, dr, ddphi), longitudinal tyre forces and loads, all consistent."""
+    """Return (dv_x, dv_y, dr, ddphi), longitudinal tyre forces and loads, all consistent.
+
+    The loads are sought from those `near` on, by default the static ones.
+    """
     v_x, v_y, r, _, _, _, phi, dphi, *spins = state
     slips = []
     for (x, y), w, angle in zip(PLACES, spins, (delta, delta, 0.0, 0.0), strict=True):
         forward, side = v_x - r * y, v_y + r * x
         v = forward * cos(angle) + side * sin(angle)
         slips.append((atan2(side, forward) - angle, (w * R - v) / max(w * R, v), angle))
-    f_z = [M * GRAVITY * (B if k < 2 else A) / (2 * LENGTH) for k in range(4)]
+    f_z = near or [M * GRAVITY * (B if k < 2 else A) / (2 * LENGTH) for k in range(4)]
     for _ in range(400):
-        total = np.zeros(3)
+        sum_x = sum_y = moment = 0.0
         axle = [0.0, 0.0]
         longitudinal = []
         for k, ((alpha, kappa, angle), (x, y)) in enumerate(zip(slips, PLACES, strict=True)):
@@ -45,8 +52,10 @@ def balance(
             x_car = f_x * cos(angle) - f_y * sin(angle)
             y_car = f_x * sin(angle) + f_y * cos(angle)
             axle[k // 2] += y_car
-            total += (x_car, y_car, x * y_car - y * x_car)
-        pitch = H * total[0] / (2 * LENGTH)
+            sum_x += x_car
+            sum_y += y_car
+            moment += x * y_car - y * x_car
+        pitch = H * sum_x / (2 * LENGTH)
         front = (FRONT * (K * phi + C * dphi) + H_F * axle[0]) / D
         rear = ((1 - FRONT) * (K * phi + C * dphi) + H_R * axle[1]) / D
         static_front, static_rear = M * GRAVITY * B / (2 * LENGTH), M * GRAVITY * A / (2 * LENGTH)
@@ -75,9 +84,9 @@ def balance(
     resisting = DRAG * v_x * abs(v_x)
     right = np.array(
         [
-            total[0] - resisting + M * v_y * r - 2 * M_S * H_S * r * dphi,
-            total[1] - M * v_x * r,
-            total[2],
+            sum_x - resisting + M * v_y * r - 2 * M_S * H_S * r * dphi,
+            sum_y - M * v_x * r,
+            moment,
             M_S * H_S * v_x * r + M_S * GRAVITY * H_S * sin(phi) - K * phi - C * dphi,
         ]
     )
@@ -97,8 +106,12 @@ def solve(
 ) -> np.ndarray:
     """Return v_x, v_y, r, x, y, psi, phi, dphi and the four wheel speeds (rows) at `times` (columns)."""
 
+    loads: list[float] | None = None
+
     def derivatives(t: float, state: np.ndarray) -> list[float]:
-        (dv_x, dv_y, dr, ddphi), longitudinal, f_z = balance(state, steer(t), mu, tyre)
+        nonlocal loads
+        (dv_x, dv_y, dr, ddphi), longitudinal, f_z = balance(state.tolist(), steer(t), mu, tyre, loads)
+        loads = f_z
         v_x, v_y, r, _, _, psi, _, dphi = state[:8]
         moved = [v_x * cos(psi) - v_y * sin(psi), v_x * sin(psi) + v_y * cos(psi), r]
         resisting = [ROLLING * load * R * copysign(1.0, w) for load, w in zip(f_z, state[8:], strict=True)]

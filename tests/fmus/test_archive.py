@@ -175,6 +175,16 @@ def test_the_same_sources_give_the_same_bytes_in_another_process(tmp_path):
         assert (here / f"{name}.fmu").read_bytes() == (there / f"{name}.fmu").read_bytes()
 
 
+@pytest.fixture
+def quick_launcher(monkeypatch):
+    """The launcher, compiled anew and fast."""
+    monkeypatch.setattr(compiler, "FLAGS", ["-O0" if flag == "-O2" else flag for flag in compiler.FLAGS])
+    compiler._launcher.cache_clear()
+    yield
+    compiler._launcher.cache_clear()
+
+
+@pytest.mark.usefixtures("quick_launcher")
 def test_the_launcher_compiles_to_the_same_bytes_again(tmp_path, monkeypatch):
     made = []
     for cache in ("a", "b"):
@@ -190,10 +200,10 @@ def test_the_launcher_compiles_to_the_same_bytes_again(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("harm", [lambda c: c[: len(c) // 2], lambda c: b"", lambda c: c[:-1] + b"x"])
 @pytest.mark.sampled(1)
+@pytest.mark.usefixtures("quick_launcher")
 def test_a_damaged_launcher_in_the_cache_is_compiled_anew(harm, tmp_path, monkeypatch):
     """Believed, it would end the build with SIGBUS, or have every FMU fail."""
     monkeypatch.setattr("orchestrator.cache.cache_folders", lambda: iter([tmp_path]))
-    compiler._launcher.cache_clear()
     good = compile_launcher()[0]
     (kept,) = tmp_path.glob("launcher/*")
     kept.write_bytes(harm(good))

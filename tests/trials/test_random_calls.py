@@ -60,7 +60,7 @@ def told_of_a_fault(monkeypatch: pytest.MonkeyPatch, fault: Callable[[Host, Call
         return fault(host, call, right) if host.fmu.folder.name == "python" else right
 
     monkeypatch.setattr(Host, "answer", wrong)
-    (note,) = made("controller_pid", [SEED], 60).notes
+    (note,) = made("controller_pid", [SEED], 30).notes
     return note.splitlines()
 
 

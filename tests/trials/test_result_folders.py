@@ -12,7 +12,7 @@ from .result_folders import cases, trial
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs links and pipes")
 
 
-@pytest.mark.parametrize("every", [pytest.param(4, marks=pytest.mark.exhaustive), 199])
+@pytest.mark.parametrize("every", [pytest.param(4, marks=pytest.mark.exhaustive), 397])
 def test_what_reads_a_folder_of_somebody_else_answers_and_changes_nothing(every: int, tmp_path: Path) -> None:
     chosen = cases()[::every]
     tally = trial(chosen, tmp_path)

@@ -8,7 +8,7 @@ import pytest
 
 from .wrong_calls import TAKEN, Tally, cases, described, trial
 
-EACH = 59
+EACH = 113
 """Calls of which the sample makes one. Chosen: a prime, so that each parameter meets other values."""
 
 
