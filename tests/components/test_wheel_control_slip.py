@@ -148,9 +148,9 @@ class QuarterCar:
         rows = []
         for i in range(round(until / self.ts)):
             wanted = request(i * self.ts)
-            torque = stand.step(self.ts, **self.inputs(wanted))["torque_request_fl"]
-            if not controlled:
-                torque = 0.313 * wanted
+            torque = 0.313 * wanted
+            if controlled:
+                torque = stand.step(self.ts, **self.inputs(wanted))["torque_request_fl"]
             self.hold(torque)
             rows.append((self.kappa, torque, self.v))
         return rows

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from fmus.native import compare_with_python
 from fmus.native.emit import emit
@@ -82,10 +83,11 @@ def choose(library: Path, number: int) -> None:
 
 
 @contextmanager
-def comparisons(laws: Mapping[str, str], before: str, folder: Path) -> Iterator[Callable[[str], None]]:
+def comparisons(laws: Mapping[str, str], before: str, folder: Path) -> Iterator[Callable[..., Any]]:
     """Translate and compile laws; yield a function that drives the one of a name beside Python.
 
-    What is wrong with the translation of a law is raised when it is to be driven.
+    The function may be given another comparison than `compare`, as `differences`. What is wrong with the
+    translation of a law is raised when it is to be driven.
     """
     made = {}
     failed = {}
@@ -99,11 +101,12 @@ def comparisons(laws: Mapping[str, str], before: str, folder: Path) -> Iterator[
                 failed[name] = error
         library = library_of([text for _, text in made.values()], folder, "-O0")
 
-        def compare(name: str) -> None:
+        def compare(name: str, how: Callable[..., Any] | None = None) -> Any:
             if name in failed:
                 raise failed[name]
             choose(library, list(made).index(name))
             with fewer_steps():
-                compare_with_python.compare(library, "{a}", made[name][0], home.parent)
+                compared = how or compare_with_python.compare
+                return compared(library, "{a}", made[name][0], home.parent)
 
         yield compare
