@@ -23,6 +23,18 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
+@pytest.fixture(scope="session")
+def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A cache for many tests: equal FMUs are unpacked and described once."""
+    return tmp_path_factory.mktemp("unpacked")
+
+
+@pytest.fixture
+def common_cache(unpacked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The cache for many tests, in place of the user's."""
+    monkeypatch.setenv("YAWBENCH_CACHE", str(unpacked))
+
+
 def build_here(source: Path, folder: Path) -> Path:
     """Build a component in C without its library for Windows, which takes as long as that for Linux."""
     with pytest.MonkeyPatch.context() as patch:

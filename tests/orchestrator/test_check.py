@@ -16,7 +16,7 @@ from tests.sentences import golden, golden_in
 
 from .fake_fmus import Var, make_fmu, out
 
-pytestmark = pytest.mark.usefixtures("cache")
+pytestmark = pytest.mark.usefixtures("common_cache")
 
 SCENARIO = """\
 title: Single sine [mu 0.65]

@@ -18,7 +18,7 @@ from tests.sentences import golden, texts_of
 
 from ..trials.large import write_ring
 
-pytestmark = pytest.mark.usefixtures("cache")
+pytestmark = pytest.mark.usefixtures("common_cache")
 
 
 def lines_run(function: Callable[[], object]) -> int:

@@ -18,7 +18,7 @@ from tests.sentences import golden
 
 from .fake_fmus import Var, make_fmu, out
 
-pytestmark = pytest.mark.usefixtures("cache")
+pytestmark = pytest.mark.usefixtures("common_cache")
 
 CAR = {"mass": 1650, "yaw_inertia": 2600, "wheelbase": 2.75}
 SCENARIO = """\

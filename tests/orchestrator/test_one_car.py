@@ -144,7 +144,7 @@ def plan(tmp_path, monkeypatch):
     return made
 
 
-pytestmark = pytest.mark.usefixtures("cache")
+pytestmark = pytest.mark.usefixtures("common_cache")
 
 
 def unit(plan, name):

@@ -30,7 +30,7 @@ from .fakes import Behaviour, Stage
 from .fakes import make_plan as fake_plan
 from .recorded import car, write
 
-pytestmark = pytest.mark.usefixtures("cache")
+pytestmark = pytest.mark.usefixtures("common_cache")
 
 
 class Witness(Behaviour):

@@ -19,7 +19,7 @@ from tests.sentences import golden, refused, texts_of
 
 from .fake_fmus import Var, make_fmu, out
 
-pytestmark = pytest.mark.usefixtures("cache")
+pytestmark = pytest.mark.usefixtures("common_cache")
 
 UNITS = """<ssd:Units>
   <ssc:Unit name="deg"><ssc:BaseUnit rad="1" factor="0.0174532925199433"/></ssc:Unit>

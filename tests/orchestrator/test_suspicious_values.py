@@ -16,7 +16,7 @@ from vocabulary.wheels import WHEELS
 
 from .fake_fmus import Var, make_fmu, out
 
-pytestmark = pytest.mark.usefixtures("cache")
+pytestmark = pytest.mark.usefixtures("common_cache")
 
 SCENARIO = """\
 vehicle: car.yaml

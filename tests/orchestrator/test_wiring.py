@@ -21,7 +21,7 @@ from vocabulary.wheels import WHEELS
 
 from .fake_fmus import Var, make_fmu, out
 
-pytestmark = pytest.mark.usefixtures("cache")
+pytestmark = pytest.mark.usefixtures("common_cache")
 
 UNITS = """\
   driver: {fmu: driver_sine}
