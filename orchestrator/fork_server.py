@@ -15,6 +15,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import ctypes
+import gc
 import os
 import pickle
 import select
@@ -29,6 +30,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib import import_module
 from typing import Any, NamedTuple
 
+GARBAGE = 50_000
+"""New objects after which copies of the fork server search for garbage. Chosen: a figure makes more."""
 _PROGRAM = (
     "import sys; sys.path[:] = sys.argv[2].split('\\n'); from importlib import import_module; "
     "import_module(sys.argv[1]).main(*sys.argv[3:])"
@@ -262,6 +265,7 @@ def _serve(asking: socket.socket) -> None:
     os.set_blocking(woken, False)
     signal.signal(signal.SIGCHLD, lambda number, frame: None)
     signal.set_wakeup_fd(woken, warn_on_full_buffer=False)
+    gc.set_threshold(GARBAGE, 20, 20)
     children: dict[int, int] = {}  # process id -> pipe for its return code
     events = select.poll()
     events.register(asking, select.POLLIN)
@@ -280,6 +284,7 @@ def _serve(asking: socket.socket) -> None:
                 for module in request.preload:
                     with contextlib.suppress(ImportError):
                         import_module(module)
+                gc.freeze()  # modules stay: no copy searches them for garbage, or writes to their memory
                 child = os.fork()
                 if not child:
                     for descriptor in (asking.detach(), waking, woken, status, *children.values()):

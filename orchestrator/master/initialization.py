@@ -65,9 +65,10 @@ def initialize(signals: SignalPool, check: StatusCheck, log: Log) -> int:
             others.
     """
     plan = signals.plan
+    start, stop = plan.time(0), plan.time(plan.n_steps)
     for slot in signals.slots:
         tolerance = slot.instance.tolerance or slot.instance.fmu.tolerance
-        experiment = ExperimentSetup(plan.time(0), plan.time(plan.n_steps), tolerance)
+        experiment = ExperimentSetup(start, stop, tolerance)
         check(slot.name, "initialization", slot.fmu_instance.setup(experiment))
         _put(slot, slot.instance.parameters, "setting parameters", check)
         _put(slot, _known_inputs(signals, slot), "setting inputs", check)
@@ -79,9 +80,7 @@ def initialize(signals: SignalPool, check: StatusCheck, log: Log) -> int:
         if not moving:
             break
     if any(movement.large for movement in moving):
-        raise SimulationError(
-            _unsettled(moving), instance=None, time=plan.time(0), code="initialization-unsettled"
-        )
+        raise SimulationError(_unsettled(moving), instance=None, time=start, code="initialization-unsettled")
     for slot in signals.slots:
         check(slot.name, "initialization", slot.fmu_instance.exit())
         _get(signals, slot, check)

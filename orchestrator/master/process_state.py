@@ -385,12 +385,12 @@ def _signal_actions() -> list[bytes]:
 
     Most of a mask is larger than what the kernel fills in: it differs from call to call.
     """
-    action, installed = ctypes.create_string_buffer(_ACTION), []
-    for number in _HANDLED:
-        _c.sigaction(number, None, action)
-        raw = action.raw
-        installed.append(raw[:_HANDLER] + raw[_FLAGS])
-    return installed
+    actions = ctypes.create_string_buffer(_ACTION * len(_HANDLED))
+    begins = range(0, len(actions), _ACTION)
+    for number, begin in zip(_HANDLED, begins, strict=True):
+        _c.sigaction(number, None, ctypes.byref(actions, begin))
+    raw = actions.raw
+    return [raw[begin : begin + _HANDLER] + raw[begin:][_FLAGS] for begin in begins]
 
 
 def _folder() -> str:

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import itertools
 import math
 import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -101,12 +102,17 @@ class InstanceSlot:
         outputs = self.instance.fmu.of("output")
         return bool(outputs) and all(v.discrete for v in outputs)
 
+    @functools.cached_property
+    def feedthrough(self) -> frozenset[str] | None:
+        """Inputs on which outputs depend directly; None if an output may depend on any of them."""
+        depending = [v.depends_on for v in self.instance.fmu.of("output")]
+        return None if None in depending else frozenset(itertools.chain(*filter(None, depending)))
+
     def direct(self, variable: Variable) -> bool:
         """Return whether an input is needed at the end of the step (see `coupling_algorithms`)."""
         if variable.discrete or self.sampled:
             return True
-        outputs = self.instance.fmu.of("output")
-        return any(v.depends_on is None or variable.name in v.depends_on for v in outputs)
+        return self.feedthrough is None or variable.name in self.feedthrough
 
 
 class SignalPool:

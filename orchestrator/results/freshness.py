@@ -13,7 +13,7 @@ import platform
 from collections.abc import Hashable, Mapping
 from dataclasses import asdict, astuple
 from datetime import datetime, timezone
-from functools import cache
+from functools import cache, lru_cache
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any
@@ -66,7 +66,7 @@ def run_record(plan: Plan, *, status: RunStatus, started: datetime) -> RunRecord
         units=units_of(plan),
         texts=[column for column, variable in recorded_variables(plan).items() if variable.type == "String"],
         fmus={name: _fmu(instance, plan, sources) for name, instance in instances.items()},
-        sources=[SourceRecord(**asdict(source)) for source in sources],
+        sources=[*map(_source, sources)],
         changes=[OverrideRecord.model_validate(change.record) for change in plan.changes],
         connections=connections_of(plan),
         scenario=plan.scenario,
@@ -76,6 +76,11 @@ def run_record(plan: Plan, *, status: RunStatus, started: datetime) -> RunRecord
     if plan.faults:
         record.faults = faults_of(plan)
     return record
+
+
+@lru_cache(4096)
+def _source(source: ValueSource) -> SourceRecord:
+    return SourceRecord(**asdict(source))
 
 
 def recorded_variables(plan: Plan) -> dict[str, Variable]:
