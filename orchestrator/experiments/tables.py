@@ -26,7 +26,7 @@ from ..metrics.measures import si, symbol
 from ..plan import Fmu, Plan
 from ..results.reader import FoundRun, Results
 from ..results.run_record import RunRecord
-from ..scenario import loader, yaml_lines
+from ..scenario import loader
 from ..scenario.overrides import changed, with_changes
 
 if TYPE_CHECKING:
@@ -315,8 +315,7 @@ def files_table(folder: Path | None, kinds: Sequence[str]) -> Table:
     for base in loader.folders() if folder is None else [folder]:
         for path, kind in loader.files(base, kinds):
             archive = path.suffix == ".ssp"
-            data = None if archive else yaml_lines.read(path, what="file").data
-            title = str(data.get("title") or "") if isinstance(data, dict) else ""
+            title = "" if archive else loader.title_of(path)
             by_name = folder is None and kind in loader.COMMANDS
             name = path.relative_to(base).with_suffix("").as_posix() if by_name else str(path)
             rows.setdefault(name, [name, "SSP archive" if archive else kind.partition(" ")[2], title or None])

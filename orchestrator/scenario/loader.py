@@ -245,6 +245,8 @@ HOMES = {"a vehicle file": "vehicles", "a file of bands": "bands"}
 """Kind of file -> its folder, which names may omit: `van` for `vehicles/van`."""
 MEASUREMENT = "a measurement file"
 _KEY = re.compile(rf"^[\"']?({'|'.join(KINDS)})[\"']?[ \t]*:", re.MULTILINE)
+_TITLE = re.compile(r"^[\"']?title[\"']?[ \t]*:[ \t]+([^\s\[{&*!#].*(?:\n[ \t]+\S.*)*)", re.MULTILINE)
+"""The entry of a text for the title, with the lines that continue it."""
 
 
 def folders() -> list[Path]:
@@ -263,6 +265,15 @@ def kind_of(path: Path) -> str:
     except (OSError, ValueError):
         return ""
     return next((kind for key, (kind, *_) in KINDS.items() if key in keys), "")
+
+
+def title_of(path: Path) -> str:
+    """Return the title of a YAML file, whose other entries are not parsed; "" if it has none."""
+    try:
+        entry = _TITLE.search(read_bytes(path, largest=TEXT).decode("utf-8-sig"))
+    except (OSError, ValueError):
+        return ""
+    return str(yaml_lines.scalar(entry[1]) or "") if entry else ""
 
 
 def files(folder: Path, kinds: Collection[str], *, depth: int | None = None) -> Iterator[tuple[Path, str]]:

@@ -9,6 +9,7 @@ from orchestrator.pages.comparison import differences
 from orchestrator.results.reader import found_runs, load_results
 from orchestrator.results.run_folder import RunStatus
 from orchestrator.results.run_record import FmuRecord, RunRecord
+from orchestrator.scenario.loader import title_of
 from tests.fmu_copies import put_fmus
 from tests.sentences import golden, golden_in
 
@@ -123,6 +124,19 @@ def test_metrics_need_only_the_columns_that_they_are_made_of(tmp_path):
     some = load_results(folder, only=lambda recorded: columns_for(recorded, names))
     assert len(some.columns) == 6 < len(load_results(folder).columns)
     assert evaluate_all(some, names) == evaluate_all(load_results(folder), names)
+
+
+@pytest.mark.parametrize(
+    ("entry", "title"),
+    [
+        ("title: A car # mine", "A car"), ("'title': 'A: b'", "A: b"), ("title: >-\n  A long\n  one", "A long one"),
+        ("title: 5", "5"), ("title: ~", ""), ("title: [", ""), ("x: 1", ""), ("x:\n  title: inner", ""),
+    ],
+)  # fmt: skip
+def test_a_title_is_read_without_the_rest_of_its_file(entry, title, tmp_path):
+    file = tmp_path / "a.yaml"
+    file.write_text(f"{entry}\nunits: [not YAML\n")
+    assert title_of(file) == title
 
 
 def test_without_a_word_the_list_shows_scenarios_by_name_then_vehicles(yawbench, tmp_path, monkeypatch):
