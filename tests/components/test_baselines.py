@@ -81,7 +81,7 @@ def test_an_inverse_is_one():
 @pytest.mark.sampled(1)
 def test_far_from_limits_a_long_prediction_is_the_regulator_of_the_sampled_car(car):
     a, step = error_dynamics(car, 25.0), 0.05
-    weights = CostWeights(**SCALES, penalty=1.0, step=step, moves=60, steps_per_move=1)
+    weights = CostWeights(**SCALES, penalty=1.0, step=step, moves=45, steps_per_move=1)
     law = PredictiveLaw(a, car.i_z, weights)
     phi, gamma = _discrete(a, weights.moment_0 / car.i_z, step)
     b = np.array(gamma).reshape(2, 1)

@@ -117,7 +117,8 @@ def test_roll_frequency_and_damping_match_the_closed_form():
         assert y["roll_angle"] == pytest.approx(start * exp(-ratio * natural * t) * phase, abs=2e-5 * start)
 
 
-@pytest.mark.parametrize("damping", [0.0, 2600.0])
+@pytest.mark.parametrize("damping", [2600.0, 0.0])
+@pytest.mark.sampled(1)
 def test_rolling_conserves_lateral_momentum_and_loses_energy_only_to_the_dampers(damping):
     stand = Stand(EightDof, initial_speed=0.0, roll_damping=damping, **FREE)
     y = stand.start(**lateral(5000.0))
@@ -190,14 +191,14 @@ def test_stiff_in_roll_the_car_is_the_one_with_seven_degrees_of_freedom():
     stiff |= {"roll_centre_height_front": 0.0, "roll_centre_height_rear": 0.0, "roll_inertia": 2000.0}
     stiff |= {"roll_stiffness": 8e9, "roll_damping": 5e6, **FREE}
     names = [*four("vertical_load", 0.0), "yaw_rate", "sideslip", "acceleration_y"]
-    record = {"steer": 0.05, "until": 1.2, "h": 2e-4, "record": names, "mu": 0.65}
+    record = {"steer": 0.05, "until": 1.0, "h": 2e-4, "record": names, "mu": 0.65}
     eight = drive(Dugoff, **record, **shared, **stiff)
     seven = drive(Dugoff, plant=SevenDof, **record, **shared)
     assert np.abs(seven[4]).max() > 0.2  # the car slides
     for name, e, s in zip(names, eight, seven, strict=True):
         peak = np.abs(s - s[0]).max()
         assert np.abs(e - s).max() < 1e-3 * peak, name  # at the corner where steering begins
-        assert np.abs(e - s)[-4000:].max() < 1e-4 * peak, name  # roll follows forces half a step late
+        assert np.abs(e - s)[-3000:].max() < 1e-4 * peak, name  # roll follows forces half a step late
 
 
 def magic(alpha: float, kappa: float, load: float, mu: float) -> tuple[float, float]:
@@ -310,6 +311,7 @@ def test_a_car_on_two_wheels_does_not_blow_up():
         mu=1.2,
         steer=0.2,
         until=4.0,
+        h=2e-3,
         record=names,
         initial_speed=25.0,
         roll_centre_height_front=0.6,

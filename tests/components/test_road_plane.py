@@ -139,7 +139,7 @@ def test_a_braked_car_stands_on_a_slope_on_tyres_with_relaxation_lengths():
     braked = {f"wheel_torque_{w}": -900.0 for w in WHEELS} | {f"friction_{w}": 0.9 for w in WHEELS}
     units = [(EightDof, {"initial_speed": 0.5}), (MagicFormula62Transient, {})]
     loop = Loop(units, algorithm="extrapolated", constants={"slope": 0.1, **braked})
-    loop.run(6.0, 3000, lambda _: None)
+    loop.run(4.0, 2000, lambda _: None)
     assert abs(loop["velocity_x"]) < 1e-8
     held = sum(loop[f"tyre_force_x_{w}"] for w in WHEELS)
     assert held == pytest.approx(EightDof.Parameters().mass * G * sin(0.1), rel=1e-4)

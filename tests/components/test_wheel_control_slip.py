@@ -229,9 +229,9 @@ def drive(control, *, total, steer, speed, low_friction="scale", until=1.5):
 
 
 @pytest.mark.parametrize("low_friction", ["scale", "similarity"])
-@pytest.mark.parametrize("steer", [0.0, 0.03])
+@pytest.mark.parametrize("steer", [0.03, 0.0])
 @pytest.mark.parametrize(("total", "speed"), [(-6000.0, 80.0 / 3.6), (6000.0, 10.0)])
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(1)
 def test_a_car_asked_for_more_than_its_grip_keeps_its_wheels_turning_and_its_course(
     total, speed, steer, low_friction
 ):

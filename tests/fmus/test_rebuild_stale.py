@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build_component
+from fmus.build import build_component, find_recipes
 from fmus.native.build import Native
 from fmus.rebuild_stale import FmuUpdater
 from fmus.source_digests import SourceDigests
@@ -299,8 +299,20 @@ def test_nobody_waits_for_the_builder_if_everything_is_current(tmp_path, yawbenc
     assert done.stdout.endswith("False False\n"), done.stderr
 
 
-def test_a_file_that_comes_before_a_known_one_makes_an_fmu_stale(project):
+def test_a_file_that_comes_before_a_known_one_is_noticed(tmp_path):
     """A package goes before a module of the same name, without any known file being changed."""
+    root = tmp_path / "components"
+    shutil.copytree(ROOT / "components", root, ignore=shutil.ignore_patterns("__pycache__"))
+    evidence = find_recipes(root)["driver_sine"].evidence()
+    assert SourceDigests().confirm(evidence)
+    package = root / "driving/speed_holding"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    assert not SourceDigests().confirm(evidence)
+
+
+@pytest.mark.exhaustive
+def test_a_file_that_comes_before_a_known_one_makes_an_fmu_stale(project):
     package = project / "components/driving/speed_holding"
     package.mkdir()
     (package / "__init__.py").write_text("undefined_name\n")

@@ -15,6 +15,7 @@ from fmus.compiler import compiler_command
 from orchestrator.commands.new import begin
 from orchestrator.fmu.archive import REASON, runs_as
 from orchestrator.plan import RunsAs
+from tests.checkout import ROOT
 from tests.sentences import golden
 
 LAW = '''"""A law."""
@@ -44,20 +45,15 @@ class Law(Component):
         return (BODY,)
 '''
 PROGRAM = """
-import json, sys
-import fmpy
-from fmpy import instantiate_fmu
-import tempfile
-archive = sys.argv[1]
-description = fmpy.read_model_description(archive)
+import json, sys, tempfile, zipfile
+from tests.fmus.bare import Fmu, Unit
 with tempfile.TemporaryDirectory() as folder:
-    fmpy.extract(archive, folder)
-    unit = instantiate_fmu(folder, description, "CoSimulation")
-    unit.setupExperiment(); unit.enterInitializationMode()
-    unit.setReal([0, 1], [0.3, 0.1]); unit.exitInitializationMode()
+    zipfile.ZipFile(sys.argv[1]).extractall(folder)
+    unit = Unit(Fmu(folder), yaw_rate_ref=0.3, yaw_rate=0.1)
+    unit.start()
     loaded = open("/proc/self/maps").read()
-    print(json.dumps([unit.getReal([2])[0], "native.so" in loaded, "libpythonfmu" in loaded]))
-    unit.freeInstance()
+    print(json.dumps([unit.outputs()[0], "native.so" in loaded, "libpythonfmu" in loaded]))
+    unit.free()
 """
 
 
@@ -72,6 +68,7 @@ def law(tmp_path_factory):
 def asked(archive, **environment):
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM, str(archive)],
+        cwd=ROOT,
         env={**os.environ, **environment},
         capture_output=True,
         text=True,

@@ -30,6 +30,10 @@ from tests.sentences import golden_in
 OLDEST_GLIBC = (2, 14)
 """As docs/other_tools.md says."""
 CHROOT = shutil.which("chroot")
+SHARES = pytest.mark.parametrize(
+    "share", [slice(0, None, 8), pytest.param(slice(None), marks=pytest.mark.exhaustive)]
+)
+"""Every eighth unit in the first tier, all in the second."""
 
 
 @pytest.fixture(scope="module")
@@ -72,9 +76,11 @@ def test_native_libraries_run_with_the_oldest_glibc_that_is_stated(libraries):
     assert stated in (FMUS.parent / "docs" / "other_tools.md").read_text()
 
 
+@SHARES
 @pytest.mark.skipif(CHROOT is None or os.geteuid() != 0, reason="only root may chroot")
+@pytest.mark.same_sentences("share")
 def test_every_native_unit_runs_where_there_is_nothing_but_libc_and_libm(
-    native, host, archive, unpack, tmp_path
+    native, share, host, archive, unpack, tmp_path
 ):
     """As host.c has it: two instances step, save, serialize, restore, are reset and freed."""
     for library in {*needed(host, native[0] / "binaries/linux64/native.so").values()}:
@@ -94,7 +100,7 @@ def test_every_native_unit_runs_where_there_is_nothing_but_libc_and_libm(
             [CHROOT, tmp_path, *arguments], env={}, capture_output=True, text=True, check=False
         )
 
-    for folder in native:
+    for folder in native[share]:
         done = run(folder)
         assert (done.returncode, done.stderr) == (0, ""), folder
         assert host_outputs(done, folder) == expected_outputs(folder)
@@ -103,9 +109,7 @@ def test_every_native_unit_runs_where_there_is_nothing_but_libc_and_libm(
     assert golden_in(done.stderr)
 
 
-@pytest.mark.parametrize(
-    "share", [slice(0, None, 8), pytest.param(slice(None), marks=pytest.mark.exhaustive)]
-)
+@SHARES
 def test_fifty_instances_in_fifty_threads_give_what_each_gives_alone(native, share, tmp_path):
     program = tmp_path / "host_threads"
     source = Path(__file__).with_name("host_threads.c")
