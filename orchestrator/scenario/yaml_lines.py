@@ -26,6 +26,10 @@ ALIASED = 100_000
 """Maximum number of values repeated by aliases: nested aliases multiply, and a few lines could exhaust the
 memory. Chosen: a hundred times what a study of a hundred runs needs."""
 
+LARGEST_KEPT, KEPT = 20_000, 16
+"""Length of texts that are kept when parsed, and their number. Chosen: all of a scenario and its vehicle, in
+some megabytes."""
+
 KeyPath = tuple[str | int, ...]
 """Path of a value in a file: ('connections', 3, 'from')."""
 
@@ -229,12 +233,19 @@ class _NotYamlError(Exception):
 
 
 def _composed(text: str) -> tuple[Any, Any]:
-    """Return the root node of a text (None if it is empty), and the constructor of scalars.
+    """Return the root node of a text (None if it is empty), and a constructor of scalars of its own.
 
     Raises:
         _NotYamlError: with the line, 0 if unknown.
         RecursionError: the text is nested too deeply.
     """
+    node, constructor = (_kept if len(text) <= LARGEST_KEPT else _parsed)(text)
+    own = copy(constructor)
+    own.constructed_objects, own.recursive_objects = {}, {}  # what it knows of nodes read before
+    return node, own
+
+
+def _parsed(text: str) -> tuple[Any, Any]:
     from ruamel.yaml import YAML
     from ruamel.yaml.docinfo import DocInfo
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
@@ -256,6 +267,10 @@ def _composed(text: str) -> tuple[Any, Any]:
         raise _NotYamlError(0, str(error)) from None
     except (ValueError, OverflowError) as error:  # such as an escape beyond Unicode
         raise _NotYamlError(yaml.reader.line + 1, str(error)) from None
+
+
+_kept = lru_cache(KEPT)(_parsed)
+"""The same from memory: one vehicle file is read for every run, and parsing takes longer than short runs."""
 
 
 def _limit_depth(yaml: Any) -> None:

@@ -89,6 +89,15 @@ def test_a_line_that_names_the_version_of_yaml_is_read(document):
     assert document("%YAML 1.2\n---\na: yes\n").data == {"a": "yes"}
 
 
+def test_a_text_that_was_read_before_has_the_same_errors_and_data_of_its_own(document):
+    text = "a: {b: 1}\nc: !!int x\nd: !!int x\n"
+    first, again = document(text), document(text)
+    assert len(sentences(first)) == 2
+    assert sentences(first) == sentences(again)
+    first.data["a"]["b"] = 2
+    assert document(text).data["a"] == again.data["a"] == {"b": 1}
+
+
 def test_very_many_brackets_are_refused_before_they_are_scanned(document):
     (sentence,) = sentences(document("a:\n  " + "[" * 100_000))
     assert golden(sentence)
