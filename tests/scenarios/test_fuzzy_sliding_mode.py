@@ -73,10 +73,15 @@ GOLDEN = {
 """Column -> tolerance in SI, values at 1 and 2 s of each road with the fuzzy law."""
 
 
+@pytest.fixture(scope="module")
+def fuzzy_runs(study):
+    return [load_results(study["folder"] / road / "fuzzy") for road in ROADS]
+
+
 @pytest.mark.parametrize("column", GOLDEN)
-def test_the_fuzzy_runs_are_what_they_were(study, column):
+def test_the_fuzzy_runs_are_what_they_were(fuzzy_runs, column):
     tolerance, values = GOLDEN[column]
-    found = [load_results(study["folder"] / road / "fuzzy")[column][[1000, 2000]] for road in ROADS]
+    found = [run[column][[1000, 2000]] for run in fuzzy_runs]
     assert np.concatenate(found) == pytest.approx(values, abs=tolerance)
 
 

@@ -247,6 +247,7 @@ def test_every_car_of_the_library_is_whole_and_says_where_it_comes_from(name):
     assert {key for key, one in CAR.items() if one.needed} - told_by_tyres <= known.keys()
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("name", LIBRARY)
 def test_every_car_of_the_library_fits_every_plant(fmus, name):
     for plant in PLANTS:

@@ -104,7 +104,7 @@ def _levels(pipe, controller):
     pipe.send(made.table["status"].tolist())
 
 
-@pytest.mark.parametrize("how", ["fork", "spawn"])
+@pytest.mark.parametrize("how", ["fork", pytest.param("spawn", marks=pytest.mark.exhaustive)])
 def test_an_experiment_runs_in_a_daemonic_process(how):
     context = multiprocessing.get_context(how)
     reading, writing = context.Pipe(duplex=False)

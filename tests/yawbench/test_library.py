@@ -233,7 +233,14 @@ LAWS = {
 }
 
 
-@pytest.mark.parametrize("what", LAWS)
+AS_WITH_PARAMETERS = {"a lambda", "an object", "an object that is called", "a partial function"}
+"""Laws whose like test_parameters.py runs in both ways, and one that is called and remembers, here."""
+
+
+@pytest.mark.parametrize(
+    "what",
+    [pytest.param(what, marks=[pytest.mark.exhaustive] * (what in AS_WITH_PARAMETERS)) for what in LAWS],
+)
 def test_plain_python_runs_natively_with_the_same_bits(what, base, monkeypatch):
     scenario = base.swap(controller=LAWS[what])
     native = scenario.run()
