@@ -87,6 +87,7 @@ def both(tmp_path, monkeypatch, capsys):
     return run
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("interpolation", ["linear", "held"])
 @pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
 def test_periods_series_and_converting_wires_give_the_same_bytes(
@@ -109,6 +110,7 @@ def test_a_published_scenario_gives_the_same_bytes(both, fmus, name):
     assert (status, record["status"]) == (0, "completed"), said
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize(
     "fault",
     [

@@ -20,6 +20,9 @@ from .test_foreign import write_fmu
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux")
 together_and_apart = pytest.mark.parametrize("isolate", [[], ["--isolate"]], ids=["together", "apart"])
+mostly_together = pytest.mark.parametrize(
+    "isolate", [[], pytest.param(["--isolate"], marks=pytest.mark.exhaustive)], ids=["together", "apart"]
+)
 
 
 @pytest.fixture(scope="session")
@@ -60,7 +63,7 @@ def by_fmpy(tmp_path, model, **options):
     return simulate_fmu(str(tmp_path / f"{model}.fmu"), output_interval=0.1, **options)
 
 
-@together_and_apart
+@mostly_together
 @pytest.mark.parametrize(
     ("model", "parameters"),
     [("Dahlquist", {"k": 2.5}), ("VanDerPol", {"mu": 3.0}), ("BouncingBall", {"e": 0.5, "g": -20.0})],
@@ -180,7 +183,7 @@ def test_an_integer_that_feeds_a_real_is_coupled_alike_by_both_loops(run, tmp_pa
     assert files[0] == files[1]
 
 
-@together_and_apart
+@mostly_together
 @pytest.mark.parametrize(
     ("wire", "constants", "unit", "time"),
     [
@@ -204,7 +207,7 @@ def test_a_number_that_its_input_cannot_be_ends_the_run(
     assert results.record.error.time == pytest.approx(time, abs=0.11)
 
 
-@together_and_apart
+@mostly_together
 @pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
 @pytest.mark.sampled(2)
 def test_arrays_are_wired_set_and_recorded_element_by_element(run, library, tmp_path, isolate, algorithm):
@@ -225,7 +228,7 @@ def test_arrays_are_wired_set_and_recorded_element_by_element(run, library, tmp_
         assert results["n.y[1]"].tolist() == results["m.y[1]"].tolist()
 
 
-@together_and_apart
+@mostly_together
 def test_an_alias_of_an_input_is_another_name_for_it(run, isolate):
     units = {"d": ("Dahlquist", {}), "m": ("Matrix", {}), "n": ("Matrix", {})}
     wires = [{"from": "d.x", "to": "m.force[2]"}, {"from": "m.y[*]", "to": "n.force[*]"}]
@@ -255,7 +258,7 @@ def test_an_input_with_two_names_has_one_source(run):
     assert golden_in(said)
 
 
-@together_and_apart
+@mostly_together
 def test_units_of_both_versions_share_a_scenario(run, tmp_path, library, isolate):
     old = write_fmu(tmp_path / "foreign.fmu", library, "Real")
     units = {"d": ("Dahlquist", {}), "old": (old, {}), "m": ("Matrix", {})}
@@ -266,7 +269,7 @@ def test_units_of_both_versions_share_a_scenario(run, tmp_path, library, isolate
     assert [results.record.fmus[u].fmi_version for u in units] == ["3.0", "2.0", "3.0"]
 
 
-@together_and_apart
+@mostly_together
 def test_an_fmu_that_wants_to_end_ends_the_run_after_its_last_step(run, isolate):
     status, said, results = run({"a": ("Stair", {})}, *isolate, stop_time=20, step_size=0.5)
     assert status == 0, said
@@ -275,21 +278,21 @@ def test_an_fmu_that_wants_to_end_ends_the_run_after_its_last_step(run, isolate)
     assert results.record.ended.time == 9.0
 
 
-@together_and_apart
+@mostly_together
 def test_a_step_from_which_an_fmu_returns_early_is_gone_to_its_end(run, isolate):
     status, said, results = run({"a": ("Early", {})}, *isolate)
     assert status == 0, said
     assert np.allclose(results["a.gone"], results.time, atol=1e-12)
 
 
-@together_and_apart
+@mostly_together
 def test_an_fmu_that_returns_early_and_stays_is_an_error(run, isolate):
     status, said, _ = run({"a": ("Stuck", {})}, *isolate)
     assert status == 1
     assert golden_in(said)
 
 
-@together_and_apart
+@mostly_together
 def test_a_parameter_that_does_not_take_ends_the_run(run, isolate):
     status, said, _ = run({"a": ("Deaf", {"parameters": {"k": 2.0}})}, *isolate)
     assert status == 1
@@ -332,7 +335,7 @@ def test_other_interfaces_are_refused(run, tmp_path, models, interface, words):
     assert golden_in(said)
 
 
-@together_and_apart
+@mostly_together
 def test_elements_of_arrays_can_be_faulty(run, isolate):
     units = {"d": ("Dahlquist", {}), "m": ("Matrix", {}), "n": ("Matrix", {})}
     wires = [{"from": "d.x", "to": "m.u[2]"}, {"from": "m.y[*]", "to": "n.u[*]"}]

@@ -113,6 +113,9 @@ def run(library, tmp_path, capsys):
 
 
 together_and_apart = pytest.mark.parametrize("isolate", [[], ["--isolate"]], ids=["together", "apart"])
+mostly_together = pytest.mark.parametrize(
+    "isolate", [[], pytest.param(["--isolate"], marks=pytest.mark.exhaustive)], ids=["together", "apart"]
+)
 
 
 @together_and_apart
@@ -129,7 +132,7 @@ def test_all_types_pass_through_without_optional_capabilities(run, isolate):
     }  # fmt: skip; text is not recorded, see below
 
 
-@together_and_apart
+@mostly_together
 def test_enumerations_are_wired_and_given_by_name(run, isolate):
     status, said, results = run(*isolate, given={"Enumeration": "dry"})
     assert status == 0, said
@@ -153,7 +156,7 @@ def test_a_step_that_fails_is_a_sentence_and_the_results_so_far(run, isolate, an
     }  # fmt: skip
 
 
-@together_and_apart
+@mostly_together
 def test_a_warning_is_said_and_the_run_goes_on(run, isolate):
     status, said, results = run(*isolate, answer=1)
     assert status == 0
@@ -170,7 +173,7 @@ def test_a_tunable_parameter_is_given_as_any_other(run):
     assert "4" in said
 
 
-@together_and_apart
+@mostly_together
 def test_a_parameter_reaches_an_fmu_that_resets_when_the_experiment_is_set_up(run, isolate):
     assert run(*isolate, answer=3, guid="{reset}")[0] == 1  # as told, it fails
     status, said, results = run(*isolate, answer=1, guid="{reset}")
@@ -179,7 +182,7 @@ def test_a_parameter_reaches_an_fmu_that_resets_when_the_experiment_is_set_up(ru
     assert results.record.fmus["b"].parameters == {"answer": 1}
 
 
-@together_and_apart
+@mostly_together
 def test_a_parameter_that_does_not_take_ends_the_run(run, isolate):
     status, said, results = run(*isolate, answer=2, guid="{deaf}")
     assert status == 1
@@ -188,7 +191,7 @@ def test_a_parameter_that_does_not_take_ends_the_run(run, isolate):
     assert results.record.error.instance == "b"
 
 
-@together_and_apart
+@mostly_together
 def test_a_parameter_that_cannot_be_read_back_is_a_warning(run, isolate):
     status, said, results = run(*isolate, answer=1, guid="{mute}")
     assert status == 0
@@ -196,7 +199,7 @@ def test_a_parameter_that_cannot_be_read_back_is_a_warning(run, isolate):
     assert results.time[-1] == 0.5
 
 
-@together_and_apart
+@mostly_together
 @pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
 @pytest.mark.sampled(2)
 def test_gain_and_offset_reach_units_that_declare_no_units_of_measurement(run, isolate, algorithm):
@@ -216,7 +219,7 @@ def test_gain_and_offset_reach_units_that_declare_no_units_of_measurement(run, i
     }  # fmt: skip
 
 
-@together_and_apart
+@mostly_together
 @pytest.mark.parametrize("form", ["csv", "parquet", "mf4"])
 @pytest.mark.sampled(2)
 def test_text_parameters_and_inputs_are_recorded_by_name(run, isolate, form):
@@ -264,7 +267,7 @@ def test_a_run_that_an_fmu_has_ended_is_fresh_and_lacks_metrics_of_later_windows
     assert evaluate(results, peak, (0.0, 0.4)) is None
 
 
-@together_and_apart
+@mostly_together
 def test_start_time_and_tolerance_reach_the_fmu(run, isolate):
     status, said, results = run(*isolate, "--set", "start_time=0.25", guid="{solver}")
     assert status == 0, said
@@ -339,7 +342,7 @@ def test_every_command_that_runs_a_scenario_takes_fmus_that_are_formally_wrong_i
         assert ended.value.code == 0, command
 
 
-@together_and_apart
+@mostly_together
 def test_an_fmu_without_optional_functions_runs(run, bare_library, isolate):
     numbers = {kind: value for kind, value in KINDS.items() if kind != "String"}
     status, said, results = run(*isolate, given=numbers, binary=bare_library)
@@ -359,7 +362,7 @@ def test_an_fmu_without_a_function_that_is_needed_is_refused_before_the_run(
     assert golden_in(capsys.readouterr().err)
 
 
-@together_and_apart
+@mostly_together
 def test_a_foreign_unit_takes_time_series_of_every_type(run, isolate, tmp_path):
     (tmp_path / "d.csv").write_text("time,r,i,b,s\n0,0,1,0,x\n0.25,1,2,1,y\n0.5,2,3,0,z\n", encoding="utf-8")
     given = {

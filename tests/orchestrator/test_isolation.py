@@ -159,7 +159,7 @@ def test_an_fmu_that_ends_the_process_is_named(foreign, run):
     ],
 )
 @pytest.mark.parametrize("format_", ["csv", "parquet"])
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(1)
 def test_without_isolation_too_an_end_without_a_word_is_a_sentence_and_the_results_so_far(
     act, did, format_, foreign, run
 ):

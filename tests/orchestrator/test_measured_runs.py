@@ -75,7 +75,7 @@ def test_the_commands_take_measurements_beside_runs(places, tmp_path, capsys):
 
 
 def test_compare_shows_a_recording_beside_all_runs(places, tmp_path):
-    swaps = ("--swap", "controller=controller_off,controller_fnn", "--set", "stop_time=0.5 s")
+    swaps = ("--swap", "controller=controller_off", "--set", "stop_time=0.5 s")
     options = ("--measured", places[1], "--from", "10 s", "--out", tmp_path)
     assert status_of("compare", "fnn_sideslip/25mps", *swaps, *options) == 0
     page = unpacked(tmp_path / "report.html")

@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
+from xml.etree import ElementTree
 
 import matplotlib
 import pytest
@@ -82,11 +83,17 @@ def test_outputs_that_contradict_each_other_are_refused(run, capsys):
 
 @pytest.mark.parametrize("style", ["ieee", pytest.param("elsevier", marks=pytest.mark.exhaustive)])
 def test_a_style_grows_with_its_panels(run, style):
-    assert status_of("plot", run, *FIVE, "--style", style, "--format", "png", "--out", "five") == 0
-    wide, high = Image.open("five/overview.png").size
-    assert status_of("plot", run, *SINGLE, "--style", style, "--format", "png", "--out", "single") == 0
-    single = Image.open("single/overview.png").size
+    assert status_of("plot", run, *FIVE, "--style", style, "--format", "svg", "--out", "five") == 0
+    wide, high = size_of("five/overview.svg")
+    assert status_of("plot", run, *SINGLE, "--style", style, "--format", "svg", "--out", "single") == 0
+    single = size_of("single/overview.svg")
     assert wide == single[0] and high > 2 * single[1]
+
+
+def size_of(file: str) -> tuple[float, float]:
+    """Return width and height of an SVG file [pt]."""
+    root = ElementTree.parse(file).getroot()
+    return float(root.get("width").removesuffix("pt")), float(root.get("height").removesuffix("pt"))
 
 
 def test_panels_without_room_are_refused(run, capsys):

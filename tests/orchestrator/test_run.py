@@ -305,7 +305,7 @@ def run_process(*arguments):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="os.kill ends the process there")
-@pytest.mark.parametrize("loop", ["compiled", "python"])
+@pytest.mark.parametrize("loop", ["compiled", pytest.param("python", marks=pytest.mark.exhaustive)])
 def test_ctrl_c_ends_a_component_that_never_comes_back(loop, faulty, fmus, tmp_path, monkeypatch):
     monkeypatch.setenv("YAWBENCH_LOOP", loop)
     scenario = faulty("os.kill(os.getppid(), signal.SIGINT)\n            while True: signal.pause()")
