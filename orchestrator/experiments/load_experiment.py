@@ -49,10 +49,7 @@ def found_studies(folder: Path = SCENARIOS) -> list[Path]:
     Raises:
         ScenarioError: there are none.
     """
-    titles: dict[Path, str] = {}
-    for path, _ in loader.files(folder, ["a study file"], depth=2):
-        data = yaml_lines.read(path, what="study file").data
-        titles[path] = str(data.get("title", "")) if isinstance(data, dict) else ""
+    titles = {path: loader.title_of(path) for path, _ in loader.files(folder, ["a study file"], depth=2)}
     if not titles:
         raise ScenarioError(
             f"no study file was named, and there is none in {folder}/*/", code="file-wrong-kind"

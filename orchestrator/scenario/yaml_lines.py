@@ -26,7 +26,7 @@ ALIASED = 100_000
 """Maximum number of values repeated by aliases: nested aliases multiply, and a few lines could exhaust the
 memory. Chosen: a hundred times what a study of a hundred runs needs."""
 
-LARGEST_KEPT, KEPT = 20_000, 16
+LARGEST_KEPT, KEPT = 30_000, 16
 """Length of texts that are kept when parsed, and their number. Chosen: all of a scenario and its vehicle, in
 some megabytes."""
 
