@@ -21,7 +21,7 @@ TRUTH = {"yaw_inertia": 1791.6, "front": 0.72, "rear": 1.0}
 SCENARIO = """title: 7 DOF
 vehicle: {vehicle}
 stop_time: {stop}
-step_size: 0.002
+step_size: 0.004
 speed: 25
 friction: 0.9
 units:

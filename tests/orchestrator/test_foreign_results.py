@@ -127,6 +127,16 @@ def work(tmp_path: Path, home: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
+each_command = pytest.mark.parametrize(
+    "command",
+    [
+        pytest.param(command, marks=[pytest.mark.exhaustive] * (command in ("compare", "report")))
+        for command in MAKES
+    ],
+)
+"""Those that draw and write as `study` does are for the second tier."""
+
+
 def die(folder: Path, **record: object) -> None:
     """Let a folder look like that of a run that died with this record."""
     text = json.dumps({**json.loads((folder / "run.json").read_text()), **record})
@@ -372,7 +382,7 @@ def planted(products, work, home):
     return plant
 
 
-@pytest.mark.parametrize("command", MAKES)
+@each_command
 def test_a_command_that_makes_runs_follows_no_link_where_it_writes(
     command, projects, products, planted, work, home
 ):
@@ -425,7 +435,7 @@ def test_nor_where_it_writes_drafts_and_folders(command, projects, products, pla
     assert snapshot(home) == before
 
 
-@pytest.mark.parametrize("command", MAKES)
+@each_command
 def test_results_of_a_file_above_go_below_results(command, projects, work, monkeypatch):
     sub = work / "sub"
     sub.mkdir()

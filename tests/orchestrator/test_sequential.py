@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections import Counter
 from itertools import pairwise
 
@@ -41,16 +42,20 @@ def cells(found: Counter[Decision]) -> list[str]:
     return [str(found[decision]) for decision in (Decision.BELOW, Decision.ABOVE, Decision.OPEN)]
 
 
+decision = functools.cache(TEST.decision)
+bounds = functools.cache(TEST.bounds)
+
+
 def stop(outcomes: np.ndarray) -> int:
     """Return the number of points after which a claim is decided, or all looks are spent."""
     counts = np.cumsum(outcomes)
-    decided_at = (look for look in TEST.looks if TEST.decision(int(counts[look - 1]), look) != Decision.OPEN)
+    decided_at = (look for look in TEST.looks if decision(int(counts[look - 1]), look) != Decision.OPEN)
     return next(decided_at, TEST.looks[-1])
 
 
 def decided(outcomes: np.ndarray) -> Decision:
     number = stop(outcomes)
-    return TEST.decision(int(outcomes[:number].sum()), number)
+    return decision(int(outcomes[:number].sum()), number)
 
 
 @pytest.mark.parametrize("share", WRONG)
@@ -109,7 +114,7 @@ def test_the_interval_agrees_with_the_decision_and_has_its_confidence():
     missed = 0
     for outcomes in chance.random((2000, TEST.looks[-1])) < share:
         number = stop(outcomes)
-        low, high = TEST.bounds(int(outcomes[:number].sum()), number)
+        low, high = bounds(int(outcomes[:number].sum()), number)
         missed += not low <= share <= high
     assert missed <= 0.05 * 2000
 
