@@ -389,6 +389,7 @@ def test_a_declared_delay_breaks_an_algebraic_loop(run, tmp_path, monkeypatch, a
     assert [wire.delay for wire in results.record.connections] == ["1 step", None]
 
 
+@pytest.mark.sampled(6)
 @pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
 @pytest.mark.parametrize(("n", "m"), [(1, 1), (2, 1), (1, 2), (3, 2)])
 def test_a_delayed_wire_brings_the_value_of_one_communication_step_before(run, algorithm, n, m):

@@ -233,7 +233,13 @@ def without_products(tree: dict[str, tuple[int, int, object]]) -> dict[str, obje
 
 
 @each_plant
-@pytest.mark.parametrize("command", READS)
+@pytest.mark.parametrize(
+    "command",
+    [
+        pytest.param(command, marks=[pytest.mark.exhaustive] * (command in ("animate", "evaluate")))
+        for command in READS
+    ],
+)
 def test_a_command_that_reads_changes_nothing_but_its_own_product(command, plant, work, home, yawbench):
     plant(work / "theirs", home)
     outside, inside = snapshot(home), without_products(snapshot(work))
