@@ -128,7 +128,7 @@ def test_a_freely_rolling_undamped_car_keeps_its_energy():
 
     first = energy()
     swinging, off = energy_of(RIDE, 0.5, unit.body) - 0.5 * P.yaw_inertia * 0.25, 0.0
-    for _ in range(8000):
+    for _ in range(4000):
         stand.step(5e-4)
         off = max(off, abs(energy() - first) / swinging)
     measured("energy", "plant_fourteen_dof without dampers", "its start", off, at_most=2e-6)

@@ -133,7 +133,7 @@ def sample(system: Mamdani, n: int, *, beyond: float = 0.0, seed: int = 1) -> li
 def test_surface_agrees_with_scikit_fuzzy(make):
     system = make()
     peaks = [(x, y) for x in system.rows.peaks[::2] for y in system.columns.peaks[::2]]
-    points = sample(system, 40, beyond=0.1) + peaks
+    points = sample(system, 20, beyond=0.1) + peaks
     ours = np.array([system(x, y) for x, y in points])
     theirs = scikit_fuzzy_surfaces(system, points)
     ranges = [sets.peaks[-1] - sets.peaks[0] for sets in system.outputs]

@@ -21,6 +21,8 @@ from tests.fmus.plausible import plausible
 from vocabulary.wheels import WHEELS
 
 COMPONENTS = find_components()
+ALL_TRIALS = 21
+"""Least number of trials of a unit in the second tier."""
 FORCES = {"steer_angle", "yaw_moment", "slope", "bank", "wind_force_y", "wind_moment_z"} | {
     f"tyre_{signal}_{wheel}" for signal in ("force_x", "force_y", "moment_z") for wheel in WHEELS
 }
@@ -32,6 +34,8 @@ SLOW = {
     "sensor_poor",
     "sensor_production",
 }
+RARE = {"wheel_control_slip"}
+"""Units some of whose dependencies show in few states: they are sought in the second tier."""
 GIVEN = {
     "road_patchwork": {
         "patches": "y > 0; 0.3: 40 < x < 60",
@@ -121,7 +125,7 @@ def declared(component):
 
 
 @pytest.mark.parametrize("name", list(COMPONENTS))
-@pytest.mark.parametrize("trials", [4, pytest.param(21, marks=pytest.mark.exhaustive)])
+@pytest.mark.parametrize("trials", [4, pytest.param(ALL_TRIALS, marks=pytest.mark.exhaustive)])
 def test_declared_dependencies_are_exactly_those_found(name, trials):
     """A rate over the step, and what is learnt in it, show at a step of some length only.
 
@@ -146,7 +150,8 @@ def test_declared_dependencies_are_exactly_those_found(name, trials):
         direct = at_once | later if component.sampled else at_once
         assert direct <= expected, f"not declared: {sorted(direct - expected)}"
         seen |= at_once | later
-        if (expected <= seen or name in SLOW) and trial >= trials:
+        enough = expected <= seen or name in SLOW or (name in RARE and trials < ALL_TRIALS)
+        if enough and trial >= trials:
             return
     assert expected <= seen, f"declared, but never seen: {sorted(expected - seen)}"
 

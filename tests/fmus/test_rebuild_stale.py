@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from fmus.build import build_component, find_recipes
-from fmus.native.build import Native
+from fmus.native import build as native_build
 from fmus.rebuild_stale import FmuUpdater
 from fmus.source_digests import SourceDigests
 from tests.checkout import CODE, ROOT, copy_checkout, run_in
@@ -72,7 +72,7 @@ def own(written: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def without_native_libraries(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave native libraries out of what is built: they take most of the time."""
-    monkeypatch.setattr("fmus.recipe.native", lambda *_, **__: Native(why_not="left out"))
+    monkeypatch.setattr("fmus.recipe.native", lambda *_, **__: native_build.Native(why_not="left out"))
 
 
 def record(project: Path, folder: str = "out") -> dict:
@@ -196,12 +196,14 @@ def test_no_run_waits_for_a_native_library_that_takes_long(own, yawbench, monkey
     monkeypatch.undo()
     monkeypatch.chdir(own)
     monkeypatch.setenv("YAWBENCH_CACHE", str(own / "cache"))
-    monkeypatch.setattr("fmus.native.build.TO_WINDOWS", "no compiler")
+    native_build.toolchain()  # the real one is kept for the whole process
+    monkeypatch.setattr(native_build, "TO_WINDOWS", "no compiler")
+    monkeypatch.setattr(native_build, "LINUX", ("-O0",))
     build = ("build", OWN, "--out", "fmus")
     yawbench(*build)  # from now on it is known what the library takes
     yawbench("run", "driver.yaml", "--out", "out")
     amplitude = record(own)["defaults"]["amplitude"]
-    monkeypatch.setattr("fmus.native.build.LONGEST", 0.0)
+    monkeypatch.setattr(native_build, "LONGEST", 0.0)
     double(own / OWN)
     _, _, errors = yawbench("run", "driver.yaml", "--out", "out")
     assert golden_in(errors)
@@ -271,6 +273,11 @@ def test_a_component_that_has_no_fmu_yet_is_built(project):
     assert golden(done.stderr)
     assert done.returncode == 0
     assert not (project / "fmus/driver_sine.fmu").exists()
+
+
+@pytest.mark.exhaustive
+def test_a_component_that_has_no_fmu_yet_is_guessed_from_a_wrong_name(project):
+    (project / "fmus/driver_sine.fmu").unlink()
     done = command(project, "check", "driver.yaml", "--swap", "driver=driver_sin")
     assert done.returncode == 2
     assert golden_in(done.stderr)
