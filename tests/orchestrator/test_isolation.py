@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +16,8 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.commands.new import begin
 from orchestrator.errors import SimulationError
+from orchestrator.interrupts import StopFlag
+from orchestrator.master import child_run
 from orchestrator.master.isolation import Isolation
 from orchestrator.master.simulate import simulate
 from orchestrator.results.reader import load_results
@@ -170,6 +175,20 @@ def test_without_isolation_too_an_end_without_a_word_is_a_sentence_and_the_resul
     assert results.record.error.instance == "controller"
     assert results.time[-1] == 0.051  # the controller takes two steps at once
     assert np.all(np.isfinite(results["plant.velocity_x"]))
+
+
+def test_a_child_that_is_to_stop_is_not_asked_again_after_each_answer(monkeypatch):
+    asked: list[bytes] = []
+    run = SimpleNamespace(
+        _stopped_at=-math.inf, _stop=StopFlag(), _ask=asked.append, _deadline=math.inf,
+        _shared=SimpleNamespace(completed=SimpleNamespace(value=1)),
+    )  # fmt: skip
+    now = itertools.count(0.0, 0.001)
+    monkeypatch.setattr(child_run, "time", SimpleNamespace(monotonic=lambda: next(now)))
+    monkeypatch.setattr(child_run, "stop_requested_at", lambda: 0.0)
+    for _ in range(1000):
+        child_run.ChildRun.check_time(run)
+    assert 9 <= len(asked) <= 10
 
 
 @needs_cc
