@@ -293,20 +293,20 @@ def test_plot_draws_one_run_into_its_folder_and_several_beside_them(yawbench, fo
 
 
 def test_plot_runs_a_scenario_whose_results_are_missing_or_of_another_controller(yawbench, folder):
-    out = f"results/{folder.name}/half"
+    out, plot = f"results/{folder.name}/half", ("plot", "half.yaml", "--panel", "yaw_moment")
 
     def controller():
         return json.loads((folder / out / "run.json").read_text())["fmus"]["controller"]["name"]
 
-    status, _, said = yawbench("plot", "half.yaml")
+    status, _, said = yawbench(*plot)
     assert status == 0
     assert said.splitlines()[0].startswith("[1/1] half: ")
     assert golden(said.splitlines()[1])
     assert controller() == "controller_fuzzy_sideslip"
-    status, _, said = yawbench("plot", "half.yaml")
+    status, _, said = yawbench(*plot)
     assert status == 0
     assert golden(said)
-    status, _, said = yawbench("plot", "half.yaml", "--swap", "controller=controller_off")
+    status, _, said = yawbench(*plot, "--swap", "controller=controller_off")
     assert (status, said.count("\n")) == (0, 2)
     assert golden(said.splitlines()[1])
     assert controller() == "controller_fuzzy_sideslip"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,6 +13,7 @@ from matplotlib.figure import Figure
 
 from orchestrator.commands.results import distinct
 from orchestrator.errors import Diagnostic, ScenarioError
+from orchestrator.experiments import result_files
 from orchestrator.experiments.claim_schema import MetricSpec
 from orchestrator.experiments.experiment import NamedRun, experiment_of
 from orchestrator.experiments.experiment_result import judge_results
@@ -20,6 +22,7 @@ from orchestrator.experiments.result_files import draw_all, write_findings
 from orchestrator.experiments.scenario_experiments import FIGURE_SPECS, comparison_table, variants
 from orchestrator.experiments.schema import ExperimentSpec
 from orchestrator.figures.plots import LabelledRun, shown_by
+from orchestrator.figures.style import save
 from orchestrator.metrics.expressions import MetricValue
 from orchestrator.pages.comparison import BEST, comparison_facts, metric_table
 from tests.changed import changed
@@ -165,7 +168,8 @@ def test_the_table_has_a_row_per_metric_and_a_column_per_run(findings):
     assert golden(table.text()[0])  # fmt: skip
 
 
-def test_a_run_that_failed_is_named_and_the_others_are_drawn(findings, tmp_path):
+def test_a_run_that_failed_is_named_and_the_others_are_drawn(findings, tmp_path, monkeypatch):
+    monkeypatch.setattr(result_files, "save", partial(save, kinds=["svg"]))
     drawn, problems = draw_all(findings, tmp_path)
     assert (list(drawn), problems) == (["overview", "wheel_torques"], [])
     write_findings(findings, drawn, tmp_path)
