@@ -67,9 +67,8 @@ def test_there_is_no_ground_without_patches_or_of_too_many_pieces():
 def test_a_viewer_carries_the_ground_once_and_says_what_its_colours_mean():
     road = {"name": "road_a", "parameters": {"patches": "y > 0", "base_friction": 0.8}, "constants": {},
             "defaults": {"patch_friction": 0.2}}  # fmt: skip
-    run = whole_car()
-    assert "slippery" not in viewer([LabelledRun("a", run)])
-    on_road = noted(run, fmus={"road": road})
+    assert "slippery" not in viewer([LabelledRun("a", whole_car())])
+    on_road = noted(whole_car(), fmus={"road": road})
     html = viewer([LabelledRun("a", on_road), LabelledRun("b", on_road)])
     data = data_in(html)
     assert [[friction for friction, _ in ground] for ground in data["grounds"]] == [[0.8, 0.2]]
