@@ -9,6 +9,7 @@ from __future__ import annotations
 import gc
 import os
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -50,7 +51,7 @@ def pytest_collection_finish() -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    items.sort(key=place_in_order)
+    items.sort(key=lambda item: place_in_order(item.path))
     sampled: dict[tuple[str, str], list[pytest.Item]] = {}
     for item in items:
         if item.get_closest_marker("sampled"):
@@ -63,9 +64,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
                 item.add_marker(pytest.mark.exhaustive)
 
 
-def place_in_order(item: pytest.Item) -> int:
-    """Return how early the tests of an item's file begin."""
-    path = item.path.relative_to(TESTS).as_posix()
+@cache
+def place_in_order(file: Path) -> int:
+    """Return how early the tests of a file begin."""
+    path = file.relative_to(TESTS).as_posix()
     return next(k for k, start in enumerate(LONGEST_FIRST) if path.startswith(start))
 
 
