@@ -155,6 +155,9 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
                 if finished.died or worker.retires or worker.calls >= self._lasting:
                     self._workers.remove(worker)
                     worker.close()
+                elif following:  # it need not wait until this answer has been seen to
+                    worker.give(following[0], function, following[1])
+                    following = next(waiting, None)
                 yield finished
 
     def map(self, function: Callable[..., Any], *arguments: Iterable[Any]) -> list[Any]:
