@@ -93,7 +93,7 @@ def test_results_of_an_earlier_run_cannot_pass_for_new(tmp_path):
     assert golden(read_back(tmp_path / "fails", "of the new run"))
 
 
-@pytest.mark.parametrize("why", [KeyboardInterrupt, ValueError])
+@pytest.mark.parametrize("why", [KeyboardInterrupt, pytest.param(ValueError, marks=pytest.mark.exhaustive)])
 def test_when_the_caller_stops_all_runs_end(tmp_path, monkeypatch, why):
     def stop(outcome):
         raise why

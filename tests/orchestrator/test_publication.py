@@ -49,7 +49,7 @@ def test_every_font_is_embedded(run, style):
     assert fonts and all(" yes yes " in font for font in fonts)
 
 
-@pytest.mark.parametrize("kind", ["svg", "png", "pdf"])
+@pytest.mark.parametrize("kind", ["svg", pytest.param("png", marks=pytest.mark.exhaustive), "pdf"])
 def test_the_format_is_that_of_the_option_or_the_file(run, kind):
     assert status_of("plot", run, *SINGLE, "--format", kind, "--out", "folder") == 0
     assert status_of("plot", run, *SINGLE, "--out", f"one.{kind}") == 0

@@ -190,6 +190,7 @@ def test_a_sweep_with_a_stop_time_of_its_own_tells_it_in_the_table_and_warns_of_
     assert about["experiment"]["stop_time"] == 0.05
 
 
+@pytest.mark.exhaustive
 def test_the_table_is_the_same_to_the_byte_however_many_workers(moods, yawbench, tmp_path):
     file = moods(5, 20, count=2)
     for workers in ("1", "3"):
@@ -233,7 +234,7 @@ def test_isolated_runs_that_hang_or_crash_are_rows_that_name_the_unit(moods, yaw
 
 
 @pytest.mark.parametrize("level", [40, 50])
-@pytest.mark.sampled(1)
+@pytest.mark.exhaustive
 def test_a_run_whose_process_is_killed_is_made_again(level, moods, yawbench, tmp_path):
     status, _, err = yawbench(moods(10, level, count=2), "out", "--jobs", "1")
     assert status == 0, err

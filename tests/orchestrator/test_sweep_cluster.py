@@ -62,7 +62,7 @@ def cluster_of_threads():
 
 def table_of(file, yawbench, cluster, tmp_path):  # noqa: F811
     """Make runs here and on the cluster; compare the tables, and return the words of a second call."""
-    yawbench(file, "here")
+    yawbench(file, "here", "--jobs", "2")
     status, _, err = yawbench(file, "there", "--scheduler", cluster.scheduler_address)
     assert status == 1, err  # level 20 fails
     assert ": 6 runs\n" in err
