@@ -565,7 +565,7 @@ def test_a_page_of_foreign_results_loads_nothing_and_runs_no_script_of_theirs(wo
         yawbench("animate", "theirs", "good", "--label", evil, "--label", "good", "--out", "a.html")[0] == 0
     )
     yawbench("study", "study.yaml", "--no-run", "--jobs", "1", "--out", ".")
-    assert yawbench("plot", "theirs", "--label", evil)[0] == 0
+    assert yawbench("plot", "theirs", "--label", evil, "--panel", "yaw_rate")[0] == 0
     for name in ("a.html", "report.html"):
         page = html.parse(str(work / name))
         assert not [one for one in page.iter("script") if one.get("src")]
