@@ -74,6 +74,7 @@ def test_values_end_at_the_range(channel):
 
 
 @every_channel
+@pytest.mark.sampled(6)
 @pytest.mark.parametrize(("frequency", "gain"), [(2.1, 1.0), (21.0, 1 / sqrt(2)), (63.0, 1 / sqrt(82))])
 def test_the_low_pass_has_minus_3_db_at_its_bandwidth_and_40_db_per_decade(channel, frequency, gain):
     times, y = received(

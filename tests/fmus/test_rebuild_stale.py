@@ -283,6 +283,7 @@ def test_a_component_that_has_no_fmu_yet_is_guessed_from_a_wrong_name(project):
     assert golden_in(done.stderr)
 
 
+@pytest.mark.exhaustive
 def test_a_copy_of_a_components_fmu_in_another_folder_is_told_of_and_not_touched(project):
     (project / "before").mkdir()
     shutil.copy(project / "fmus/driver_sine.fmu", project / "before")

@@ -34,6 +34,7 @@ def made(unit: str, seeds: Sequence[int], calls: int) -> Tally:
 
 
 @pytest.mark.parametrize("unit", SMALL)
+@pytest.mark.sampled(1)
 def test_a_few_random_calls_are_answered_alike(unit: str) -> None:
     tally = made(unit, range(2), 100)
     assert not tally.notes, "\n".join(tally.notes)
