@@ -329,8 +329,8 @@ def report(context: typer.Context, options: RunOptions, studies: Studies = None)
     Per study report.html, a single file: verdicts, runs, system, tables, parameters and their sources,
     with the figures beside it as SVG and PNG. Of several studies also an overview, which shows the runs
     of every claim. Runs whose results are missing or out of date are made first. Without --out, pages go
-    to the studies' folders below results/, the overview to results/. All studies in scenarios/ take some
-    four minutes on two cores; --quick omits the regions.
+    to the studies' folders below results/, the overview to results/. All studies in scenarios/ take four
+    to seven minutes on two cores; --quick omits the regions.
     """
     from ..experiments.load_experiment import found_studies
 
