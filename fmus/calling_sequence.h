@@ -8,6 +8,9 @@
 
 enum { BEFORE_INITIALIZATION, DURING_INITIALIZATION, AFTER_INITIALIZATION, AFTER_TERMINATE };
 
+#define LONGEST_STEP 86400.0 /* [s]; chosen: a day. Units compute thousands of inner steps per second. */
+#define LATEST_START 1e12 /* [s]; chosen: up to here, periods of a thousandth of a second still advance the time */
+
 typedef struct {
     int phase;
     int failed; /* an error has been logged since the last reset */
@@ -62,8 +65,9 @@ static inline int set_up(Progress *at, double start, int stop_defined, double st
     if (at->phase != BEFORE_INITIALIZATION) {
         return not_allowed(at, "fmi2SetupExperiment", why);
     }
-    if (!isfinite(start)) {
-        return refuse_times(why, "fmi2SetupExperiment: the start time must be finite (got %.9g s)", start, 0.0);
+    if (!(fabs(start) <= LATEST_START)) {
+        return refuse_times(why, "fmi2SetupExperiment: the start time must be within %.9g s of 0 (got %.9g s)",
+                            LATEST_START, start);
     }
     at->time = start, at->stop_defined = stop_defined != 0, at->stop = stop;
     return 1;
@@ -85,8 +89,9 @@ static inline int may_step(const Progress *at, double t, double h, Refusal *why)
     if (at->phase != AFTER_INITIALIZATION) {
         return not_allowed(at, "fmi2DoStep", why);
     }
-    if (!(h > 0.0 && h < HUGE_VAL)) {
-        return refuse_times(why, "fmi2DoStep: the step must be positive and finite (got %.9g s)", h, 0.0);
+    if (!(h > 0.0 && h <= LONGEST_STEP)) {
+        return refuse_times(why, "fmi2DoStep: the step must be positive and at most %.9g s (got %.9g s)",
+                            LONGEST_STEP, h);
     }
     double tolerance = time_tolerance(at, h);
     if (!(fabs(t - at->time) <= tolerance)) {

@@ -25,9 +25,8 @@ SHARES_OF_WRONG = (0.01, 0.05, 0.2)
 """Shares of wrong calls in a sequence: after an error, all steps are refused until a reset."""
 NUMBERS = (math.nan, math.inf, -math.inf, 1e300, -0.0, 0.0)
 TIMES = (math.nan, math.inf, -1.0, 1e300)
-STARTS = (math.nan, math.inf, -math.inf, -1.0, 1e6)
-STEPS = (0.0, -0.001, math.nan, math.inf, -math.inf, 1e-320, 5.0)
-"""Without start times and steps of 1e300 s, in which units that sample messages would never end."""
+STARTS = (math.nan, math.inf, -math.inf, -1.0, 1e6, 1e12, 1e300)
+STEPS = (0.0, -0.001, math.nan, math.inf, -math.inf, 1e-320, 5.0, 1e300)
 STATES = (0, 1, 2)
 INTEGERS = (0, 1, 2, 5, -1, 2**31 - 1, -(2**31))
 TEXTS = (
