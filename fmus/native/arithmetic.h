@@ -229,6 +229,16 @@ MAYBE_UNUSED static double sorted_item(int place, int ties, int n, const double 
     return order[place];
 }
 
+/* Index in `count` items, counted from the beginning; -1 if it is out of range, -2 if it is none in Python. */
+MAYBE_UNUSED static double place_in(double index, double count)
+{
+    if (!(index >= -0x1p63 && index < 0x1p63)) {
+        return -2.0;
+    }
+    index = index < 0.0 ? index + count : index;
+    return index >= 0.0 && index < count ? index : -1.0;
+}
+
 /* ---- growing lists: ring buffers of items with a fixed number of doubles ---- */
 
 typedef struct {
@@ -261,6 +271,11 @@ MAYBE_UNUSED static int push(List *list, int width, const void *numbers)
     size_t place = list->first + list->count++;
     memcpy(list->items + (place < list->capacity ? place : place - list->capacity) * (size_t)width, numbers, size);
     return 1;
+}
+
+MAYBE_UNUSED static void replace(List *list, double index, int width, const double *numbers)
+{
+    memcpy(list->items + (item(list, width, index) - list->items), numbers, (size_t)width * sizeof *numbers);
 }
 
 MAYBE_UNUSED static void drop(List *list, int every)

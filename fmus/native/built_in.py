@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import array
 import bisect
 import itertools
 import math
@@ -10,11 +11,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from . import ir
+from .loops import UNROLLED
 from .of_numbers import OfNumbers
 from .shapes import push
 from .values import (
     EITHER,
     UNSET,
+    Array,
     Box,
     Bytes,
     Dict,
@@ -34,6 +37,7 @@ from .values import (
     is_plain,
     is_real,
     joined_text,
+    same,
 )
 
 _OPERATORS = {
@@ -151,7 +155,7 @@ class BuiltIn(OfNumbers):
             return self._of_dict(Dict(function.__self__), name, args)
         own = getattr(self, f"_python_{name}", None)
         if own is not None and getattr(function, "__module__", "") in (
-            "builtins", "itertools", "math", "_bisect", "bisect", "functools", "_functools",
+            "array", "builtins", "itertools", "math", "_bisect", "bisect", "functools", "_functools",
         ):  # fmt: skip
             return own(*args, **named)
         if getattr(function, "__module__", "") == "math" and all(map(is_number, args)):
@@ -178,7 +182,21 @@ class BuiltIn(OfNumbers):
             return self.ring_length(value)
         if isinstance(value, Picked):
             return len(value.items[0])
+        if isinstance(value, Array):
+            return value.memory.length
         return len(self.read(value) if isinstance(value, Box) else value)
+
+    def _python_array(self, kind: Any, values: Any = ()) -> Array:
+        items = self.items(values)
+        if kind != "d" or not items:
+            raise Refused("an array other than one of real numbers")
+        made = Array(ir.Array(f"a{self.new(ir.REAL).name}", len(items)))
+        if len(items) > UNROLLED and all(same(x, items[0]) for x in items):
+            self.for_each_index(len(items), lambda k: self.set_array_item(made, k, items[0]))
+        else:
+            for k, x in enumerate(items):
+                self.set_array_item(made, k, x)
+        return made
 
     def _python_bool(self, value: Any) -> Any:
         return self.truth_of(value)
@@ -299,6 +317,8 @@ class BuiltIn(OfNumbers):
             return issubclass(of, kinds)
         if isinstance(value, Instance):
             return issubclass(value.cls, kinds)
+        if isinstance(value, Array):
+            return issubclass(array.array, kinds)
         if isinstance(value, (List, Ring, Dict)):
             return issubclass(dict if isinstance(value, Dict) else list, kinds)
         return isinstance(value, kinds)

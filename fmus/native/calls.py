@@ -125,7 +125,7 @@ class Calling(BuiltIn):
 
     @staticmethod
     def _is_python(cls: type) -> bool:
-        return cls.__module__ in ("builtins", "itertools", "operator", "collections", "functools")
+        return cls.__module__ in ("array", "builtins", "itertools", "operator", "collections", "functools")
 
     # ---- functions of the component ---------------------------------------------------------
 
@@ -143,7 +143,7 @@ class Calling(BuiltIn):
     def inside(self, call: Call, node: ast.FunctionDef | ast.Lambda) -> Any:
         """Return the value of a function, evaluated in place."""
         if len(self.calls) > DEEPEST:
-            raise Refused("unlimited recursion")
+            raise Refused("recursion whose depth is only known at run time")
         self.calls.append(call)
         try:
             if isinstance(node, ast.Lambda):

@@ -169,6 +169,8 @@ class _Function:
             for s in ir.every(self.function.body)
             if isinstance(s, ir.Digits)
         ]
+        arrays = dict.fromkeys(s.array for s in ir.every(self.function.body) if isinstance(s, ir.Put))
+        texts += [f"    double {array.name}[{array.length}];" for array in arrays]
         return [head, "{", *reads, *declared, *texts, *self.tables, *body, *made, "    return 0;", "}", ""]
 
     def _place(self, place: str) -> str:
@@ -222,17 +224,23 @@ class _Function:
                 lines.append(
                     f"{pad}{s.target.name} = {self._table(s, lines, pad)}[(int){self._real(s.index)}];"
                 )
+            elif isinstance(s, ir.Fetch):
+                lines.append(f"{pad}{s.target.name} = {s.array.name}[(int){self._real(s.index)}];")
+            elif isinstance(s, ir.Put):
+                lines.append(f"{pad}{s.array.name}[(int){self._real(s.index)}] = {self._real(s.value)};")
             elif isinstance(s, ir.Raise):
                 lines += self._raise(s, pad)
             elif isinstance(s, ir.Push):
-                items = s.items or (0,)  # of items that are always the same, only the number is kept
-                numbers = ", ".join(map(self._real, items))
+                numbers = self._item(s.items)
                 lines += [
-                    f"{pad}if (!push(&lists[{s.ring}], {len(items)}, (const double[]){{{numbers}}})) {{",
+                    f"{pad}if (!push(&lists[{s.ring}], {numbers})) {{",
                     f'{pad}    begin_problem(problem, "MemoryError", "");',
                     f"{pad}    return 1;",
                     f"{pad}}}",
                 ]
+            elif isinstance(s, ir.Replace):
+                index = self._real(s.index)
+                lines.append(f"{pad}replace(&lists[{s.ring}], {index}, {self._item(s.items)});")
             elif isinstance(s, ir.Drop):
                 lines.append(f"{pad}drop(&lists[{s.ring}], {int(s.every)});")
             elif isinstance(s, ir.Invoke):
@@ -244,6 +252,11 @@ class _Function:
             elif isinstance(s, ir.Digit):
                 text = f"text_{s.digits.name}[(int){self._real(s.index)}]"
                 lines.append(f"{pad}{s.target.name} = (unsigned char){text};")
+
+    def _item(self, numbers: Sequence[ir.Operand]) -> str:
+        """Return the width of a list's items, and an item."""
+        numbers = numbers or (0,)  # of items that are always the same, only the number is kept
+        return f"{len(numbers)}, (const double[]){{{', '.join(map(self._real, numbers))}}}"
 
     def _invoke(self, s: ir.Invoke, pad: str) -> list[str]:
         arguments = "".join(
@@ -384,7 +397,7 @@ def _outlined(body: Sequence[ir.Statement]) -> Iterator[ir.Outlined]:
 
 def _targets(body: Sequence[ir.Statement]) -> Iterator[ir.Var]:
     for s in ir.every(body):
-        if isinstance(s, (ir.Let, ir.Load, ir.Digit)):
+        if isinstance(s, (ir.Let, ir.Load, ir.Fetch, ir.Digit)):
             yield s.target
         elif isinstance(s, ir.Invoke):
             yield from s.targets
@@ -403,8 +416,14 @@ def _operands(s: ir.Statement) -> Sequence[ir.Operand]:
         return (s.test,)
     if isinstance(s, ir.Leave):
         return (s.test,)
+    if isinstance(s, ir.Fetch):
+        return (s.index,)
+    if isinstance(s, ir.Put):
+        return (s.index, s.value)
     if isinstance(s, ir.Push):
         return s.items
+    if isinstance(s, ir.Replace):
+        return (s.index, *s.items)
     if isinstance(s, ir.Digits):
         return (s.value,)
     if isinstance(s, ir.Digit):

@@ -20,6 +20,7 @@ from .values import (
     EITHER,
     RESIZED,
     UNSET,
+    Array,
     Bound,
     Box,
     Bytes,
@@ -100,8 +101,7 @@ class Evaluation(Places):
         method = getattr(self, prefix + kind.lower(), None)
         self.at(node)
         if method is None:
-            first = ast.unparse(node).strip().splitlines()[0]
-            raise Refused(f"{kind} is not translated: {first}", self.where())
+            raise Refused(f"{kind} is not translated: {_first_line(node)}", self.where())
         try:
             return method(node)
         except Refused as refused:
@@ -109,6 +109,9 @@ class Evaluation(Places):
                 self.at(node)
                 refused.where = self.where()
             raise
+        except (TypeError, AttributeError, LookupError, ValueError) as error:
+            self.at(node)
+            raise Refused(f"{kind} is not translated: {_first_line(node)}", self.where()) from error
 
     def call(self, function: Any, args: Sequence[Any], named: dict[str, Any]) -> Any:
         """Return the value of a call; implemented in `calls`."""
@@ -233,6 +236,9 @@ class Evaluation(Places):
             if value.once:
                 self.write(value, "used", True)
             return value
+        if isinstance(value, Array):
+            array = value
+            return Each(array.memory.length, lambda k: self.array_item(array, k))
         if not isinstance(value, List):
             items = self.items(value)
             return Each(len(items), items.__getitem__)
@@ -252,7 +258,7 @@ class Evaluation(Places):
             Refused: the number of items is only known at run time.
         """
         value = self.narrowed(value)
-        if isinstance(value, Each):
+        if isinstance(value, (Each, Array)):
             each = self.each(value)
             return [each.item(k) for k in range(each.count)]
         if isinstance(value, (List, Dict)):
@@ -341,6 +347,8 @@ class Evaluation(Places):
         """Return owner[index]."""
         if owner is None:
             self.end("TypeError", "'NoneType' object is not subscriptable")
+        if isinstance(owner, Array):
+            return self.array_item(owner, index)
         if isinstance(owner, Ring) and not is_real(index):
             return self.ring_item(owner, self.ring_index(owner, index, "list index out of range"))
         if isinstance(owner, Dict):
@@ -407,6 +415,10 @@ class Evaluation(Places):
 
     def _whole(self, value: Any) -> Any:
         return self.loaded(value) if isinstance(value, Picked) else value
+
+
+def _first_line(node: ast.AST) -> str:
+    return ast.unparse(node).strip().splitlines()[0]
 
 
 def _beyond(items: Any) -> str:

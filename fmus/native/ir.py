@@ -69,6 +69,32 @@ class Load:
     index: Operand
 
 
+@dataclass(frozen=True, eq=False)
+class Array:
+    """Array of real numbers in memory, which lasts until its function returns."""
+
+    name: str
+    length: int
+
+
+@dataclass(frozen=True)
+class Fetch:
+    """target = array[index]."""
+
+    target: Var
+    array: Array
+    index: Operand
+
+
+@dataclass(frozen=True)
+class Put:
+    """array[index] = value."""
+
+    array: Array
+    index: Operand
+    value: Operand
+
+
 @dataclass(frozen=True)
 class Digits:
     """count = number of characters of an integer's text, which are read by `Digit`."""
@@ -127,6 +153,15 @@ class Push:
 
 
 @dataclass(frozen=True)
+class Replace:
+    """Replace an item of a list of the state."""
+
+    ring: int
+    index: Operand
+    items: tuple[Operand, ...]
+
+
+@dataclass(frozen=True)
 class Drop:
     """Remove the first item of a list of the state, or `every` item."""
 
@@ -153,7 +188,9 @@ class Invoke:
     operands: tuple[Operand, ...]
 
 
-Statement = Let | Load | Invoke | Digits | Digit | If | Loop | Leave | Raise | Push | Drop
+Statement = (
+    Let | Load | Fetch | Put | Invoke | Digits | Digit | If | Loop | Leave | Raise | Push | Replace | Drop
+)
 
 
 @dataclass(frozen=True)

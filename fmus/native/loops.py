@@ -12,7 +12,7 @@ from .merge import items_of
 from .read import kinds_within, names_within
 from .shapes import Memo, Shape, Widening, build, numbers_of, shape_of, types_of
 from .statements import CONTINUE, EXIT, ON, OVER, RESULT, RETURN, Execution
-from .values import RESIZED, UNSET, Box, Bytes, Each, List, Refused, Ring, Span, now, same
+from .values import RESIZED, UNSET, Array, Box, Bytes, Each, List, Refused, Ring, Span, now, same
 
 UNROLLED = 16
 """Number of passes up to which a loop over a range is unrolled; chosen: four wheels, seven sets."""
@@ -44,6 +44,9 @@ class Looping(Execution):
         if isinstance(over, Ring):
             ring = over
             over = Span(0, self.ring_length(ring), lambda k: self.ring_item(ring, k), ring)
+        if isinstance(over, Array) and over.memory.length > UNROLLED:
+            array = over
+            over = Span(0, array.memory.length, lambda k: self.array_item(array, k))
         if isinstance(over, range) and len(over) > UNROLLED and over.step == 1:
             over = Span(over.start, over.stop, lambda k: k)
         if isinstance(over, Bytes):
@@ -86,17 +89,15 @@ class Looping(Execution):
 
     def _after_loop(self, node: ast.For | ast.While) -> None:
         how = self.exit
+        after: Any = RETURN if how == RETURN else ON
+        if isinstance(how, ir.Var) and kinds_within(node)[ast.Return]:
+            back = self.compare("==", how, RETURN)
+            after = self.branch(back, lambda: RETURN, lambda: ON)
         if node.orelse:
-            over = self.compare("==", how, OVER)
-            self.branch(over, lambda: self._otherwise(node.orelse), lambda: None)
-            how = self.exit
-        if isinstance(how, ir.Var):
-            if kinds_within(node)[ast.Return]:
-                back = self.compare("==", how, RETURN)
-                how = self.branch(back, lambda: RETURN, lambda: ON)
-            else:
-                how = ON
-        self.leave(how if isinstance(how, ir.Var) or how == RETURN else ON)
+            over = self.compare("==", how, OVER)  # a break in `else` leaves the loop around this one
+            self.branch(over, lambda: self._otherwise(node.orelse), lambda: self.leave(after))
+        else:
+            self.leave(after)
 
     def _otherwise(self, statements: Sequence[ast.stmt]) -> None:
         self.leave(ON)
@@ -131,6 +132,9 @@ class Looping(Execution):
 
         def body() -> None:
             k = self.read(counter)[0]
+            ends = self.range_of(over.first), self.range_of(over.end)
+            if isinstance(k, ir.Var) and ends[0] and ends[1]:
+                self.ranges[k] = ends[0][0], ends[1][1] - 1
             self.write(counter, 0, self.binary("+", k, 1))
             self.assign(node.target, over.item(k))
             self.block(node.body)
@@ -174,6 +178,18 @@ class Looping(Execution):
         else:
             raise Refused("a loop in which values keep taking new forms")
         self._finish_loop(node, made, carried, heads)
+
+    def for_each_index(self, count: int, body: Callable[[ir.Var], None]) -> None:
+        """Emit a loop over the indices below `count`; `body` changes nothing but arrays."""
+        k = self.new(ir.INT)
+        self.out.append(ir.Let(k, "copy", (0,)))
+        outer, self.out = self.out, []
+        self.out.append(ir.Leave(self.let(ir.BOOL, "ge", k, count)))
+        self.ranges[k] = 0, count - 1
+        body(k)
+        self.out.append(ir.Let(k, "copy", (self.let(ir.INT, "add", k, 1),)))
+        loop, self.out = ir.Loop(self.out), outer
+        self.out.append(loop)
 
     def _is_read_outside(self, loop: ast.AST, name: str) -> bool:
         read = name, ast.Load

@@ -128,6 +128,7 @@ class Lowering:
     def __init__(self) -> None:
         self.out: list[ir.Statement] = []
         self.facts = Facts()
+        self.ranges: dict[ir.Var, tuple[int, int]] = {}  # least and largest value of integers
         self.choices: dict[ir.Var, tuple[ir.Operand, int, int]] = {}  # between constants: test, then, else
         self._count = 0
 
@@ -186,6 +187,15 @@ class Lowering:
                 return value if value.type == ir.BOOL else a if known else b
         left = facts.left(value)
         return next(iter(left)) if left is not None and len(left) == 1 else value
+
+    def range_of(self, value: ir.Operand) -> tuple[int, int] | None:
+        """Return the least and the largest value of an integer; None if unknown."""
+        if not isinstance(value, ir.Var):
+            return int(value), int(value)
+        if value.type == ir.BOOL:
+            return 0, 1
+        values = self.facts.left(value)
+        return (min(values), max(values)) if values else self.ranges.get(value)
 
     # ---- conditions -------------------------------------------------------------------------
 

@@ -15,6 +15,7 @@ from .lower import Facts, Lowering
 from .values import (
     ANY,
     UNSET,
+    Array,
     Bound,
     Box,
     Closure,
@@ -76,7 +77,7 @@ def alike(a: Any, b: Any) -> bool:
             return len(a.slots) == len(b.slots)
         if isinstance(a, Instance) and isinstance(b, Instance) and a.cls is not b.cls:
             return False
-        return not isinstance(a, Ring) and set(a.slots) == set(b.slots)
+        return not isinstance(a, (Ring, Array)) and set(a.slots) == set(b.slots)
     if isinstance(a, Closure) and isinstance(b, Closure):
         return a.node is b.node and same(a.defaults, b.defaults)
     if isinstance(a, Union) or isinstance(b, Union):

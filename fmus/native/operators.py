@@ -14,6 +14,7 @@ from .merge import alike
 from .read import kinds_within
 from .values import (
     EITHER,
+    Array,
     Box,
     Closure,
     Dict,
@@ -37,8 +38,6 @@ BINARY = {
 COMPARED = {
     ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
 }  # fmt: skip
-SMALL = 2**20
-"""Magnitude below which the result of two integers is exact as a double."""
 
 
 class Operating(Evaluation):
@@ -159,18 +158,30 @@ class Operating(Evaluation):
 
     def _exact(self, op: str, result: ir.Operand, a: ir.Operand, b: ir.Operand) -> ir.Operand:
         """Emit an exception for integers that are not exact as doubles; Python's integers are unbounded."""
-        whole = isinstance(result, ir.Var) and result.type == ir.INT
-        if whole and not (self._is_small(a) and self._is_small(b)):
-            for x in (a, result) if op == "//" else (result,):  # the quotient of a larger one may be rounded
-                inside = self.compare("<", self.size(x), float(ir.EXACT))  # 2^53 may be 2^53 + 1, rounded
-                self.require(inside, "OverflowError", ir.INEXACT)
+        if not isinstance(result, ir.Var) or result.type != ir.INT:
+            return result
+        between = self._range_of_result(op, a, b)
+        if between is not None and -ir.EXACT < between[0] <= between[1] < ir.EXACT:
+            self.ranges[result] = between
+            return result
+        for x in (a, result) if op == "//" else (result,):  # the quotient of a larger one may be rounded
+            inside = self.compare("<", self.size(x), float(ir.EXACT))  # 2^53 may be 2^53 + 1, rounded
+            self.require(inside, "OverflowError", ir.INEXACT)
         return result
 
-    def _is_small(self, a: ir.Operand) -> bool:
-        if not isinstance(a, ir.Var):
-            return abs(a) < SMALL
-        values = self.facts.domains.get(a)
-        return a.type == ir.BOOL or (values is not None and max(map(abs, values), default=0) < SMALL)
+    def _range_of_result(self, op: str, a: ir.Operand, b: ir.Operand) -> tuple[int, int] | None:
+        """Return the least and the largest value of an integer operation, as far as they are known."""
+        of_a, of_b = self.range_of(a), self.range_of(b)
+        if op == "%" and isinstance(b, int) and b > 0:
+            return 0, b - 1
+        if of_a is None or of_b is None:
+            return None
+        if op in ("+", "-", "*"):
+            ends = [OPERATORS[op](x, y) for x in of_a for y in of_b]
+            return min(ends), max(ends)
+        if op == "//" and isinstance(b, int) and b > 0:
+            return of_a[0] // b, of_a[1] // b
+        return None
 
     def _unaryop(self, node: ast.UnaryOp) -> Any:
         value = self.evaluate(node.operand)
@@ -204,6 +215,8 @@ class Operating(Evaluation):
             return self.truth(value)
         if isinstance(value, Ring):
             return self.compare("!=", self.ring_length(value), 0)
+        if isinstance(value, Array):
+            return True
         if isinstance(value, (List, Dict)):
             return bool(self.read(value))
         if isinstance(value, Picked):
@@ -295,6 +308,8 @@ class Operating(Evaluation):
         if all(lists) or (isinstance(a, tuple) and isinstance(b, tuple)):
             items_a, items_b = self.items(a), self.items(b)
             return len(items_a) == len(items_b) and self._all_equal(list(zip(items_a, items_b, strict=True)))
+        if isinstance(a, Array) or isinstance(b, Array):
+            raise Refused("comparing arrays")
         if isinstance(a, Box) or isinstance(b, Box):
             return a is b
         return not (isinstance(a, ir.Var) or isinstance(b, ir.Var)) and bool(a == b)

@@ -63,7 +63,10 @@ class Outlining(Calling):
             if isinstance(value, Picked):
                 call.frame.slots[name] = self.loaded(value)
         chosen = {tag: left for tag in self.choosers if (left := self.facts.left(tag)) is not None}
-        shape = shape_of(call.frame, self.read, "", Memo(self.fixed))
+        try:
+            shape = shape_of(call.frame, self.read, "", Memo(self.fixed))
+        except Refused:
+            return self.inside(call, node)  # an argument is not made of numbers
         key = id(call.source), id(node), _key(shape, {}), frozenset(chosen.items())
         if key not in self.library.made:
             self.library.kept.append((call.source, shape))
@@ -121,7 +124,7 @@ class Outlining(Calling):
 def _is_of_list(statement: ir.Statement) -> bool:
     if isinstance(statement, ir.Let):
         return statement.op.startswith("ring_")
-    return isinstance(statement, (ir.Push, ir.Drop))
+    return isinstance(statement, (ir.Push, ir.Replace, ir.Drop))
 
 
 def _holds(value: Any, boxes: set[int], machine: Calling) -> bool:

@@ -16,6 +16,7 @@ from .merge import Merging, items_of
 from .values import (
     ANY,
     UNSET,
+    Array,
     Bound,
     Box,
     Closure,
@@ -139,6 +140,8 @@ def shape_of(value: Any, slots: Place, path: str = "", memo: Memo | None = None)
         return Items(value, [shape_of(x, slots, f"{path}.{i}", memo) for i, x in enumerate(value)])
     if isinstance(value, Ring):
         return Growing(value.number, value.item)
+    if isinstance(value, Array):
+        raise Refused("an array that is passed on between steps or passes of a loop; use a list")
     if isinstance(value, Box):
         if value.fixed:
             return Known(value)
@@ -338,7 +341,14 @@ def numbers_of(shape: Shape, value: Any, slots: Place, machine: Merging) -> list
 
 
 def push(ring: Growing | Ring, item: Any, slots: Place, machine: Merging) -> None:
-    """Append an item to a list of the state.
+    """Append an item to a list of the state."""
+    machine.out.append(ir.Push(ring.number, numbers_of_item(ring, item, slots, machine)))
+
+
+def numbers_of_item(
+    ring: Growing | Ring, item: Any, slots: Place, machine: Merging
+) -> tuple[ir.Operand, ...]:
+    """Return the numbers of an item of a list of the state.
 
     Raises:
         Promote: the shape of its items is not wide enough.
@@ -347,7 +357,7 @@ def push(ring: Growing | Ring, item: Any, slots: Place, machine: Merging) -> Non
     widening.of(ring.item, shape)
     if widening.grew:
         raise Promote(ring.number, shape)
-    machine.out.append(ir.Push(ring.number, tuple(numbers_of(ring.item, item, slots, machine))))
+    return tuple(numbers_of(ring.item, item, slots, machine))
 
 
 def _collect(

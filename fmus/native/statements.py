@@ -16,6 +16,7 @@ from .read import kinds_within
 from .shapes import Promote, shape_of
 from .values import (
     UNSET,
+    Array,
     Box,
     Closure,
     Dict,
@@ -126,7 +127,7 @@ class Execution(Operating):
             self.set_attribute(owner, target.attr, self._in_place(op, before, value))
         else:
             owner, index = self.evaluate(target.value), self.evaluate(target.slice)
-            before = self.subscript(owner, index)
+            before = self.by_form(owner, lambda x: self.subscript(x, index))
             value = self.evaluate(node.value)
             self.at(node)
             self.set_item(owner, index, self._in_place(op, before, value))
@@ -254,9 +255,18 @@ class Execution(Operating):
         self.by_form(owner, use)
 
     def set_item(self, owner: Any, index: Any, value: Any) -> None:
-        """Set an item of a list or dictionary."""
+        """Set an item of a list, array or dictionary."""
+        if isinstance(owner, Union):
+            self.by_form(owner, lambda x: self.set_item(x, index, value))
+            return
         if isinstance(owner, Dict):
             self.write(owner, self._key(index), value)
+            return
+        if isinstance(owner, Array):
+            self.set_array_item(owner, index, value)
+            return
+        if isinstance(owner, Ring) and not is_real(index):
+            self.set_ring_item(owner, index, value)
             return
         if not isinstance(owner, List):
             raise Refused(f"setting an item of a {type(owner).__name__}")

@@ -132,6 +132,14 @@ class Ring(Box):
         self.number, self.item = number, item
 
 
+class Array(Box):
+    """`array("d")`: real numbers in memory, whose content is only known at run time."""
+
+    def __init__(self, memory: ir.Array) -> None:
+        super().__init__()
+        self.memory = memory
+
+
 @dataclass(frozen=True, eq=False)
 class Union:
     """Value with several forms; `tag` is the active alternative."""

@@ -216,6 +216,10 @@ STATEMENTS: Templates = (
     (0.05, "<list>[1:] = [<y>, <x>]"), (0.05, "<list>.sort()"), (0.3, "<list> += [<x>]\n<a> = <list>.pop()"),
     (0.3, "<a> = <list>\n<a>[0] = <x>\n<a> = 3 * <a>[1]"),
     (0.3, "for k, <v> in enumerate(<list>):\n    <list>[k] = <e>"),
+    (0.4, "array_<a> = array('d', [<x>, <y>, <x>])\narray_<a>[<at>] = <x>\n<a> = sum(array_<a>)"),
+    (0.3, "array_<a> = array('d', [<y>] * 20)\nfor <v> in range(20):\n    array_<a>[<v>] += <e>\n"
+     "<a> = array_<a>[<place>] + max(array('d', array_<a>))"),
+    (0.3, "array_<a> = array('d', <l>)\nif <c>:\n    array_<a>[<place>] = <x>\n<a> = array_<a>[0]"),
     (0.1, "r<a> = [[<y>, 1], [2, <y>]]\nr<a>[<i> % 2][0] = <x>\n<a> = r<a>[0][0] + sum(r<a>[1])"),
     (0.2, "r<a> = [[0, 1.0]] * 2\nr<a>[0][0] = <x>\n<a> = r<a>[1][0]"),
     (0.4, "k<a> = Kept(<x>)\nif <c>:\n    k<a>.raised(<y>)\n<a> = k<a>.level + k<a>.count"),

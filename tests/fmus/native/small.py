@@ -19,6 +19,7 @@ from fmus.staging import staged
 HEAD = '''"""A small component."""
 
 import math
+from array import array
 from bisect import bisect_right
 from dataclasses import dataclass
 from itertools import chain, pairwise, repeat

@@ -111,6 +111,89 @@ def advance(self, t, h, u):
 def output(self, t, u):
     return (self.total + len(self.seen),)
 """,
+    "else of a loop that leaves the loop around it": """
+def output(self, t, u):
+    total = 0.0
+    for k in range(5):
+        total += 1.0
+        for x in (u[0], 0.5, u[1]):
+            if x > 0.8:
+                break
+            total += x
+        else:
+            if u[0] < u[1]:
+                break
+            if k % 2:
+                continue
+            total += 10.0
+        for x in range(20):
+            if x > 10.0 * u[1]:
+                break
+        else:
+            return (total,)
+        total += 100.0
+    return (total,)
+""",
+    "an array that loops of many passes fill": """
+def configure(self):
+    n = 20
+    self.table = self.solved(n)
+def solved(self, n):
+    rows = array("d", [0.0] * (n * n))
+    for i in range(n):
+        for j in range(n):
+            rows[i * n + j] = self.p.gain / (i + j + 1.0)
+        rows[i * n + i] += 1 + self.p.on
+    x = array("d", [1.0] * n)
+    further = array("d", x)
+    for sweep in range(30):
+        largest = 0.0
+        for i in range(n):
+            rest = 0.0
+            for j in range(n):
+                if j != i:
+                    rest += rows[n * i + j] * x[j]
+            further[i] = (1.0 - rest) / rows[i * n + i] / 3.0
+            largest = max(largest, abs(further[i] - x[i]))
+        for i in range(n):
+            x[i] = further[i]
+        if largest < 1e-3:
+            break
+    return [value for value in x]
+def start(self, t, u):
+    self.last = 0.0
+def advance(self, t, h, u):
+    few = array("d", [u[0], u[1], True, 2])
+    other = few if u[0] > 0.5 else array("d", few)
+    other[-1] = 0.25 * u[1]
+    k = int(8.0 * u[0])
+    if abs(k) < 4:
+        other[k] += 3
+    few[2] -= u[0]
+    self.last = sum(few) + sum(x * y for x, y in zip(few, u)) + len(few) + other[0] + bool(few)
+def output(self, t, u):
+    total = 0.0
+    for x in array("d", self.table):
+        total += x
+    return (total + self.last + self.table[int(19.9 * abs(u[0])) % 20],)
+""",
+    "items of a list that grows are replaced": """
+def start(self, t, u):
+    self.table = []
+    self.seen = 0
+def advance(self, t, h, u):
+    while len(self.table) < 12 + self.p.count:
+        self.table.append((0.0, len(self.table)))
+    place = self.seen % len(self.table)
+    self.table[place] = (u[0], self.table[place - 1][1])
+    self.table[-1] = (self.table[-1][0] + u[1], 2.0)
+    self.seen += 1
+def output(self, t, u):
+    total = 0.0
+    for k, x in self.table:
+        total = 0.5 * total + k * x
+    return (total,)
+""",
     "a list of the state gone through in pairs": """
 def start(self, t, u):
     self.seen = [(t, 0.0)]
