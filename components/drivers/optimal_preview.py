@@ -39,8 +39,7 @@ from ..driving.speed_holding import HeldSpeedParameters, SpeedHold
 from ..driving.track import TRACK_OUTPUTS, LaneChangeParameters, Track
 from ..fmi.component import Component
 from ..fmi.variables import like, parameter
-from ..mathematics.preview_control import discrete, tracking_gains
-from ..mathematics.sums import dot
+from ..mathematics.preview_control import TrackingLaw, discrete
 from .double_lane_change import DoubleLaneChangeParameters
 
 STEP = 0.03
@@ -49,6 +48,10 @@ SLOWEST = 2.0
 """Speed below which the gains are constant [m/s]."""
 MOST = 0.99
 """Largest share of F_max; chosen: 0.78 of the slip at which Fiala's force saturates."""
+STATES = 5
+"""Number of states (y, psi, v_y, r, hand wheel) of the linear car."""
+KEPT = 3
+"""Number of speeds whose gains are kept; chosen: two are interpolated, also when a whole speed is crossed."""
 
 
 @dataclass(frozen=True)
@@ -132,12 +135,13 @@ class OptimalPreview(Component):
         self.track = Track(self.p)
         self.car = SingleTrackCar.of(self.p, self.p.yaw_inertia)
         self.steps = max(1, round(self.p.preview_time / STEP))
-        self.gains: dict[int, tuple[float, ...]] = {}
         self.path = planned(self.p)
 
     def start(self, t: float, u: list[float]) -> None:
         self.speed = SpeedHold(self.p, u[0])
         self.linear = self.hand = 0.0  # hand wheel of the linear and of the real car [rad]
+        self.speeds = [-1] * KEPT  # whole speeds [m/s] of the gains, that of v at v % KEPT
+        self.gains: list[float] = []  # of states and steps, for each of the speeds
 
     def advance(self, t: float, h: float, u: list[float]) -> None:
         p: OptimalPreviewParameters = self.p
@@ -165,21 +169,37 @@ class OptimalPreview(Component):
         """Return the optimal rate of the linear car's hand wheel [rad/s], with interpolated gains."""
         v, v_y, r, x, y, psi = u
         along = STEP * (v * cos(psi) - v_y * sin(psi))
-        path = self.path
-        seen = [-y, -psi, -v_y, -r, -self.linear, *[path(x + k * along) for k in range(1, self.steps + 1)]]
         level = max(v, SLOWEST)
         lower = int(level)
         share = level - lower
-        rate = dot(self._gains(lower), seen)
-        above = dot(self._gains(lower + 1), seen)
+        first, second = self._place_of_gains(lower), self._place_of_gains(lower + 1)
+        rate = above = 0.0
+        for k, state in enumerate((y, psi, v_y, r, self.linear)):
+            rate += self.gains[first + k] * -state
+            above += self.gains[second + k] * -state
+        for k in range(1, self.steps + 1):
+            ahead = self.path(x + k * along)
+            rate += self.gains[first + STATES - 1 + k] * ahead
+            above += self.gains[second + STATES - 1 + k] * ahead
         return rate + share * (above - rate)
 
-    def _gains(self, v: int) -> tuple[float, ...]:
-        """Return the gains of state and previewed path at a whole speed [m/s], cached."""
-        if v not in self.gains:
+    def _place_of_gains(self, v: int) -> int:
+        """Return the index of the first gain at a whole speed [m/s]; computes the gains if necessary."""
+        count: int = STATES + self.steps
+        while len(self.gains) < KEPT * count:
+            self.gains.append(0.0)
+        place = v % KEPT * count
+        if self.speeds[v % KEPT] != v:
+            self.speeds[v % KEPT] = v
             p: OptimalPreviewParameters = self.p
-            self.gains[v] = preview_gains(v, self.car, p.steering_ratio, p.offset_scale, self.steps)
-        return self.gains[v]
+            law = tracking_law(v, self.car, p.steering_ratio, p.offset_scale)
+            for k, gain in enumerate(law.gains):
+                self.gains[place + k] = gain
+            line = law.line
+            for k in range(self.steps):
+                self.gains[place + STATES + k] = law.gain_ahead(line)
+                line = law.further(line)
+        return place
 
     def _hand(self, u: list[float]) -> float:
         """Return the hand-wheel angle [rad] for the front side force of the linear car, with real tyres."""
@@ -214,14 +234,11 @@ def lane_dynamics(
 
 
 @lru_cache(maxsize=256)
-def preview_gains(
-    v: int, car: SingleTrackCar, steering_ratio: float, offset_scale: float, steps: int
-) -> tuple[float, ...]:
-    """Return the gains of state and previewed path at `v` [m/s], for a preview of `steps` steps."""
+def tracking_law(v: int, car: SingleTrackCar, steering_ratio: float, offset_scale: float) -> TrackingLaw:
+    """Return the law that tracks a known path at `v` [m/s]."""
     phi, gamma = discrete(*lane_dynamics(car, float(v), steering_ratio), STEP)
     first = (1.0, 0.0, 0.0, 0.0, 0.0)  # y
-    state, ahead = tracking_gains(phi, gamma, first, weight=offset_scale**-2, steps=steps)
-    return (*state, *ahead)
+    return TrackingLaw(phi, gamma, first, offset_scale**-2)
 
 
 @lru_cache(maxsize=16)

@@ -17,20 +17,23 @@ sideslip beta = c y'' of a steady turn. The cost is convex; Newton's method mini
 Source: ours. The forces are those of a single-track car with slowly changing sideslip.
 """
 
+from __future__ import annotations
+
+from array import array
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from math import inf
 
 from vocabulary.lane_change import Lane
 
-from ..mathematics.quadratic_program import Rows, solution
-from ..mathematics.sums import dot
+from ..mathematics.linear_equations import solve
 from .track import Outline
 
 LEAD, TAIL = 15.0, 15.0
 """Path before the first and after the last cones [m]. Chosen: time to turn the wheel at 25 m/s."""
 INTERVALS = 40
 """Number of intervals between knots. Chosen: with half of them the largest force is 2 % higher."""
+KNOTS = INTERVALS + 1
 POWER = 8
 MOST_STEPS = 60
 """Largest number of steps of Newton's method; chosen: twice what the standard's tracks need."""
@@ -45,6 +48,8 @@ CONES = 4
 """Intervals along a lane; the corners of the body keep the margin at their ends."""
 POINTS = 5
 """Points along the side of the body that keep the margin at the outer cones of a lane."""
+MOST_PLACES = 3 * (CONES + 1) * POINTS
+"""Places of points that are kept between the borders of three lanes."""
 
 
 class LanePath:
@@ -75,11 +80,12 @@ class LanePath:
     ) -> None:
         self.start = lanes[0].start - LEAD
         self.spacing = (lanes[-1].end + TAIL - self.start) / INTERVALS
-        knots = [self.start + self.spacing * k for k in range(INTERVALS + 1)]
-        demands = _demands(self.spacing, levers, [easing(x) for x in knots])
-        rows, bounds = self._constraints(lanes, outline, margin, slip)
-        rows = [[bend / give * value for value in row] for row in rows]
-        program = _Program(demands, rows, [bound / give for bound in bounds], self.spacing)
+        program = PathProgram(self.spacing, bend / give)
+        program.add_forces(self.start, levers, easing)
+        for k, lane in enumerate(lanes):
+            self._add_points(program, k, lane, outline, margin, give)
+        program.bound_points(slip)
+        program.bound_end(AHEAD)
         self.bends = [bend * value for value in program.solved()]  # y'' at the knots
         self.slopes, self.places = [0.0], [0.0]  # y' and y there
         h = self.spacing
@@ -100,136 +106,189 @@ class LanePath:
         steeper = (self.bends[k + 1] - bend) / self.spacing
         return self.places[k] + t * (self.slopes[k] + t * (0.5 * bend + t * steeper / 6.0))
 
-    def _constraints(
-        self, lanes: Sequence[Lane], outline: Outline, margin: float, slip: float
-    ) -> tuple[Rows, list[float]]:
-        """Return the rows of the inequality constraints on y'' at the knots, and their upper bounds [m]."""
-        basis = _Basis(self.spacing)
-        front, rear, half = outline
-        body = [-rear + (front + rear) * k / (POINTS - 1) for k in range(POINTS)]
-        rows: Rows = []
-        bounds: list[float] = []
-        for lane in lanes:
-            cones = [lane.start + (lane.end - lane.start) * k / CONES for k in range(CONES + 1)]
-            for cone in cones:
-                for s in body if cone in (lane.start, lane.end) else (-rear, front):
-                    row = basis.place(cone - s - self.start, s, slip)
-                    rows += [row, [-value for value in row]]
-                    bounds += [lane.left - half - margin, -lane.right - half - margin]
-        end = [AHEAD * value for value in basis.slopes[-1]]
-        rows += [end, [-value for value in end]]
-        bounds += [0.0, 0.0]
-        return rows, bounds
-
-
-class _Demand(NamedTuple):
-    """Axle force at a knot k: `here` y''(k) + `next` y''(k + 1)."""
-
-    k: int
-    here: float
-    next: float
-
-
-def _demands(spacing: float, levers: tuple[float, float], easing: Sequence[float]) -> list[_Demand]:
-    """Return the forces of both axles at both ends of every interval."""
-    return [
-        _Demand(k, ease * (1.0 - end - lever / spacing), ease * (end + lever / spacing))
-        for k, ease in enumerate(easing[:-1])
-        for end in (0.0, 1.0)
-        for lever in levers
-    ]
-
-
-class _Basis:
-    """Linear maps from the values of y'' at the knots to y, y' and y'', as rows."""
-
-    def __init__(self, spacing: float) -> None:
-        self.spacing = h = spacing
-        count = INTERVALS + 1
-        self.bends = [[1.0 if i == k else 0.0 for i in range(count)] for k in range(count)]
-        self.slopes, self.places = [[0.0] * count], [[0.0] * count]
-        for bend, next_bend in pairwise(self.bends):
-            rows = zip(self.places[-1], self.slopes[-1], bend, next_bend, strict=True)
-            self.places.append([y + h * slope + h * h * (c / 3.0 + d / 6.0) for y, slope, c, d in rows])
-            rows = zip(self.places[-1], self.slopes[-1], bend, next_bend, strict=True)
-            self.slopes.append([slope + 0.5 * h * (c + d) for _, slope, c, d in rows])
-
-    def place(self, x: float, s: float, slip: float) -> list[float]:
-        """Return the row of y + s (y' - slip y'') at x [m] from the first knot."""
-        k = min(max(int(x / self.spacing), 0), INTERVALS - 1)
-        t = x - k * self.spacing
-        row = []
-        for y, slope, bend, next_bend in zip(
-            self.places[k], self.slopes[k], self.bends[k], self.bends[k + 1], strict=True
-        ):
-            steeper = (next_bend - bend) / self.spacing
-            there = y + t * (slope + t * (0.5 * bend + t * steeper / 6.0))
-            turned = slope + t * (bend + 0.5 * t * steeper) - slip * (bend + t * steeper)
-            row.append(there + s * turned)
-        return row
-
-
-class _Program:
-    """Cost of axle forces and violated constraints, and its minimization."""
-
-    def __init__(
-        self, demands: Sequence[_Demand], rows: Rows, bounds: Sequence[float], spacing: float
+    def _add_points(
+        self, program: PathProgram, number: int, lane: Lane, outline: Outline, margin: float, give: float
     ) -> None:
-        self.demands, self.rows, self.bounds = demands, rows, bounds
-        self.weight = spacing / 4.0  # four forces per interval
+        """Keep points along the body between the borders of a lane where its cones stand."""
+        front, rear, half = outline
+        left, right = (lane.left - half - margin) / give, (-lane.right - half - margin) / give
+        for i in range(CONES + 1):
+            cone = lane.start + (lane.end - lane.start) * i / CONES
+            outer = cone in (lane.start, lane.end)
+            for k in range(POINTS):
+                if outer:
+                    s = -rear + (front + rear) * k / (POINTS - 1)
+                elif k == 0:
+                    s = -rear
+                elif k == POINTS - 1:
+                    s = front
+                else:
+                    continue
+                place = (number * (CONES + 1) + i) * POINTS + k
+                program.add_point(place, cone - s - self.start, s, left, right)
 
-    def solved(self) -> list[float]:
+
+class PathProgram:
+    """Cost of axle forces and violated constraints as a function of y'' at the knots, and its minimization.
+
+    Every constraint is on a linear function of y'', from both sides. Numbers are in arrays, so that a native
+    unit goes through them in loops.
+
+    Args:
+        spacing: between knots [m].
+        scale: unit of y'' over the unit of constraints, a_0 / v^2 / s_0 [1/m2].
+    """
+
+    def __init__(self, spacing: float, scale: float) -> None:
+        self.spacing, self.scale = spacing, scale
+        self.weight = spacing / 4.0  # four forces per interval
+        self.here, self.further = _zeros(4 * INTERVALS), _zeros(4 * INTERVALS)  # force per y''(k), y''(k + 1)
+        self.xs, self.offsets = _zeros(MOST_PLACES), _zeros(MOST_PLACES)  # x and s of the points
+        self.borders = array(
+            "d", [inf] * (2 * MOST_PLACES)
+        )  # on both sides; infinite where there is no point
+        self.bounds = 0
+        self.lefts, self.rights = _zeros(MOST_PLACES + 1), _zeros(MOST_PLACES + 1)
+        self.rows = _zeros((MOST_PLACES + 1) * KNOTS)
+        self.slopes, self.places = _zeros(KNOTS * KNOTS), _zeros(KNOTS * KNOTS)  # y' and y per y'', at knots
+        h = spacing
+        for k in range(INTERVALS):
+            for j in range(KNOTS):
+                now, then = KNOTS * k + j, KNOTS * (k + 1) + j
+                bend, next_bend = float(j == k), float(j == k + 1)
+                y, slope = self.places[now], self.slopes[now]
+                self.places[then] = y + h * slope + h * h * (bend / 3.0 + next_bend / 6.0)
+                self.slopes[then] = slope + 0.5 * h * (bend + next_bend)
+
+    def add_forces(self, start: float, levers: tuple[float, float], easing: Callable[[float], float]) -> None:
+        """Add the forces of both axles at both ends of every interval."""
+        for k in range(INTERVALS):
+            ease = easing(start + self.spacing * k)
+            for i, (end, lever) in enumerate([(end, lever) for end in (0.0, 1.0) for lever in levers]):
+                self.here[4 * k + i] = ease * (1.0 - end - lever / self.spacing)
+                self.further[4 * k + i] = ease * (end + lever / self.spacing)
+
+    def add_point(self, place: int, x: float, s: float, left: float, right: float) -> None:
+        """Add a point s [m] ahead of the centre of mass, where that is x [m] from the first knot.
+
+        Args:
+            place: index of the point; those of other points differ.
+            x, s: the point.
+            left, right: bounds of its y and -y, in units of s_0.
+        """
+        self.xs[place], self.offsets[place] = x, s
+        self.borders[2 * place], self.borders[2 * place + 1] = left, right
+
+    def bound_points(self, slip: float) -> None:
+        """Bound y + s (y' - slip y'') of all points."""
+        for place in range(MOST_PLACES):
+            if self.borders[2 * place] == inf:
+                continue
+            x, s = self.xs[place], self.offsets[place]
+            k = min(max(int(x / self.spacing), 0), INTERVALS - 1)
+            t = x - k * self.spacing
+            for j in range(KNOTS):
+                y, slope = self.places[KNOTS * k + j], self.slopes[KNOTS * k + j]
+                bend, next_bend = float(j == k), float(j == k + 1)
+                steeper = (next_bend - bend) / self.spacing
+                there = y + t * (slope + t * (0.5 * bend + t * steeper / 6.0))
+                turned = slope + t * (bend + 0.5 * t * steeper) - slip * (bend + t * steeper)
+                self.rows[KNOTS * self.bounds + j] = self.scale * (there + s * turned)
+            self._bound(self.borders[2 * place], self.borders[2 * place + 1])
+
+    def bound_end(self, ahead: float) -> None:
+        """Bound the offset `ahead` [m] of the path's end to zero."""
+        for j in range(KNOTS):
+            self.rows[KNOTS * self.bounds + j] = self.scale * (ahead * self.slopes[KNOTS * INTERVALS + j])
+        self._bound(0.0, 0.0)
+
+    def _bound(self, left: float, right: float) -> None:
+        self.lefts[self.bounds], self.rights[self.bounds] = left, right
+        self.bounds += 1
+
+    def solved(self) -> array[float]:
         """Return the values of y'' at the knots, in units of the bend of cost 1."""
-        z = [0.0] * (INTERVALS + 1)
-        cost = self._cost(z)
+        z, nearer, step = _zeros(KNOTS), _zeros(KNOTS), _zeros(KNOTS)
+        slope, hessian = _zeros(KNOTS), _zeros(KNOTS * KNOTS)
+        cost = self.cost(z)
         for _ in range(MOST_STEPS):
-            slope, hessian = self._derivatives(z)
-            step = solution(hessian, [-value for value in slope])
-            share, nearer, less = 1.0, z, cost
+            self.derive(z, slope, hessian)
+            for i in range(KNOTS):
+                step[i] = -slope[i]
+            solve(hessian, step, KNOTS)
+            share, less = 1.0, cost
             while share > 1e-6:
-                nearer = [a + share * b for a, b in zip(z, step, strict=True)]
-                less = self._cost(nearer)
+                for i in range(KNOTS):
+                    nearer[i] = z[i] + share * step[i]
+                less = self.cost(nearer)
                 if less < cost:
                     break
                 share *= 0.5
             if not less < cost:
                 break
             gained = cost - less
-            z, cost = nearer, less
+            cost = less
+            for i in range(KNOTS):
+                z[i] = nearer[i]
             if gained < CLOSE * cost:
                 break
         return z
 
-    def _cost(self, z: Sequence[float]) -> float:
+    def cost(self, z: array[float]) -> float:
+        """Return the cost of y''."""
         total = 0.0
-        for k, here, further in self.demands:
-            force = here * z[k] + further * z[k + 1]
+        for m in range(4 * INTERVALS):
+            force = self._force(m, z)
             total += self.weight * (force**POWER / POWER + 0.5 * CALM * force * force)
-        for row, bound in zip(self.rows, self.bounds, strict=True):
-            lacking = dot(row, z) - bound
-            if lacking > 0.0:
-                total += 0.5 * lacking * lacking
+        for bound in range(self.bounds):
+            place = self._place(bound, z)
+            for lacking in (place - self.lefts[bound], -place - self.rights[bound]):
+                if lacking > 0.0:
+                    total += 0.5 * lacking * lacking
         return total
 
-    def _derivatives(self, z: Sequence[float]) -> tuple[list[float], Rows]:
-        """Return the first and second derivatives of the cost."""
-        slope = [0.0] * len(z)
-        hessian = [[0.0] * len(z) for _ in z]
-        for k, here, further in self.demands:
-            force = here * z[k] + further * z[k + 1]
+    def derive(self, z: array[float], slope: array[float], hessian: array[float]) -> None:
+        """Compute the first and second derivatives of the cost."""
+        for i in range(KNOTS):
+            slope[i] = 0.0
+            for j in range(KNOTS):
+                hessian[KNOTS * i + j] = 0.0
+        for m in range(4 * INTERVALS):
+            force, here, further = self._force(m, z), self.here[m], self.further[m]
             first = self.weight * (force ** (POWER - 1) + CALM * force)
             second = self.weight * ((POWER - 1) * force ** (POWER - 2) + CALM)
+            k = m // 4
             slope[k] += here * first
             slope[k + 1] += further * first
-            hessian[k][k] += here * here * second
-            hessian[k + 1][k + 1] += further * further * second
-            hessian[k][k + 1] += here * further * second
-            hessian[k + 1][k] += here * further * second
-        for row, bound in zip(self.rows, self.bounds, strict=True):
-            lacking = dot(row, z) - bound
-            if lacking > 0.0:
-                for i, value in enumerate(row):
-                    if value:
-                        slope[i] += lacking * value
-                        hessian[i] = [a + value * b for a, b in zip(hessian[i], row, strict=True)]
-        return slope, hessian
+            hessian[KNOTS * k + k] += here * here * second
+            hessian[KNOTS * (k + 1) + k + 1] += further * further * second
+            hessian[KNOTS * k + k + 1] += here * further * second
+            hessian[KNOTS * (k + 1) + k] += here * further * second
+        for bound in range(self.bounds):
+            place = self._place(bound, z)
+            for side, limit in ((1.0, self.lefts[bound]), (-1.0, self.rights[bound])):
+                lacking = side * place - limit
+                if lacking > 0.0:
+                    self._push(lacking * side, bound, slope, hessian)
+
+    def _push(self, lacking: float, bound: int, slope: array[float], hessian: array[float]) -> None:
+        """Add the derivatives of the cost of a lack of margin, negative on the right."""
+        for i in range(KNOTS):
+            value = self.rows[KNOTS * bound + i]
+            if value:
+                slope[i] += lacking * value
+                for j in range(KNOTS):
+                    hessian[KNOTS * i + j] += value * self.rows[KNOTS * bound + j]
+
+    def _force(self, m: int, z: array[float]) -> float:
+        return self.here[m] * z[m // 4] + self.further[m] * z[m // 4 + 1]
+
+    def _place(self, bound: int, z: array[float]) -> float:
+        total = 0.0
+        for i in range(KNOTS):
+            total += self.rows[KNOTS * bound + i] * z[i]
+        return total
+
+
+def _zeros(count: int) -> array[float]:
+    return array("d", [0.0] * count)

@@ -46,43 +46,51 @@ def discrete(a: Sequence[Sequence[float]], b: Sequence[float], h: float) -> tupl
     return [row[:n] for row in total[:n]], [row[n] for row in total[:n]]
 
 
-def tracking_gains(
-    phi: Rows, gamma: Sequence[float], c: Sequence[float], *, weight: float, steps: int
-) -> tuple[list[float], list[float]]:
-    """Return K, with an element per state, and f_1 to f_steps.
+class TrackingLaw:
+    """Optimal input for a known target: u = -K x + sum of f_j target(k + j).
 
     Args:
         phi, gamma: from `discrete`.
         c: output vector, y = c' x.
         weight: w, in squares of the input over those of the target.
-        steps: number of steps for which the target is known.
+
+    Attributes:
+        gains: K, with an element per state.
+        line: w c, from which the gains of the target follow one after the other.
     """
-    aim = [[weight * x * y for y in c] for x in c]
-    across = [list(column) for column in zip(*phi, strict=True)]
-    p = aim
-    gains = [0.0] * len(c)
-    closed, s = phi, 1.0
-    for _ in range(LONGEST):
-        carried = _applied(p, gamma)
-        s = 1.0 + dot(gamma, carried)
-        before, gains = gains, [value / s for value in _applied(across, carried)]
-        closed = [
-            [value - g * k for value, k in zip(row, gains, strict=True)]
-            for row, g in zip(phi, gamma, strict=True)
-        ]
-        p = [
-            [x + y for x, y in zip(row, addend, strict=True)]
-            for row, addend in zip(aim, product(across, product(p, closed)), strict=True)
-        ]
-        if max(abs(x - y) for x, y in zip(before, gains, strict=True)) <= STILL * max(map(abs, gains)):
-            break
-    back = [list(column) for column in zip(*closed, strict=True)]
-    line = [weight * value for value in c]
-    ahead = []
-    for _ in range(steps):
-        ahead.append(dot(gamma, line) / s)
-        line = _applied(back, line)
-    return gains, ahead
+
+    def __init__(self, phi: Rows, gamma: Sequence[float], c: Sequence[float], weight: float) -> None:
+        aim = [[weight * x * y for y in c] for x in c]
+        across = [list(column) for column in zip(*phi, strict=True)]
+        p = aim
+        gains = [0.0] * len(c)
+        closed, s = phi, 1.0
+        for _ in range(LONGEST):
+            carried = _applied(p, gamma)
+            s = 1.0 + dot(gamma, carried)
+            before, gains = gains, [value / s for value in _applied(across, carried)]
+            closed = [
+                [value - g * k for value, k in zip(row, gains, strict=True)]
+                for row, g in zip(phi, gamma, strict=True)
+            ]
+            p = [
+                [x + y for x, y in zip(row, addend, strict=True)]
+                for row, addend in zip(aim, product(across, product(p, closed)), strict=True)
+            ]
+            if max(abs(x - y) for x, y in zip(before, gains, strict=True)) <= STILL * max(map(abs, gains)):
+                break
+        self.gains = gains
+        self.line = [weight * value for value in c]
+        self._gamma, self._s = gamma, s
+        self._back = [list(column) for column in zip(*closed, strict=True)]
+
+    def gain_ahead(self, line: Sequence[float]) -> float:
+        """Return f_j for the line of the step j."""
+        return dot(self._gamma, line) / self._s
+
+    def further(self, line: Sequence[float]) -> list[float]:
+        """Return the line of the next step, (Phi - Gamma K)' line."""
+        return _applied(self._back, line)
 
 
 def product(left: Sequence[Sequence[float]], right: Sequence[Sequence[float]]) -> Rows:

@@ -16,8 +16,6 @@ Model Predictive Control System Design and Implementation Using MATLAB, 2009, se
 
 from collections.abc import Sequence
 
-from .sums import dot
-
 Rows = list[list[float]]
 
 SWEEPS = 500
@@ -41,25 +39,6 @@ def inverse(h: Sequence[Sequence[float]]) -> Rows:
             if k != i and (factor := rows[k][i]):
                 rows[k] = [value - factor * above for value, above in zip(rows[k], rows[i], strict=True)]
     return [row[n:] for row in rows]
-
-
-def solution(h: Sequence[Sequence[float]], g: Sequence[float]) -> list[float]:
-    """Return z with H z = g, H symmetric and positive definite, by Gaussian elimination.
-
-    Raises:
-        ZeroDivisionError: a pivot is zero, so H is not positive definite.
-    """
-    rows = [[*row[i:], value] for i, (row, value) in enumerate(zip(h, g, strict=True))]  # upper triangle
-    n = len(rows)
-    for i, top in enumerate(rows):
-        for k in range(1, n - i):
-            if factor := top[k] / top[0]:
-                below = rows[i + k]
-                rows[i + k] = [a - factor * b for a, b in zip(below, top[k:], strict=True)]
-    z: list[float] = []
-    for top in reversed(rows):
-        z.insert(0, (top[-1] - dot(top[1:-1], z)) / top[0])
-    return z
 
 
 def multipliers(p: Sequence[Sequence[float]], d: Sequence[float]) -> list[float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from array import array
 
 import numpy as np
 import pytest
@@ -18,7 +19,8 @@ from components.drivers.optimal_preview import (
 )
 from components.driving import lane_path
 from components.driving.track import Track
-from components.mathematics.preview_control import discrete, tracking_gains
+from components.mathematics.linear_equations import solve
+from components.mathematics.preview_control import TrackingLaw, discrete
 from vocabulary.gravity import G
 
 from .stand import Stand
@@ -43,7 +45,11 @@ def test_held_inputs_are_carried_as_by_the_matrix_exponential(v, h):
 def test_the_gains_are_those_of_the_riccati_equation_and_of_the_best_inputs_for_a_known_path():
     phi, gamma = discrete(*lane_dynamics(CAR, 17.0, 17.0), 0.03)
     weight, steps = 0.02**-2, 60
-    gains, ahead = tracking_gains(phi, gamma, FIRST, weight=weight, steps=steps)
+    law = TrackingLaw(phi, gamma, FIRST, weight)
+    gains, ahead, line = law.gains, [], law.line
+    for _ in range(steps):
+        ahead.append(law.gain_ahead(line))
+        line = law.further(line)
     a, b = np.array(phi), np.array(gamma).reshape(5, 1)
     p = solve_discrete_are(a, b, np.diag([weight, 0, 0, 0, 0]), np.eye(1))
     np.testing.assert_allclose(gains, (np.linalg.solve(1 + b.T @ p @ b, b.T @ p @ a)).ravel(), rtol=1e-6)
@@ -66,23 +72,41 @@ def test_the_gains_are_those_of_the_riccati_equation_and_of_the_best_inputs_for_
     assert -np.dot(gains, start) + np.dot(ahead, target[:steps]) == pytest.approx(best, rel=1e-5)
 
 
+@pytest.mark.parametrize("n", [1, 5, 40])
+def test_linear_equations_have_the_solution_of_numpy(n):
+    rng = np.random.default_rng(n)
+    a = rng.normal(size=(n, n))
+    h, g = a @ a.T + np.eye(n), rng.normal(size=n)
+    z = array("d", g)
+    solve(array("d", h.ravel()), z, n)
+    np.testing.assert_allclose(z, np.linalg.solve(h, g), rtol=1e-9)
+
+
+def test_a_matrix_with_a_pivot_of_zero_is_an_error():
+    with pytest.raises(ZeroDivisionError):
+        solve(array("d", [0.0, 0.0, 0.0, 1.0]), array("d", [1.0, 1.0]), 2)
+
+
 @pytest.mark.parametrize("more", [{}, PART_2], ids=["part 1", "part 2"])
 def test_no_other_path_costs_less(more, monkeypatch):
     """The cost is convex, so where its slope by finite differences is zero it is least."""
     seen = []
-    solved = lane_path._Program.solved
+    solved = lane_path.PathProgram.solved
     monkeypatch.setattr(
-        lane_path._Program, "solved", lambda self: seen.append((self, solved(self))) or seen[0][1]
+        lane_path.PathProgram, "solved", lambda self: seen.append((self, solved(self))) or seen[0][1]
     )
     planned.__wrapped__(P(target_speed=17.0, **more))
     (program, z), h = seen[0], 1e-5
     slopes = []
     for k in range(len(z)):
         up, down = ([v + sign * h * (i == k) for i, v in enumerate(z)] for sign in (1.0, -1.0))
-        slopes.append((program._cost(up) - program._cost(down)) / (2 * h))
-    typical = max(abs(v) for v in program._derivatives([0.0] * len(z))[0])
-    assert max(map(abs, slopes)) < 1e-3 * typical
-    assert np.linalg.eigvalsh(program._derivatives(z)[1]).min() > 0.0
+        slopes.append((program.cost(up) - program.cost(down)) / (2 * h))
+    n = len(z)
+    slope, hessian = array("d", [0.0] * n), array("d", [0.0] * (n * n))
+    program.derive([0.0] * n, slope, hessian)
+    assert max(map(abs, slopes)) < 1e-3 * max(map(abs, slope))
+    program.derive(z, slope, hessian)
+    assert np.linalg.eigvalsh(np.reshape(hessian, (n, n))).min() > 0.0
     assert max(map(abs, z)) > 0.1  # there is something to be done
 
 

@@ -58,9 +58,9 @@ def needed(*binaries: Path) -> dict[str, str]:
     return {Path(match[1]).name: match[2] or match[1] for match in found if match}
 
 
-def test_all_units_but_three_are_native(native):
+def test_all_units_but_two_are_native(native):
     python = set(find_components()) - {Fmu(folder).name for folder in native}
-    assert python <= {"controller_mpc", "driver_optimal_preview", "road_patchwork"}
+    assert python <= {"controller_mpc", "road_patchwork"}
 
 
 def test_native_libraries_need_libc_and_libm_alone(libraries):
@@ -104,7 +104,7 @@ def test_every_native_unit_runs_where_there_is_nothing_but_libc_and_libm(
         done = run(folder)
         assert (done.returncode, done.stderr) == (0, ""), folder
         assert host_outputs(done, folder) == expected_outputs(folder)
-    done = run(unpack(archive("driver_optimal_preview")))
+    done = run(unpack(archive("controller_mpc")))
     assert done.returncode == 3
     assert golden_in(done.stderr)
 
