@@ -45,6 +45,8 @@ _OPERATORS = {
     operator.mod: "%", operator.pow: "**",
 }  # fmt: skip
 
+MOST_IN_ARRAY = 4096
+"""Largest number of numbers in an array; chosen: it is on the stack."""
 
 _PURE = (set, frozenset, str, repr, ord, chr, divmod, pow, format, float, int, bool, tuple, complex, range)
 
@@ -187,15 +189,23 @@ class BuiltIn(OfNumbers):
         return len(self.read(value) if isinstance(value, Box) else value)
 
     def _python_array(self, kind: Any, values: Any = ()) -> Array:
-        items = self.items(values)
-        if kind != "d" or not items:
+        each = self.each(values)
+        if kind != "d" or not each.count:
             raise Refused("an array other than one of real numbers")
-        made = Array(ir.Array(f"a{self.new(ir.REAL).name}", len(items)))
+        if each.count > MOST_IN_ARRAY:
+            raise Refused(f"an array of more than {MOST_IN_ARRAY:,} numbers")
+        made = Array(ir.Array(f"a{self.new(ir.REAL).name}", each.count))
+        if isinstance(values, Array):
+            self.for_each_index(
+                each.count, lambda k: self.set_array_item(made, k, self.array_item(values, k))
+            )
+            return made
+        items = [each.item(k) for k in range(each.count)]
         if len(items) > UNROLLED and all(same(x, items[0]) for x in items):
             self.for_each_index(len(items), lambda k: self.set_array_item(made, k, items[0]))
-        else:
-            for k, x in enumerate(items):
-                self.set_array_item(made, k, x)
+            return made
+        for k, x in enumerate(items):
+            self.set_array_item(made, k, x)
         return made
 
     def _python_bool(self, value: Any) -> Any:

@@ -169,7 +169,7 @@ class _Function:
             for s in ir.every(self.function.body)
             if isinstance(s, ir.Digits)
         ]
-        arrays = dict.fromkeys(s.array for s in ir.every(self.function.body) if isinstance(s, ir.Put))
+        arrays = ir.arrays_of(self.function.body)
         texts += [f"    double {array.name}[{array.length}];" for array in arrays]
         return [head, "{", *reads, *declared, *texts, *self.tables, *body, *made, "    return 0;", "}", ""]
 

@@ -217,6 +217,11 @@ def every(body: Sequence[Statement]) -> Iterator[Statement]:
             yield from every(s.body)
 
 
+def arrays_of(body: Sequence[Statement]) -> list[Array]:
+    """Return the arrays that statements fill."""
+    return list(dict.fromkeys(s.array for s in every(body) if isinstance(s, Put)))
+
+
 def type_of(value: Operand) -> str:
     """Return the type of a variable or constant."""
     if isinstance(value, Var):

@@ -114,6 +114,7 @@ class Outlining(Calling):
         if (
             sum(1 for _ in ir.every(path.out)) < SHORTEST
             or len(results) > MOST_RESULTS
+            or ir.arrays_of(path.out)  # they share the stack of the method
             or _holds(value, set(map(id, boxes)), self)
         ):
             return None

@@ -25,6 +25,8 @@ WIDEST = 40
 """Largest number of evaluations of a step until the shape of the state converges."""
 MOST_NUMBERS = 5000
 """Largest number of numbers in a state of fixed shape; chosen: each is a variable in C."""
+MOST_IN_ARRAYS = 32_768
+"""Largest number of numbers in the arrays of a function; chosen: they take 256 KiB of its stack."""
 STACK = 512 * 1024 * 1024
 """Stack of the translating thread [bytes], since nested calls are evaluated by nested calls."""
 
@@ -210,6 +212,10 @@ class _Specialising:
             [change for change, leaf in zip(changes, leaves, strict=True) if change[1] is not leaf],
         )
         program.functions["output"] = self._output(state, leaves, fixed)
+        for name, function in program.functions.items():
+            if sum(array.length for array in ir.arrays_of(function.body)) > MOST_IN_ARRAYS:
+                text = f"arrays of more than {MOST_IN_ARRAYS:,} numbers together"
+                raise Refused(text, self._line_of(name))
         program.rings = [max(1, len(list(types_of(g.item)))) for g in self.growing.values()]
         for g in self.growing.values():
             if ir.WORD in types_of(g.item):

@@ -113,6 +113,33 @@ REFUSED = {
         "an integer of 64 bits or another number",
         3,
     ),
+    "an array that is kept": (
+        "def start(self, t, u):\n    self.a = array('d', u)\ndef output(self, t, u):\n    return (self.a[0],)",
+        "an array that is passed on between steps",
+        1,
+    ),
+    "an array that is passed on between passes": (
+        "def output(self, t, u):\n    a = array('d', u)\n    for k in range(self.p.count):\n"
+        "        a = array('d', a)\n    return (a[0],)",
+        "an array that is passed on between steps or passes of a loop",
+        3,
+    ),
+    "a long array": (
+        "def output(self, t, u):\n    return (array('d', [0.0] * 5000)[int(u[0])],)",
+        "an array of more than 4,096 numbers",
+        2,
+    ),
+    "many long arrays": (
+        "def output(self, t, u):\n    a = [array('d', [0.5] * 4000) for k in range(10)]\n"
+        "    return (sum(x[int(u[0])] for x in a),)",
+        "arrays of more than 32,768 numbers together",
+        1,
+    ),
+    "arrays that are compared": (
+        "def output(self, t, u):\n    return (array('d', u) == array('d', u),)",
+        "comparing arrays",
+        2,
+    ),
     "a generator": (
         "def output(self, t, u):\n    return (sum(self.halves(u)),)\n"
         "def halves(self, u):\n    for x in u:\n        yield 0.5 * x",
