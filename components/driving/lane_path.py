@@ -34,6 +34,7 @@ LEAD, TAIL = 15.0, 15.0
 INTERVALS = 40
 """Number of intervals between knots. Chosen: with half of them the largest force is 2 % higher."""
 KNOTS = INTERVALS + 1
+"""Number of knots."""
 POWER = 8
 MOST_STEPS = 60
 """Largest number of steps of Newton's method; chosen: twice what the standard's tracks need."""
@@ -48,8 +49,8 @@ CONES = 4
 """Intervals along a lane; the corners of the body keep the margin at their ends."""
 POINTS = 5
 """Points along the side of the body that keep the margin at the outer cones of a lane."""
-MOST_PLACES = 3 * (CONES + 1) * POINTS
-"""Places of points that are kept between the borders of three lanes."""
+MOST_POINTS = 3 * (CONES + 1) * POINTS
+"""Largest number of points that are kept between the borders of three lanes."""
 
 
 class LanePath:
@@ -124,8 +125,8 @@ class LanePath:
                     s = front
                 else:
                     continue
-                place = (number * (CONES + 1) + i) * POINTS + k
-                program.add_point(place, cone - s - self.start, s, left, right)
+                point = (number * (CONES + 1) + i) * POINTS + k
+                program.add_point(point, cone - s - self.start, s, left, right)
 
 
 class PathProgram:
@@ -143,13 +144,11 @@ class PathProgram:
         self.spacing, self.scale = spacing, scale
         self.weight = spacing / 4.0  # four forces per interval
         self.here, self.further = _zeros(4 * INTERVALS), _zeros(4 * INTERVALS)  # force per y''(k), y''(k + 1)
-        self.xs, self.offsets = _zeros(MOST_PLACES), _zeros(MOST_PLACES)  # x and s of the points
-        self.borders = array(
-            "d", [inf] * (2 * MOST_PLACES)
-        )  # on both sides; infinite where there is no point
+        self.xs, self.offsets = _zeros(MOST_POINTS), _zeros(MOST_POINTS)  # x and s of the points
+        self.borders = array("d", [inf] * (2 * MOST_POINTS))  # left, right; infinite if a point is not added
         self.bounds = 0
-        self.lefts, self.rights = _zeros(MOST_PLACES + 1), _zeros(MOST_PLACES + 1)
-        self.rows = _zeros((MOST_PLACES + 1) * KNOTS)
+        self.lefts, self.rights = _zeros(MOST_POINTS + 1), _zeros(MOST_POINTS + 1)
+        self.rows = _zeros((MOST_POINTS + 1) * KNOTS)
         self.slopes, self.places = _zeros(KNOTS * KNOTS), _zeros(KNOTS * KNOTS)  # y' and y per y'', at knots
         h = spacing
         for k in range(INTERVALS):
@@ -168,23 +167,23 @@ class PathProgram:
                 self.here[4 * k + i] = ease * (1.0 - end - lever / self.spacing)
                 self.further[4 * k + i] = ease * (end + lever / self.spacing)
 
-    def add_point(self, place: int, x: float, s: float, left: float, right: float) -> None:
+    def add_point(self, point: int, x: float, s: float, left: float, right: float) -> None:
         """Add a point s [m] ahead of the centre of mass, where that is x [m] from the first knot.
 
         Args:
-            place: index of the point; those of other points differ.
+            point: its number, below `MOST_POINTS`.
             x, s: the point.
             left, right: bounds of its y and -y, in units of s_0.
         """
-        self.xs[place], self.offsets[place] = x, s
-        self.borders[2 * place], self.borders[2 * place + 1] = left, right
+        self.xs[point], self.offsets[point] = x, s
+        self.borders[2 * point], self.borders[2 * point + 1] = left, right
 
     def bound_points(self, slip: float) -> None:
         """Bound y + s (y' - slip y'') of all points."""
-        for place in range(MOST_PLACES):
-            if self.borders[2 * place] == inf:
+        for point in range(MOST_POINTS):
+            if self.borders[2 * point] == inf:
                 continue
-            x, s = self.xs[place], self.offsets[place]
+            x, s = self.xs[point], self.offsets[point]
             k = min(max(int(x / self.spacing), 0), INTERVALS - 1)
             t = x - k * self.spacing
             for j in range(KNOTS):
@@ -194,7 +193,7 @@ class PathProgram:
                 there = y + t * (slope + t * (0.5 * bend + t * steeper / 6.0))
                 turned = slope + t * (bend + 0.5 * t * steeper) - slip * (bend + t * steeper)
                 self.rows[KNOTS * self.bounds + j] = self.scale * (there + s * turned)
-            self._bound(self.borders[2 * place], self.borders[2 * place + 1])
+            self._bound(self.borders[2 * point], self.borders[2 * point + 1])
 
     def bound_end(self, ahead: float) -> None:
         """Bound the offset `ahead` [m] of the path's end to zero."""
