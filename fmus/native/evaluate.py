@@ -130,30 +130,29 @@ class Evaluation(Places):
     def _name(self, node: ast.Name) -> Any:
         call = self.calls[-1]
         frame: Frame | None = call.frame
-        outside = False
+        outside = free = False
         while frame is not None:
             value = self.read(frame).get(node.id, UNSET)
             if value is not UNSET:
                 if outside and node.id in call.own:
                     raise Refused(f"{node.id} is read before the inner function sets it")
-                return self.present(value, "UnboundLocalError", node.id)
+                return self.present(value, *_unset(node.id, free))
             outside = outside or frame is call.base
+            free = free or not frame.inlined
             frame = frame.parent
         for names in (call.source.cells, call.source.names, vars(builtins)):
             if node.id in names:
                 return names[node.id]
         raise Refused(f"{node.id} has no value here")
 
-    def present(self, value: Any, kind: str, name: str) -> Any:
-        """Return a value that is set, or raise like Python where it is not."""
+    def present(self, value: Any, kind: str, text: str) -> Any:
+        """Return a value that is set, or raise an exception where it is not."""
         if not isinstance(value, Union) or not any(x is UNSET for x in value.alternatives):
             return value
-        text = f"cannot access local variable '{name}' where it is not associated with a value"
 
         def use(x: Any) -> Any:
             if x is UNSET:
-                self.fail(kind, text if kind == "UnboundLocalError" else name)
-                raise Unreachable
+                self.end(kind, text)
             return x
 
         return self.by_form(value, use)
@@ -415,6 +414,13 @@ class Evaluation(Places):
 
     def _whole(self, value: Any) -> Any:
         return self.loaded(value) if isinstance(value, Picked) else value
+
+
+def _unset(name: str, free: bool) -> tuple[str, str]:
+    """Return Python's exception for a name without value, of a function itself or of the one around it."""
+    kind = "free" if free else "local"
+    text = f"cannot access {kind} variable '{name}' where it is not associated with a value"
+    return ("NameError", f"{text} in enclosing scope") if free else ("UnboundLocalError", text)
 
 
 def _first_line(node: ast.AST) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
@@ -50,18 +51,22 @@ class Operating(Evaluation):
     ) -> list[Any]:
         call, kinds = self.calls[-1], kinds_within(element)
         together = bool(kinds[ast.Lambda] or kinds[ast.GeneratorExp])
-        return [self._within(call, frame, make) for frame in self._frames(generators, together)]
+        frames = self._frames(generators, together, inlined=sys.version_info >= (3, 12))
+        return [self._within(call, frame, make) for frame in frames]
 
-    def _frames(self, generators: list[ast.comprehension], together: bool) -> Iterator[Frame]:
+    def _frames(
+        self, generators: list[ast.comprehension], together: bool, inlined: bool = False
+    ) -> Iterator[Frame]:
         """Yield the names of each element of a comprehension.
 
         Args:
             generators: its loops.
             together: whether the elements share their names, so that a function made by one of them sees
                 those of the last; otherwise elements can be evaluated later.
+            inlined: see `Frame`.
         """
         call = self.calls[-1]
-        shared = Frame({}, call.frame)
+        shared = Frame({}, call.frame, inlined)
 
         def go(k: int, frame: Frame) -> Iterator[Frame]:
             if k == len(generators):
@@ -69,7 +74,7 @@ class Operating(Evaluation):
                 return
             each = self.each(self._within(call, frame, lambda: self.evaluate(generators[k].iter)))
             for i in range(each.count):
-                inner = shared if together else Frame({}, frame)
+                inner = shared if together else Frame({}, frame, inlined)
                 if self._within(call, inner, lambda: self._passes(generators[k], each.item(i))):  # noqa: B023
                     yield from go(k + 1, inner)
 

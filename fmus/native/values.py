@@ -66,12 +66,16 @@ class Box:
 
 
 class Frame(Box):
-    """Names of a call, and those of the enclosing function."""
+    """Names of a call, and those of the enclosing function.
 
-    def __init__(self, names: dict[str, Any], parent: Frame | None = None) -> None:
+    Attributes:
+        inlined: whether they are those of a comprehension that Python evaluates in the enclosing function.
+    """
+
+    def __init__(self, names: dict[str, Any], parent: Frame | None = None, inlined: bool = False) -> None:
         super().__init__()
         self.slots = names
-        self.parent = parent
+        self.parent, self.inlined = parent, inlined
 
 
 class Instance(Box):

@@ -134,6 +134,19 @@ def output(self, t, u):
         total += 100.0
     return (total,)
 """,
+    "names without a value, in a function and in those inside it": """
+def output(self, t, u):
+    for x in u:
+        if x > 0.9:
+            y = x
+    if u[0] > 0.5:
+        return (sum(y * k for k in (1.0, 2.0)),)
+    if u[0] > 0.0:
+        return (sum([y * k for k in (1.0, 2.0)]),)
+    if u[0] > -0.5:
+        return (y,)
+    return ((lambda z: z + y)(0.5),)
+""",
     "an array that loops of many passes fill": """
 def configure(self):
     n = 20

@@ -114,7 +114,8 @@ REFUSED = {
         3,
     ),
     "an array that is kept": (
-        "def start(self, t, u):\n    self.a = array('d', u)\ndef output(self, t, u):\n    return (self.a[0],)",
+        "def start(self, t, u):\n    self.a = array('d', u)\n"
+        "def output(self, t, u):\n    return (self.a[0],)",
         "an array that is passed on between steps",
         1,
     ),
