@@ -219,7 +219,7 @@ def stale_fmus(fmus: Iterable[Fmu]) -> list[Diagnostic]:
     return [
         Diagnostic(
             "fmu-out-of-date",
-            f"{path.name} is out of date with {source or 'its sources'}; 'yawbench build' rebuilds it",
+            f"{path.name} is out of date with {source or 'its sources'}; build it again",
             "warning",
         )
         for path, source in stale.items()
