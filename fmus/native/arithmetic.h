@@ -229,7 +229,7 @@ MAYBE_UNUSED static double sorted_item(int place, int ties, int n, const double 
     return order[place];
 }
 
-/* Index in `count` items, counted from the beginning; -1 if it is out of range, -2 if it is none in Python. */
+/* Index in `count` items, counted from the beginning; -1 if it is out of range, -2 if it is too large for Python. */
 MAYBE_UNUSED static double place_in(double index, double count)
 {
     if (!(index >= -0x1p63 && index < 0x1p63)) {
@@ -246,7 +246,7 @@ typedef struct {
     size_t first, count, capacity;
 } List;
 
-MAYBE_UNUSED static const double *item(const List *list, int width, double index)
+MAYBE_UNUSED static double *item(const List *list, int width, double index)
 {
     size_t place = list->first + (size_t)index;
     return list->items + (place < list->capacity ? place : place - list->capacity) * (size_t)width;
@@ -268,14 +268,13 @@ MAYBE_UNUSED static int push(List *list, int width, const void *numbers)
         free(list->items);
         *list = (List){items, 0, list->count, capacity};
     }
-    size_t place = list->first + list->count++;
-    memcpy(list->items + (place < list->capacity ? place : place - list->capacity) * (size_t)width, numbers, size);
+    memcpy(item(list, width, (double)list->count++), numbers, size);
     return 1;
 }
 
 MAYBE_UNUSED static void replace(List *list, double index, int width, const double *numbers)
 {
-    memcpy(list->items + (item(list, width, index) - list->items), numbers, (size_t)width * sizeof *numbers);
+    memcpy(item(list, width, index), numbers, (size_t)width * sizeof *numbers);
 }
 
 MAYBE_UNUSED static void drop(List *list, int every)

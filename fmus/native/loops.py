@@ -45,8 +45,8 @@ class Looping(Execution):
             ring = over
             over = Span(0, self.ring_length(ring), lambda k: self.ring_item(ring, k), ring)
         if isinstance(over, Array) and over.memory.length > UNROLLED:
-            array = over
-            over = Span(0, array.memory.length, lambda k: self.array_item(array, k))
+            each = self.each(over)
+            over = Span(0, each.count, each.item)
         if isinstance(over, range) and len(over) > UNROLLED and over.step == 1:
             over = Span(over.start, over.stop, lambda k: k)
         if isinstance(over, Bytes):
