@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import functools
-import re
 import sys
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
@@ -169,50 +168,3 @@ def test_no_module_imports_itself_by_way_of_others():
     files = modules()
     sorter = TopologicalSorter({name: needs(name, files) for name in files})
     sorter.prepare()  # a CycleError names the circle
-
-
-def test_modules_are_subjects_of_natural_size():
-    lines = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in SOURCES}
-    imports = sum(
-        (node.end_lineno or node.lineno) - node.lineno + 1
-        for path in SOURCES
-        for node in nodes_of(path)
-        if isinstance(node, (ast.Import, ast.ImportFrom))
-    )
-    assert len(lines) <= 150
-    assert {path: number for path, number in lines.items() if number > 450} == {}
-    assert imports <= 0.075 * sum(lines.values())
-
-
-EMPTY = {"one", "found", "given", "said", "told", "asked"}
-"""Names that say nothing about what they name."""
-
-
-def test_no_name_is_an_empty_word():
-    names = [
-        (path.relative_to(ROOT).as_posix(), node.lineno, name)
-        for path in (path for room in PRODUCT for path in (ROOT / room).rglob("*.py"))
-        for node in nodes_of(path)
-        if isinstance(node, (ast.Name, ast.arg, ast.Attribute))
-        for name in [getattr(node, "id", None) or getattr(node, "arg", None) or getattr(node, "attr", None)]
-        if name in EMPTY
-    ]
-    assert names == []
-
-
-RIDDLES = re.compile(r"(What|How|Where|Who|Why|When|Which|Of) ")
-"""Beginnings of sentences that say something about a thing, not what it is."""
-TEXTS = re.compile(rf"[\"'](\\\n)?\s*{RIDDLES.pattern}")
-"""Such a beginning in a file; only few have one, and reading all takes seconds."""
-
-
-def test_docstrings_say_what_a_thing_is():
-    riddles = [
-        (path.relative_to(ROOT).as_posix(), node.value.lineno, node.value.value)
-        for path in (path for room in (*PRODUCT, "docs", "tests") for path in (ROOT / room).rglob("*.py"))
-        if TEXTS.search(path.read_text(encoding="utf-8"))
-        for node in nodes_of(path)
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
-        if isinstance(node.value.value, str) and RIDDLES.match(node.value.value.lstrip())
-    ]
-    assert riddles == []
