@@ -32,7 +32,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -52,8 +52,8 @@ from ..scenario import yaml_lines
 from ..scenario.quantities import convert, measure_of, parse_unit
 from ..scenario.schema_validation import StrictModel, quantities_in, text_in_unit, validate
 from ..scenario.yaml_lines import Document, KeyPath
+from .clocks import PACKED, UNIX, seconds_of
 from .recording_formats import (
-    SECOND,
     ColumnFile,
     FileColumn,
     numbers_in,
@@ -61,7 +61,19 @@ from .recording_formats import (
     refuse_implausible,
     unit_of,
 )
-from .segment import MOVED, POLES, LowPass, Segment, parts_of, resample, to_centre_of_mass, without_spikes
+from .segment import (
+    MOVED,
+    POLES,
+    LowPass,
+    Segment,
+    common_times,
+    parts_of,
+    resample,
+    to_centre_of_mass,
+    told_apart,
+    without_spikes,
+)
+from .units_of_loggers import unit_in_file
 
 MEASURABLE: dict[str, SignalEntry] = {name: entry for key, entry in SIGNALS.items() for name in wheels(key)}
 """Signals that a measurement may have, those of wheels one by one."""
@@ -75,8 +87,13 @@ OF_TEST = {"action_time": "s"}
 
 
 def _unit(text: str) -> str:
-    parse_unit(text)
+    if unit_in_file(text) is None:
+        parse_unit(text)  # says why not
     return text
+
+
+def _unit_of_time(text: str) -> str:
+    return text if text in (PACKED, *UNIX) else _unit(text)
 
 
 def _signal(name: str) -> str:
@@ -104,6 +121,7 @@ MeasurableName = Annotated[
     str, AfterValidator(_signal), WithJsonSchema({"type": "string", "enum": sorted(MEASURABLE)})
 ]
 UnitText = Annotated[str, AfterValidator(_unit)]
+UnitOfTime = Annotated[str, AfterValidator(_unit_of_time)]
 Quantity = Annotated[str, BeforeValidator(_quantity)]
 Length = Annotated[Quantity, WithJsonSchema(text_in_unit("m"))]
 Frequency = Annotated[Quantity, WithJsonSchema(text_in_unit("Hz"))]
@@ -122,7 +140,10 @@ class PositionSpec(StrictModel):
 class SignalSpec(StrictModel):
     """The column of a recording that holds a signal, and how the signal follows from it."""
 
-    column: str = Field(description="Its header, without the unit", min_length=1)
+    column: str = Field(
+        description="Its header, without the unit; of several alike 'speed#2', or 'speed#gps' by its source",
+        min_length=1,
+    )
     unit: UnitText | None = Field(None, description="Unit of its numbers; default: as the file says")
     sign: Literal[1, -1] = Field(1, description="-1: positive where ISO 8855 is negative")
     gain: float = Field(1.0, description="Factor of its numbers", gt=0)
@@ -137,7 +158,9 @@ class TimeSpec(StrictModel):
     """The column of times."""
 
     column: str = Field("time", min_length=1)
-    unit: UnitText | None = Field(None, description="Default: as the file says")
+    unit: UnitOfTime | None = Field(
+        None, description=f"Default: as the file says. {PACKED}: packed clock times; {UNIX[0]}: s or ms since 1970"
+    )
     repeated: Literal["refuse", "mean"] = Field(
         "refuse", description="Rows with the same time; mean: become a row of their means"
     )
@@ -164,7 +187,13 @@ AnyTime = Annotated[TimeSpec, BeforeValidator(_column, json_schema_input_type=st
 class MeasurementSpec(StrictModel):
     """Content of a measurement file."""
 
-    files: list[str] = Field(description="CSV, Parquet or MDF 4, relative to this file", min_length=1)
+    files: list[str] = Field(description="CSV, .vbo, Parquet or MDF, relative to this file", min_length=1)
+    header: int | None = Field(
+        None, description="Line of the names of columns, from 1; default: it is looked for", ge=1
+    )
+    decimal: Literal[".", ","] | None = Field(
+        None, description="Decimal mark of text files; default: as their numbers show"
+    )
     segments: SegmentsSpec | None = Field(None, description="Default: a segment per file")
     time: AnyTime = Field(
         TimeSpec(column="time", unit=None, repeated="refuse"), description="Column of times"
@@ -266,8 +295,15 @@ def load_measurement(path: Path | str, *, filtered: bool = True) -> Measurement:
     segments = [segment for number in range(len(spec.files)) for segment in reader.segments_of(number)]
     document.raise_errors()
     if filtered and reader.filter:
-        low = reader.filter
-        segments = [segment.filtered(low) for segment in segments]
+        for segment in segments:
+            if not reader.filter.cut_off < 0.5 * segment.rate:
+                document.report(
+                    ("filter", "low_pass"),
+                    f"must be below half of the rate of {segment.name}, {0.5 * segment.rate:.4g} Hz "
+                    f"(got {spec.filter.low_pass if spec.filter else ''})",
+                )
+        document.raise_errors()
+        segments = [segment.filtered(reader.filter) for segment in segments]
     digest = hashlib.sha256(path.read_bytes() + "".join(reader.hashes).encode()).hexdigest()
     return Measurement(
         path, tuple(segments), spec.car, spec.source, spec.licence, spec.date, reader.vehicle, reader.test,
@@ -347,39 +383,46 @@ class _Reader:
         try:
             path = Path(os.path.normpath(self.document.path.parent / name))
             with reading_series(path):
-                file = ColumnFile(path)
+                asked = [self.spec.time.column, *(signal.column for signal in self.spec.signals.values())]
+                file = ColumnFile(path, asked, header=self.spec.header, decimal=self.spec.decimal)
             self.hashes.append(file.sha256)
         except ValueError as error:
             self.document.report(key, str(error), code_of(error, "series-unreadable"))
             return
+        where = self.document.location(key)
+        self.notes += [
+            Diagnostic("recording-rows", f"{name}: {note}", "info", where) for note in file.notes
+        ]
         read = {signal: self._read(file, name, signal) for signal in self.spec.signals}
         labels = self._labels(file)
         if self.document.errors:
             return
-        times = next(iter(read.values()))[0]
-        parts: Iterable[tuple[str, slice]] = [("", slice(None))]
-        if self.spec.segments is not None:
-            if any(not np.array_equal(t, times) for t, _ in read.values()) or (
-                labels is not None and len(labels) != len(times)
-            ):
-                wrong = f"{name}: channels with times of their own cannot be divided into segments"
-                return self.document.report(("segments",), wrong, "measurement-time")
-            parts = parts_of(times, labels)
-        for label, rows in parts:
+        try:
+            parts = list(_parts(read, labels)) if self.spec.segments else [("", read)]
+        except ValueError as error:
+            return self.document.report(("segments",), f"{name}: {error}", "measurement-time")
+        for label, samples in parts:
             called = f"{name} {label}" if label else name
             try:
-                yield self._segment(called, {signal: (t[rows], x[rows]) for signal, (t, x) in read.items()})
+                yield self._segment(called, samples)
             except ValueError as error:
                 self.document.report(key, f"{called}: {error}", code_of(error, "measurement-time"))
 
-    def _read(self, file: ColumnFile, path: str, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return times [s] and values [SI] of a column; report their errors."""
-        spec, time, entry = self.spec.signals[name], self.spec.time, MEASURABLE[name]
+    def _times(self, file: ColumnFile, column: FileColumn) -> np.ndarray:
+        """Return the times of a column in s."""
+        time = self.spec.time
+        stated = time.unit or column.time_unit
+        if stated is None and column.times.dtype.kind not in "mMO":
+            stated = unit_of("time", time.column, None, "s")
+        return seconds_of(column.times, stated, f"time {time.column!r}")
+
+    def _read(self, file: ColumnFile, path: str, name: str) -> Samples:
+        """Return times [s] and values [SI] of a column, NaN where none was taken; report their errors."""
+        spec, entry = self.spec.signals[name], MEASURABLE[name]
         try:
-            column: FileColumn = file.column(spec.column, time.column)
+            column: FileColumn = file.column(spec.column, self.spec.time.column)
             unit = unit_of(name, spec.column, spec.unit or column.unit, entry.unit)
-            of_time = unit_of("time", time.column, time.unit or column.time_unit, "s")
-            times = numbers_in(column.times, of_time, SECOND, "s", "time")
+            times = self._times(file, column)
             what = f"column {spec.column!r}"
             values = numbers_in(column.values, unit, measure_of(entry.unit), entry.unit, what)
             values = spec.gain * (values - self.corrections[name].offset)
@@ -387,30 +430,34 @@ class _Reader:
         except ValueError as error:
             self.document.report(("signals", name), f"{path}: {error}", code_of(error, "series-unreadable"))
             return np.zeros(0), np.zeros(0)
-        return times, spec.sign * values if spec.sign < 0 else values
+        known = ~np.isnan(times)
+        return times[known], (spec.sign * values if spec.sign < 0 else values)[known]
 
-    def _labels(self, file: ColumnFile) -> np.ndarray | None:
-        """Return the column whose changes begin segments; None: they begin where time restarts."""
+    def _labels(self, file: ColumnFile) -> Samples | None:
+        """Return times and values of the column whose changes begin segments; None: where time restarts."""
         segments = self.spec.segments
         if segments is None or segments.by == BY_TIME:
             return None
         try:
-            return file.column(segments.by, self.spec.time.column).values
+            column = file.column(segments.by, self.spec.time.column)
+            times = self._times(file, column)
         except ValueError as error:
             self.document.report(("segments", "by"), str(error), "series-unreadable")
             return None
+        known = ~np.isnan(times)
+        return times[known], _held(column.values)[known]
 
-    def _segment(self, name: str, read: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Segment:
-        clocks = {}
+    def _segment(self, name: str, read: Mapping[str, Samples]) -> Segment:
+        recorded, clocks = {}, {}
         for signal, (times, values) in read.items():
-            times, values = _increasing(times, values, self.spec.time)
+            taken = ~np.isnan(values)
+            if np.count_nonzero(taken) < 2:
+                raise InvalidValueError(f"{signal} has less than two values", code="measurement-time")
+            times, values = _increasing(times[taken], values[taken], self.spec.time)
             correction = self.corrections[signal]
+            recorded[signal] = times
             clocks[signal] = times - correction.delay, without_spikes(times, values, correction.spikes)
-        time = next(iter(clocks.values()))[0] + next(iter(self.corrections.values())).delay
-        begin, end = max(t[0] for t, _ in clocks.values()), min(t[-1] for t, _ in clocks.values())
-        time = time[(time >= begin) & (time <= end)]
-        if time.size < 2:
-            raise ValueError("its signals have less than two samples at the same times")
+        time = common_times(recorded, {signal: times for signal, (times, _) in clocks.items()})
         signals = {
             signal: values if np.array_equal(t, time) else resample(time, t, values)
             for signal, (t, values) in clocks.items()
@@ -420,6 +467,46 @@ class _Reader:
             signal: correction.at for signal, correction in self.corrections.items() if any(correction.at)
         }
         return replace(segment, signals=to_centre_of_mass(segment, positions)) if positions else segment
+
+
+Samples = tuple[np.ndarray, np.ndarray]
+"""Times [s] and values of a signal."""
+
+
+def _held(labels: np.ndarray) -> np.ndarray:
+    """Return labels, those of cells without a value as in the row before; "-" ahead of the first."""
+    missing = np.array([label is None or label != label for label in labels], dtype=bool)
+    if not missing.any():
+        return labels
+    last = np.maximum.accumulate(np.where(missing, -1, np.arange(labels.size)))
+    held = labels[np.maximum(last, 0)].astype(object)
+    held[last < 0] = "-"
+    return held
+
+
+def _parts(
+    read: Mapping[str, Samples], labels: Samples | None
+) -> Iterator[tuple[str, Mapping[str, Samples]]]:
+    """Yield label and samples of the segments of a file.
+
+    Raises:
+        ValueError: signals with times of their own cannot be divided.
+    """
+    times = next(iter(read.values()))[0]
+    clock = times if labels is None else labels[0]
+    if all(np.array_equal(t, clock) for t, _ in read.values()):
+        for label, rows in parts_of(clock, None if labels is None else labels[1]):
+            yield label, {signal: (t[rows], x[rows]) for signal, (t, x) in read.items()}
+        return
+    if labels is None:
+        raise ValueError("channels with times of their own cannot be divided where time restarts")
+    if any(np.any(np.diff(t) < 0.0) for t in (clock, *(t for t, _ in read.values()))):
+        raise ValueError("channels with times of their own, which restart, cannot be divided")
+    for label, rows in parts_of(clock, labels[1], least=1):
+        begin = clock[rows.start] if rows.start else -np.inf
+        end = clock[rows.stop] if rows.stop < clock.size else np.inf
+        inside = {signal: (t >= begin) & (t < end) for signal, (t, _) in read.items()}
+        yield label, {signal: (t[inside[signal]], x[inside[signal]]) for signal, (t, x) in read.items()}
 
 
 def _increasing(times: np.ndarray, values: np.ndarray, spec: TimeSpec) -> tuple[np.ndarray, np.ndarray]:
@@ -432,7 +519,7 @@ def _increasing(times: np.ndarray, values: np.ndarray, spec: TimeSpec) -> tuple[
     if back.size:
         row = int(back[0])
         raise InvalidValueError(
-            f"time goes back from {times[row]:g} to {times[row + 1]:g} s (value {row + 2}): write "
+            f"time goes back from {told_apart(times[row], times[row + 1])} (value {row + 2}): write "
             f"'segments: {{by: {BY_TIME}}}', or by: the column that counts laps",
             code="measurement-time",
         )
@@ -441,7 +528,7 @@ def _increasing(times: np.ndarray, values: np.ndarray, spec: TimeSpec) -> tuple[
     if spec.repeated == "refuse":
         row = int(np.flatnonzero(np.diff(times) == 0.0)[0])
         raise InvalidValueError(
-            f"{times[row]:g} s occurs twice (value {row + 2}): write 'time: {{column: {spec.column}, "
+            f"{times[row]:.15g} s occurs twice (value {row + 2}): write 'time: {{column: {spec.column}, "
             "repeated: mean}' for the mean of such rows",
             code="measurement-time",
         )

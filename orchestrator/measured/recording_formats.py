@@ -1,22 +1,18 @@
-"""Files of recorded columns: CSV, Parquet and ASAM MDF 4.
+"""Files of recorded columns: CSV and other text, .vbo of Racelogic, Parquet and ASAM MDF.
 
-CSV is separated by `,`, `;`, tab, `|` or spaces, in UTF-8, UTF-16 or Latin-1 (Windows-1252). Its numbers may
-have a decimal comma if the comma does not separate. A header may name a unit, `delta [deg]`, and CSV may have
-a row of units below its header; Parquet has units in the metadata of fields, MDF in channels. The units of
-results of this program are in the run.json next to them.
+A header may name a unit, `delta [deg]`, and text may have a row of units below its header; Parquet has units in the
+metadata of fields, MDF in channels. The units of results of this program are in the run.json next to them. Of
+columns or channels of the same name, `speed#2` is the second, and `speed#gps` that of the source or group `gps`.
 """
 
 from __future__ import annotations
 
 import contextlib
-import csv
 import hashlib
 import io
-import itertools
 import json
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from operator import itemgetter
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,22 +22,24 @@ from vocabulary.signals import SignalEntry
 
 from ..cache import changed_since, has_checksums, warn_of_record
 from ..errors import ScenarioError
-from ..messages import hint, listed
+from ..messages import cut, hint, listed
 from ..safe_files import read_bytes, reading, reason
-from ..scenario.quantities import Unit, gain_and_offset, meant_unit, measure_of, spellings
+from ..scenario.quantities import Unit, meant_unit, spellings
+from .text_tables import MISSING, Mark, read_text_table, split_header
+from .units_of_loggers import factors, stated_unit
 
 LARGEST = 1_000_000_000
 """Bytes of a file. Chosen: it fits into memory."""
 BESIDE = "run.json"
-_HEADER = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*")
 _INDEXED = re.compile(r".*\w\[[\d, ]+\]\s*")
+TEXT, MDF = (".csv", ".tsv", ".txt", ".vbo"), (".mf4", ".mdf")
 
 
 class FileColumn(NamedTuple):
     """A column as in the file, and the times of its values."""
 
-    times: np.ndarray  # shape (rows,) [time_unit]
-    values: np.ndarray  # shape (rows,), numbers or text
+    times: np.ndarray  # shape (rows,): numbers [time_unit], NaN where a row has none, text, or times of NumPy
+    values: np.ndarray  # shape (rows,): numbers, NaN where none was taken, or text, None where none was taken
     time_unit: str | None
     unit: str | None
 
@@ -51,37 +49,56 @@ class _Table(NamedTuple):
 
     headers: list[str]
     units: Sequence[str | None]  # where the format has them apart from headers
+    sources: Sequence[str]  # groups of channels, or what a table states as the source of a column; "": none
     values: Callable[[int], np.ndarray]
     times: Callable[[int], np.ndarray] | None = None  # in s, if every column has its own times
+    notes: Sequence[str] = ()
 
 
 class ColumnFile:
     """A file of columns, read into memory.
+
+    Args:
+        path: the file.
+        asked: names of columns that will be asked for, by which the line of names is found.
+        header: of text, the line of the names of columns; default: it is looked for.
+        decimal: of text, the decimal mark; default: as the numbers show.
 
     Raises:
         OSError: the file cannot be read.
         ValueError: its content is not usable; also raised by `column`.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(
+        self,
+        path: Path,
+        asked: Collection[str] = (),
+        *,
+        header: int | None = None,
+        decimal: Mark | None = None,
+    ) -> None:
         raw = read_bytes(path, largest=LARGEST)
         self.sha256 = hashlib.sha256(raw).hexdigest()
-        kinds: dict[str, Callable[[bytes], _Table]] = {
-            ".csv": _csv, ".tsv": _csv, ".txt": _csv, ".parquet": _parquet, ".mf4": _mdf,
-        }  # fmt: skip
-        if path.suffix.lower() not in kinds:
-            raise ValueError(f"must be a file of type {', '.join(kinds)}")
-        self._table = kinds[path.suffix.lower()](raw)
+        ending = path.suffix.lower()
+        if ending in TEXT:
+            self._table = _text(raw, asked, header, decimal)
+        elif ending == ".parquet":
+            self._table = _parquet(raw)
+        elif ending in MDF:
+            self._table = _mdf(raw)
+        else:
+            raise ValueError(f"must be a file of type {', '.join((*TEXT, '.parquet', *MDF))}")
+        self.notes = self._table.notes
         self._clocks: dict[int, np.ndarray] = {}
         self._names: list[str] = []
         self._units: list[str | None] = []
         beside = _units_beside(path)
-        for header, unit in zip(self._table.headers, self._table.units, strict=True):
-            known = unit or beside.get(header)
-            parts = None if known and _INDEXED.fullmatch(header) else _HEADER.fullmatch(header)
-            name = parts["name"] if parts else header.strip()
+        for heading, unit in zip(self._table.headers, self._table.units, strict=True):
+            known = unit or beside.get(heading)
+            element = known and _INDEXED.fullmatch(heading)
+            name, in_header = (heading.strip(), None) if element else split_header(heading)
             self._names.append(name)
-            self._units.append((parts and parts["unit"].strip()) or known or beside.get(name))
+            self._units.append(in_header or known or beside.get(name))
 
     def column(self, name: str, time: str) -> FileColumn:
         """Return a column with its times: those of the column `time`, in MDF those of the channel."""
@@ -93,92 +110,66 @@ class ColumnFile:
             self._clocks[clock] = table.values(clock)
         return FileColumn(self._clocks[clock], table.values(at), self._units[clock], self._units[at])
 
-    def _find(self, name: str) -> int:
-        for names in (self._names, self._table.headers):
-            indices = [i for i, column in enumerate(names) if column == name]
-            if len(indices) > 1:
-                raise ValueError(f"{len(indices)} columns are called {name!r}")
-            if indices:
-                return indices[0]
-        raise ValueError(f"has no column {name!r}{hint(name, self._names, lead='it has')}")
+    def _find(self, asked: str) -> int:
+        found = self._called(asked)
+        name, mark, which = asked.rpartition("#")
+        if not found and mark:
+            alike = self._called(name.strip())
+            found = [at for at in alike if self._is_of(self._table.sources[at], which.strip())]
+            if which.strip().isdigit() and alike and not found:
+                if not 1 <= int(which) <= len(alike):
+                    raise ValueError(f"has no column {asked!r}: {self._alike(name.strip(), alike)}")
+                found = [alike[int(which) - 1]]
+        if len(found) > 1:
+            raise ValueError(self._alike(asked, found))
+        if found:
+            return found[0]
+        raise ValueError(f"has no column {asked!r}{self._instead(asked)}")
+
+    def _called(self, name: str) -> list[int]:
+        pairs = zip(self._names, self._table.headers, strict=True)
+        return [at for at, of_column in enumerate(pairs) if name in of_column]
+
+    @staticmethod
+    def _is_of(source: str, asked: str) -> bool:
+        """Return whether a source is the one asked for: `gps` is `100: gps`, too."""
+        return bool(source) and asked.lower() in (source.lower(), source.rpartition(":")[2].strip().lower())
+
+    def _alike(self, name: str, indices: Sequence[int]) -> str:
+        """Return the message of several columns of a name, which tells how to choose one."""
+        table = self._table
+        ways = []
+        for number, at in enumerate(indices, start=1):
+            about = ", ".join(filter(None, (self._units[at], table.sources[at])))
+            ways.append(f"'{name}#{number}'{f' ({about})' if about else ''}")
+        return f"{len(indices)} columns are called {name!r}: write {listed(ways[:10], last='or')}"
+
+    def _instead(self, asked: str) -> str:
+        """Return what a missing column may be instead."""
+        table = self._table
+        if any(header.startswith("CAN_DataFrame") for header in table.headers):
+            return (
+                ": it has raw CAN frames, no signals: decode it first, with a DBC file and extract_bus_logging "
+                "of asammdf"
+            )
+        if len(table.headers) <= LIST_OF_READINGS and not table.times:
+            for at, header in enumerate(table.headers):
+                values = table.values(at)
+                if values.dtype.kind == "O" and asked in values:
+                    return (
+                        f": it is a list of readings, whose column {header!r} has {asked!r} in some rows: export "
+                        "a table with a column per signal"
+                    )
+        return hint(asked, self._names, lead="it has")
 
 
-def _csv(raw: bytes) -> _Table:
-    """Return the table of a CSV file; its text is parsed again for every column, to save memory."""
-    encoding = _encoding(raw)
-    first, _, rest = raw[:HEADING].decode(encoding, "replace").partition("\n")
-    separator = max(SEPARATORS, key=first.count)
-    spaced = separator not in first and len(first.split()) == len(rest.partition("\n")[0].split()) > 1
-
-    def rows() -> Iterator[list[str]]:
-        text = io.TextIOWrapper(io.BytesIO(raw), encoding=encoding, newline="")
-        lines = (line.split() for line in text) if spaced else csv.reader(text, delimiter=separator)
-        return itertools.islice(filter(None, lines), head, None)
-
-    def values(at: int) -> np.ndarray:
-        cells: Iterable[str] = map(itemgetter(at), rows())
-        if spaced or separator != ",":
-            cells = (cell.replace(",", ".") for cell in cells)
-        try:
-            return np.fromiter(map(float, cells), float)
-        except ValueError:
-            return np.array([row[at] for row in rows()], dtype=object)
-
-    head = 0
-    headers, below = [*itertools.islice(rows(), 2), [], []][:2]
-    units = _row_of_units(below) if len(below) == len(headers) else None
-    head = 2 if units else 1
-    last = head
-    for last, row in enumerate(rows(), start=head + 1):
-        if len(row) != len(headers):
-            raise ValueError(f"row {last} has {len(row)} values for {len(headers)} columns")
-    if last == head:
-        raise ValueError("has no rows")
-    return _Table(headers, units or [None] * len(headers), values)
+LIST_OF_READINGS = 8
+"""Columns of a list with a reading per row at most: time, name, number, unit, and some of positions."""
 
 
-SEPARATORS = ",;\t|"
-HEADING = 100_000
-"""Bytes in which the first two lines of a CSV file end. Chosen: some thousand columns."""
-
-
-def _encoding(raw: bytes) -> str:
-    """Return the encoding of a text.
-
-    Raises:
-        ValueError: not a text.
-    """
-    if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return "utf-16"
-    if b"\0" in raw:
-        raise ValueError("is not text")
-    try:
-        raw.decode("utf-8")
-    except UnicodeDecodeError:
-        return "cp1252" if not _UNDEFINED.intersection(raw) else "latin-1"
-    return "utf-8-sig"
-
-
-_UNDEFINED = frozenset(b"\x81\x8d\x8f\x90\x9d")
-"""Bytes that Windows-1252 does not define; Latin-1 does."""
-
-
-def _row_of_units(row: Sequence[str]) -> list[str | None] | None:
-    """Return the unit of each column from a row of units, None if the row has a number or no unit at all.
-
-    An empty cell and `-` mean no unit.
-    """
-    cells = [cell.strip().removeprefix("[").removesuffix("]").strip() for cell in row]
-    units = [cell if cell not in ("", "-") else None for cell in cells]
-    return units if any(units) and not any(map(_is_number, cells)) else None
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text.replace(",", "."))
-    except ValueError:
-        return False
-    return True
+def _text(raw: bytes, asked: Collection[str], header: int | None, decimal: Mark | None) -> _Table:
+    table = read_text_table(raw, asked=asked, header=header, decimal=decimal)
+    return _Table(table.headers, table.units, table.sources, table.column, notes=table.notes)
 
 
 def _parquet(raw: bytes) -> _Table:
@@ -189,8 +180,25 @@ def _parquet(raw: bytes) -> _Table:
         table = pq.read_table(pa.BufferReader(raw))
     except pa.ArrowInvalid as error:
         raise ValueError(f"is not a Parquet file, or damaged: {error}") from None
-    units = [(field.metadata or {}).get(b"unit", b"").decode() for field in table.schema]
-    return _Table(table.column_names, units, lambda at: table.column(at).to_numpy())
+    units = [stated_unit((field.metadata or {}).get(b"unit", b"").decode()) for field in table.schema]
+
+    def values(at: int) -> np.ndarray:
+        column, kind = table.column(at), table.column(at).type
+        if pa.types.is_dictionary(kind):
+            column = column.cast(kind.value_type)
+            kind = kind.value_type
+        if pa.types.is_nested(kind):
+            raise ValueError(f"column {table.column_names[at]!r} holds lists: one number per row is wanted")
+        if pa.types.is_time(kind):
+            column = column.cast(pa.string())
+        elif pa.types.is_decimal(kind) or pa.types.is_boolean(kind):
+            column = column.cast(pa.float64())
+        elif pa.types.is_date(kind):
+            column = column.cast(pa.timestamp("ms"))
+        array: np.ndarray = column.to_numpy()
+        return array
+
+    return _Table(table.column_names, units, [""] * len(units), values)
 
 
 def _mdf(raw: bytes) -> _Table:
@@ -206,20 +214,34 @@ def _mdf(raw: bytes) -> _Table:
             for index, channel in enumerate(channels.channels)
             if index != mdf.masters_db.get(group)
         ]
+        sources = [_group_name(mdf.groups[group].channel_group) for group, *_ in channels]
     except Exception as error:  # asammdf raises whatever its parsing meets
         why = re.sub(r'"?<_io\.BytesIO[^>]*>"?', "it", " ".join(str(error).split()))
         raise ValueError(f"is not an MDF file, or damaged: {why}") from None
 
     def signal(at: int) -> Any:
-        group, index, *_ = channels[at]
-        return mdf.get(group=group, index=index)
+        group, index, name, _ = channels[at]
+        master = mdf.masters_db.get(group)
+        if master is None or getattr(mdf.groups[group].channels[master], "sync_type", 1) not in (0, 1):
+            raise ValueError(f"channel {name!r} has no times: its group {sources[at]!r} has no clock in s")
+        taken = mdf.get(group=group, index=index).validate(copy=False)
+        if taken.samples.ndim != 1 or taken.samples.dtype.names:
+            raise ValueError(f"channel {name!r} holds arrays: one number per sample is wanted")
+        return taken
 
     def values(at: int) -> np.ndarray:
-        samples = signal(at).samples
+        samples: np.ndarray = signal(at).samples
         return np.char.decode(samples, "utf-8").astype(object) if samples.dtype.kind == "S" else samples
 
-    headers, units = [name for _, _, name, _ in channels], [unit for *_, unit in channels]
-    return _Table(headers, units, values, times=lambda at: signal(at).timestamps)
+    headers, units = [name for _, _, name, _ in channels], [stated_unit(unit) for *_, unit in channels]
+    return _Table(headers, units, sources, values, times=lambda at: signal(at).timestamps)
+
+
+def _group_name(group: Any) -> str:
+    """Return what an MDF calls a group of channels: name, source or comment; "": nothing."""
+    source = getattr(group, "acq_source", None)
+    names = (getattr(group, "acq_name", ""), getattr(source, "name", ""), getattr(group, "comment", ""))
+    return next((cut(str(name).strip(), 60) for name in names if name and str(name).strip()), "")
 
 
 def _units_beside(path: Path) -> Mapping[str, str]:
@@ -247,9 +269,6 @@ def _units_beside(path: Path) -> Mapping[str, str]:
     return {str(name): str(unit) for name, unit in units.items() if unit} if isinstance(units, dict) else {}
 
 
-SECOND = measure_of("s")
-
-
 @contextlib.contextmanager
 def reading_series(path: Path | str) -> Iterator[None]:
     """Like `files.reading` for files of time series, but raise ValueError."""
@@ -264,7 +283,9 @@ def reading_series(path: Path | str) -> Iterator[None]:
 
 
 def numbers_in(column: np.ndarray, unit: str | None, wanted: Unit | None, says: str, what: str) -> np.ndarray:
-    """Convert a column to finite numbers in a unit; a column without a unit is taken to be in that unit.
+    """Convert a column to numbers in a unit, NaN where none was taken.
+
+    A column without a unit is taken to be in that unit.
 
     Args:
         column: numbers or text.
@@ -273,32 +294,34 @@ def numbers_in(column: np.ndarray, unit: str | None, wanted: Unit | None, says: 
         what: name of the column for messages.
 
     Raises:
-        ValueError: the column is not numeric, not finite, or in an incompatible unit.
+        ValueError: the column is not numeric, not finite, without any number, or in an unknown or incompatible
+            unit.
     """
     numbers = _numbers(column, what)
     if unit is None or wanted is None:
         return numbers
-    between = gain_and_offset(unit, wanted)
-    if between is None:
-        raise ValueError(f"{what}: its unit {unit!r} does not fit: {says} is wanted")
-    gain, offset = between
-    return numbers if between == (1.0, 0.0) else gain * numbers + offset
+    gain, offset = factors(unit, wanted, says, what)
+    return numbers if (gain, offset) == (1.0, 0.0) else gain * numbers + offset
 
 
 def _numbers(column: np.ndarray, what: str) -> np.ndarray:
-    """Convert a column to finite numbers."""
+    """Convert a column to numbers; None and NaN are values that were not taken."""
+    if column.dtype.kind in "mM":
+        raise ValueError(f"{what} has times, not numbers")
+    numbers = np.full(column.size, np.nan)
     try:
-        numbers = column.astype(float)
+        numbers[:] = column
     except (TypeError, ValueError):
-        for row, cell in enumerate(column, start=1):
+        for row, cell in enumerate(column):
             try:
-                float(cell)
+                numbers[row] = np.nan if str(cell).strip().lower() in MISSING else float(cell)
             except (TypeError, ValueError):  # noqa: PERF203 - the first ends the loop
-                raise ValueError(f"{what}: value {row} is not a number ({cell!r})") from None
-        raise
-    bad = np.flatnonzero(~np.isfinite(numbers))
+                raise ValueError(f"{what}: value {row + 1} is not a number ({cell!r})") from None
+    bad = np.flatnonzero(np.isinf(numbers))
     if bad.size:
         raise ValueError(f"{what}: value {bad[0] + 1} is not finite ({numbers[bad[0]]:g})")
+    if np.isnan(numbers).all():
+        raise ValueError(f"{what} has no values")
     return numbers
 
 
@@ -334,9 +357,10 @@ def refuse_implausible(
         unit: unit of the column.
     """
     largest, wanted = entry.largest, entry.unit
+    values = values[~np.isnan(values)]
     if largest is None or np.mean(np.abs(values) > largest) <= SHARE_OF_SPIKES:
         return
-    number = float(np.quantile(np.abs(recorded.astype(float)), 1.0 - SHARE_OF_SPIKES))
+    number = float(np.nanquantile(np.abs(recorded.astype(float)), 1.0 - SHARE_OF_SPIKES))
     likely = meant_unit(number, unit, wanted, lambda value: abs(value) <= largest)
     value = f"{number:.4g} {unit}" if unit != "1" else f"{number:.4g}"
     raise ValueError(

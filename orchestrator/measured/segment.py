@@ -17,6 +17,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..errors import InvalidValueError
+
 Position = tuple[float, float, float]
 """x, y, z [m] relative to the centre of mass, vehicle axes."""
 POLES = 12
@@ -58,13 +60,70 @@ def _sections(order: int, cut_off: float, rate: float) -> np.ndarray:
     return np.asarray(butter(order, cut_off, fs=rate, output="sos"))
 
 
+MOST = 10_000_000
+"""Samples up to which a recording is brought to even times, or four times those that it has. Chosen: a day at
+100 Hz, 80 MB per signal."""
+
+
 def even_grid(time: np.ndarray, step: float | None = None) -> np.ndarray:
-    """Return evenly spaced times, at their median step [s] if they are uneven; shape (rows,)."""
+    """Return evenly spaced times, at their median step [s] if they are uneven; shape (rows,).
+
+    Raises:
+        InvalidValueError: a jump of the clock would make too many of them.
+    """
     steps = np.diff(time)
     wanted = float(np.median(steps)) if step is None else step
     if np.all(np.abs(steps - wanted) <= UNEVEN * max(wanted, 1e-12) + 1e-9):
         return time
+    refuse_jump(time, wanted)
     return np.asarray(time[0] + wanted * np.arange(int((time[-1] - time[0]) / wanted + 1e-9) + 1))
+
+
+def refuse_jump(time: np.ndarray, step: float | None = None) -> None:
+    """Raise InvalidValueError if times at even steps [s], by default their median, would be too many."""
+    steps = np.diff(time)
+    count = (time[-1] - time[0]) / (float(np.median(steps)) if step is None else step)
+    if count > max(MOST, 4 * time.size):
+        row = int(np.argmax(steps))
+        raise InvalidValueError(
+            f"time jumps from {told_apart(time[row], time[row + 1])} (value {row + 2}), as if the clock had been "
+            f"set while recording: {count:.2g} samples would lie between its first and last value at even "
+            "steps; delete the rows ahead of the jump or behind it",
+            code="measurement-time",
+        )
+
+
+def told_apart(first: float, second: float) -> str:
+    """Return "1.5 to 2 s" of two times, with all their digits: stamps of one day have the first six in common."""
+    return f"{first:.15g} to {second:.15g} s"
+
+
+def common_times(recorded: Mapping[str, np.ndarray], clocks: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return the times at which all signals of a segment are taken.
+
+    They are those of the signal with the most samples in the span that all signals share; of several with
+    as many, the first by name.
+
+    Args:
+        recorded: signal -> times of its samples.
+        clocks: likewise, less the delay of the signal.
+
+    Raises:
+        InvalidValueError: there are less than two, or the clock jumps (see `refuse_jump`).
+    """
+    late = max(clocks, key=lambda name: (clocks[name][0], name))
+    early = min(clocks, key=lambda name: (clocks[name][-1], name))
+    begin, end = clocks[late][0], clocks[early][-1]
+    inside = {name: t[(t >= begin) & (t <= end)] for name, t in sorted(recorded.items())}
+    time = max(inside.values(), key=len)
+    if time.size < 2:
+        raise InvalidValueError(
+            "its signals have less than two samples at the same times: "
+            f"{late} begins at {begin:.10g} s, {early} ends at {end:.10g} s",
+            code="measurement-time",
+        )
+    refuse_jump(time)
+    return time
 
 
 def resample(grid: np.ndarray, time: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -113,19 +172,22 @@ class Segment:
         return replace(self, time=self.time[inside], signals=signals)
 
 
-def parts_of(times: np.ndarray, labels: np.ndarray | None) -> Iterator[tuple[str, slice]]:
+def parts_of(
+    times: np.ndarray, labels: np.ndarray | None, *, least: int = 2
+) -> Iterator[tuple[str, slice]]:
     """Yield label and rows of the segments of a file; the label of a single segment is "".
 
     Args:
         times: of the rows.
         labels: a value per row whose changes begin segments; None: they begin where time goes back.
+        least: rows of a segment; shorter ones are left out.
     """
     apart = np.diff(times) < 0.0 if labels is None else labels[1:] != labels[:-1]
     edges = [0, *(int(cut) + 1 for cut in np.flatnonzero(apart)), len(times)]
     for number, (begin, end) in enumerate(pairwise(edges), start=1):
         label = number if labels is None else labels[begin]
-        words = str(label) if isinstance(label, (int, str)) else f"{label:g}"
-        if end - begin >= 2:
+        words = f"{label:g}" if isinstance(label, (float, np.floating)) else str(label)
+        if end - begin >= least:
             yield words if len(edges) > 2 else "", slice(begin, end)
 
 

@@ -154,8 +154,11 @@ def _series_reader(scenario: LoadedScenario) -> Reader:
     the times do not cover the run.
     """
     # NumPy takes long to import
+    from ..measured.clocks import seconds_of
     from ..measured.measurement import ENDINGS, Measurement, load_measurement
-    from ..measured.recording_formats import ColumnFile, numbers_in, reading_series
+    from ..measured.recording_formats import ColumnFile, reading_series
+
+    asked: dict[str, list[str]] = {}
 
     @cache
     def opened(file: str) -> ColumnFile | Measurement:
@@ -163,7 +166,7 @@ def _series_reader(scenario: LoadedScenario) -> Reader:
         if path.suffix in ENDINGS:
             return load_measurement(path)
         with reading_series(path):
-            return ColumnFile(path)
+            return ColumnFile(path, asked[file])
 
     def column_of(spec: SeriesSpec, name: str) -> FileColumn:
         file = opened(spec.file)
@@ -175,13 +178,14 @@ def _series_reader(scenario: LoadedScenario) -> Reader:
 
     def read(spec: SeriesSpec, part: str, variable: Variable) -> InputSeries:
         name = (spec.column or variable.name).replace("*", part)
+        asked.setdefault(spec.file, [spec.time, name])
         try:
             file = opened(spec.file)
         except ScenarioError as error:
             raise InvalidValueError(text_of(error.diagnostics), code=error.code) from None
         with reading_series(spec.file):
             column = column_of(spec, name)
-            times = numbers_in(column.times, column.time_unit, measure_of("s"), "s", f"time {spec.time!r}")
+            times, column = _taken(seconds_of(column.times, column.time_unit, f"time {spec.time!r}"), column)
             if spec.begin is not None:
                 times = times - float(spec.begin - scenario.start_time)
             values = _values(column, name, variable)
@@ -190,6 +194,16 @@ def _series_reader(scenario: LoadedScenario) -> Reader:
         return InputSeries(spec.file, name, file.sha256, held, times, values)
 
     return read
+
+
+def _taken(times: np.ndarray, column: FileColumn) -> tuple[np.ndarray, FileColumn]:
+    """Return times and column without the rows that have no time or no value."""
+    missing = times != times
+    if column.values.dtype.kind in "fO":
+        missing = missing | [cell is None or cell != cell for cell in column.values.tolist()]
+    if not missing.any() or missing.all():
+        return times, column
+    return times[~missing], column._replace(values=column.values[~missing])
 
 
 def _values(column: FileColumn, name: str, variable: Variable) -> np.ndarray:

@@ -276,7 +276,8 @@ def test_check_and_run_json_tell_of_a_series_and_a_changed_file_makes_results_st
             "data.csv: has no column 't_fl [m]'; did you mean 't_fl'?",
         ),
         ("{file: data.csv, column: word}", "data.csv: column 'word': value 2 is not a number ('high')"),
-        ("{file: data.csv, column: gap}", "data.csv: column 'gap': value 2 is not finite (nan)"),
+        ("{file: data.csv, column: void}", "data.csv: column 'void' has no values"),
+        ("{file: data.csv, column: far}", "data.csv: column 'far': value 2 is not finite (inf)"),
         (
             "{file: data.csv, column: mass}",
             "data.csv: column 'mass': its unit 'kg' does not fit: rad is wanted",
@@ -298,8 +299,8 @@ def test_check_and_run_json_tell_of_a_series_and_a_changed_file_makes_results_st
 def test_what_is_wrong_with_a_series_is_said_before_the_run(given: str, says: str, folder: Path) -> None:
     runs = folder / "runs"
     (runs / "data.csv").write_text(
-        "time [s];delta;t_fl;word;gap;mass [kg];low;twice;twice\n"
-        "0;0;0;1;1;1;0;0;0\n0.5;0;0;high;nan;1;-7;0;0\n1;0;0;1;1;1;0;0;0\n"
+        "time [s];delta;t_fl;word;void;far;mass [kg];low;twice;twice\n"
+        "0;0;0;1;;1;1;0;0;0\n0.5;0;0;high;nan;inf;1;-7;0;0\n1;0;0;1;;1;1;0;0;0\n"
     )
     (runs / "data.txt").write_text("")
     (runs / "back.csv").write_text("time,x\n0,0\n0.5,1\n0.5,2\n1,0\n")
