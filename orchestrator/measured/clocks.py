@@ -1,8 +1,8 @@
 """Clocks of recordings, converted to seconds.
 
-Numbers have a unit of time. Stamps with a date and times of day, be they text or a type of the file, packed clock
-times (`hhmmss.ss`, unit `hhmmss`) and the unit `unix time` count from the first row that has a time. Times of day
-go on after midnight.
+Numbers have a unit of time. Stamps with a date and times of day, be they text or a type of the file, packed
+clock times (`hhmmss.ss`, unit `hhmmss`) and the unit `unix time` count from the first row that has a time.
+Times of day go on after midnight.
 """
 
 from __future__ import annotations
@@ -37,19 +37,22 @@ def seconds_of(times: np.ndarray, unit: str | None, what: str) -> np.ndarray:
     Raises:
         ValueError: it has no times that can be converted.
     """
-    if times.dtype.kind in "mMO" and unit not in (None, "s", "sec", PACKED, *UNIX):
+    if holds_times(times) and unit not in (None, "s", "sec", PACKED, *UNIX):
         shown = next((str(cell) for cell in times if cell is not None), "")
         raise ValueError(f"{what} has times of its own ({shown!r}): leave out its unit {unit!r}")
     if times.dtype.kind == "m":
-        return np.where(np.isnat(times), np.nan, times.astype("timedelta64[ns]").astype(np.int64) / 1e9)
+        return _in_seconds(times)
     if times.dtype.kind == "M":
         return _differences(times, _first(~np.isnat(times), what))
     if times.dtype.kind == "O":
-        return _of_text(times, what)
+        try:
+            times = np.array([np.nan if cell is None else float(cell) for cell in times])
+        except ValueError:
+            return _of_text(times, what)
     numbers = times.astype(float)
     _refuse_infinite(numbers, what)
     if unit in UNIX:
-        seconds = numbers - numbers[_first(~np.isnan(numbers), what)]
+        seconds: np.ndarray = numbers - numbers[_first(~np.isnan(numbers), what)]
         return seconds / 1000.0 if np.nanmax(np.abs(numbers)) > MILLISECONDS else seconds
     if unit == PACKED:
         return _unpacked(numbers, what)
@@ -58,6 +61,13 @@ def seconds_of(times: np.ndarray, unit: str | None, what: str) -> np.ndarray:
     if gain == 1.0:
         _refuse_packed(seconds, what)
     return seconds
+
+
+def holds_times(times: np.ndarray) -> bool:
+    """Return whether a column has times of its own: times of NumPy, or text with a colon."""
+    if times.dtype.kind == "O":
+        return any(":" in str(cell) for cell in times if cell is not None)
+    return times.dtype.kind in "mM"
 
 
 def _first(there: np.ndarray, what: str) -> int:
@@ -75,8 +85,12 @@ def _refuse_infinite(numbers: np.ndarray, what: str) -> None:
 
 def _differences(stamps: np.ndarray, first: int) -> np.ndarray:
     """Return the seconds since a stamp, exact to the nanosecond; NaN where there is no stamp."""
-    since = stamps - stamps[first]
-    return np.where(np.isnat(since), np.nan, since.astype("timedelta64[ns]").astype(np.int64) / 1e9)
+    return _in_seconds(stamps - stamps[first])
+
+
+def _in_seconds(times: np.ndarray) -> np.ndarray:
+    seconds = times.astype("timedelta64[ns]").astype(np.int64) / 1e9
+    return np.asarray(np.where(np.isnat(times), np.nan, seconds))
 
 
 def _of_text(cells: np.ndarray, what: str) -> np.ndarray:
@@ -98,7 +112,7 @@ def _of_text(cells: np.ndarray, what: str) -> np.ndarray:
             if not re.search(r"\d:\d\d", text)
         )
         raise ValueError(f"{what}: value {row + 1} is not a time ({cell!r})")
-    return np.round(seconds - seconds[first], 9)
+    return np.asarray(np.round(seconds - seconds[first], 9))
 
 
 def _whole(texts: list[str]) -> np.ndarray:
@@ -125,14 +139,16 @@ def _of_dates(cells: np.ndarray, there: np.ndarray, what: str) -> np.ndarray:
         try:
             with warnings.catch_warnings():  # pandas doubts its guess of a form
                 warnings.simplefilter("ignore")
-                stamps = pd.to_datetime(texts, utc=True, **options)  # type: ignore[call-overload]
+                stamps = pd.to_datetime(texts, utc=True, **options)
         except (ValueError, OverflowError):
             continue
         readings.append(stamps.dt.tz_localize(None).to_numpy())
         if "format" in options:
             break
     if not readings:
-        raise ValueError(f"{what}: its times are not understood ({texts.iloc[0]!r}): write 2026-05-17T12:00:00.00")
+        raise ValueError(
+            f"{what}: its times are not understood ({texts.iloc[0]!r}); 2026-05-17T12:00:00.00 would be"
+        )
     stamps = min(readings, key=np.ptp)
     times = np.full(cells.size, np.datetime64("NaT"), dtype="datetime64[ns]")
     times[there] = stamps
@@ -150,7 +166,7 @@ def _unpacked(numbers: np.ndarray, what: str) -> np.ndarray:
     of_day = 3600.0 * np.floor(minutes / 100.0) + 60.0 * np.mod(minutes, 100.0) + seconds
     there = ~np.isnan(of_day)
     of_day[there] = _past_midnight(of_day[there])
-    return np.round(of_day - of_day[first], 6)
+    return np.asarray(np.round(of_day - of_day[first], 6))
 
 
 def _refuse_packed(seconds: np.ndarray, what: str) -> None:

@@ -46,13 +46,13 @@ from vocabulary.vehicle import CAR
 from vocabulary.wheels import wheels
 
 from ..errors import Diagnostic, InvalidValueError, Location, ScenarioError, code_of
-from ..messages import hint, listed
+from ..messages import counted, hint, listed
 from ..safe_files import reads
 from ..scenario import yaml_lines
 from ..scenario.quantities import convert, measure_of, parse_unit
 from ..scenario.schema_validation import StrictModel, quantities_in, text_in_unit, validate
 from ..scenario.yaml_lines import Document, KeyPath
-from .clocks import PACKED, UNIX, seconds_of
+from .clocks import PACKED, UNIX, holds_times, seconds_of
 from .recording_formats import (
     ColumnFile,
     FileColumn,
@@ -73,7 +73,7 @@ from .segment import (
     told_apart,
     without_spikes,
 )
-from .units_of_loggers import unit_in_file
+from .units_of_loggers import how_to_give, unit_in_file
 
 MEASURABLE: dict[str, SignalEntry] = {name: entry for key, entry in SIGNALS.items() for name in wheels(key)}
 """Signals that a measurement may have, those of wheels one by one."""
@@ -88,7 +88,10 @@ OF_TEST = {"action_time": "s"}
 
 def _unit(text: str) -> str:
     if unit_in_file(text) is None:
-        parse_unit(text)  # says why not
+        try:
+            parse_unit(text)
+        except ValueError as error:
+            raise ValueError(f"{error}: {how_to_give('a known one')}") from None
     return text
 
 
@@ -159,7 +162,8 @@ class TimeSpec(StrictModel):
 
     column: str = Field("time", min_length=1)
     unit: UnitOfTime | None = Field(
-        None, description=f"Default: as the file says. {PACKED}: packed clock times; {UNIX[0]}: s or ms since 1970"
+        None,
+        description=f"Default: as the file says. {PACKED}: packed clock times; {UNIX[0]}: s or ms since 1970",
     )
     repeated: Literal["refuse", "mean"] = Field(
         "refuse", description="Rows with the same time; mean: become a row of their means"
@@ -297,11 +301,11 @@ def load_measurement(path: Path | str, *, filtered: bool = True) -> Measurement:
     if filtered and reader.filter:
         for segment in segments:
             if not reader.filter.cut_off < 0.5 * segment.rate:
-                document.report(
-                    ("filter", "low_pass"),
-                    f"must be below half of the rate of {segment.name}, {0.5 * segment.rate:.4g} Hz "
-                    f"(got {spec.filter.low_pass if spec.filter else ''})",
+                wrong = (
+                    f"must be below {0.5 * segment.rate:.4g} Hz, half of the rate of {segment.name}, "
+                    f"{segment.rate:.4g} Hz (got {reader.filter.cut_off:g} Hz)"
                 )
+                document.report(("filter", "low_pass"), wrong)
         document.raise_errors()
         segments = [segment.filtered(reader.filter) for segment in segments]
     digest = hashlib.sha256(path.read_bytes() + "".join(reader.hashes).encode()).hexdigest()
@@ -319,6 +323,7 @@ class _Reader:
         self.document, self.spec = document, spec
         self.hashes: list[str] = []
         self.notes: list[Diagnostic] = []
+        self.without_times: set[str] = set()  # files of which this was said
         if missing := [key for key in ("car", "source", "licence", "date") if not getattr(spec, key)]:
             words = f"states no {listed(missing, last='and')}; reports show where a recording comes from"
             where = Location(document.path, 1)
@@ -389,12 +394,10 @@ class _Reader:
         except ValueError as error:
             self.document.report(key, str(error), code_of(error, "series-unreadable"))
             return
-        where = self.document.location(key)
-        self.notes += [
-            Diagnostic("recording-rows", f"{name}: {note}", "info", where) for note in file.notes
-        ]
+        for note in file.notes:
+            self._note(name, note)
         read = {signal: self._read(file, name, signal) for signal in self.spec.signals}
-        labels = self._labels(file)
+        labels = self._labels(file, name)
         if self.document.errors:
             return
         try:
@@ -408,13 +411,23 @@ class _Reader:
             except ValueError as error:
                 self.document.report(key, f"{called}: {error}", code_of(error, "measurement-time"))
 
-    def _times(self, file: ColumnFile, column: FileColumn) -> np.ndarray:
-        """Return the times of a column in s."""
+    def _note(self, path: str, words: str) -> None:
+        where = self.document.location(("files",))
+        self.notes.append(Diagnostic("recording-rows", f"{path}: {words}", "info", where))
+
+    def _times(self, path: str, column: FileColumn) -> np.ndarray:
+        """Return the times of a column in s; report their errors, once per file."""
         time = self.spec.time
         stated = time.unit or column.time_unit
-        if stated is None and column.times.dtype.kind not in "mMO":
-            stated = unit_of("time", time.column, None, "s")
-        return seconds_of(column.times, stated, f"time {time.column!r}")
+        try:
+            if stated is None and not holds_times(column.times):
+                stated = unit_of("time", time.column, None, "s")
+            return seconds_of(column.times, stated, f"time {time.column!r}")
+        except ValueError as error:
+            if path not in self.without_times:
+                self.document.report(("time",), f"{path}: {error}", code_of(error, "series-unreadable"))
+            self.without_times.add(path)
+            return np.full(column.times.size, np.nan)
 
     def _read(self, file: ColumnFile, path: str, name: str) -> Samples:
         """Return times [s] and values [SI] of a column, NaN where none was taken; report their errors."""
@@ -422,7 +435,7 @@ class _Reader:
         try:
             column: FileColumn = file.column(spec.column, self.spec.time.column)
             unit = unit_of(name, spec.column, spec.unit or column.unit, entry.unit)
-            times = self._times(file, column)
+            times = self._times(path, column)
             what = f"column {spec.column!r}"
             values = numbers_in(column.values, unit, measure_of(entry.unit), entry.unit, what)
             values = spec.gain * (values - self.corrections[name].offset)
@@ -431,19 +444,23 @@ class _Reader:
             self.document.report(("signals", name), f"{path}: {error}", code_of(error, "series-unreadable"))
             return np.zeros(0), np.zeros(0)
         known = ~np.isnan(times)
+        lost = int(np.count_nonzero(~known & ~np.isnan(values)))
+        if lost and path not in self.without_times:
+            self.without_times.add(path)
+            self._note(path, f"{counted(lost, 'row')} with values but no time are not used")
         return times[known], (spec.sign * values if spec.sign < 0 else values)[known]
 
-    def _labels(self, file: ColumnFile) -> Samples | None:
+    def _labels(self, file: ColumnFile, path: str) -> Samples | None:
         """Return times and values of the column whose changes begin segments; None: where time restarts."""
         segments = self.spec.segments
         if segments is None or segments.by == BY_TIME:
             return None
         try:
             column = file.column(segments.by, self.spec.time.column)
-            times = self._times(file, column)
         except ValueError as error:
             self.document.report(("segments", "by"), str(error), "series-unreadable")
             return None
+        times = self._times(path, column)
         known = ~np.isnan(times)
         return times[known], _held(column.values)[known]
 

@@ -1,8 +1,9 @@
 """Files of recorded columns: CSV and other text, .vbo of Racelogic, Parquet and ASAM MDF.
 
-A header may name a unit, `delta [deg]`, and text may have a row of units below its header; Parquet has units in the
-metadata of fields, MDF in channels. The units of results of this program are in the run.json next to them. Of
-columns or channels of the same name, `speed#2` is the second, and `speed#gps` that of the source or group `gps`.
+A header may name a unit, `delta [deg]`, and text may have a row of units below its header; Parquet has
+units in the metadata of fields, MDF in channels. The units of results of this program are in the run.json
+next to them. Of columns or channels of the same name, `speed#2` is the second, and `speed#gps` that of the
+source or group `gps`.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ LARGEST = 1_000_000_000
 """Bytes of a file. Chosen: it fits into memory."""
 BESIDE = "run.json"
 _INDEXED = re.compile(r".*\w\[[\d, ]+\]\s*")
-TEXT, MDF = (".csv", ".tsv", ".txt", ".vbo"), (".mf4", ".mdf")
+TEXT, MDF = (".csv", ".tsv", ".txt", ".vbo"), (".mf4", ".mdf", ".dat")
 
 
 class FileColumn(NamedTuple):
@@ -148,17 +149,14 @@ class ColumnFile:
         """Return what a missing column may be instead."""
         table = self._table
         if any(header.startswith("CAN_DataFrame") for header in table.headers):
-            return (
-                ": it has raw CAN frames, no signals: decode it first, with a DBC file and extract_bus_logging "
-                "of asammdf"
-            )
+            return ": it has raw CAN frames, no signals: decode it, with a DBC file and asammdf, before"
         if len(table.headers) <= LIST_OF_READINGS and not table.times:
             for at, header in enumerate(table.headers):
                 values = table.values(at)
                 if values.dtype.kind == "O" and asked in values:
                     return (
-                        f": it is a list of readings, whose column {header!r} has {asked!r} in some rows: export "
-                        "a table with a column per signal"
+                        f": it is a list of readings, and {asked!r} stands in rows of its column {header!r}: "
+                        "export a table with a column per signal"
                     )
         return hint(asked, self._names, lead="it has")
 
@@ -209,7 +207,7 @@ def _mdf(raw: bytes) -> _Table:
     try:
         mdf: Any = asammdf.MDF(io.BytesIO(raw))
         channels = [
-            (group, index, channel.name, channel.unit)
+            (group, index, channel.name, mdf.get_channel_unit(group=group, index=index))
             for group, channels in enumerate(mdf.groups)
             for index, channel in enumerate(channels.channels)
             if index != mdf.masters_db.get(group)
@@ -294,8 +292,7 @@ def numbers_in(column: np.ndarray, unit: str | None, wanted: Unit | None, says: 
         what: name of the column for messages.
 
     Raises:
-        ValueError: the column is not numeric, not finite, without any number, or in an unknown or incompatible
-            unit.
+        ValueError: the column is not numeric, not finite or without any number, or its unit does not fit.
     """
     numbers = _numbers(column, what)
     if unit is None or wanted is None:

@@ -86,15 +86,15 @@ def refuse_jump(time: np.ndarray, step: float | None = None) -> None:
     if count > max(MOST, 4 * time.size):
         row = int(np.argmax(steps))
         raise InvalidValueError(
-            f"time jumps from {told_apart(time[row], time[row + 1])} (value {row + 2}), as if the clock had been "
-            f"set while recording: {count:.2g} samples would lie between its first and last value at even "
-            "steps; delete the rows ahead of the jump or behind it",
+            f"time jumps from {told_apart(time[row], time[row + 1])} (value {row + 2}), as if the clock had "
+            f"been set while recording: {count:.2g} samples would lie between its first and last value at "
+            "even steps; delete the rows ahead of the jump or behind it",
             code="measurement-time",
         )
 
 
 def told_apart(first: float, second: float) -> str:
-    """Return "1.5 to 2 s" of two times, with all their digits: stamps of one day have the first six in common."""
+    """Return "1.5 to 2 s" of two times, with all digits: the first six of Unix times are alike all day."""
     return f"{first:.15g} to {second:.15g} s"
 
 
@@ -115,7 +115,7 @@ def common_times(recorded: Mapping[str, np.ndarray], clocks: Mapping[str, np.nda
     early = min(clocks, key=lambda name: (clocks[name][-1], name))
     begin, end = clocks[late][0], clocks[early][-1]
     inside = {name: t[(t >= begin) & (t <= end)] for name, t in sorted(recorded.items())}
-    time = max(inside.values(), key=len)
+    time: np.ndarray = max(inside.values(), key=len)
     if time.size < 2:
         raise InvalidValueError(
             "its signals have less than two samples at the same times: "
@@ -172,9 +172,7 @@ class Segment:
         return replace(self, time=self.time[inside], signals=signals)
 
 
-def parts_of(
-    times: np.ndarray, labels: np.ndarray | None, *, least: int = 2
-) -> Iterator[tuple[str, slice]]:
+def parts_of(times: np.ndarray, labels: np.ndarray | None, *, least: int = 2) -> Iterator[tuple[str, slice]]:
     """Yield label and rows of the segments of a file; the label of a single segment is "".
 
     Args:

@@ -1,14 +1,13 @@
 """Tables of numbers in text files: CSV as loggers and their programs write it, and .vbo of Racelogic.
 
-pyarrow splits the rows. Found here is what surrounds them: encoding, separator, the head of the logger, the names of
-the columns, rows of units and of sources below them, comments, a footer; and the decimal mark, which belongs to the
-file, not to a cell.
+pyarrow splits the rows. Found here is what surrounds them: encoding, separator, the head of the logger, the
+names of the columns, rows of units and of sources below them, comments, a footer; and the decimal mark,
+which belongs to the file, not to a cell.
 """
 
 from __future__ import annotations
 
 import csv
-import io
 import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -27,15 +26,17 @@ Mark = Literal[".", ","]
 SEPARATORS = ("\t", ";", "|", ",", " ")
 """Separators of columns; a space stands for any number of spaces."""
 HEAD = 1_000_000, 400
-"""Characters and lines in which the first rows of the table lie. Chosen: heads of loggers have up to 100 lines."""
+"""Characters and lines in which the first rows of the table lie. Chosen: heads have up to 100 lines."""
 FOOTER = 50
 """Lines of a footer at most; chosen: as much as a short table of laps."""
 COMMENTS = ("#", "%", "//")
 MISSING = frozenset(
-    "|-|--|nan|+nan|-nan|null|none|na|n/a|#n/a|<na>|?|1.#qnan|-1.#ind|1.#ind|-1.#qnan|nat|---|—|-nan(ind)|nan(ind)".split("|")
-)
+    (
+        "", "-", "--", "---", "—", "?", "nan", "+nan", "-nan", "nan(ind)", "-nan(ind)", "null", "none", "nat",
+        "na", "n/a", "#n/a", "<na>", "1.#qnan", "-1.#qnan", "1.#ind", "-1.#ind",
+    )
+)  # fmt: skip
 """Texts, in small letters, of cells without a value."""
-
 
 
 def _with(mark: Mark) -> str:
@@ -126,16 +127,17 @@ def read_text_table(
         ValueError: there is no table, or it is damaged.
     """
     text = raw.decode(encoding_of(raw))
-    lines = _lines(text[: HEAD[0]])[: HEAD[1]]
+    if "\r" in text:
+        text = text.replace("\r\n", "\n").replace("\r", "\n")
+    lines = text[: HEAD[0]].split("\n")[: HEAD[1]]
     if len(text) > HEAD[0] and len(lines) < HEAD[1]:
         lines = lines[:-1]
     if any(line.strip().lower() == "[data]" for line in lines):
         frame = _of_vbo(lines)
     else:
         frame = _frame(lines, asked, header)
-    begin = re.match(rf"(?:[^\r\n]*(?:\r\n|\n|\r)){{{frame.begin}}}", text)
-    text = text[begin.end() if begin else len(text) :].replace("\r\n", "\n").replace("\r", "\n")
-    text, notes = _without_footer(text, frame)
+    end, notes = _end(text, frame)
+    text = text[sum(len(line) + 1 for line in lines[: frame.begin]) : end]
     cells = _cells(text, frame)
     return TextTable(frame.names, frame.units, frame.sources, cells, decimal or _decimal(cells), notes)
 
@@ -165,8 +167,8 @@ _UNDEFINED = frozenset(b"\x81\x8d\x8f\x90\x9d")
 """Bytes that Windows-1252 does not define; Latin-1 does."""
 
 
-def _lines(text: str) -> list[str]:
-    return re.split(r"\r\n|\n|\r", text)
+_Row = tuple[list[str], str]
+"""Cells of a line, and their kinds, see `_kind`."""
 
 
 @dataclass
@@ -205,7 +207,7 @@ def _alike(kinds: str, others: str) -> bool:
     return pairs.count(("n", "n")) > sum({"n", "t"} == {*pair} for pair in pairs) and kinds[first] != "t"
 
 
-def _rows(lines: Sequence[str], separator: str) -> list[tuple[list[str], str]]:
+def _rows(lines: Sequence[str], separator: str) -> list[_Row]:
     """Return cells and their kinds of all lines; comments and empty lines have no cells."""
     rows = []
     for line in lines:
@@ -215,21 +217,21 @@ def _rows(lines: Sequence[str], separator: str) -> list[tuple[list[str], str]]:
     return rows
 
 
-def _longest(rows: Sequence[tuple[list[str], str]]) -> tuple[int, str]:
-    """Return the number of numbers, less that of texts, in the longest run of rows alike, and its kinds."""
-    best, count, run = (0, ""), 0, ""
+def _longest(rows: Sequence[_Row]) -> tuple[tuple[int, int], str]:
+    """Return the counts of numbers and, negative, of texts in the longest run of rows alike, and its kinds."""
+    best, run, numbers, texts = ((0, 0), ""), "", 0, 0
     for _, kinds in rows:
         if not kinds:
             continue
         if run and _alike(kinds, run):
             run = "".join(old if old != " " else new for old, new in zip(run, kinds, strict=True))
         elif "n" in kinds and len(kinds) > 1:
-            run, count = kinds, 0
+            run, numbers, texts = kinds, 0, 0
         else:
             run = ""
             continue
-        count += kinds.count("n") - kinds.count("t")
-        best = max(best, (count, run), key=lambda pair: pair[0])
+        numbers, texts = numbers + kinds.count("n"), texts - kinds.count("t")
+        best = max(best, ((numbers, texts), run), key=lambda pair: pair[0])
     return best
 
 
@@ -238,12 +240,14 @@ def _frame(lines: list[str], asked: Collection[str], header: int | None) -> _Fra
     stated = re.fullmatch(r"\s*\"?sep=(.)\"?\s*", lines[0], re.I)
     first = 1 if stated else 0
     separators = [stated[1]] if stated else SEPARATORS
-    rows, separator, (count, kinds) = [], ",", (0, "")
+    rows: list[_Row] = []
+    separator, most, kinds = ",", (0, 0), ""
     for candidate in separators:
-        split = [([], "")] * first + _rows(lines[first:], candidate)
+        none: list[_Row] = [([], "")] * first
+        split = none + _rows(lines[first:], candidate)
         found = _longest(split)
-        if found[0] > count:
-            rows, separator, (count, kinds) = split, candidate, found
+        if found[0] > most:
+            rows, separator, (most, kinds) = split, candidate, found
     if not kinds:
         filled = [line for line in lines if line.strip()]
         raise ValueError("has no rows" if len(filled) < 3 else "has no table of numbers")
@@ -273,7 +277,7 @@ def _cells_of_name(line: str, separator: str) -> list[str]:
 
 def _line_of_names(
     lines: list[str],
-    rows: list[tuple[list[str], str]],
+    rows: list[_Row],
     begin: int,
     kinds: str,
     separator: str,
@@ -281,8 +285,8 @@ def _line_of_names(
 ) -> int:
     """Return the index of the line with the names of the columns.
 
-    It is the one that has most of the names asked for, else the first of the rows of text just above the numbers, or
-    the one above a row of units.
+    It is the one that has most of the names asked for, else the first of the rows of text just above the
+    numbers, or the one above a row of units.
     """
     width = range(len(kinds.rstrip()), len(kinds) + 1)
     fits = [row for row in range(begin) if len(_cells_of_name(lines[row], separator)) in width]
@@ -308,14 +312,13 @@ def _possible(line: str, separator: str) -> Iterator[str]:
         yield split_header(cell)[0]
 
 
-def _no_names(
-    lines: list[str], rows: list[tuple[list[str], str]], begin: int, kinds: str, separator: str
-) -> str:
+def _no_names(lines: list[str], rows: list[_Row], begin: int, kinds: str, separator: str) -> str:
     nearest = next((row for row in reversed(range(begin)) if rows[row][0]), None)
     if nearest is None:
         return f"has no names of columns above its numbers, which begin in line {begin + 1}"
     count = len(_cells_of_name(lines[nearest], separator))
-    return f"row {begin + 1} has {len(kinds.rstrip())} values for {count} columns, the names in line {nearest + 1}"
+    values = len(kinds.rstrip())
+    return f"row {begin + 1} has {values} values for {count} columns, the names in line {nearest + 1}"
 
 
 _HEADER = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*")
@@ -351,10 +354,12 @@ def _units_and_sources(below: list[list[str]], width: int) -> tuple[list[str | N
 
 
 STANDARD_OF_VBO = frozenset(
-    "sats satellites time lat latitude long longitude velocity heading height vert-vel vertvel vertical "
-    "tsample sampleperiod event event-1 event-2 event1 event2 solution solution_type glonass_sats gps_sats "
-    "avifileindex avitime avisynctime trigger".split()
-)
+    (
+        "sats", "satellites", "time", "lat", "latitude", "long", "longitude", "velocity", "heading", "height",
+        "vert-vel", "vertvel", "tsample", "sampleperiod", "event", "event-1", "event-2", "event1", "event2",
+        "solution", "solution_type", "glonass_sats", "gps_sats", "avifileindex", "avitime", "avisynctime",
+    )
+)  # fmt: skip
 """Columns of .vbo files whose units are in the head or fixed, not in the section of units."""
 
 
@@ -362,12 +367,10 @@ def _of_vbo(lines: list[str]) -> _Frame:
     """Return the frame of a .vbo file, which has sections such as [header], [column names] and [data]."""
     sections: dict[str, list[str]] = {}
     section: list[str] = []
-    begin = 0
-    for begin, line in enumerate(lines, start=1):
+    begin = 1 + next(at for at, line in enumerate(lines) if line.strip().lower() == "[data]")
+    for line in lines[: begin - 1]:
         if re.fullmatch(r"\s*\[[^\]]+\]\s*", line):
             section = sections.setdefault(line.strip().lower()[1:-1], [])
-            if line.strip().lower() == "[data]":
-                break
         elif line.strip():
             section.append(line.strip())
     head = sections.get("header", [])
@@ -388,23 +391,25 @@ def _of_vbo(lines: list[str]) -> _Frame:
     return _Frame(" ", names, units, [""] * len(names), begin, "n" * len(names))
 
 
-def _without_footer(text: str, frame: _Frame) -> tuple[str, list[str]]:
-    """Return rows without the lines behind the table and without a last line that was cut off, and notes of them."""
-    kinds, notes = frame.kinds, []
-    whole = text.endswith("\n")
-    text = text.rstrip()
+def _end(text: str, frame: _Frame) -> tuple[int, list[str]]:
+    """Return where the table ends, ahead of a footer or a last line that was cut off, and notes of them."""
+    kinds, notes, end = frame.kinds, [], len(text)
     for _ in range(FOOTER):
-        before, _, line = text.rpartition("\n")
+        while end and text[end - 1].isspace():
+            end -= 1
+        begin = text.rfind("\n", 0, end) + 1
+        line = text[begin:end]
         cells = _split(line, frame.separator)
-        cut = not whole and not notes and len(cells) < len(kinds.rstrip())
+        cut = end == len(text) and len(cells) < len(kinds.rstrip())
         behind = kinds[0] == "n" and bool(cells) and _kind(cells[0]) == "t" and line not in frame.repeated
         if not cut and not behind:
             break
-        number = frame.begin + 2 + before.count("\n") if before else frame.begin + 1
         what = "is cut off" if cut else "is no row of numbers"
-        notes.append(f"line {number} {what} and is not used: {line.strip()[:40]!r}")
-        text = before.rstrip()
-    return text + "\n", notes
+        notes.append(
+            f"line {text.count(chr(10), 0, begin) + 1} {what} and is not used: {line.strip()[:40]!r}"
+        )
+        end = begin
+    return end, notes
 
 
 def _cells(text: str, frame: _Frame) -> pa.Table:
@@ -416,7 +421,9 @@ def _cells(text: str, frame: _Frame) -> pa.Table:
     import pyarrow as pa
     import pyarrow.csv
 
-    skipped = "|".join((r"[ \t]+", *(rf"[ \t]*{mark}.*" for mark in COMMENTS), *map(re.escape, frame.repeated)))
+    skipped = "|".join(
+        (r"[ \t]+", *(rf"[ \t]*{mark}.*" for mark in COMMENTS), *map(re.escape, frame.repeated))
+    )
     text = re.sub(rf"(?m)^(?:{skipped})$", "", text)
     separator = frame.separator
     if separator == " ":
@@ -473,20 +480,21 @@ def _decimal(cells: pa.Table) -> Mark | None:
     if not any(pc.any(pc.match_substring(column, ",")).as_py() for column in columns):
         return "."
     shown: dict[Mark, str] = {}
+    marks: tuple[tuple[Mark, Mark], ...] = ((".", ","), (",", "."))
     unclear = False
     for column in columns:
         texts = pc.unique(column)
         unclear = unclear or bool(pc.any(pc.match_substring_regex(texts, f"^{_grouped(',')}$")).as_py())
-        for mark, other in ((".", ","), (",", ".")):
+        for mark, other in marks:
             either = pc.match_substring_regex(texts, f"^{_grouped(mark)}$")
             sure = [
-                pc.and_not(pc.match_substring_regex(texts, f"^{_with(mark)}$"), either),  # type: ignore[arg-type]
+                pc.and_not(pc.match_substring_regex(texts, f"^({_with(mark)})$"), either),
                 pc.match_substring_regex(texts, rf"^{_grouped(other + _APART)}[{mark}]\d*$"),
                 pc.match_substring_regex(texts, rf"^[+-]?[1-9]\d{{0,2}}([{other}]\d{{3}}){{2,}}$"),
             ]
             found = texts.filter(pc.or_(pc.or_(sure[0], sure[1]), sure[2]))
             if len(found):
-                shown.setdefault(mark, found[0].as_py())  # type: ignore[call-overload]
+                shown.setdefault(mark, found[0].as_py())
     if len(shown) == 2:
         raise ValueError(f"has decimal points ({shown['.']!r}) and decimal commas ({shown[',']!r}): {STATE}")
     return next(iter(shown), None if unclear else ".")

@@ -1,7 +1,7 @@
 """Units as loggers write them: `mph`, `deg/sec`, `Meters/second`, `G`, `[km/h]`.
 
-Scenario files have the units of `scenario.quantities` alone; what is ambiguous there (`G` is a prefix, `kt` might
-be a weight) is not in the heading of a column.
+Scenario files have the units of `scenario.quantities` alone; what is ambiguous there (`G` is a prefix, `kt`
+might be a weight) is not in the heading of a column.
 """
 
 from __future__ import annotations
@@ -78,7 +78,9 @@ def unit_in_file(text: str, target: Unit | None = None) -> Unit | None:
     if target is not None and target.powers == GRAVITY.powers and text.lower() in OF_GRAVITY:
         return OF_GRAVITY[text.lower()]
     small = re.sub(r"\s+", "", text.lower()).replace("°", "deg")
-    words = re.sub(r"[a-z%]+", lambda word: WORDS.get(word[0], word[0]), re.sub(r"\s*/\s*", "/", text.lower()))
+    words = re.sub(
+        r"[a-z%]+", lambda word: WORDS.get(word[0], word[0]), re.sub(r"\s*/\s*", "/", text.lower())
+    )
     plain = words.replace("°", "deg").replace("_", "").strip()
     for spelling in (text, WHOLE.get(small, "")):
         if (known := _parsed(spelling)) is not None:
@@ -91,6 +93,11 @@ def _parsed(text: str) -> Unit | None:
         return parse_unit(text)
     except ValueError:
         return None
+
+
+def how_to_give(fitting: str) -> str:
+    """Return how to describe a column whose unit is not known, in one of the fitting units."""
+    return f"write 'unit: ...' with {fitting}, and 'gain: ...', the factor that converts its numbers to it"
 
 
 def factors(unit: str, wanted: Unit, says: str, what: str) -> tuple[float, float]:
@@ -107,7 +114,7 @@ def factors(unit: str, wanted: Unit, says: str, what: str) -> tuple[float, float
     known = unit_in_file(unit, wanted)
     if known is None:
         fitting = listed(spellings(says) if _parsed(says) else [says], last="or")
-        raise ValueError(f"{what}: unknown unit {unit!r}: give its numbers in {fitting}, with this as its unit")
+        raise ValueError(f"{what}: unknown unit {unit!r}: {how_to_give(fitting)}")
     between = conversion(known, wanted)
     if between is None:
         raise ValueError(f"{what}: its unit {unit!r} does not fit: {says} is wanted")

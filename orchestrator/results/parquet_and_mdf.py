@@ -163,15 +163,17 @@ class MdfFile:
 
     def blocks(self, columns: Sequence[str]) -> Iterator[list[np.ndarray]]:
         """Yield the chosen columns, a block of rows at a time."""
+        wanted = [name for name in columns if name != "time"]
         with self._open() as mdf:
             for begin in range(0, self._rows, self.ROWS):
                 part: dict[str, Any] = {"record_offset": begin, "record_count": self.ROWS}
-                yield [
-                    plain(mdf.get_master(0, **part))
-                    if name == "time"
-                    else plain(_decoded(mdf.get(group=0, index=self._places[name], **part).samples))
-                    for name in columns
-                ]
+                # one call for all channels: each call decompresses the whole group
+                signals = (
+                    mdf.select([(None, 0, self._places[name]) for name in wanted], **part) if wanted else []
+                )
+                time = signals[0].timestamps if signals else mdf.get_master(0, **part)
+                taken = {name: _decoded(signal.samples) for name, signal in zip(wanted, signals, strict=True)}
+                yield [plain(time if name == "time" else taken[name]) for name in columns]
 
 
 def _decoded(samples: np.ndarray) -> np.ndarray:
