@@ -56,6 +56,9 @@ def measured(action: MeasuredAction, file: MeasurementFile, out: FigureFile = No
     if not any(flaw.kind is FlawKind.REFUSED for flaw in flaws):
         measurement = load_measurement(file)
         say(f"{measurement.title}; {measurement.origin or 'source and licence not stated'}")
+        for note in measurement.notes:
+            if note.code == "recording-rows":
+                say(f"note: {note.message}")
         rows: list[Sequence[Cell]] = [
             (
                 segment.name,

@@ -20,9 +20,11 @@ own description, unless its signal is a plain number. The value of a signal is
 
     sign gain (column - offset)    at the time of its row, less its delay
 
-with spikes (values that differ from the median of seven by more than `spikes`) replaced by interpolation,
-then moved from the position of its sensor (`at`: relative to the centre of mass, ISO 8855) to the centre of
-mass of the rigid body, with angular rates p, q, r as far as they are recorded, then filtered.
+with spikes (values that differ from the median of seven by more than `spikes`) replaced by interpolation. A
+cell without a value is a sample that was not taken. All signals of a segment are then interpolated, by a
+monotone cubic, to the times of the one with most samples in the span that they share (`segment.common_times`),
+moved from the position of its sensor (`at`: relative to the centre of mass, ISO 8855) to the centre of mass of
+the rigid body, with angular rates p, q, r as far as they are recorded, and filtered.
 
 The filter is the Butterworth low pass of GTR 8 by default, which has no phase: half of its poles forward and
 half of them backward, so that amplitudes at the cut-off frequency are halved.

@@ -86,7 +86,7 @@ class ColumnFile:
         elif ending == ".parquet":
             self._table = _parquet(raw)
         elif ending in MDF:
-            self._table = _mdf(raw)
+            self._table = _mdf(raw, {name.partition("#")[0].strip() for name in asked})
         else:
             raise ValueError(f"must be a file of type {', '.join((*TEXT, '.parquet', *MDF))}")
         self.notes = self._table.notes
@@ -199,7 +199,8 @@ def _parquet(raw: bytes) -> _Table:
     return _Table(table.column_names, units, [""] * len(units), values)
 
 
-def _mdf(raw: bytes) -> _Table:
+def _mdf(raw: bytes, asked: Collection[str]) -> _Table:
+    """Return the channels of an MDF file; those asked for are read together, as groups may be compressed."""
     try:
         import asammdf
     except ImportError:
@@ -217,12 +218,22 @@ def _mdf(raw: bytes) -> _Table:
         why = re.sub(r'"?<_io\.BytesIO[^>]*>"?', "it", " ".join(str(error).split()))
         raise ValueError(f"is not an MDF file, or damaged: {why}") from None
 
+    read: dict[int, Any] = {}
+
     def signal(at: int) -> Any:
-        group, index, name, _ = channels[at]
+        group, _, name, _ = channels[at]
         master = mdf.masters_db.get(group)
         if master is None or getattr(mdf.groups[group].channels[master], "sync_type", 1) not in (0, 1):
             raise ValueError(f"channel {name!r} has no times: its group {sources[at]!r} has no clock in s")
-        taken = mdf.get(group=group, index=index).validate(copy=False)
+        if at not in read:
+            wanted = [
+                k
+                for k, (of, _, known, _) in enumerate(channels)
+                if k == at or (of == group and known in asked)
+            ]
+            signals = mdf.select([(None, group, channels[k][1]) for k in wanted])
+            read.update((k, one.validate(copy=False)) for k, one in zip(wanted, signals, strict=True))
+        taken = read[at]
         if taken.samples.ndim != 1 or taken.samples.dtype.names:
             raise ValueError(f"channel {name!r} holds arrays: one number per sample is wanted")
         return taken

@@ -218,7 +218,7 @@ def _rows(lines: Sequence[str], separator: str) -> list[_Row]:
 
 
 def _longest(rows: Sequence[_Row]) -> tuple[tuple[int, int], str]:
-    """Return the counts of numbers and, negative, of texts in the longest run of rows alike, and its kinds."""
+    """Return how many numbers and (negative) texts the longest run of rows alike has, and its kinds."""
     best, run, numbers, texts = ((0, 0), ""), "", 0, 0
     for _, kinds in rows:
         if not kinds:
