@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -253,11 +253,14 @@ def _frame(lines: list[str], asked: Collection[str], header: int | None) -> _Fra
         raise ValueError("has no rows" if len(filled) < 3 else "has no table of numbers")
     if header is not None and not 0 < header < len(lines):
         raise ValueError(f"has no names of columns in line {header} (key 'header')")
-    above = range(header or 0, len(rows))
-    begin = next((row for row in above if _alike(rows[row][1], kinds)), None)
+    at = header - 1 if header else _line_asked_for(lines, rows, kinds, separator, asked)
+    begin = next((k for k in range(0 if at is None else at + 1, len(rows)) if _alike(rows[k][1], kinds)), None)
+        (row for row in range(0 if at is None else at + 1, len(rows)) if _alike(rows[row][1], kinds)), None
+    )
     if begin is None:
-        raise ValueError(f"has no numbers below line {header} (key 'header')")
-    at = header - 1 if header else _line_of_names(lines, rows, begin, kinds, separator, asked)
+        raise ValueError(f"has no numbers below line {(at or 0) + 1}")
+    if at is None:
+        at = _line_of_names(lines, rows, begin, kinds, separator)
     names = _cells_of_name(lines[at], separator)
     below = [cells for cells, _ in rows[at + 1 : begin] if cells and len(cells) > 1]
     units, sources = _units_and_sources(below, len(names))
@@ -275,41 +278,43 @@ def _cells_of_name(line: str, separator: str) -> list[str]:
     return cells
 
 
-def _line_of_names(
-    lines: list[str],
-    rows: list[_Row],
-    begin: int,
-    kinds: str,
-    separator: str,
-    asked: Collection[str],
-) -> int:
-    """Return the index of the line with the names of the columns.
+def _line_asked_for(
+    lines: list[str], rows: list[_Row], kinds: str, separator: str, asked: Collection[str]
+) -> int | None:
+    """Return the index of the first line with most of the names asked for, None if there is none with any.
 
-    It is the one that has most of the names asked for, else the first of the rows of text just above the
-    numbers, or the one above a row of units.
+    Comments come last.
     """
-    width = range(len(kinds.rstrip()), len(kinds) + 1)
-    fits = [row for row in range(begin) if len(_cells_of_name(lines[row], separator)) in width]
-    plain = [row for row in fits if rows[row][0]]
+    wanted = {name.partition("#")[0].strip() for name in asked}
+    there = {}
+    for row, (cells, of_row) in enumerate(rows):
+        if not _alike(of_row, kinds) and _fits(lines[row], kinds, separator):
+            names = _cells_of_name(lines[row], separator)
+            known = wanted.intersection((*names, *(split_header(name)[0] for name in names)))
+            there[row] = len(known), bool(cells)
+    most = max(there.values(), default=(0, False))
+    return next(row for row, count in there.items() if count == most) if most[0] else None
+
+
+def _fits(line: str, kinds: str, separator: str) -> bool:
+    """Return whether a line may have a name for each column."""
+    return len(kinds.rstrip()) <= len(_cells_of_name(line, separator)) <= len(kinds)
+
+
+def _line_of_names(lines: list[str], rows: list[_Row], begin: int, kinds: str, separator: str) -> int:
+    """Return the index of the line with the names of the columns, by its place.
+
+    It is the first of the rows of text just above the numbers, or the one above a row of units.
+    """
+    fits = [row for row in range(begin) if _fits(lines[row], kinds, separator)]
     if not fits:
         raise ValueError(_no_names(lines, rows, begin, kinds, separator))
-    wanted = {name.partition("#")[0].strip() for name in asked}
-    for candidates in (plain, fits):  # comments come last
-        there = {row: len(wanted.intersection(_possible(lines[row], separator))) for row in candidates}
-        if there and (most := max(there.values())):
-            return max(row for row, count in there.items() if count == most)
-    group = plain or fits
+    group = [row for row in fits if rows[row][0]] or fits
     at = group[-1]
     while at - 1 in group:
         at -= 1
     of_units = [row for row in range(at + 1, group[-1] + 1) if _share_of_units(rows[row][0]) >= 0.5]
     return of_units[-1] - 1 if of_units else at
-
-
-def _possible(line: str, separator: str) -> Iterator[str]:
-    for cell in _cells_of_name(line, separator):
-        yield cell
-        yield split_header(cell)[0]
 
 
 def _no_names(lines: list[str], rows: list[_Row], begin: int, kinds: str, separator: str) -> str:
