@@ -254,9 +254,8 @@ def _frame(lines: list[str], asked: Collection[str], header: int | None) -> _Fra
     if header is not None and not 0 < header < len(lines):
         raise ValueError(f"has no names of columns in line {header} (key 'header')")
     at = header - 1 if header else _line_asked_for(lines, rows, kinds, separator, asked)
-    begin = next((k for k in range(0 if at is None else at + 1, len(rows)) if _alike(rows[k][1], kinds)), None)
-        (row for row in range(0 if at is None else at + 1, len(rows)) if _alike(rows[row][1], kinds)), None
-    )
+    below = range(0 if at is None else at + 1, len(rows))
+    begin = next((row for row in below if _alike(rows[row][1], kinds)), None)
     if begin is None:
         raise ValueError(f"has no numbers below line {(at or 0) + 1}")
     if at is None:
