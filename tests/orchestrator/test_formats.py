@@ -101,6 +101,24 @@ def test_parquet_files_carry_units_and_row_groups(tmp_path, monkeypatch):
     assert file.metadata.num_row_groups == 4
 
 
+def test_the_group_of_an_mdf_file_is_decompressed_once_for_all_its_channels(tmp_path, monkeypatch):
+    asammdf = pytest.importorskip("asammdf")
+    from asammdf.blocks.mdf_v4 import MDF4
+
+    record(tmp_path, 200, "mf4")
+    alone = []
+    get = MDF4.get
+
+    def counted(mdf, *args, data=None, **options):
+        if data is None:  # asammdf decompresses the group for this channel
+            alone.append(options)
+        return get(mdf, *args, data=data, **options)
+
+    monkeypatch.setattr(MDF4, "get", counted)
+    assert asammdf and len(load_results(tmp_path).columns) == len(COLUMNS)
+    assert not alone
+
+
 def test_mdf_files_carry_units_the_title_and_the_start(tmp_path):
     asammdf = pytest.importorskip("asammdf")
     record(tmp_path, 20, "mf4")

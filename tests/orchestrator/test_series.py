@@ -321,6 +321,18 @@ def test_a_series_may_hold_its_ends_and_a_held_one_reaches_one_interval_on(folde
     assert plan_of(scenario(plant_steer_angle=held)).instances[0].series["steer_angle"].held
 
 
+def test_a_series_leaves_out_cells_without_a_value_and_reads_clocks(folder: Path) -> None:
+    (folder / "runs/data.csv").write_text(
+        "logger 7\n\ntime;delta;gear\n;deg;\n12:00:00.00;0;1\n12:00:00.25;;\n12:00:00.50;90;2\n"
+        "12:00:01.00;180;3\n"
+    )
+    path = scenario(plant_steer_angle="{file: data.csv, column: delta}", on="true", **{"torque_*": "0"})
+    (plant,) = plan_of(path).instances
+    for name, values in (("steer_angle", [0.0, math.pi / 2, math.pi]), ("gear", [1, 2, 3])):
+        assert plant.series[name].times.tolist() == [0.0, 0.5, 1.0]
+        assert plant.series[name].values.tolist() == pytest.approx(values)
+
+
 def test_an_archive_for_other_programs_has_no_place_for_a_series(folder: Path) -> None:
     with refused(ResultsError, "ssp-unsupported"):
         write_ssp(plan_of(scenario()), folder / "a.ssp")
