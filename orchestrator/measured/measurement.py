@@ -1,7 +1,7 @@
 """Measurements: recordings of a car, described by a file `measured.yaml`, as signals in SI.
 
     files: [run01.csv, run02.mf4]
-    segments: {by: Lap}                  # where time restarts; `by: time`: at every restart
+    segments: {by: Lap}                  # `by: time`: where time restarts; `by: gaps`: where samples are missing
     time: {column: Time, unit: ms}
     signals:
       steering_wheel_angle: {column: SWA, unit: deg, sign: -1, delay: 20 ms, spikes: 2 deg}
@@ -46,12 +46,13 @@ from vocabulary.vehicle import CAR
 from vocabulary.wheels import wheels
 
 from ..errors import Diagnostic, InvalidValueError, Location, ScenarioError, code_of
-from ..messages import hint, listed
+from ..messages import hint, listed, span
 from ..safe_files import reads
 from ..scenario import yaml_lines
 from ..scenario.quantities import convert, measure_of, parse_unit
 from ..scenario.schema_validation import StrictModel, quantities_in, text_in_unit, validate
 from ..scenario.yaml_lines import Document, KeyPath
+from .gaps import gaps_in, notes_on, numbers_of_parts
 from .recording_formats import (
     SECOND,
     ColumnFile,
@@ -68,6 +69,7 @@ MEASURABLE: dict[str, SignalEntry] = {name: entry for key, entry in SIGNALS.item
 ENDINGS = (".yaml", ".yml")
 """Endings of measurement files."""
 BY_TIME = "time"
+BY_GAPS = "gaps"
 OF_CAR = {name: entry.unit for name, entry in CAR.items()} | {"friction": "1"}
 """Known quantities of a car and its road, with their units."""
 OF_TEST = {"action_time": "s"}
@@ -146,7 +148,10 @@ class TimeSpec(StrictModel):
 class SegmentsSpec(StrictModel):
     """Segments of a recording, each with increasing time."""
 
-    by: str = Field(description="Column that changes from segment to segment; time: where time restarts")
+    by: str = Field(
+        description="Column that changes from segment to segment; time: where time restarts; gaps: at stretches "
+        "without samples"
+    )
 
 
 class FilterSpec(StrictModel):
@@ -272,7 +277,8 @@ def load_measurement(path: Path | str, *, filtered: bool = True) -> Measurement:
     return Measurement(
         path, tuple(segments), spec.car, spec.source, spec.licence, spec.date, reader.vehicle, reader.test,
         {name: correction.noise for name, correction in reader.corrections.items() if correction.noise},
-        reader.filter, digest, tuple(reader.notes),
+        reader.filter, digest,
+        (*reader.notes, *(note for one in segments for note in notes_on(one.gaps, one.signals, one.name))),
     )  # fmt: skip
 
 
@@ -364,7 +370,8 @@ class _Reader:
             ):
                 wrong = f"{name}: channels with times of their own cannot be divided into segments"
                 return self.document.report(("segments",), wrong, "measurement-time")
-            parts = parts_of(times, labels)
+            by_gaps = self.spec.segments.by == BY_GAPS and labels is None
+            parts = parts_of(times, numbers_of_parts(times) if by_gaps else labels)
         for label, rows in parts:
             called = f"{name} {label}" if label else name
             try:
@@ -390,9 +397,9 @@ class _Reader:
         return times, spec.sign * values if spec.sign < 0 else values
 
     def _labels(self, file: ColumnFile) -> np.ndarray | None:
-        """Return the column whose changes begin segments; None: they begin where time restarts."""
+        """Return the column whose changes begin segments; None: the times tell where they begin."""
         segments = self.spec.segments
-        if segments is None or segments.by == BY_TIME:
+        if segments is None or segments.by in (BY_TIME, BY_GAPS):
             return None
         try:
             return file.column(segments.by, self.spec.time.column).values
@@ -415,7 +422,8 @@ class _Reader:
             signal: values if np.array_equal(t, time) else resample(time, t, values)
             for signal, (t, values) in clocks.items()
         }
-        segment = Segment(name, time, signals)
+        gaps = {signal: found for signal, (t, _) in clocks.items() if (found := gaps_in(t))}
+        segment = Segment(name, time, signals, gaps)
         positions = {
             signal: correction.at for signal, correction in self.corrections.items() if any(correction.at)
         }
@@ -432,7 +440,7 @@ def _increasing(times: np.ndarray, values: np.ndarray, spec: TimeSpec) -> tuple[
     if back.size:
         row = int(back[0])
         raise InvalidValueError(
-            f"time goes back from {times[row]:g} to {times[row + 1]:g} s (value {row + 2}): write "
+            f"time goes back from {span(times[row], times[row + 1])} s (value {row + 2}): write "
             f"'segments: {{by: {BY_TIME}}}', or by: the column that counts laps",
             code="measurement-time",
         )
@@ -441,7 +449,7 @@ def _increasing(times: np.ndarray, values: np.ndarray, spec: TimeSpec) -> tuple[
     if spec.repeated == "refuse":
         row = int(np.flatnonzero(np.diff(times) == 0.0)[0])
         raise InvalidValueError(
-            f"{times[row]:g} s occurs twice (value {row + 2}): write 'time: {{column: {spec.column}, "
+            f"{times[row]:.12g} s occurs twice (value {row + 2}): write 'time: {{column: {spec.column}, "
             "repeated: mean}' for the mean of such rows",
             code="measurement-time",
         )

@@ -11,11 +11,13 @@ measures while the car rolls is not removed, as all sensors measure it.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
+
+from .gaps import Gap, parts_between
 
 Position = tuple[float, float, float]
 """x, y, z [m] relative to the centre of mass, vehicle axes."""
@@ -83,6 +85,7 @@ class Segment:
     name: str
     time: np.ndarray  # shape (rows,) [s], as recorded
     signals: Mapping[str, np.ndarray]  # name in the vocabulary -> shape (rows,), in SI
+    gaps: Mapping[str, tuple[Gap, ...]] = field(default_factory=dict)  # signal -> its gaps, if it has any
 
     @property
     def rate(self) -> float:
@@ -99,12 +102,28 @@ class Segment:
         )
 
     def filtered(self, low_pass: LowPass) -> Segment:
-        """Return the segment with all signals filtered, at the same times."""
-        even = self.even()
-        signals = {name: low_pass(x, even.rate) for name, x in even.signals.items()}
-        if even.time is not self.time:
-            signals = {name: np.interp(self.time, even.time, x) for name, x in signals.items()}
+        """Return the segment with all signals filtered, at the same times, between gaps each part by itself."""
+        signals = {name: x.copy() for name, x in self.signals.items()}
+        for part in self.parts():
+            even = part.even()
+            rows = np.searchsorted(self.time, part.time)
+            for name, x in even.signals.items():
+                signals[name][rows] = np.interp(part.time, even.time, low_pass(x, even.rate))
         return replace(self, signals=signals)
+
+    def parts(self) -> list[Segment]:
+        """Return the parts of two samples or more that no gap of any signal interrupts."""
+        every = [gap for gaps in self.gaps.values() for gap in gaps]
+        return [
+            replace(
+                self,
+                time=self.time[rows],
+                signals={name: x[rows] for name, x in self.signals.items()},
+                gaps={},
+            )
+            for rows in (parts_between(every, self.time) if every else [slice(None)])
+            if self.time[rows].size > 1
+        ]
 
     def between(self, begin: float, end: float) -> Segment:
         """Return the part from `begin` to `end` [s], both included."""

@@ -1,0 +1,141 @@
+"""Gaps of recordings: stretches without samples, found by the times of a signal.
+
+Nothing is known of a signal in a gap, so nothing that looks at a recording draws a curve through it in silence:
+`measured show` names it, a standard test that needs the signal is not judged, a fit refuses a window with it,
+a run whose input follows it has a warning, and figures show it as a span.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import Diagnostic, Location
+from ..messages import counted, span
+
+GAP = 3.5
+"""Step over the usual one from which it is a gap. Chosen: with three samples missing, a signal sampled ten times
+as fast as it moves has lost a turn of its course; jitter of a third of the step stays below 2."""
+USUAL = 0.95
+"""Share of steps that are at most the usual one. Chosen: a recording with two rates has no gaps."""
+ONE = 0.8
+"""Share of the longer of two signals' gaps that they have in common if they are one."""
+MOST = 20
+"""Gaps of a segment that have a warning each."""
+CODE = "measurement-gap"
+"""Code of the diagnostic on a gap."""
+
+
+class Gap(NamedTuple):
+    """A stretch without samples: the times of the last sample before and the first one after it [s]."""
+
+    begin: float
+    end: float
+
+    def __str__(self) -> str:
+        return f"{span(*self)} s"
+
+    @property
+    def length(self) -> float:
+        """Its duration [s]."""
+        return self.end - self.begin
+
+    def later(self, by: float) -> Gap:
+        """Return the gap on a clock whose times are larger by so much [s]."""
+        return Gap(self.begin + by, self.end + by)
+
+
+def gaps_in(times: np.ndarray) -> tuple[Gap, ...]:
+    """Return the gaps of increasing times [s]; shape (rows,)."""
+    return tuple(Gap(float(times[k]), float(times[k + 1])) for k in _before_gaps(times))
+
+
+def numbers_of_parts(times: np.ndarray) -> np.ndarray:
+    """Return for each of the times [s] the number of the part between gaps that it is in, from 1."""
+    numbers = np.ones(times.size)
+    for k in _before_gaps(times):
+        numbers[k + 1 :] += 1.0
+    return numbers
+
+
+def _before_gaps(times: np.ndarray) -> np.ndarray:
+    steps = np.diff(times)
+    if steps.size < 2:
+        return np.zeros(0, dtype=int)
+    usual = float(np.quantile(steps, USUAL, method="lower"))
+    return np.flatnonzero(steps > GAP * usual)
+
+
+def parts_between(gaps: Iterable[Gap], times: np.ndarray) -> Iterator[slice]:
+    """Yield the rows of the parts of times [s] that no gap interrupts, without those in gaps."""
+    number, lost = np.zeros(times.size, dtype=int), np.zeros(times.size, dtype=bool)
+    for begin, end in gaps:
+        number[times >= end] += 1
+        lost |= (times > begin) & (times < end)
+    number[lost] = -1
+    edges = [0, *(int(k) + 1 for k in np.flatnonzero(np.diff(number))), times.size]
+    yield from (slice(first, end) for first, end in pairwise(edges) if end > first and not lost[first])
+
+
+def within(gaps: Iterable[Gap], begin: float, end: float) -> list[Gap]:
+    """Return the gaps that share time with begin to end [s]."""
+    return [gap for gap in gaps if gap.begin < end and begin < gap.end]
+
+
+def by_signals(gaps: Mapping[str, tuple[Gap, ...]], signals: Iterable[str]) -> list[tuple[str, Gap]]:
+    """Return the gaps in their order, each with the signals that share it, as "a, b"; "": all of them.
+
+    Args:
+        gaps: signal -> its gaps.
+        signals: all of the recording.
+    """
+    every = list(signals)
+    shared: list[tuple[list[str], Gap]] = []
+    for gap, name in sorted((gap, name) for name in every for gap in gaps.get(name, ())):
+        for k in range(len(shared) - 1, max(len(shared) - 1 - len(every), -1), -1):
+            names, known = shared[k]
+            if name not in names and _alike(known, gap):
+                shared[k] = [*names, name], Gap(known.begin, max(known.end, gap.end))
+                break
+        else:
+            shared.append(([name], gap))
+    return [("" if len(names) == len(every) else ", ".join(names), gap) for names, gap in shared]
+
+
+def _alike(a: Gap, b: Gap) -> bool:
+    """Return whether gaps are one, of signals with rates or delays of their own."""
+    common = min(a.end, b.end) - max(a.begin, b.begin)
+    return common >= ONE * max(a.end - a.begin, b.end - b.begin)
+
+
+def notes_on(
+    gaps: Mapping[str, tuple[Gap, ...]], signals: Iterable[str], segment: str, start: float = 0.0
+) -> list[Diagnostic]:
+    """Return a warning for each gap of a segment, with its begin and its length, of many for the longest.
+
+    Args:
+        gaps: signal -> its gaps.
+        signals: all of the segment.
+        segment: its name.
+        start: the time that becomes 0 [s].
+    """
+    found = by_signals(gaps, signals)
+    shortest_named = sorted((gap.length for _, gap in found), reverse=True)[:MOST][-1:]
+    notes = [
+        Diagnostic(
+            CODE,
+            f"{segment}: no samples{f' of {names}' * bool(names)} from {gap.later(-start)}",
+            "warning",
+            Location(signal=names or None, time=gap.begin - start),
+            gap.length,
+        )
+        for names, gap in found
+        if gap.length >= shortest_named[0]
+    ][:MOST]
+    if len(found) > len(notes):
+        rest = counted(len(found) - len(notes), "shorter stretch", "shorter stretches")
+        notes.append(Diagnostic(CODE, f"{segment}: {rest} without samples", "warning"))
+    return notes
