@@ -98,7 +98,7 @@ def counted(number: int, noun: str, several: str = "") -> str:
 
 
 RESOLVED = 3
-"""Digits of the distance of two numbers that a range shows. Chosen: both ends are exact to a thousandth of it."""
+"""Digits of the distance of two numbers that a range shows. Chosen: exact to a thousandth of it."""
 EXACT = 1e15
 """Size beyond which numbers have no decimals as double precision."""
 

@@ -7,7 +7,7 @@ without a number, and a criterion that needs it is not judged, never passed.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import wraps
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Concatenate, Literal, ParamSpec, Protocol
@@ -127,7 +127,7 @@ def evaluation(
     def evaluate(trace: Trace, /, *args: P.args, **kwargs: P.kwargs) -> Evaluation:
         judged = Evaluation(trace.label)
         try:
-            fill(judged, trace, *args, **kwargs)
+            fill(judged, replace(trace, judged=True) if trace.gaps else trace, *args, **kwargs)
         except NotJudged as why:
             judged.report("test-not-judged", str(why))
         return judged

@@ -7,8 +7,8 @@ if it explains `EXPLAINED` of what remains without it; a recording without v_y a
 factors and signs alone. Two signals that contradict each other do not tell which of them is wrong: a sign is
 that of one signal only where a third, the steering, agrees with the other.
 
-Spikes are taken out, uneven times made even, and stretches between gaps examined each by itself before signals
-are compared, so that none of these hides a contradiction.
+Before signals are compared, spikes are taken out and uneven times made even, and stretches between gaps are
+taken each by itself, so that none of these hides a contradiction.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ EVEN = 0.05
 NAMED = 10
 """Gaps of a segment that are named one by one; chosen: of more, their number says enough."""
 LIKE = 0.5
-"""Normalized product of two signals from which they are compared. Chosen: in bends it is above 0.9; a car that
-drives straight, or a channel without a signal, has about 0."""
+"""Normalized product of two signals from which they are compared. Chosen: in bends it is above 0.9; straight
+ahead, and of a channel without a signal, about 0."""
 LEAST_TURN = 0.1
 """Standard deviation of a_y from which it is compared [m/s2]. Chosen: less is the noise of sensors."""
 STEERING = ("steering_wheel_angle", "steer_angle")
@@ -118,10 +118,11 @@ def flaws_of(path: Path | str) -> tuple[Flaw, ...]:
 
 
 def not_examined(measurement: Measurement) -> str:
-    """Return why signals of a measurement were not compared with each other, in a sentence; "" if they were."""
+    """Return why signals of a measurement were not compared with each other; "" if they were."""
     lacking = [name for name in MOTION if all(name not in one.signals for one in measurement.segments)]
     if lacking:
-        return f"signs, units and lags were not examined: they show in {listed(MOTION)}, without {listed(lacking)}"
+        missing = f"of {listed(MOTION)}, there is no {listed(lacking, last='and no')}"
+        return f"signs, units and lags were not examined: {missing}"
     if any(_motion_of(segment) is not None for segment in measurement.segments):
         return ""
     return (
@@ -139,8 +140,8 @@ def _gaps(segment: Segment, where: str) -> list[Flaw]:
     ]
     if rest := [gap for _, gap in found[NAMED:]]:
         length = sum(gap.length for gap in rest)
-        words = f"{where}no samples in {counted(len(rest), 'more stretch', 'more stretches')}, {length:.3g} s in all"
-        flaws.append(Flaw(FlawKind.GAP, "", length, words))
+        more = counted(len(rest), "more stretch", "more stretches")
+        flaws.append(Flaw(FlawKind.GAP, "", length, f"{where}no samples in {more}, {length:.3g} s in all"))
     return flaws
 
 
@@ -171,9 +172,9 @@ def _uneven(parts: Sequence[Segment]) -> Flaw | None:
         return None
     words = (
         f"{100.0 * uneven:.0f} % of the steps of time differ by more than a tenth from their median, "
-        f"{1000.0 * usual:.4g} ms (up to {1000.0 * float(steps.max()):.4g} ms): if samples were taken evenly and "
-        "only their times jitter, write even times into the column; if they were taken at these times, leave "
-        "them: filters, tests and fits interpolate to even steps"
+        f"{1000.0 * usual:.4g} ms (up to {1000.0 * float(steps.max()):.4g} ms): if the samples were taken "
+        "evenly and only their times jitter, write even times into the column; if they were taken at these "
+        "times, leave them: filters, tests and fits interpolate to even steps"
     )
     return Flaw(FlawKind.UNEVEN_TIME, "", uneven, words)
 
@@ -188,7 +189,7 @@ def _spike_limit(parts: Sequence[Segment], name: str) -> float:
 
 def _off(part: Segment, name: str) -> np.ndarray:
     x = part.signals[name]
-    return np.abs(x - running_median(x))
+    return np.asarray(np.abs(x - running_median(x)))
 
 
 def _spikes(parts: Sequence[Segment], name: str, limit: float) -> Flaw | None:
@@ -218,7 +219,7 @@ class _Motion:
 
 
 def _motion(parts: Sequence[Segment], names: Iterable[str], cut_off: float) -> _Motion | None:
-    """Return signals below a cut-off [Hz]; None if they are not recorded, or no part is long and fine enough."""
+    """Return signals below a cut-off [Hz]; None without one of them, or a part long and fine enough."""
     every: list[tuple[dict[str, np.ndarray], dict[str, np.ndarray]]] = []
     for part in parts:
         if not set(names) <= part.signals.keys() or part.rate < 3.0 * cut_off:
@@ -259,12 +260,12 @@ def _contradiction(parts: Sequence[Segment]) -> Flaw | None:
     signals, slopes = motion.signals, motion.slopes
     r, a_y, v = (signals[name] for name in MOTION)
     turning = r * v
-    if abs(_likeness(a_y, turning)) < LIKE:
+    likeness = _likeness(a_y, turning)
+    if abs(likeness) < LIKE:
         return None
-    ratio = float(np.sum(a_y * turning) / np.sum(turning * turning))
-    if (flaw := _factor(ratio)) is not None:
+    if (flaw := _factor(float(np.sqrt(np.sum(a_y * a_y) / np.sum(turning * turning))))) is not None:
         return flaw
-    if ratio < 0.0:
+    if likeness < 0.0:
         return _sign(signals)
     if (flaw := _steering(signals)) is not None or "side" not in signals:
         return flaw
@@ -301,8 +302,8 @@ def _against_position(parts: Sequence[Segment]) -> Flaw | None:
     if abs(factor - 1.0) < WRONG_SPEED:
         return None
     words = (
-        f"is {factor:.3g} times the speed of the recorded position: 'gain: {1.0 / factor:.4g}', or its unit, if "
-        "the position is right"
+        f"is {factor:.3g} times the speed of the recorded position: if that is right, 'gain: "
+        f"{1.0 / factor:.4g}', or its unit"
     )
     return Flaw(FlawKind.FACTOR, "velocity_x", factor, words)
 
@@ -314,13 +315,13 @@ def _lateral_velocity(smooth: Mapping[str, np.ndarray]) -> np.ndarray | None:
 
 
 def _factor(ratio: float) -> Flaw | None:
-    """Return the signal whose unit explains the ratio of a_y to r v."""
+    """Return the signal whose unit explains the ratio of a_y to r v, of their rms."""
     for name, factor in FACTORS.items():
         for wrong, of_ratio in (
             (factor, factor if name == "acceleration_y" else 1.0 / factor),
             (1.0 / factor, 1.0 / factor if name == "acceleration_y" else factor),
         ):
-            if abs(abs(ratio) / of_ratio - 1.0) < NEAR:
+            if abs(ratio / of_ratio - 1.0) < NEAR:
                 words = (
                     f"is {wrong:.3g} times what other signals imply: 'gain: {1.0 / wrong:.4g}', or its unit"
                 )
@@ -333,13 +334,15 @@ def _sign(signals: Mapping[str, np.ndarray]) -> Flaw:
 
     Without a steering that is like one of them, it is a flaw of both.
     """
-    likeness = next((_likeness(signals[name], signals["yaw_rate"]) for name in STEERING if name in signals), 0.0)
+    likeness = next(
+        (_likeness(signals[name], signals["yaw_rate"]) for name in STEERING if name in signals), 0.0
+    )
     if abs(likeness) >= LIKE:
         name = "yaw_rate" if likeness < 0.0 else "acceleration_y"
         return Flaw(FlawKind.SIGN, name, -1.0, _described(FlawKind.SIGN, name, -1.0))
     words = (
-        "are opposed to each other: one of them needs 'sign: -1', and they alone do not tell which; a steering "
-        f"signal ({listed(STEERING, last='or')}) would. Both are positive in a turn to the left"
+        "are opposed to each other: one of them needs 'sign: -1', and they alone do not tell which; a signal "
+        f"of the steering ({listed(STEERING, last='or')}) would. Both are positive in a turn to the left"
     )
     return Flaw(FlawKind.SIGN, "yaw_rate, acceleration_y", -1.0, words)
 
@@ -348,8 +351,8 @@ def _steering(signals: Mapping[str, np.ndarray]) -> Flaw | None:
     for name in STEERING:
         if name in signals and _likeness(signals[name], signals["yaw_rate"]) < -LIKE:
             words = (
-                "is opposed to yaw_rate and acceleration_y: 'sign: -1', or the same for both of them; all are "
-                "positive to the left"
+                "is opposed to yaw_rate and acceleration_y: 'sign: -1', or the same for both of them; all "
+                "are positive to the left"
             )
             return Flaw(FlawKind.SIGN, name, -1.0, words)
     return None

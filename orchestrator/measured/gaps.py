@@ -1,8 +1,8 @@
 """Gaps of recordings: stretches without samples, found by the times of a signal.
 
-Nothing is known of a signal in a gap, so nothing that looks at a recording draws a curve through it in silence:
-`measured show` names it, a standard test that needs the signal is not judged, a fit refuses a window with it,
-a run whose input follows it has a warning, and figures show it as a span.
+Nothing is known of a signal in a gap, so nothing goes through it in silence: `measured show` names it, a
+standard test that needs the signal is not judged, a fit refuses a window with it, a run whose input follows
+it has a warning, comparisons leave it out, and figures show it as a span.
 """
 
 from __future__ import annotations
@@ -17,16 +17,14 @@ from ..errors import Diagnostic, Location
 from ..messages import counted, span
 
 GAP = 3.5
-"""Step over the usual one from which it is a gap. Chosen: with three samples missing, a signal sampled ten times
-as fast as it moves has lost a turn of its course; jitter of a third of the step stays below 2."""
+"""Step over the usual one from which it is a gap: three samples in a row are missing. Chosen: jitter of a
+third of a step makes at most twice the usual one, and one sample or two do not change a curve."""
 USUAL = 0.95
 """Share of steps that are at most the usual one. Chosen: a recording with two rates has no gaps."""
 ONE = 0.8
 """Share of the longer of two signals' gaps that they have in common if they are one."""
 MOST = 20
 """Gaps of a segment that have a warning each."""
-CODE = "measurement-gap"
-"""Code of the diagnostic on a gap."""
 
 
 class Gap(NamedTuple):
@@ -42,6 +40,10 @@ class Gap(NamedTuple):
     def length(self) -> float:
         """Its duration [s]."""
         return self.end - self.begin
+
+    def overlaps(self, begin: float, end: float) -> bool:
+        """Return whether it shares time with begin to end [s]."""
+        return self.begin < end and begin < self.end
 
     def later(self, by: float) -> Gap:
         """Return the gap on a clock whose times are larger by so much [s]."""
@@ -80,11 +82,6 @@ def parts_between(gaps: Iterable[Gap], times: np.ndarray) -> Iterator[slice]:
     yield from (slice(first, end) for first, end in pairwise(edges) if end > first and not lost[first])
 
 
-def within(gaps: Iterable[Gap], begin: float, end: float) -> list[Gap]:
-    """Return the gaps that share time with begin to end [s]."""
-    return [gap for gap in gaps if gap.begin < end and begin < gap.end]
-
-
 def by_signals(gaps: Mapping[str, tuple[Gap, ...]], signals: Iterable[str]) -> list[tuple[str, Gap]]:
     """Return the gaps in their order, each with the signals that share it, as "a, b"; "": all of them.
 
@@ -94,7 +91,7 @@ def by_signals(gaps: Mapping[str, tuple[Gap, ...]], signals: Iterable[str]) -> l
     """
     every = list(signals)
     shared: list[tuple[list[str], Gap]] = []
-    for gap, name in sorted((gap, name) for name in every for gap in gaps.get(name, ())):
+    for gap, name in sorted((gap, signal) for signal in every for gap in gaps.get(signal, ())):
         for k in range(len(shared) - 1, max(len(shared) - 1 - len(every), -1), -1):
             names, known = shared[k]
             if name not in names and _alike(known, gap):
@@ -126,7 +123,7 @@ def notes_on(
     shortest_named = sorted((gap.length for _, gap in found), reverse=True)[:MOST][-1:]
     notes = [
         Diagnostic(
-            CODE,
+            "measurement-gap",
             f"{segment}: no samples{f' of {names}' * bool(names)} from {gap.later(-start)}",
             "warning",
             Location(signal=names or None, time=gap.begin - start),
@@ -137,5 +134,13 @@ def notes_on(
     ][:MOST]
     if len(found) > len(notes):
         rest = counted(len(found) - len(notes), "shorter stretch", "shorter stretches")
-        notes.append(Diagnostic(CODE, f"{segment}: {rest} without samples", "warning"))
+        notes.append(Diagnostic("measurement-gap", f"{segment}: {rest} without samples", "warning"))
     return notes
+
+
+def gaps_noted(notes: Iterable[Diagnostic]) -> Iterator[tuple[str, Gap]]:
+    """Yield the gaps that diagnostics tell of, each with its signals as "a, b"; "": all of them."""
+    for note in notes:
+        if note.code == "measurement-gap" and note.location.time is not None and note.value is not None:
+            begin = note.location.time
+            yield note.location.signal or "", Gap(begin, begin + note.value)

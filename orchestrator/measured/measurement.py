@@ -1,7 +1,7 @@
 """Measurements: recordings of a car, described by a file `measured.yaml`, as signals in SI.
 
     files: [run01.csv, run02.mf4]
-    segments: {by: Lap}                  # `by: time`: where time restarts; `by: gaps`: where samples are missing
+    segments: {by: Lap}                  # where time restarts; `by: time`: at restarts; `by: gaps`: at gaps
     time: {column: Time, unit: ms}
     signals:
       steering_wheel_angle: {column: SWA, unit: deg, sign: -1, delay: 20 ms, spikes: 2 deg}
@@ -149,8 +149,8 @@ class SegmentsSpec(StrictModel):
     """Segments of a recording, each with increasing time."""
 
     by: str = Field(
-        description="Column that changes from segment to segment; time: where time restarts; gaps: at stretches "
-        "without samples"
+        description="Column that changes from segment to segment; time: where time restarts; gaps: at "
+        "stretches without samples"
     )
 
 

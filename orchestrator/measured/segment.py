@@ -102,7 +102,7 @@ class Segment:
         )
 
     def filtered(self, low_pass: LowPass) -> Segment:
-        """Return the segment with all signals filtered, at the same times, between gaps each part by itself."""
+        """Return the segment with all signals filtered, at the same times; gaps separate parts."""
         signals = {name: x.copy() for name, x in self.signals.items()}
         for part in self.parts():
             even = part.even()
