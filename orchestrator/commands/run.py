@@ -105,14 +105,13 @@ def run(
     if metrics:
         from ..experiments.tables import metrics_of_run
         from ..metrics.expressions import columns_for, evaluate_all
-        from ..metrics.measures import si
         from ..results.reader import load_results
 
         needed = load_results(folder, only=lambda recorded: columns_for(recorded, metrics))
         print_tables([metrics_of_run(needed, metrics)])
         numbers = evaluate_all(needed, metrics)
         output.answer(
-            metrics={name: {"value": value.number, "unit": si(value.unit)} for name, value in numbers.items()}
+            metrics={name: {"value": value.number, "unit": value.unit} for name, value in numbers.items()}
         )
 
 

@@ -17,7 +17,7 @@ from vocabulary.wheels import WHEELS
 
 from ..experiments.experiment_result import ExperimentResult
 from ..experiments.tables import Table, marked, remarks
-from ..figures.style import LabelledRun, digits_of, shown, shown_unit
+from ..figures.style import LabelledRun, digits_of, shown, shown_unit, unit_of_signal
 from ..measured.gaps import gaps_noted
 from ..messages import counted, resolved, span, star
 from ..metrics.expressions import MetricValue, metric
@@ -329,7 +329,7 @@ def metric_table(findings: ExperimentResult, runs: Sequence[LabelledRun]) -> Tab
         measure = chosen.name.partition("(")[0]
         least = _best(values, idle if measure in OF_CONTROL else ()) if measure in LESS_IS_BETTER else None
         cells = [
-            shown(value.number, value.unit)
+            shown(value.number, value.shown_in)
             + f" {BEST}" * (k == least)
             + (f"\n{apart}" if k and (apart := difference(values[0], value)) else "")
             if value
@@ -368,7 +368,7 @@ def _best(values: Sequence[MetricValue | None], apart: Collection[int]) -> int |
     if len(known) < 2:
         return None
     (first, best), (second, _) = known[:2]
-    unit = next(value.unit for value in values if value is not None)
+    unit = next(value.shown_in for value in values if value is not None)
     return None if shown(first, unit) == shown(second, unit) else best
 
 
@@ -390,7 +390,7 @@ def difference(first: MetricValue | None, other: MetricValue | None) -> str:
     apart = other.number - first.number
     if not math.isfinite(apart):
         return ""
-    unit, factor = shown_unit(other.unit)
+    unit, factor = shown_unit(other.shown_in)
     if apart == 0:
         return "the same"
     size = digits_of(abs(apart) * factor)
@@ -442,7 +442,7 @@ def partings_table(partings: Sequence[SignalDifference], title: str = "") -> Tab
             ", ".join(parting.targets) or "recorded only",
             f"{parting.first:g} s",
             None if parting.seen is None else f"{parting.seen:g} s",
-            None if math.isnan(parting.largest) else shown(parting.largest, parting.unit),
+            None if math.isnan(parting.largest) else shown(parting.largest, unit_of_signal(parting.unit)),
             f"{parting.largest_at:g} s",
         ])  # fmt: skip
     return table

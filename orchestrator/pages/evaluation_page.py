@@ -73,16 +73,18 @@ def _distance(verdict: Verdict) -> str:
     beyond, margin = verdict.beyond, margin_words(verdict)
     if beyond is None:
         return ""
-    return f"{shown(beyond, verdict.unit)} ({margin})" if margin else shown(beyond, verdict.unit)
+    return f"{shown(beyond, verdict.shown_in)} ({margin})" if margin else shown(beyond, verdict.shown_in)
 
 
 def _numbers(verdict: Verdict) -> tuple[str, str]:
     """Return value and limit of a verdict, with digits enough to tell them apart."""
     if verdict.value is None or verdict.bound is None:
         return "", ""
-    digits = digits_apart([(verdict.value, verdict.bound)], verdict.unit)
+    digits = digits_apart([(verdict.value, verdict.bound)], verdict.shown_in)
     symbol = SYMBOLS[verdict.relation] if verdict.relation else ""
-    value, bound = (shown(number, verdict.unit, digits=digits) for number in (verdict.value, verdict.bound))
+    value, bound = (
+        shown(number, verdict.shown_in, digits=digits) for number in (verdict.value, verdict.bound)
+    )
     return value, f"{symbol} {bound}".strip()
 
 
