@@ -103,13 +103,20 @@ EXACT = 1e15
 """Size beyond which numbers have no decimals as double precision."""
 
 
-def span(begin: float, end: float) -> str:
+def span(begin: float, end: float, digits: int = 0) -> str:
     """Return "3 to 5.5": two numbers with so many decimals that they read differently.
+
+    Args:
+        begin, end: the numbers.
+        digits: significant digits, where these are enough.
 
     >>> span(3.0, 5.5), span(1.7e9 + 3.0, 1.7e9 + 5.5), span(0.0, 1e-5)
     ('3 to 5.5', '1700000003 to 1700000005.5', '0 to 0.00001')
+    >>> span(1050.25, 1261.5, 3), span(1050.25, 1051.5, 3)
+    ('1.05e+03 to 1.26e+03', '1050.25 to 1051.5')
     """
-    return " to ".join(resolved(begin, end))
+    first, last = (f"{number:.{digits}g}" for number in (begin, end)) if digits else ("", "")
+    return f"{first} to {last}" if first != last else " to ".join(resolved(begin, end))
 
 
 def resolved(*numbers: float) -> list[str]:

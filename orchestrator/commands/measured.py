@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from ..errors import ScenarioError
-from ..messages import resolved
+from ..messages import resolved, span
 from . import output
 from .options import CHANGES, MAKING, RunOptions, takes
 from .output import hold, print_tables, say, stoppable
@@ -222,7 +222,7 @@ def vehicle_text(result: FitResult, folder: Path, planner: Planner) -> str:
             lines.append(f"  {name}: {json.dumps(value)}")
     for name, parameter in fitted.items():
         interval = intervals[parameter.name]
-        bounds = f"95 % {interval[0]:.4g} to {interval[1]:.4g}" if interval else "no interval"
+        bounds = f"95 % {span(*interval, digits=4)}" if interval else "no interval"
         lines.append(
             f"  {name}: {model.estimate.values[parameter.name]:.6g}  # {parameter.unit}; fitted, {bounds}"
         )

@@ -36,7 +36,7 @@ from ..errors import Diagnostic, ResultsError, ScenarioError, code_of, warnings_
 from ..figures.style import CHANGED, frame, line_style, new_figure, shown_unit
 from ..measured.measurement import Measurement
 from ..measured.segment import Segment
-from ..messages import counted, hint
+from ..messages import counted, hint, resolved
 from ..metrics.measures import words
 from ..metrics.verdict import Verdict, apart, compare, not_judged, worst
 from ..results.reader import Results
@@ -331,8 +331,10 @@ def _conditions(bands: Bands, over: np.ndarray, tests: Sequence[np.ndarray]) -> 
     reached = max(float(np.abs(test).max()) for test in tests)
     tolerance = float(bands.tolerances[bands.over](np.array(wanted)))
     unit = SIGNALS[bands.over].unit
+    ends = [f"{x:.3g}" for x in (reached, wanted)]
+    its, own = ends if ends[0] != ends[1] else resolved(reached, wanted)
     short = (
-        f"the measurement ends at {reached:.3g} {unit} of {bands.over}, the run at {wanted:.3g} {unit}; "
+        f"the measurement ends at {its} {unit} of {bands.over}, the run at {own} {unit}; "
         "the rest is not judged"
     )
     yield f"largest {bands.over}", compare(reached, "at_least", wanted - tolerance, unit, why=short)

@@ -28,7 +28,7 @@ import numpy as np
 from vocabulary.wheels import WHEELS, wheels
 
 from ..errors import ScenarioError
-from ..messages import closest, fold, hint, listed, short
+from ..messages import closest, fold, hint, listed, short, span
 from ..plan import SENSING
 from ..scenario.quantities import convert
 from ..signal_names import VARIABLE, SignalName
@@ -150,7 +150,7 @@ def during(window: TimeWindow | None, lead: str = "") -> str:
     if window is None:
         return ""
     first, last = window
-    return f", at {first:g} s" if first == last else f", {lead}{first:g} to {last:g} s"
+    return f", at {first:g} s" if first == last else f", {lead}{span(first, last)} s"
 
 
 def window_of(text: str) -> TimeWindow:
