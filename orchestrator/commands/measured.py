@@ -266,9 +266,10 @@ def validate(
         out / "validation.json", json.dumps(validation.as_data(), indent=1, ensure_ascii=False) + "\n"
     )
     output.answer(folder=out, validation=validation.as_data())
-    output.note((*measurement.notes, *validation.diagnostics))
+    notes = tuple(dict.fromkeys((*measurement.notes, *validation.diagnostics)))
+    output.note(notes)
     print_tables([validation_table(validation), conditions_table(validation)])
-    for diagnostic in (*measurement.notes, *validation.diagnostics):
+    for diagnostic in notes:
         say(f"{'note' if diagnostic.severity == 'info' else 'warning'}: {diagnostic}")
     written = [str(out / "validation.json"), *(path.name for path in drawing)]
     if page:

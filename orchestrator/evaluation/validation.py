@@ -305,7 +305,11 @@ def compare_run(results: Results, measurement: Measurement, bands: Bands) -> Val
     notes = [verdict.why for verdict in conditions.values() if not verdict.holds]
     return Validation(
         trace.title, measurement.title, measurement.origin, bands.title, bands.source, verdicts, conditions,
-        tuple(Diagnostic("validation-conditions", note, "warning") for note in notes), plots, bands.over,
+        (
+            *(note for note in measurement.notes if note.code == "measurement-gap"),
+            *(Diagnostic("validation-conditions", note, "warning") for note in notes),
+        ),
+        plots, bands.over,
     )  # fmt: skip
 
 
