@@ -285,12 +285,15 @@ def compare_run(results: Results, measurement: Measurement, bands: Bands) -> Val
         signals = {name: low_pass(even[name], even.rate) for name in bands.tolerances if name in even}
         trace = Trace(trace.label, even.time, signals, title=trace.title)
     over = trace[bands.over]
-    tests = [segment for segment in measurement.segments if bands.over in segment.signals]
+    tests = [
+        segment.sampled([bands.over]) for segment in measurement.segments if bands.over in segment.signals
+    ]
     if not tests:
         raise ResultsError(f"{measurement.path}: {bands.over} is not measured", code="signal-unknown")
     verdicts, plots = {}, []
     for name in bands.judged:
-        own = [segment for segment in tests if name in segment.signals]
+        sampled = [segment.sampled((bands.over, name)) for segment in tests if name in segment.signals]
+        own = [segment for segment in sampled if segment.time.size]
         if name not in trace or not own:
             verdicts[name] = not_judged("not measured" if name in trace else "not recorded in the run")
             continue

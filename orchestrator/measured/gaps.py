@@ -23,6 +23,8 @@ USUAL = 0.95
 """Share of steps that are at most the usual one. Chosen: a recording with two rates has no gaps."""
 ONE = 0.8
 """Share of the longer of two signals' gaps that they have in common if they are one."""
+ROUNDING = 1e-9
+"""Distance of times that count as the same [s]; chosen: a nanosecond, far below any step."""
 MOST = 20
 """Gaps of a segment that have a warning each."""
 
@@ -71,12 +73,20 @@ def _before_gaps(times: np.ndarray) -> np.ndarray:
     return np.flatnonzero(steps > GAP * usual)
 
 
+def outside(gaps: Iterable[Gap], times: np.ndarray) -> np.ndarray:
+    """Return which times [s] are not in gaps; their ends are samples. Shape (rows,)."""
+    kept = np.ones(times.size, dtype=bool)
+    for begin, end in gaps:
+        kept &= (times <= begin + ROUNDING) | (times >= end - ROUNDING)
+    return kept
+
+
 def parts_between(gaps: Iterable[Gap], times: np.ndarray) -> Iterator[slice]:
     """Yield the rows of the parts of times [s] that no gap interrupts, without those in gaps."""
-    number, lost = np.zeros(times.size, dtype=int), np.zeros(times.size, dtype=bool)
-    for begin, end in gaps:
-        number[times >= end] += 1
-        lost |= (times > begin) & (times < end)
+    every = list(gaps)
+    number, lost = np.zeros(times.size, dtype=int), ~outside(every, times)
+    for gap in every:
+        number[times >= gap.end - ROUNDING] += 1
     number[lost] = -1
     edges = [0, *(int(k) + 1 for k in np.flatnonzero(np.diff(number))), times.size]
     yield from (slice(first, end) for first, end in pairwise(edges) if end > first and not lost[first])

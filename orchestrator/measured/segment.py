@@ -10,14 +10,14 @@ measures while the car rolls is not removed, as all sensors measure it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 
-from .gaps import Gap, parts_between
+from .gaps import Gap, outside, parts_between
 
 Position = tuple[float, float, float]
 """x, y, z [m] relative to the centre of mass, vehicle axes."""
@@ -110,6 +110,12 @@ class Segment:
             for name, x in even.signals.items():
                 signals[name][rows] = np.interp(part.time, even.time, low_pass(x, even.rate))
         return replace(self, signals=signals)
+
+    def sampled(self, names: Iterable[str]) -> Segment:
+        """Return the rows that lie in no gap of some signals, where their values are not interpolated."""
+        rows = outside((gap for name in names for gap in self.gaps.get(name, ())), self.time)
+        signals = {name: x[rows] for name, x in self.signals.items()}
+        return replace(self, time=self.time[rows], signals=signals)
 
     def parts(self) -> list[Segment]:
         """Return the parts of two samples or more that no gap of any signal interrupts."""

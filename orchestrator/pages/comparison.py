@@ -18,7 +18,7 @@ from vocabulary.wheels import WHEELS
 from ..experiments.experiment_result import ExperimentResult
 from ..experiments.tables import Table, marked, remarks
 from ..figures.style import LabelledRun, digits_of, shown, shown_unit, unit_of_signal
-from ..measured.gaps import gaps_noted
+from ..measured.gaps import gaps_noted, outside
 from ..messages import counted, resolved, span, star
 from ..metrics.expressions import MetricValue, metric
 from ..metrics.measures import variable_of
@@ -119,9 +119,7 @@ def _inside(measured: MeasuredResults, other: Results) -> np.ndarray:
     time = measured.time
     inside = (time >= other.time[0] - 1e-9) & (time <= other.time[-1] + 1e-9)
     notes = (*measured.record.all_diagnostics, *other.record.all_diagnostics)
-    for _, (begin, end) in gaps_noted(notes):
-        inside &= (time <= begin + 1e-9) | (time >= end - 1e-9)
-    return np.flatnonzero(inside)
+    return np.flatnonzero(inside & outside((gap for _, gap in gaps_noted(notes)), time))
 
 
 def _at(time: np.ndarray, run: Results, name: str) -> np.ndarray:

@@ -274,6 +274,24 @@ def test_the_effects_of_parameters_are_those_outside_gaps(tmp_path):
     assert effects_in(load_measurement(path))
 
 
+def test_a_validation_compares_no_values_that_were_not_measured(tmp_path):
+    asammdf = pytest.importorskip("asammdf")
+    a_y = 4.0 * np.sin(2.0 * np.pi * T / 8.0)
+    lost = (T <= 1.0) | (T >= 3.0)  # the hand wheel is not recorded while a_y is largest
+    with asammdf.MDF(version="4.10") as mdf:
+        mdf.append([asammdf.Signal(a_y, T, name="lat", unit="m/s2")])
+        mdf.append([asammdf.Signal(0.1 * a_y[lost], T[lost], name="hand", unit="rad")])
+        mdf.save(tmp_path / "car.mf4")
+    path = tmp_path / "car.yaml"
+    path.write_text("files: [car.mf4]\nsignals: {acceleration_y: lat, steering_wheel_angle: hand}\n")
+    table = np.column_stack([T, a_y, 0.1 * a_y])
+    np.savetxt(tmp_path / "run.csv", table, "%.9g", ",", header="time [s],lat [m/s2],hand [rad]", comments="")
+    (tmp_path / "run.yaml").write_text(path.read_text().replace("car.mf4", "run.csv"))
+    validation = yb.validate(yb.measured(tmp_path / "run.yaml"), path)
+    assert validation.verdicts["steering_wheel_angle"].value < 0.05
+    assert [one.code for one in validation.diagnostics].count("measurement-gap") == 1
+
+
 @pytest.fixture
 def compared(tmp_path) -> Path:
     """A folder with the results of a run, which begins at 0 s."""
