@@ -29,6 +29,10 @@ MOST = 20
 """Gaps of a segment that have a warning each."""
 
 
+Samples = tuple[np.ndarray, np.ndarray]
+"""Times [s] and values of a signal; NaN: none was taken."""
+
+
 class Gap(NamedTuple):
     """A stretch without samples: the times of the last sample before and the first one after it [s]."""
 
@@ -54,23 +58,29 @@ class Gap(NamedTuple):
 
 def gaps_in(times: np.ndarray) -> tuple[Gap, ...]:
     """Return the gaps of increasing times [s]; shape (rows,)."""
-    return tuple(Gap(float(times[k]), float(times[k + 1])) for k in _before_gaps(times))
-
-
-def numbers_of_parts(times: np.ndarray) -> np.ndarray:
-    """Return for each of the times [s] the number of the part between gaps that it is in, from 1."""
-    numbers = np.ones(times.size)
-    for k in _before_gaps(times):
-        numbers[k + 1 :] += 1.0
-    return numbers
-
-
-def _before_gaps(times: np.ndarray) -> np.ndarray:
     steps = np.diff(times)
     if steps.size < 2:
-        return np.zeros(0, dtype=int)
+        return ()
     usual = float(np.quantile(steps, USUAL, method="lower"))
-    return np.flatnonzero(steps > GAP * usual)
+    before = np.flatnonzero(steps > GAP * usual)
+    return tuple(Gap(float(times[k]), float(times[k + 1])) for k in before)
+
+
+def between_gaps(read: Mapping[str, Samples]) -> list[tuple[str, dict[str, Samples]]]:
+    """Return number, "" of a single one, and samples of the parts that no gap of any signal interrupts.
+
+    Parts in which a signal has less than two samples are left out.
+    """
+    taken = {signal: np.unique(t[~np.isnan(x)]) for signal, (t, x) in read.items()}
+    clock = np.unique(np.concatenate([*taken.values()]))
+    found = []
+    for rows in parts_between((gap for t in taken.values() for gap in gaps_in(t)), clock):
+        first, last = clock[rows][0], clock[rows][-1]
+        inside = {signal: (t >= first) & (t <= last) for signal, (t, _) in read.items()}
+        part = {signal: (t[inside[signal]], x[inside[signal]]) for signal, (t, x) in read.items()}
+        if all(np.count_nonzero(~np.isnan(x)) > 1 for _, x in part.values()):
+            found.append(part)
+    return [(str(number) if len(found) > 1 else "", part) for number, part in enumerate(found, start=1)]
 
 
 def outside(gaps: Iterable[Gap], times: np.ndarray) -> np.ndarray:

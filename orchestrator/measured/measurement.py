@@ -52,7 +52,7 @@ from ..scenario import yaml_lines
 from ..scenario.quantities import convert, measure_of, parse_unit
 from ..scenario.schema_validation import StrictModel, quantities_in, text_in_unit, validate
 from ..scenario.yaml_lines import Document, KeyPath
-from .gaps import gaps_in, notes_on, numbers_of_parts
+from .gaps import Samples, between_gaps, gaps_in, notes_on
 from .recording_formats import (
     SECOND,
     ColumnFile,
@@ -363,19 +363,26 @@ class _Reader:
         if self.document.errors:
             return
         times = next(iter(read.values()))[0]
-        parts: Iterable[tuple[str, slice]] = [("", slice(None))]
-        if self.spec.segments is not None:
+        parts: Iterable[tuple[str, Mapping[str, Samples]]] = [("", read)]
+        if self.spec.segments is not None and self.spec.segments.by == BY_GAPS:
+            parts = between_gaps(read)
+            if not parts:
+                wrong = f"{name}: no part between gaps has two samples of every signal"
+                return self.document.report(("segments", "by"), wrong, "measurement-time")
+        elif self.spec.segments is not None:
             if any(not np.array_equal(t, times) for t, _ in read.values()) or (
                 labels is not None and len(labels) != len(times)
             ):
                 wrong = f"{name}: channels with times of their own cannot be divided into segments"
                 return self.document.report(("segments",), wrong, "measurement-time")
-            by_gaps = self.spec.segments.by == BY_GAPS and labels is None
-            parts = parts_of(times, numbers_of_parts(times) if by_gaps else labels)
-        for label, rows in parts:
+            parts = (
+                (label, {signal: (t[rows], x[rows]) for signal, (t, x) in read.items()})
+                for label, rows in parts_of(times, labels)
+            )
+        for label, samples in parts:
             called = f"{name} {label}" if label else name
             try:
-                yield self._segment(called, {signal: (t[rows], x[rows]) for signal, (t, x) in read.items()})
+                yield self._segment(called, samples)
             except ValueError as error:
                 self.document.report(key, f"{called}: {error}", code_of(error, "measurement-time"))
 

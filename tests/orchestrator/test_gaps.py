@@ -130,6 +130,9 @@ def test_a_gap_of_one_channel_is_named_with_its_signal(tmp_path):
     assert (flaw.kind, flaw.signal, tuple(flaw.gap)) == (FlawKind.GAP, "yaw_rate", (3.0, 5.5))
     (note,) = [one for one in load_measurement(path).notes if one.code == "measurement-gap"]
     assert note.location.signal == "yaw_rate" and "yaw_rate" in note.message
+    path.write_text(f"files: [m.mf4]\n{SIGNALS}segments: {{by: gaps}}\n")
+    ends = [(float(one.time[0]), float(one.time[-1])) for one in load_measurement(path).segments]
+    assert ends == [(0.0, 3.0), (5.5, 8.0)]
 
 
 def test_a_recording_can_be_divided_at_its_gaps(tmp_path):
