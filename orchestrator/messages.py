@@ -1,10 +1,12 @@
-"""Building blocks of messages: lists, shortened text, "did you mean", merged wheels."""
+"""Building blocks of messages: lists, shortened text, ranges of numbers, "did you mean", merged wheels."""
 
 from __future__ import annotations
 
 import difflib
+import math
 import re
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 from typing import TypeVar
 
 from vocabulary.wheels import WHEELS
@@ -93,6 +95,39 @@ def hint(name: str, valid: Iterable[str], *, lead: str) -> str:
 def counted(number: int, noun: str, several: str = "") -> str:
     """Return "1 run", "2 runs"; `several`: a plural that is not formed with s."""
     return f"{number} {noun if number == 1 else several or f'{noun}s'}"
+
+
+RESOLVED = 3
+"""Digits of the distance of two numbers that a range shows. Chosen: exact to a thousandth of it."""
+EXACT = 1e15
+"""Size beyond which numbers have no decimals as double precision."""
+
+
+def span(begin: float, end: float, digits: int = 0) -> str:
+    """Return "3 to 5.5": two numbers with so many decimals that they read differently.
+
+    Args:
+        begin, end: the numbers.
+        digits: significant digits, where these are enough.
+
+    >>> span(3.0, 5.5), span(1.7e9 + 3.0, 1.7e9 + 5.5), span(0.0, 1e-5)
+    ('3 to 5.5', '1700000003 to 1700000005.5', '0 to 0.00001')
+    >>> span(1050.25, 1261.5, 3), span(1050.25, 1051.5, 3)
+    ('1.05e+03 to 1.26e+03', '1050.25 to 1051.5')
+    """
+    first, last = (f"{number:.{digits}g}" for number in (begin, end)) if digits else ("", "")
+    return f"{first} to {last}" if first != last else " to ".join(resolved(begin, end))
+
+
+def resolved(*numbers: float) -> list[str]:
+    """Return numbers as text, with the decimals that show their least distance to a thousandth."""
+    ordered = sorted(set(numbers))
+    least = min((b - a for a, b in pairwise(ordered)), default=abs(ordered[0]))
+    if not math.isfinite(sum(numbers)) or not least or max(map(abs, numbers)) >= EXACT:
+        return [f"{number:.16g}" for number in numbers]
+    decimals = max(0, RESOLVED - math.floor(math.log10(least)))
+    texts = [f"{round(number, decimals) + 0.0:.{decimals}f}" for number in numbers]
+    return [text.rstrip("0").rstrip(".") if decimals else text for text in texts]
 
 
 def fold(names: Sequence[str]) -> list[str]:

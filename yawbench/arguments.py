@@ -21,7 +21,7 @@ from typing import Any, NoReturn, TypeGuard, TypeVar, cast
 import numpy as np
 
 from orchestrator.errors import ScenarioError, code_of
-from orchestrator.messages import listed, short, unprintable
+from orchestrator.messages import listed, resolved, short, unprintable
 
 MOST = 100_000
 """Largest number of items of an argument. Chosen: the limit on runs of an experiment."""
@@ -100,7 +100,8 @@ def span(value: Any, name: str) -> tuple[float, float]:
         refuse(name, "a pair of times, (1.0, 3.0)", value)
     first, last = (number(end, f"{name}[{k}]") for k, end in enumerate(ends))
     if first > last:
-        raise ValueError(f"{name}: must not end before it begins (got {first:g} to {last:g} s)")
+        got = " to ".join(resolved(first, last))
+        raise ValueError(f"{name}: must not end before it begins (got {got} s)")
     return first, last
 
 

@@ -68,6 +68,13 @@ def second_opinion(
         except RuntimeError as error:
             raise SimulationError(str(error), instance=None, time=0.0) from None
     show(opinions)
+    if all(opinion.problem for opinion in opinions):
+        raise SimulationError(
+            f"{scenario}: nothing was compared, no other master has a result",
+            instance=None,
+            time=0.0,
+            code="nothing-to-compare",
+        )
     wrong = [opinion for opinion in opinions if not opinion.agrees and opinion.master.title != "fmpy"]
     if wrong:
         names = " and ".join(opinion.master.title for opinion in wrong)

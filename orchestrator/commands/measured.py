@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from ..errors import ScenarioError
+from ..messages import resolved, span
 from . import output
 from .options import CHANGES, MAKING, RunOptions, takes
 from .output import hold, print_tables, say, stoppable
@@ -43,18 +44,21 @@ SETS = "sets"
 def measured(action: MeasuredAction, file: MeasurementFile, out: FigureFile = None) -> None:
     """Examine a recording: signals, flaws, what a fit can find.
 
-    Flaws are spikes, times that are uneven, repeated or restart, and signals that contradict the motion of a
+    Flaws are stretches without samples, spikes, times that are uneven, repeated or restart, and signals that
+    contradict the motion of a
     rigid car: wrong signs, mistaken units, lag, position and zero points of sensors, a speed that does not
     match the recorded position. The table of effects shows which parameters of a car the recording
     determines. Exit status 1 if there is any flaw.
     """
     from ..experiments.tables import Cell, Table
-    from ..measured.flaws import FlawKind, flaws_of
+    from ..measured.flaws import FlawKind, flaws_of, not_examined
     from ..measured.measurement import load_measurement
 
     flaws = flaws_of(file)
+    unexamined = ""
     if not any(flaw.kind is FlawKind.REFUSED for flaw in flaws):
         measurement = load_measurement(file)
+        unexamined = not_examined(measurement)
         say(f"{measurement.title}; {measurement.origin or 'source and licence not stated'}")
         for note in measurement.notes:
             if note.code == "recording-rows":
@@ -62,8 +66,7 @@ def measured(action: MeasuredAction, file: MeasurementFile, out: FigureFile = No
         rows: list[Sequence[Cell]] = [
             (
                 segment.name,
-                f"{segment.time[0]:.6g}",
-                f"{segment.time[-1]:.6g}",
+                *resolved(segment.time[0], segment.time[-1]),
                 f"{segment.rate:.4g}",
                 ", ".join(segment.signals),
             )
@@ -81,11 +84,15 @@ def measured(action: MeasuredAction, file: MeasurementFile, out: FigureFile = No
     output.answer(
         flaws=[
             {"kind": flaw.kind.value, "signal": flaw.signal, "value": flaw.value, "text": flaw.text}
+            | ({"begin": flaw.gap.begin, "end": flaw.gap.end} if flaw.gap else {})
             for flaw in flaws
-        ]
+        ],
+        examined=not unexamined,
     )
     for flaw in flaws:
         say(f"{flaw.signal}: {flaw.text}" if flaw.signal else flaw.text)
+    if unexamined:
+        say(f"note: {unexamined}")
     if flaws:
         raise typer.Exit(1)
     say("no flaws")
@@ -218,7 +225,7 @@ def vehicle_text(result: FitResult, folder: Path, planner: Planner) -> str:
             lines.append(f"  {name}: {json.dumps(value)}")
     for name, parameter in fitted.items():
         interval = intervals[parameter.name]
-        bounds = f"95 % {interval[0]:.4g} to {interval[1]:.4g}" if interval else "no interval"
+        bounds = f"95 % {span(*interval, digits=4)}" if interval else "no interval"
         lines.append(
             f"  {name}: {model.estimate.values[parameter.name]:.6g}  # {parameter.unit}; fitted, {bounds}"
         )
@@ -262,9 +269,10 @@ def validate(
         out / "validation.json", json.dumps(validation.as_data(), indent=1, ensure_ascii=False) + "\n"
     )
     output.answer(folder=out, validation=validation.as_data())
-    output.note((*measurement.notes, *validation.diagnostics))
+    notes = tuple(dict.fromkeys((*measurement.notes, *validation.diagnostics)))
+    output.note(notes)
     print_tables([validation_table(validation), conditions_table(validation)])
-    for diagnostic in (*measurement.notes, *validation.diagnostics):
+    for diagnostic in notes:
         say(f"{'note' if diagnostic.severity == 'info' else 'warning'}: {diagnostic}")
     written = [str(out / "validation.json"), *(path.name for path in drawing)]
     if page:

@@ -105,14 +105,13 @@ def run(
     if metrics:
         from ..experiments.tables import metrics_of_run
         from ..metrics.expressions import columns_for, evaluate_all
-        from ..metrics.measures import si
         from ..results.reader import load_results
 
         needed = load_results(folder, only=lambda recorded: columns_for(recorded, metrics))
         print_tables([metrics_of_run(needed, metrics)])
         numbers = evaluate_all(needed, metrics)
         output.answer(
-            metrics={name: {"value": value.number, "unit": si(value.unit)} for name, value in numbers.items()}
+            metrics={name: {"value": value.number, "unit": value.unit} for name, value in numbers.items()}
         )
 
 
@@ -317,7 +316,8 @@ def diff(first_run: FirstRun, second_run: SecondRun, begin: MeasuredFrom = "0 s"
 
     First the inputs: scenario, parameters, FMUs, connections, program versions. Then the results, signal
     by signal: when they start to differ, when the difference becomes visible (1 % of the signal's
-    largest value), and the largest difference. The filter of a measurement acts on the other run, too.
+    largest value), and the largest difference. The filter of a measurement acts on the other run, too, which
+    is interpolated to the times of the measurement. Exit status 1 if nothing could be compared.
     """
     from ..pages.comparison import differences, differences_table, divergence, outcome_table
     from .results import distinct, read_runs, start_of
@@ -325,7 +325,8 @@ def diff(first_run: FirstRun, second_run: SecondRun, begin: MeasuredFrom = "0 s"
     first, second = read_runs([first_run, second_run], start_of(begin))
     inputs, parted = differences(first.record, second.record), divergence(first, second)
     output.answer(
-        identical=not (inputs or parted.partings or parted.notes),
+        identical=not (inputs or parted.partings or parted.notes or parted.compares_nothing),
+        compared={"signals": parted.compared, "times": parted.times},
         inputs=[{"name": name, "first": ours, "second": theirs} for name, ours, theirs in inputs],
         signals=[
             {
@@ -341,7 +342,10 @@ def diff(first_run: FirstRun, second_run: SecondRun, begin: MeasuredFrom = "0 s"
     )
     if inputs:
         print_tables([differences_table(inputs, *distinct([first_run, second_run]))])
-    if parted.partings or parted.notes:
+    if parted.partings or parted.notes or parted.compares_nothing:
         print_tables([outcome_table(parted, first, second)])
+    if parted.compares_nothing:
+        say(f"{first_run}, {second_run}: nothing could be compared")
+        raise typer.Exit(1)
     if not (inputs or parted.partings or parted.notes):
         say("The runs are identical: same inputs, same numbers.")

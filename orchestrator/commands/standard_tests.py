@@ -5,17 +5,18 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from ..errors import ResultsError, ScenarioError
 from ..evaluation.standard_tests import DRIVEN, TESTS, Evaluation, StandardTest, TestSeries
-from ..messages import counted
+from ..messages import counted, listed
 from ..metrics.verdict import NotJudged
+from ..results.run_folder import RUN_FILE
 from . import output
 from .options import CHANGES, MAKING, RunOptions, executor_of, takes
 from .output import hold, print_tables, say, stoppable
@@ -111,7 +112,7 @@ def drive(
     driver = TestDriver(chosen, one_run, changes, execute, known)
     with stoppable(folder):
         series = chosen.drive(driver)
-    EvaluatedRuns(chosen, driver.traces, driver.judged, series, known, folder).conclude(each=figures)
+    EvaluatedRuns(DRIVE, chosen, driver.traces, driver.judged, series, known, folder).conclude(each=figures)
     if driver.status:
         raise typer.Exit(driver.status)
 
@@ -185,6 +186,10 @@ OutFile = Annotated[
 ]
 
 FILE, PAGE = "evaluation.json", "evaluation.html"
+DRIVE, EVALUATE = "drive", "evaluate"
+"""Commands that write evaluations; neither replaces those of the other."""
+BESIDE = "evaluated"
+"""Folder of an evaluation below a folder that has one of another command already."""
 
 
 def evaluate(
@@ -199,8 +204,9 @@ def evaluate(
     """Evaluate recorded or measured runs of a standard test.
 
     Prints all quantities and a verdict with its reason per criterion; draws a figure per run. For sine
-    with dwell, give A with --slow-steer or --angle; several runs are judged as a series. Exit status 1
-    if nothing could be judged.
+    with dwell, give A with --slow-steer or --angle; several runs are judged as a series. In the folder of
+    `yawbench drive`, its runs and its A are taken, and its evaluation is kept: this one goes to a folder
+    evaluated in it. Exit status 1 if nothing could be judged.
     """
     from ..evaluation.trace import trace_of
     from ..results.measurement_results import load_run
@@ -210,15 +216,26 @@ def evaluate(
     chosen = TESTS[test]
     if signals is not None:
         _refuse_mapping(signals, sources, test)
-    places = [place for source in sources for place in _runs(source)]
-    labels = distinct(places) if len(places) > 1 else [str(places[0])]
     known = _angle(angle, slow_steer, chosen)
+    driven = {source: found for source in sources if (found := _driven(source, chosen)) is not None}
+    places = [
+        place for source in sources for place in (driven[source][0] if source in driven else _runs(source))
+    ]
+    if chosen.needs_angle:
+        places, slow = _apart(places)
+        known = known or _angle_beside(driven, slow, chosen)
+    labels = distinct(places) if len(places) > 1 else [str(places[0])]
+    recorded_here = all(place.is_dir() for place in places)
+    folder = out or (folder_of_all(places) if recorded_here else below_results("evaluation"))
+    if _command_of(folder) not in (None, EVALUATE):
+        if out is not None:
+            taken = f"has the evaluation of another command in {FILE}, which is kept: name another folder"
+            raise ScenarioError(f"--out {out}: {taken}", code="option-invalid")
+        folder = folder / BESIDE
     traces = [trace_of(load_run(place), label) for place, label in zip(places, labels, strict=True)]
     judged = [chosen.evaluate(trace, known) for trace in traces]
     series = chosen.judge_together(judged, known)
-    recorded_here = all(place.is_dir() for place in places)
-    folder = out or (folder_of_all(places) if recorded_here else below_results("evaluation"))
-    EvaluatedRuns(chosen, traces, judged, series, known, folder).conclude(
+    EvaluatedRuns(EVALUATE, chosen, traces, judged, series, known, folder).conclude(
         each=figures, together=out is not None
     )
     if all(evaluation.judges_nothing for evaluation in judged):
@@ -230,6 +247,7 @@ def evaluate(
 class EvaluatedRuns:
     """The evaluations of the runs of a test, and of their series."""
 
+    command: str
     test: StandardTest
     traces: list[Trace]
     judged: list[Evaluation]
@@ -251,6 +269,7 @@ class EvaluatedRuns:
 
         drawn = self._draw(each=each, together=together)
         data = {
+            "command": self.command,
             "test": self.test.name,
             "A": self.angle,
             "runs": [run.as_data() for run in self.judged],
@@ -314,6 +333,68 @@ def _runs(source: Path) -> list[Path]:
     for problem in unreadable:
         say(f"note: skipped: {problem}")
     return completed
+
+
+def _written(folder: Path) -> dict[str, Any] | None:
+    """Return the evaluation in a folder; None if there is none, or it cannot be read."""
+    try:
+        data = json.loads((folder / FILE).read_bytes())
+    except (OSError, ValueError):
+        return None
+    return data if isinstance(data, dict) else None
+
+
+def _command_of(folder: Path) -> str | None:
+    """Return the command whose evaluation is in a folder, "" if unknown; None if there is none."""
+    if not (folder / FILE).exists():
+        return None
+    return str((_written(folder) or {}).get("command", ""))
+
+
+def _driven(source: Path, test: StandardTest) -> tuple[list[Path], float | None] | None:
+    """Return the runs that `yawbench drive` has judged in a folder, and A [rad].
+
+    None if it has not driven this test there, or the runs are not there any more.
+    """
+    data = _written(source) or {}
+    angle, runs = data.get("A"), data.get("runs")
+    if data.get("command") != DRIVE or data.get("test") != test.name or not isinstance(runs, list):
+        return None
+    places = [source / str(run.get("label")) for run in runs if isinstance(run, dict)]
+    if not places or not all((place / RUN_FILE).is_file() for place in places):
+        return None
+    return places, float(angle) if isinstance(angle, (int, float)) else None
+
+
+def _apart(places: list[Path]) -> tuple[list[Path], list[Path]]:
+    """Return the runs to judge, and those of slowly increasing steer beside them, which give A."""
+    from ..evaluation.steering_tests import SLOW_STEER
+
+    slow = [place for place in places if SLOW_STEER in place.parts]
+    others = [place for place in places if place not in slow]
+    return (others, slow) if others else (places, [])
+
+
+def _angle_beside(
+    driven: Mapping[Path, tuple[list[Path], float | None]], slow: list[Path], test: StandardTest
+) -> float | None:
+    """Return A [rad] of driven series, else of runs of slowly increasing steer; None without either.
+
+    Raises:
+        ScenarioError: series have different A.
+    """
+    known = {angle for _, angle in driven.values() if angle is not None}
+    if not known:
+        return _angle(None, slow, test) if slow else None
+    if len(known) > 1:
+        several = listed(f"{math.degrees(angle):.1f} degrees" for angle in sorted(known))
+        raise ScenarioError(
+            f"A differs between the series, {several}: evaluate one at a time, or give --angle",
+            code="option-invalid",
+        )
+    (angle,) = known
+    say(f"A = {math.degrees(angle):.1f} degrees, of the driven series")
+    return angle
 
 
 def angle_of(text: str | None) -> float | None:

@@ -7,13 +7,13 @@ without a number, and a criterion that needs it is not judged, never passed.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import wraps
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Concatenate, Literal, ParamSpec, Protocol
 
 from ..errors import Diagnostic, Severity
-from ..metrics.verdict import NotJudged, Verdict, worst
+from ..metrics.verdict import NotJudged, Verdict, WithUnit, worst
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,8 +29,8 @@ Limit = tuple[str, float, str]
 
 
 @dataclass(frozen=True)
-class TestQuantity:
-    """A quantity of a run, in SI; `unit` "%" marks a ratio that is shown in per cent.
+class TestQuantity(WithUnit):
+    """A quantity of a run, in SI; `percent`: tables show it, a ratio, in per cent.
 
     >>> gain = yb.load("proving_ground/step_steer").run().evaluate("step-steer").quantities["yaw_rate_gain"]
     >>> gain.name, gain.unit, gain.value > 0
@@ -43,6 +43,7 @@ class TestQuantity:
     value: float | None  # None: not defined for this run
     unit: str
     reading: str = ""  # our reading of the standard
+    percent: bool = field(default=False, kw_only=True, repr=False)
 
 
 TestQuantity.__module__ = "yawbench"  # where users import it from
@@ -98,13 +99,11 @@ class Evaluation:
 
     def as_data(self) -> dict[str, Any]:
         """Return the evaluation as plain data for files, in SI units."""
-        from ..metrics.measures import si  # needs numpy, which takes long to import
-
         return {
             "label": self.label,
             "verdict": self.verdict and self.verdict.status,
             "quantities": {
-                key: asdict(quantity) | {"unit": si(quantity.unit)}
+                key: {name: x for name, x in asdict(quantity).items() if name != "percent"}
                 for key, quantity in self.quantities.items()
             },
             "criteria": {name: verdict.as_data() for name, verdict in self.criteria.items()},
@@ -127,7 +126,7 @@ def evaluation(
     def evaluate(trace: Trace, /, *args: P.args, **kwargs: P.kwargs) -> Evaluation:
         judged = Evaluation(trace.label)
         try:
-            fill(judged, trace, *args, **kwargs)
+            fill(judged, replace(trace, judged=True) if trace.gaps else trace, *args, **kwargs)
         except NotJudged as why:
             judged.report("test-not-judged", str(why))
         return judged

@@ -154,6 +154,8 @@ def gradients(a_y: np.ndarray, extra: np.ndarray) -> dict[float, float | None]:
 
 G = 9.80665
 """Standard gravity [m/s2]."""
+SLOW_STEER = "slowly_increasing_steer"
+"""Scenario of slowly increasing steer, and the folder of its runs in a driven series."""
 SLOW_STEER_ACCELERATION, SLOW_STEER_WINDOW = 0.3 * G, (0.1 * G, 0.375 * G)
 """Lateral acceleration of A, and the window of the regression [m/s2]."""
 

@@ -16,7 +16,7 @@ opposes the hand wheel is an error in the data, not a property of the car, and s
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -27,6 +27,7 @@ import numpy as np
 from vocabulary.signals import SIGNALS
 
 from ..errors import ResultsError
+from ..measured.gaps import gaps_noted
 from ..measured.segment import LowPass, even_grid, resample
 from ..metrics.expressions import columns_of
 from ..metrics.measures import si_of
@@ -101,6 +102,8 @@ class Trace:
     facts: dict[str, Any] = field(default_factory=dict)  # other parameters of the run: name -> value
     folder: Path | None = None  # of the results
     title: str = ""
+    gaps: Mapping[str, str] = field(default_factory=dict)  # signal, "": all -> which samples are missing
+    judged: bool = False  # signals with gaps are refused: what is read from them is judged
 
     @property
     def name(self) -> str:
@@ -115,6 +118,7 @@ class Trace:
 
         Raises:
             ResultsError: the trace does not have it.
+            NotJudged: it has gaps, and the trace is judged.
         """
         if name not in self.signals:
             have = ", ".join(self.signals) or "nothing"
@@ -122,6 +126,8 @@ class Trace:
                 f"{self.label}: the signal {name!r} is missing, which this test needs; recorded: {have}",
                 code="signal-unknown",
             )
+        if self.judged and (lacking := self.gaps.get(name) or self.gaps.get("")):
+            raise NotJudged(f"{lacking}: 'segments: {{by: gaps}}' divides a recording there")
         return self.signals[name]
 
     def parameter(self, name: str, meaning: str = "") -> float:
@@ -183,7 +189,15 @@ def trace_of(results: Results, label: str = "") -> Trace:
         facts,
         results.folder if results.record.results else None,
         with_changes(results.record.title or "", results.record.overrides),
+        dict(_gaps(results)),
     )
+
+
+def _gaps(results: Results) -> Iterator[tuple[str, str]]:
+    """Yield the signals of a recording that have gaps, "" for all of them, and the sentence on the first."""
+    for names, gap in reversed([*gaps_noted(results.record.all_diagnostics)]):
+        for name in names.split(", "):
+            yield name, f"there are no samples{f' of {name}' * bool(name)} from {gap}"
 
 
 def _friction(results: Results, fmus: Mapping[str, FmuRecord], parameters: Mapping[str, Any]) -> float | None:

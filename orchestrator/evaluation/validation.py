@@ -36,7 +36,7 @@ from ..errors import Diagnostic, ResultsError, ScenarioError, code_of, warnings_
 from ..figures.style import CHANGED, frame, line_style, new_figure, shown_unit
 from ..measured.measurement import Measurement
 from ..measured.segment import Segment
-from ..messages import counted, hint
+from ..messages import counted, hint, resolved
 from ..metrics.measures import words
 from ..metrics.verdict import Verdict, apart, compare, not_judged, worst
 from ..results.reader import Results
@@ -285,12 +285,15 @@ def compare_run(results: Results, measurement: Measurement, bands: Bands) -> Val
         signals = {name: low_pass(even[name], even.rate) for name in bands.tolerances if name in even}
         trace = Trace(trace.label, even.time, signals, title=trace.title)
     over = trace[bands.over]
-    tests = [segment for segment in measurement.segments if bands.over in segment.signals]
+    tests = [
+        segment.sampled([bands.over]) for segment in measurement.segments if bands.over in segment.signals
+    ]
     if not tests:
         raise ResultsError(f"{measurement.path}: {bands.over} is not measured", code="signal-unknown")
     verdicts, plots = {}, []
     for name in bands.judged:
-        own = [segment for segment in tests if name in segment.signals]
+        sampled = [segment.sampled((bands.over, name)) for segment in tests if name in segment.signals]
+        own = [segment for segment in sampled if segment.time.size]
         if name not in trace or not own:
             verdicts[name] = not_judged("not measured" if name in trace else "not recorded in the run")
             continue
@@ -305,7 +308,11 @@ def compare_run(results: Results, measurement: Measurement, bands: Bands) -> Val
     notes = [verdict.why for verdict in conditions.values() if not verdict.holds]
     return Validation(
         trace.title, measurement.title, measurement.origin, bands.title, bands.source, verdicts, conditions,
-        tuple(Diagnostic("validation-conditions", note, "warning") for note in notes), plots, bands.over,
+        (
+            *(note for note in measurement.notes if note.code == "measurement-gap"),
+            *(Diagnostic("validation-conditions", note, "warning") for note in notes),
+        ),
+        plots, bands.over,
     )  # fmt: skip
 
 
@@ -331,8 +338,10 @@ def _conditions(bands: Bands, over: np.ndarray, tests: Sequence[np.ndarray]) -> 
     reached = max(float(np.abs(test).max()) for test in tests)
     tolerance = float(bands.tolerances[bands.over](np.array(wanted)))
     unit = SIGNALS[bands.over].unit
+    ends = [f"{x:.3g}" for x in (reached, wanted)]
+    its, own = ends if ends[0] != ends[1] else resolved(reached, wanted)
     short = (
-        f"the measurement ends at {reached:.3g} {unit} of {bands.over}, the run at {wanted:.3g} {unit}; "
+        f"the measurement ends at {its} {unit} of {bands.over}, the run at {own} {unit}; "
         "the rest is not judged"
     )
     yield f"largest {bands.over}", compare(reached, "at_least", wanted - tolerance, unit, why=short)

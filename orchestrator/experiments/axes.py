@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, WithJsonSchema, model_validator
 
-from ..messages import short
+from ..messages import resolved, short
 from ..plan import Override, OverrideOrigin, Value
 from ..scenario import overrides, yaml_lines
 from ..scenario.fault_schema import FaultSpec, by_location
@@ -192,7 +192,7 @@ class AxisSpec(StrictModel):
         assert self.start is not None
         assert self.end is not None
         if not self.start < self.end:
-            raise ValueError(f"from must be below to (got {self.start:g} and {self.end:g})")
+            raise ValueError(f"from must be below to (got {' and '.join(resolved(self.start, self.end))})")
         if self.spacing == "log" and self.start * self.end <= 0:
             raise ValueError("from and to must both be above 0, or both below, for spacing log")
 

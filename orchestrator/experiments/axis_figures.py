@@ -279,7 +279,7 @@ class GridDrawing(ValueDrawing):
         grid = findings.spec.grids[spec.grid]
         values = findings.values_of_grids
         self.cells = [(cell, values.get(cell.key)) for cell in cells(grid) if cell.column]
-        units = {value.unit for _, value in self.cells if value}
+        units = {value.shown_in for _, value in self.cells if value}
         if not units:
             raise ResultsError("nothing to draw: no cell of the grid has a number.", code="nothing-to-draw")
         self.what = grid.title

@@ -325,7 +325,7 @@ def _compare(
         named = [run for run in runs if fnmatchcase(run, condition.run or "*")]
         measured = [(runs[run], values.get((run, condition.metric))) for run in named]
     known = sorted(((v, run) for run, v in measured if v is not None), key=lambda pair: pair[0].number)
-    unit = known[0][0].unit if known else ""
+    unit = known[0][0].shown_in if known else ""
     limit: float | None
     if isinstance(bound, MetricReference):
         other = values.get((bound.run, bound.metric))
@@ -360,7 +360,7 @@ def _range(known: Sequence[tuple[MetricValue, str]], missing: bool, digits: int)
     ends: dict[str, str] = {}
     for value, run in (*known[:1], *known[-1:]):
         ends.setdefault(
-            shown(value.number, value.unit, digits=digits, half=value.half, between=value.between),
+            shown(value.number, value.shown_in, digits=digits, half=value.half, between=value.between),
             run,
         )
     text = " to ".join(f"{number} ({run})" if run else number for number, run in ends.items())

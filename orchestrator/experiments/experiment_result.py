@@ -15,7 +15,7 @@ from ..evaluation.validation import Validation, compare_run
 from ..figures.style import digits_of
 from ..messages import counted
 from ..metrics.expressions import MetricValue
-from ..metrics.verdict import Status, Verdict, not_judged, worst
+from ..metrics.verdict import PERCENT, Status, Verdict, not_judged, worst
 from ..plan import Plan
 from ..results.reader import Results
 from ..results.run_folder import RUN_FILE
@@ -38,14 +38,16 @@ def _median(values: Sequence[MetricValue]) -> MetricValue:
     numbers = [value.number for value in values]
     median, low, high = statistics.median(numbers), min(numbers), max(numbers)
     between = (low, high) if low < high else None
-    return MetricValue(median, values[0].unit, max(high - median, median - low), between)
+    return MetricValue(median, values[0].shown_in, max(high - median, median - low), between)
 
 
 def _share(values: Sequence[MetricValue]) -> MetricValue:
     """Return the share of repeats whose value is not 0, with the interval of Clopper and Pearson."""
     count, number = sum(value.number != 0.0 for value in values), len(values)
     share, bounds = count / number, share_bounds(count, number)
-    return MetricValue(share, "%", max(bounds.high - share, share - bounds.low), (bounds.low, bounds.high))
+    return MetricValue(
+        share, PERCENT, max(bounds.high - share, share - bounds.low), (bounds.low, bounds.high)
+    )
 
 
 def _over_repeats(values: Sequence[MetricValue], number: int, kind: str = "mean") -> MetricValue | None:
@@ -63,7 +65,7 @@ def _over_repeats(values: Sequence[MetricValue], number: int, kind: str = "mean"
     if number > 1 and kind == "share":
         return _share(values)
     over = interval([value.number for value in values])
-    return over and MetricValue(over.mean, values[0].unit, over.half)
+    return over and MetricValue(over.mean, values[0].shown_in, over.half)
 
 
 @dataclass(frozen=True)
@@ -135,7 +137,7 @@ class ExperimentResult:
         if self.planned:
             return self.planned.metric_units[key]
         values = (self.value(case, key) for case in self.experiment.cases)
-        return next((value.unit for value in values if value), "1")
+        return next((value.shown_in for value in values if value), "1")
 
     @cached_property
     def at(self) -> dict[DesignPoint, dict[tuple[str, str], MetricValue]]:

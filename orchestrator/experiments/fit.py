@@ -35,11 +35,12 @@ from pydantic import Field
 from vocabulary.signals import SIGNALS
 
 from ..errors import ScenarioError, YawbenchError, code_of, text_of
+from ..measured.gaps import by_signals
 from ..measured.least_squares import Simulated, Window
 from ..measured.measurement import Measurement, load_measurement
 from ..measured.segment import LowPass, Segment
 from ..measured.single_track import start_states
-from ..messages import hint
+from ..messages import hint, span
 from ..plan import InputSeries, Instance, Override, Value, Variable
 from ..planner import Planner
 from ..results.freshness import key_of
@@ -173,7 +174,9 @@ def load_fit(path: Path | str) -> LoadedFit:
     parts = {}
     if not document.errors:
         for name in ("training", "held_out"):
-            parts[name] = list(_windows(document, name, getattr(spec, name), filtered, raw, errors))
+            stretches = getattr(spec, name)
+            settling = float(spec.settling)
+            parts[name] = list(_windows(document, name, stretches, filtered, raw, errors, settling))
     _refuse_overlaps(document, spec)
     document.raise_errors()
     return LoadedFit(path, spec, filtered, errors, parts["training"], parts["held_out"])
@@ -199,6 +202,7 @@ def _windows(
     filtered: Measurement,
     raw: Measurement,
     compared: Mapping[str, float],
+    settling: float,
 ) -> Iterator[FitWindow]:
     for number, stretch in enumerate(stretches):
         try:
@@ -209,18 +213,28 @@ def _windows(
         begin, end = float(stretch.begin), float(stretch.end)
         first, last = float(segment.time[0]), float(segment.time[-1])
         if not first - 1e-6 <= begin < end <= last + 1e-6:
-            words = f"{begin:g} to {end:g} s is not within {segment.name}, {first:g} to {last:g} s"
+            words = f"{span(begin, end)} s is not within {segment.name}, {span(first, last)} s"
             document.report((name, number), words, "fit-window")
             continue
         longest = float(stretch.window or end - begin)
         count = max(1, math.ceil((end - begin) / longest - 1e-9))
         for k in range(count):
             start = begin + k * longest
-            part = segment.between(start, min(start + longest, end)).even()
-            if len(part.time) < 3:
-                document.report((name, number), "a window has less than three samples", "fit-window")
+            stop = min(start + longest, end)
+            gaps = by_signals(segment.gaps, segment.signals)
+            if lost := next((lost for lost in gaps if lost[1].overlaps(start, stop)), None):
+                of = f" of {lost[0]}" if lost[0] else ""
+                words = (
+                    f"{segment.name} has no samples{of} from {lost[1]}: leave that out, with two stretches"
+                )
+                document.report((name, number), words, "fit-window")
                 break
-            label = f"{segment.name}, {part.time[0]:g} to {part.time[-1]:g} s"
+            part = segment.between(start, stop).even()
+            if np.count_nonzero(part.time >= part.time[0] + settling - 1e-9) < 3:
+                words = f"a window has less than three samples after 'settling', {settling:g} s"
+                document.report((name, number), words, "fit-window")
+                break
+            label = f"{segment.name}, {span(part.time[0], part.time[-1])} s"
             measured = {signal: part.signals[signal] for signal in compared}
             yield FitWindow(Window(label, part.time, measured), segment, unfiltered)
 
@@ -229,7 +243,7 @@ def _refuse_overlaps(document: Document, spec: FitSpec) -> None:
     for number, held in enumerate(spec.held_out):
         for stretch in spec.training:
             if stretch.segment == held.segment and stretch.begin < held.end and held.begin < stretch.end:
-                words = f"{float(held.begin):g} to {float(held.end):g} s shares seconds with 'training'"
+                words = f"{span(float(held.begin), float(held.end))} s shares seconds with 'training'"
                 document.report(("held_out", number), words, "fit-window")
 
 

@@ -276,7 +276,7 @@ def measured(results: Results, metrics: MetricRequests, test: TestRequest | None
     for key, name, window in metrics:
         value = evaluate(results, metric(name), window)
         short = results.ended and not window  # over a shorter time it is another metric
-        values[key] = None if value is None or short else (value.number, value.unit)
+        values[key] = None if value is None or short else (value.number, value.shown_in)
     if test:
         values |= _judged(results, *test)
     return MeasuredRun(values, results.record.course_warnings, results.ended)
@@ -288,7 +288,7 @@ def _judged(results: Results, name: str, angle: float | None) -> dict[str, tuple
 
     judged = TESTS[name].evaluate(trace_of(results, name), angle)
     quantities = {
-        key: None if quantity.value is None else (quantity.value, quantity.unit)
+        key: None if quantity.value is None else (quantity.value, quantity.shown_in)
         for key, quantity in judged.quantities.items()
     }
     verdicts = {

@@ -275,7 +275,7 @@ def _value(value: MetricValue) -> dict[str, Any]:
     number = value.number if math.isfinite(value.number) else "inf"
     half = {"half": value.half} if value.half and not value.between else {}
     between = {"between": [*map(_finite, value.between)]} if value.between else {}
-    return {"value": number, "unit": si(value.unit), **half, **between}
+    return {"value": number, "unit": value.unit, **half, **between}
 
 
 def _judgement(result: ClaimResult) -> dict[str, Any]:

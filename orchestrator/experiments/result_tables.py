@@ -81,7 +81,7 @@ def _grid_tables(findings: ExperimentResult, spec: GridSpec) -> list[Table]:
     def published(cell: GridCell) -> Cell:
         return None if cell.published is None else digits_of(cell.published)
 
-    units = {value.unit for (_, key), value in values.items() if key == spec.metric}
+    units = {value.shown_in for (_, key), value in values.items() if key == spec.metric}
     title = spec.title if units <= {"1", "%"} else f"{spec.title} [{units.pop()}]"
     tables = [Table(title, headings, [[row, *map(digits, line)] for row, line in lines], [], numbers)]
     if spec.published:
@@ -118,7 +118,7 @@ def _display_table(
 
     def number(cell: GridCell) -> str:
         value = findings.values_of_grids.get(cell.key)
-        return shown(value.number, value.unit, half=value.half, between=value.between) if value else "-"
+        return shown(value.number, value.shown_in, half=value.half, between=value.between) if value else "-"
 
     def signed(cell: GridCell) -> str:
         return f"{number(cell)} {signs.get(cell.key, '')}".rstrip()
@@ -403,7 +403,7 @@ def conditions_table(validation: Validation) -> Table:
     for name, verdict in validation.conditions.items():
         assert verdict.value is not None and verdict.bound is not None and verdict.relation
         ends = (verdict.value, verdict.bound)
-        value, bound = (f"{x:g}" if verdict.unit == "1" else shown(x, verdict.unit) for x in ends)
+        value, bound = (f"{x:g}" if verdict.shown_in == "1" else shown(x, verdict.shown_in) for x in ends)
         limit = f"{SYMBOLS[verdict.relation]} {bound}"
         table.rows.append([name, verdict.status.value, value, limit])
     return table
@@ -412,7 +412,7 @@ def conditions_table(validation: Validation) -> Table:
 def _cell(quantity: TestQuantity | None) -> Cell:
     if quantity is None or quantity.value is None:
         return None
-    return MetricValue(quantity.value, quantity.unit)
+    return MetricValue(quantity.value, quantity.shown_in)
 
 
 def run_table(judged: Evaluation, title: str) -> Table:

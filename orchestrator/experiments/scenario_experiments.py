@@ -27,7 +27,7 @@ import numpy as np
 from ..errors import ResultsError, ScenarioError
 from ..evaluation.sine_with_dwell import AMPLITUDE, SIDES
 from ..evaluation.standard_tests import Evaluation, SeriesRun, StandardTest
-from ..evaluation.steering_tests import slow_steer_amplitude
+from ..evaluation.steering_tests import SLOW_STEER, slow_steer_amplitude
 from ..evaluation.trace import Trace, trace_of
 from ..figures.style import QUIET, frame, line_style, new_figure
 from ..metrics.expressions import MetricValue, metric
@@ -442,7 +442,7 @@ def slow_steer_runs(scenario: Path, changes: Sequence[Override], execute: Execut
     """
     (plan,) = execute.plans([NamedRun("", "", "", scenario, (*changes,))])
     amplitude = slow_steer_amplitude(plan, scenario)
-    folders = {f"slowly_increasing_steer/{name}": side for name, side in SIDES}
+    folders = {f"{SLOW_STEER}/{name}": side for name, side in SIDES}
     return [
         SeriesRun(folder, folder, {AMPLITUDE: side * amplitude}, partly=False)
         for folder, side in folders.items()

@@ -22,7 +22,7 @@ from ..fmu.archive import open_fmu, runs_as
 from ..messages import printable, star
 from ..metrics.expressions import STANDARD, MetricValue, columns_of, evaluate_all, metric
 from ..metrics.measures import catalogue as measures
-from ..metrics.measures import si, symbol
+from ..metrics.measures import symbol
 from ..plan import Fmu, Plan
 from ..results.reader import FoundRun, Results
 from ..results.run_record import RunRecord
@@ -110,7 +110,7 @@ class Table:
         if unit := self.columns[column].about.get("unit"):
             return unit
         cells = [row[column] for row in self.rows if row[column] is not None]
-        units = {si(cell.unit) if isinstance(cell, MetricValue) else None for cell in cells}
+        units = {cell.unit if isinstance(cell, MetricValue) else None for cell in cells}
         return units.pop() if len(units) == 1 else None
 
     def values(self, column: int) -> list[str | float | None]:
@@ -142,7 +142,7 @@ def _shown(cell: Cell, unit: str = "") -> str:
     if isinstance(cell, int):
         return str(cell)
     value = cell if isinstance(cell, MetricValue) else MetricValue(cell, unit or "1")
-    return shown(value.number, value.unit, half=value.half, between=value.between)
+    return shown(value.number, value.shown_in, half=value.half, between=value.between)
 
 
 def for_terminal(table: Table) -> rich.console.Group:

@@ -41,6 +41,7 @@ from .style import (
     reference_style,
     shown_unit,
     style_of_run,
+    unit_of_signal,
 )
 
 if TYPE_CHECKING:
@@ -143,10 +144,12 @@ def _draw_signal(axes: Axes, runs: Sequence[LabelledRun], name: str, whole: bool
             {} if len(group) > 1 or len(lines) == 1 else {"color": line_style(number)["color"], "alpha": 0.28}
         )
         style = {**reference_style(), **own, "label": "reference"}
-        _line(axes, run.results.time, references[group[0]], run.results.units[reference], style)
+        _line(
+            axes, run.results.time, references[group[0]], unit_of_signal(run.results.units[reference]), style
+        )
     unit = ""
     for number, run, column, _ in lines:
-        unit = run.results.units[column]
+        unit = unit_of_signal(run.results.units[column])
         _line(axes, run.results.time, run.results[column], unit, style_of_run(number, run.results))
     _finish(axes, name, unit)
     if references and not whole:
@@ -195,7 +198,7 @@ def _error(run: LabelledRun, signal: str) -> np.ndarray | None:
 
 def _draw_wheels(axes: Axes, run: LabelledRun, name: str) -> None:
     columns = columns_of(run.results, name)
-    unit = run.results.units[columns[0]]
+    unit = unit_of_signal(run.results.units[columns[0]])
     for k, (column, wheel) in enumerate(zip(columns, WHEEL_NAMES, strict=True)):
         _line(axes, run.results.time, run.results[column], unit, {**line_style(k), "label": wheel})
     _finish(axes, name, unit)
@@ -343,7 +346,7 @@ def curves_of(runs: Sequence[LabelledRun], x: str, y: str) -> list[PortraitCurve
 
 
 def _shown(results: Results, column: str) -> np.ndarray:
-    factor = shown_unit(results.units[column])[1]
+    factor = shown_unit(unit_of_signal(results.units[column]))[1]
     values: np.ndarray = results[column][spread_rows(results, CURVE_POINTS)] * factor
     return values
 
@@ -367,7 +370,7 @@ def draw_portrait(axes: Axes, runs: Sequence[LabelledRun], x: str, y: str) -> No
         axes.plot(curve.x, curve.y, **style)
         axes.plot(curve.x[-1:], curve.y[-1:], "o", ms=3.5, color=style["color"])
     results = next(results for _, results in runs if columns_of(results, x) and columns_of(results, y))
-    units = [shown_unit(results.units[columns_of(results, name)[0]])[0] for name in (x, y)]
+    units = [shown_unit(unit_of_signal(results.units[columns_of(results, name)[0]]))[0] for name in (x, y)]
     over, up = (words(variable_of(signal)) for signal in (x, y))
     axes.set_title(literal(f"{up} over {over[0].lower()}{over[1:]}"))
     axes.set_xlabel(_label(x, units[0]))

@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import ResultsError
+from ..measured.gaps import gaps_noted
 from ..plan import Override
 from ..results.run_folder import RunStatus
 from ..scenario.overrides import changed, fmu_of
@@ -66,7 +67,7 @@ class FaultSpan(NamedTuple):
 
 
 def spans_of(runs: Sequence[LabelledRun]) -> list[FaultSpan]:
-    """Return the faults of runs, each once; a fault that not all runs have names its run."""
+    """Return the faults of runs and gaps of recordings, each once; one that not all have names its run."""
     labels_of: dict[FaultSpan, list[str]] = {}
     for label, results in runs:
         for fault in results.record.faults if results.time.size else ():
@@ -79,6 +80,9 @@ def spans_of(runs: Sequence[LabelledRun]) -> list[FaultSpan]:
             )
             if span.begin < span.end:
                 labels_of.setdefault(span, []).append(label)
+        for names, gap in gaps_noted(results.record.all_diagnostics):
+            lost = FaultSpan(*gap, f"no samples{f' of {names}' * bool(names)}")
+            labels_of.setdefault(lost, []).append(label)
     return [
         span if len(labels) == len(runs) else span._replace(label=f"{', '.join(labels)}: {span.label}")
         for span, labels in labels_of.items()
@@ -95,9 +99,8 @@ def mark(axes: Axes, spans: Sequence[FaultSpan]) -> None:
 
 def in_legend(spans: Sequence[FaultSpan]) -> list[str]:
     """Return the legend entries of spans."""
-    if len(spans) > NAMED:
-        return [f"{len(spans)} faults"]
-    return [span.label for span in spans]
+    labels = list(dict.fromkeys(span.label for span in spans))
+    return labels if len(labels) <= NAMED else [f"{len(labels)} faults"]
 
 
 def shown_by(runs: Sequence[LabelledRun], names: Sequence[str], *, whole: bool = False) -> list[Panel]:

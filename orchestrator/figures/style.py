@@ -358,8 +358,18 @@ def in_formula(signal: str) -> str:
     return f"${head}_\\mathrm{{{index}}}$" if index else f"${head}$"
 
 
+SIGNAL_IN_PERCENT = "% of a signal"
+
+
+def unit_of_signal(unit: str) -> str:
+    """Return the unit for `shown` and `shown_unit` of a recorded signal; one in per cent is no ratio."""
+    return SIGNAL_IN_PERCENT if unit == "%" else unit
+
+
 def shown_unit(unit: str) -> tuple[str, float]:
     """Return the displayed unit and the factor to it; `%` marks a ratio in per cent."""
+    if unit == SIGNAL_IN_PERCENT:
+        return "%", 1.0
     if unit in SHOWN:
         return SHOWN[unit]
     si, to_si = si_of(unit)

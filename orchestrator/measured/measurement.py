@@ -1,7 +1,7 @@
 """Measurements: recordings of a car, described by a file `measured.yaml`, as signals in SI.
 
     files: [run01.csv, run02.mf4]
-    segments: {by: Lap}                  # where time restarts; `by: time`: at every restart
+    segments: {by: Lap}                  # where time restarts; `by: time`: at restarts; `by: gaps`: at gaps
     time: {column: Time, unit: ms}
     signals:
       steering_wheel_angle: {column: SWA, unit: deg, sign: -1, delay: 20 ms, spikes: 2 deg}
@@ -34,7 +34,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -48,13 +48,14 @@ from vocabulary.vehicle import CAR
 from vocabulary.wheels import wheels
 
 from ..errors import Diagnostic, InvalidValueError, Location, ScenarioError, code_of
-from ..messages import counted, hint, listed, short
+from ..messages import counted, hint, listed, short, span
 from ..safe_files import reads
 from ..scenario import yaml_lines
 from ..scenario.quantities import convert, measure_of
 from ..scenario.schema_validation import StrictModel, quantities_in, text_in_unit, validate
 from ..scenario.yaml_lines import Document, KeyPath
 from .clocks import PACKED, UNIX, holds_times, seconds_of
+from .gaps import Samples, between_gaps, gaps_in, notes_on
 from .recording_formats import (
     ColumnFile,
     FileColumn,
@@ -72,7 +73,6 @@ from .segment import (
     parts_of,
     resample,
     to_centre_of_mass,
-    told_apart,
     without_spikes,
 )
 from .units_of_loggers import how_to_give, unit_in_file
@@ -82,6 +82,7 @@ MEASURABLE: dict[str, SignalEntry] = {name: entry for key, entry in SIGNALS.item
 ENDINGS = (".yaml", ".yml")
 """Endings of measurement files."""
 BY_TIME = "time"
+BY_GAPS = "gaps"
 OF_CAR = {name: entry.unit for name, entry in CAR.items()} | {"friction": "1"}
 """Known quantities of a car and its road, with their units."""
 OF_TEST = {"action_time": "s"}
@@ -172,7 +173,10 @@ class TimeSpec(StrictModel):
 class SegmentsSpec(StrictModel):
     """Segments of a recording, each with increasing time."""
 
-    by: str = Field(description="Column that changes from segment to segment; time: where time restarts")
+    by: str = Field(
+        description="Column that changes from segment to segment; time: where time restarts; gaps: at "
+        "stretches without samples"
+    )
 
 
 class FilterSpec(StrictModel):
@@ -311,7 +315,8 @@ def load_measurement(path: Path | str, *, filtered: bool = True) -> Measurement:
     return Measurement(
         path, tuple(segments), spec.car, spec.source, spec.licence, spec.date, reader.vehicle, reader.test,
         {name: correction.noise for name, correction in reader.corrections.items() if correction.noise},
-        reader.filter, digest, tuple(reader.notes),
+        reader.filter, digest,
+        (*reader.notes, *(note for one in segments for note in notes_on(one.gaps, one.signals, one.name))),
     )  # fmt: skip
 
 
@@ -399,8 +404,13 @@ class _Reader:
         labels = self._labels(file, name)
         if self.document.errors:
             return
+        parts: Sequence[tuple[str, Mapping[str, Samples]]] = [("", read)]
         try:
-            parts = list(_parts(read, labels)) if self.spec.segments else [("", read)]
+            if self.spec.segments is not None and self.spec.segments.by == BY_GAPS:
+                if not (parts := between_gaps(read)):
+                    raise ValueError("no part between gaps has two samples of every signal")
+            elif self.spec.segments is not None:
+                parts = list(_parts(read, labels))
         except ValueError as error:
             return self.document.report(("segments",), f"{name}: {error}", "measurement-time")
         for label, samples in parts:
@@ -452,7 +462,7 @@ class _Reader:
     def _labels(self, file: ColumnFile, path: str) -> Samples | None:
         """Return times and values of the column whose changes begin segments; None: where time restarts."""
         segments = self.spec.segments
-        if segments is None or segments.by == BY_TIME:
+        if segments is None or segments.by in (BY_TIME, BY_GAPS):
             return None
         try:
             column = file.column(segments.by, self.spec.time.column)
@@ -478,15 +488,12 @@ class _Reader:
             signal: values if np.array_equal(t, time) else resample(time, t, values)
             for signal, (t, values) in clocks.items()
         }
-        segment = Segment(name, time, signals)
+        gaps = {signal: found for signal, (t, _) in clocks.items() if (found := gaps_in(t))}
+        segment = Segment(name, time, signals, gaps)
         positions = {
             signal: correction.at for signal, correction in self.corrections.items() if any(correction.at)
         }
         return replace(segment, signals=to_centre_of_mass(segment, positions)) if positions else segment
-
-
-Samples = tuple[np.ndarray, np.ndarray]
-"""Times [s] and values of a signal."""
 
 
 def _held(labels: np.ndarray) -> np.ndarray:
@@ -535,7 +542,7 @@ def _increasing(times: np.ndarray, values: np.ndarray, spec: TimeSpec) -> tuple[
     if back.size:
         row = int(back[0])
         raise InvalidValueError(
-            f"time goes back from {told_apart(times[row], times[row + 1])} (value {row + 2}): write "
+            f"time goes back from {span(times[row], times[row + 1])} s (value {row + 2}): write "
             f"'segments: {{by: {BY_TIME}}}', or by: the column that counts laps",
             code="measurement-time",
         )

@@ -10,14 +10,16 @@ measures while the car rolls is not removed, as all sensors measure it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 
 from ..errors import InvalidValueError
+from ..messages import span
+from .gaps import Gap, outside, parts_between
 
 Position = tuple[float, float, float]
 """x, y, z [m] relative to the centre of mass, vehicle axes."""
@@ -86,16 +88,11 @@ def refuse_jump(time: np.ndarray, step: float | None = None) -> None:
     if count > max(MOST, 4 * time.size):
         row = int(np.argmax(steps))
         raise InvalidValueError(
-            f"time jumps from {told_apart(time[row], time[row + 1])} (value {row + 2}), as if the clock had "
+            f"time jumps from {span(time[row], time[row + 1])} s (value {row + 2}), as if the clock had "
             f"been set while recording: {count:.2g} samples would lie between its first and last value at "
             "even steps; delete the rows ahead of the jump or behind it",
             code="measurement-time",
         )
-
-
-def told_apart(first: float, second: float) -> str:
-    """Return "1.5 to 2 s" of two times, with all digits: the first six of Unix times are alike all day."""
-    return f"{first:.15g} to {second:.15g} s"
 
 
 def common_times(recorded: Mapping[str, np.ndarray], clocks: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -142,6 +139,7 @@ class Segment:
     name: str
     time: np.ndarray  # shape (rows,) [s], as recorded
     signals: Mapping[str, np.ndarray]  # name in the vocabulary -> shape (rows,), in SI
+    gaps: Mapping[str, tuple[Gap, ...]] = field(default_factory=dict)  # signal -> its gaps, if it has any
 
     @property
     def rate(self) -> float:
@@ -158,12 +156,34 @@ class Segment:
         )
 
     def filtered(self, low_pass: LowPass) -> Segment:
-        """Return the segment with all signals filtered, at the same times."""
-        even = self.even()
-        signals = {name: low_pass(x, even.rate) for name, x in even.signals.items()}
-        if even.time is not self.time:
-            signals = {name: np.interp(self.time, even.time, x) for name, x in signals.items()}
+        """Return the segment with all signals filtered, at the same times; gaps separate parts."""
+        signals = {name: x.copy() for name, x in self.signals.items()}
+        for part in self.parts():
+            even = part.even()
+            rows = np.searchsorted(self.time, part.time)
+            for name, x in even.signals.items():
+                signals[name][rows] = np.interp(part.time, even.time, low_pass(x, even.rate))
         return replace(self, signals=signals)
+
+    def sampled(self, names: Iterable[str]) -> Segment:
+        """Return the rows that lie in no gap of some signals, where their values are not interpolated."""
+        rows = outside((gap for name in names for gap in self.gaps.get(name, ())), self.time)
+        signals = {name: x[rows] for name, x in self.signals.items()}
+        return replace(self, time=self.time[rows], signals=signals)
+
+    def parts(self) -> list[Segment]:
+        """Return the parts of two samples or more that no gap of any signal interrupts."""
+        every = [gap for gaps in self.gaps.values() for gap in gaps]
+        return [
+            replace(
+                self,
+                time=self.time[rows],
+                signals={name: x[rows] for name, x in self.signals.items()},
+                gaps={},
+            )
+            for rows in (parts_between(every, self.time) if every else [slice(None)])
+            if self.time[rows].size > 1
+        ]
 
     def between(self, begin: float, end: float) -> Segment:
         """Return the part from `begin` to `end` [s], both included."""

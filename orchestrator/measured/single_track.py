@@ -212,7 +212,7 @@ def effects_in(measurement: Measurement) -> list[Effect]:
     mass, front, rear = (float(value or 0.0) for value in car)
     windows = [window for segment in measurement.segments for window in _windows(segment, measurement)]
     if not windows:
-        raise ValueError("its segments are shorter than a second")
+        raise ValueError("no part of its segments without a gap is as long as a window")
     chosen = windows[:: -(-len(windows) // MOST)]
     start = typical_values(mass, front, rear) | dict.fromkeys(FRICTIONS, _friction(measurement))
     moved = [start | {name: (1.0 + CHANGE) * value} for name, value in start.items()]
@@ -259,6 +259,9 @@ def _windows(segment: Segment, measurement: Measurement) -> list[SingleTrackWind
     windows = []
     for first in range(0, even.time.size - rows + 1, rows):
         times = even.time[first : first + rows]
+        gaps = itertools.chain.from_iterable(segment.gaps.values())
+        if any(gap.overlaps(float(times[0]), float(times[-1])) for gap in gaps):
+            continue
         states = start_states(even, float(times[0]))
         speed = states.get("initial_speed", 0.0)
         start = (

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,11 +28,12 @@ import numpy as np
 from vocabulary.wheels import WHEELS, wheels
 
 from ..errors import ScenarioError
-from ..messages import closest, fold, hint, listed, short
+from ..messages import closest, fold, hint, listed, short, span
 from ..plan import SENSING
 from ..scenario.quantities import convert
 from ..signal_names import VARIABLE, SignalName
 from .measures import MEASURES, Measure, si_of, symbol, variable_of, words
+from .verdict import WithUnit
 
 if TYPE_CHECKING:
     from ..plan import Plan
@@ -123,8 +124,8 @@ def _times_seconds(unit: str, power: int) -> str:
 
 
 @dataclass(frozen=True)
-class MetricValue:
-    """The value of a metric in one run, in SI; `unit` "%" marks a ratio that is shown in per cent.
+class MetricValue(WithUnit):
+    """The value of a metric in one run, in SI; `percent`: tables show it, a ratio, in per cent.
 
     Over several repeats it is the mean, and `half` is half the width of its confidence interval. If it is
     their median or a share, `between` has their range or the share's interval, `half` its larger distance.
@@ -138,6 +139,7 @@ class MetricValue:
     unit: str
     half: float = 0.0
     between: tuple[float, float] | None = None
+    percent: bool = field(default=False, kw_only=True, repr=False)
 
 
 MetricValue.__module__ = "yawbench"  # where users import it from
@@ -148,7 +150,7 @@ def during(window: TimeWindow | None, lead: str = "") -> str:
     if window is None:
         return ""
     first, last = window
-    return f", at {first:g} s" if first == last else f", {lead}{first:g} to {last:g} s"
+    return f", at {first:g} s" if first == last else f", {lead}{span(first, last)} s"
 
 
 def window_of(text: str) -> TimeWindow:

@@ -323,6 +323,7 @@ _UNITS = {
     "{x}/s2": "of the signal, per s2",
     "{x}.s": "of the signal, times s",
     "{x}2/s": "of the signal squared, per s",
+    "%": "1, shown in %",
 }
 _NEEDS = {"x_ref": "a reference", "x_rate": "its rate"}
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any, Literal
 
@@ -42,8 +42,32 @@ class Status(str, Enum):
 WORST_FIRST = (Status.FAILED, Status.NOT_JUDGED, Status.SENSITIVE, Status.UNDECIDED, Status.PASSED)
 
 
+PERCENT = "%"
+"""Unit that says how a ratio is shown: its number and its unit stay those of a ratio, 1."""
+
+
+class WithUnit:
+    """Base of numbers with a unit, in SI: a ratio has the unit "1", even where it is shown in per cent.
+
+    Created with the unit "%", it is the ratio, to be shown in per cent.
+    """
+
+    unit: str
+    percent: bool
+
+    def __post_init__(self) -> None:
+        if self.unit == PERCENT:
+            object.__setattr__(self, "unit", "1")
+            object.__setattr__(self, "percent", True)
+
+    @property
+    def shown_in(self) -> str:
+        """The unit for `figures.style.shown`: "%" for a ratio in per cent."""
+        return PERCENT if self.percent else self.unit
+
+
 @dataclass(frozen=True)
-class Verdict:
+class Verdict(WithUnit):
     """The verdict on a claim, criterion or limit, with the number and the bound that decide it.
 
     >>> run.evaluate("sine-with-dwell").criteria["stability"].holds is None  # not this manoeuvre
@@ -54,10 +78,11 @@ class Verdict:
     value: float | None = None  # in SI; None: judged by more than a number, or not judged
     bound: float | None = None
     relation: Relation | None = None  # in which the value has to be to the bound
-    unit: str = ""  # of both; "%" marks a ratio that is shown in per cent
+    unit: str = ""  # of both; "1" for ratios
     margin: float | None = None  # [1], as defined above
     half: float = 0.0  # half width of the confidence interval of value - bound, as means over repeats
     why: str = ""  # the reason in words
+    percent: bool = field(default=False, kw_only=True, repr=False)  # whether tables show a ratio in per cent
 
     @property
     def holds(self) -> bool | None:
@@ -88,8 +113,8 @@ class Verdict:
         """Return the verdict as plain data for files, in SI units; numbers that are not finite as text."""
         numbers = {"value": self.value, "bound": self.bound, "margin": self.margin}
         data = {key: x if x is None or math.isfinite(x) else str(x) for key, x in numbers.items()}
-        unit = "1" if self.unit == "%" else self.unit or None
-        return {"verdict": self.status, "why": self.why, **data, "relation": self.relation, "unit": unit}
+        own = {"relation": self.relation, "unit": self.unit or None}
+        return {"verdict": self.status, "why": self.why, **data, **own}
 
     def __str__(self) -> str:
         return f"{self.status.value}. {self.why}"

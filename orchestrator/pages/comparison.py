@@ -17,10 +17,12 @@ from vocabulary.wheels import WHEELS
 
 from ..experiments.experiment_result import ExperimentResult
 from ..experiments.tables import Table, marked, remarks
-from ..figures.style import LabelledRun, digits_of, shown, shown_unit
-from ..messages import counted, star
+from ..figures.style import LabelledRun, digits_of, shown, shown_unit, unit_of_signal
+from ..measured.gaps import gaps_noted, outside
+from ..messages import counted, resolved, span, star
 from ..metrics.expressions import MetricValue, metric
 from ..metrics.measures import variable_of
+from ..results.measurement_results import MeasuredResults
 from ..results.reader import Results
 from ..results.run_record import RunRecord
 from ..scenario.overrides import changed
@@ -55,14 +57,22 @@ class RunComparison:
     partings: tuple[SignalDifference, ...]
     compared: int  # number of signals
     notes: tuple[str, ...]
+    times: int  # number of times at which they were compared
+
+    @property
+    def compares_nothing(self) -> bool:
+        """Whether the runs have no signal or no time in common."""
+        return not self.compared or not self.times
 
 
 def divergence(first: Results, second: Results) -> RunComparison:
     """Compare all signals that both runs recorded, at their common times.
 
-    Signals that begin to differ at the same time are in evaluation order, so that causes come first.
+    A recording has times of its own: the other run is interpolated to them, as far as both reach and outside
+    gaps. Signals that begin to differ at the same time are in evaluation order, so that causes come first.
     """
     rows, others = _common(first.time, second.time)
+    measured = next((run for run in (first, second) if isinstance(run, MeasuredResults)), None)
     notes = [
         f"only {which} recorded {', '.join(dict.fromkeys(star(name) for name in missing))}"
         for which, missing in (
@@ -71,13 +81,26 @@ def divergence(first: Results, second: Results) -> RunComparison:
         )
         if missing
     ]
-    if rows.size < max(first.time.size, second.time.size):
-        notes.append(f"compared at the {rows.size} times that both runs have")
     shared = [name for name in first if name in second]
-    time = first.time[rows]
+    if measured is not None and (inside := _inside(measured, second if measured is first else first)).size:
+        time = measured.time[inside]
+        values = [{name: _at(time, run, name) for name in shared} for run in (first, second)]
+        if any(not np.array_equal(run.time, time) for run in (first, second)):
+            where = f"of the recording, {span(time[0], time[-1])} s"
+            notes.append(f"compared at {counted(time.size, 'time')} {where}")
+    else:
+        time = first.time[rows]
+        values = [
+            {name: run.columns[name][kept] for name in shared}
+            for run, kept in ((first, rows), (second, others))
+        ]
+        if not rows.size:
+            notes.append(_no_common_time(first, second))
+        elif rows.size < max(first.time.size, second.time.size):
+            notes.append(f"compared at the {rows.size} times that both runs have")
     by_signal: dict[str, SignalDifference] = {}
-    for name in shared if rows.size else []:
-        parting = _parting(name, time, first.columns[name][rows], second.columns[name][others], first)
+    for name in shared if time.size else []:
+        parting = _parting(name, time, values[0][name], values[1][name], first)
         if parting is not None:
             known = by_signal.get(parting.signal)
             by_signal[parting.signal] = parting if known is None else _together(known, parting)
@@ -86,7 +109,39 @@ def divergence(first: Results, second: Results) -> RunComparison:
         by_signal.values(),
         key=lambda p: (p.first, order.get(SignalName.parse(p.signal).instance, len(order))),
     )
-    return RunComparison(tuple(ranked), len(shared), tuple(notes))
+    return RunComparison(tuple(ranked), len(shared), tuple(notes), time.size)
+
+
+def _inside(measured: MeasuredResults, other: Results) -> np.ndarray:
+    """Return the rows of a recording whose times lie within another run, and outside its gaps."""
+    if not other.time.size:
+        return np.zeros(0, dtype=int)
+    time = measured.time
+    inside = (time >= other.time[0] - 1e-9) & (time <= other.time[-1] + 1e-9)
+    notes = (*measured.record.all_diagnostics, *other.record.all_diagnostics)
+    return np.flatnonzero(inside & outside((gap for _, gap in gaps_noted(notes)), time))
+
+
+def _at(time: np.ndarray, run: Results, name: str) -> np.ndarray:
+    """Return a signal of a run at some times, interpolated; text as of the row before."""
+    values = run.columns[name]
+    if not np.issubdtype(values.dtype, np.number):
+        return values[np.clip(np.searchsorted(run.time, time + 1e-9, side="right") - 1, 0, None)]
+    return np.asarray(np.interp(time, run.time, values))
+
+
+def _no_common_time(first: Results, second: Results) -> str:
+    """Return that two runs have no time in common, and what moves a recording to the run."""
+    ends = [
+        f"{span(run.time[0], run.time[-1])} s" if run.time.size else "no time at all"
+        for run in (first, second)
+    ]
+    words = f"the runs have no time in common: the first has {ends[0]}, the other {ends[1]}"
+    both = first.time.size and second.time.size
+    measured = next((run for run in (first, second) if isinstance(run, MeasuredResults)), None)
+    if measured is None or not both:
+        return words
+    return f"{words}; --from '{measured.time[0]:.12g} s' begins the recording with the run"
 
 
 def _common(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -272,7 +327,7 @@ def metric_table(findings: ExperimentResult, runs: Sequence[LabelledRun]) -> Tab
         measure = chosen.name.partition("(")[0]
         least = _best(values, idle if measure in OF_CONTROL else ()) if measure in LESS_IS_BETTER else None
         cells = [
-            shown(value.number, value.unit)
+            shown(value.number, value.shown_in)
             + f" {BEST}" * (k == least)
             + (f"\n{apart}" if k and (apart := difference(values[0], value)) else "")
             if value
@@ -311,7 +366,7 @@ def _best(values: Sequence[MetricValue | None], apart: Collection[int]) -> int |
     if len(known) < 2:
         return None
     (first, best), (second, _) = known[:2]
-    unit = next(value.unit for value in values if value is not None)
+    unit = next(value.shown_in for value in values if value is not None)
     return None if shown(first, unit) == shown(second, unit) else best
 
 
@@ -333,7 +388,7 @@ def difference(first: MetricValue | None, other: MetricValue | None) -> str:
     apart = other.number - first.number
     if not math.isfinite(apart):
         return ""
-    unit, factor = shown_unit(other.unit)
+    unit, factor = shown_unit(other.shown_in)
     if apart == 0:
         return "the same"
     size = digits_of(abs(apart) * factor)
@@ -354,6 +409,8 @@ def parting_summary(comparison: RunComparison) -> str:
     """Return a sentence on the signals that differ first."""
     if not comparison.compared:
         return "The runs have no signal in common."
+    if not comparison.times:
+        return "The runs have no time in common, so nothing was compared."
     if not comparison.partings:
         which = (
             "The only signal they share is"
@@ -383,7 +440,7 @@ def partings_table(partings: Sequence[SignalDifference], title: str = "") -> Tab
             ", ".join(parting.targets) or "recorded only",
             f"{parting.first:g} s",
             None if parting.seen is None else f"{parting.seen:g} s",
-            None if math.isnan(parting.largest) else shown(parting.largest, parting.unit),
+            None if math.isnan(parting.largest) else shown(parting.largest, unit_of_signal(parting.unit)),
             f"{parting.largest_at:g} s",
         ])  # fmt: skip
     return table
@@ -392,10 +449,14 @@ def partings_table(partings: Sequence[SignalDifference], title: str = "") -> Tab
 def outcome_table(comparison: RunComparison, first: Results, second: Results) -> Table:
     """Return the table of all signals that differ, with notes on what could not be compared."""
     table = partings_table(comparison.partings, "What came out")
-    ends = {f"{run.time[-1]:.6g} s" for run in (first, second) if run.time.size}
+    ended = [float(run.time[-1]) for run in (first, second) if run.time.size]
+    ends = {f"{end} s" for end in resolved(*ended)}
     table.notes += comparison.notes
     table.notes += [f"The runs end at {' and '.join(sorted(ends))}."] if len(ends) > 1 else []
-    table.notes.append(
-        f"{counted(comparison.compared, 'signal')} compared; the others are the same to the end."
-    )
+    if comparison.compares_nothing:
+        table.notes.append("Nothing was compared.")
+    else:
+        compared = f"{counted(comparison.compared, 'signal')} compared at {counted(comparison.times, 'time')}"
+        same = "the others are the same" if comparison.partings else "no difference"
+        table.notes.append(f"{compared}; {same}.")
     return table

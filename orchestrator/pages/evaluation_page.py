@@ -33,7 +33,7 @@ from ..experiments.result_tables import (
 from ..experiments.tables import Table
 from ..figures.style import LabelledRun, digits_apart, shown, shown_unit
 from ..measured.least_squares import LEAST_PIECES
-from ..messages import counted, listed
+from ..messages import counted, listed, span
 from ..metrics.expressions import MetricValue
 from ..metrics.measures import words
 from ..metrics.verdict import SYMBOLS, Status, Verdict, apart, worst
@@ -73,16 +73,18 @@ def _distance(verdict: Verdict) -> str:
     beyond, margin = verdict.beyond, margin_words(verdict)
     if beyond is None:
         return ""
-    return f"{shown(beyond, verdict.unit)} ({margin})" if margin else shown(beyond, verdict.unit)
+    return f"{shown(beyond, verdict.shown_in)} ({margin})" if margin else shown(beyond, verdict.shown_in)
 
 
 def _numbers(verdict: Verdict) -> tuple[str, str]:
     """Return value and limit of a verdict, with digits enough to tell them apart."""
     if verdict.value is None or verdict.bound is None:
         return "", ""
-    digits = digits_apart([(verdict.value, verdict.bound)], verdict.unit)
+    digits = digits_apart([(verdict.value, verdict.bound)], verdict.shown_in)
     symbol = SYMBOLS[verdict.relation] if verdict.relation else ""
-    value, bound = (shown(number, verdict.unit, digits=digits) for number in (verdict.value, verdict.bound))
+    value, bound = (
+        shown(number, verdict.shown_in, digits=digits) for number in (verdict.value, verdict.bound)
+    )
     return value, f"{symbol} {bound}".strip()
 
 
@@ -298,12 +300,12 @@ def parameter_table(model: FittedModel) -> Table:
         if free.name in estimate.at_bound:
             words = "at its bound"
         elif interval:
-            words = f"{interval[0]:.5g} to {interval[1]:.5g}"
+            words = span(*interval, digits=5)
         prior = free.prior and f"{free.prior[0]:.5g} ± {free.prior[1]:.3g}"
         unit = free.unit.replace(".", "·") if free.unit != "1" else ""
         value = f"{estimate.values[free.name]:.6g} {unit}".strip()
         table.rows.append(
-            [free.name, value, words, f"{free.start:.5g}", f"{free.low:.5g} to {free.high:.5g}", prior]
+            [free.name, value, words, f"{free.start:.5g}", span(free.low, free.high, digits=5), prior]
         )
     search = f"{estimate.sets} sets of values; {estimate.message}"
     table.notes.append(f"condition {estimate.identifiability.condition:.3g}; {search}")

@@ -24,7 +24,16 @@ from markupsafe import Markup
 
 from ..errors import ResultsError
 from ..figures.plots import changes_of, spans_of
-from ..figures.style import LINES, MEASURED_LINE, LabelledRun, digits_apart, line_style, shown, shown_unit
+from ..figures.style import (
+    LINES,
+    MEASURED_LINE,
+    LabelledRun,
+    digits_apart,
+    line_style,
+    shown,
+    shown_unit,
+    unit_of_signal,
+)
 from ..messages import listed
 from ..metrics.expressions import MetricValue, columns_of, evaluate, metric, reference_of
 from ..metrics.measures import words
@@ -303,7 +312,7 @@ def answer_of(runs: Sequence[LabelledRun]) -> str:
 
 def _compared(runs: Sequence[LabelledRun], values: Sequence[MetricValue]) -> str:
     """Return the values of a metric with their runs; of many runs, the smallest and the largest."""
-    unit, numbers = values[0].unit, [value.number for value in values]
+    unit, numbers = values[0].shown_in, [value.number for value in values]
     digits = digits_apart(pairwise(sorted(numbers)), unit)
     texts = [
         f"{shown(number, unit, digits=digits)} ({run.label})"
@@ -365,7 +374,7 @@ def _signals(results: Sequence[Results]) -> dict[str, dict[str, Any]]:
     for run in results:
         for name, values in run.columns.items():
             if name not in signals and is_numeric(values):
-                unit = run.units.get(name, "")
+                unit = unit_of_signal(run.units.get(name, ""))
                 text, factor = shown_unit(unit)
                 label = words(run.names[name].variable)
                 signals[name] = {"label": label, "unit": text, "factor": factor, "si": unit}
@@ -375,7 +384,7 @@ def _signals(results: Sequence[Results]) -> dict[str, dict[str, Any]]:
 def _values(runs: Sequence[LabelledRun], name: str) -> list[str]:
     """Return a metric of every run as text, "" where a run has none."""
     values = [evaluate(run.results, metric(name)) for run in runs]
-    return [shown(value.number, value.unit) if value is not None else "" for value in values]
+    return [shown(value.number, value.shown_in) if value is not None else "" for value in values]
 
 
 def still_of(results: Sequence[Results]) -> float:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import ResultsError
+from ..measured.gaps import notes_on
 from ..measured.measurement import ENDINGS, MEASURABLE, load_measurement
 from ..measured.segment import LowPass, even_grid
 from .reader import Results, load_results
@@ -122,6 +123,8 @@ def measured_results(path: Path, start: float = 0.0) -> MeasuredResults:
         column = f"{'driver' if name in STEERING else 'plant'}.{name}"
         columns[column], units[column] = values, MEASURABLE[name].unit
     known = {**measurement.vehicle, **measurement.test}
+    notes = [note for note in measurement.notes if note.code != "measurement-gap"]
+    gaps = notes_on(segment.gaps, segment.signals, segment.name, start)
     record = RunRecord(
         status=RunStatus.COMPLETED,
         title=f"{measurement.title}, {segment.name}" if len(measurement.segments) > 1 else measurement.title,
@@ -134,7 +137,7 @@ def measured_results(path: Path, start: float = 0.0) -> MeasuredResults:
             for role in ("driver", "plant")
         },
         scenario={"source": measurement.origin, "file": str(path)},
-        diagnostics=[DiagnosticRecord.of(note) for note in measurement.notes],
+        diagnostics=[DiagnosticRecord.of(note) for note in (*notes, *gaps)],
         results="",
     )
     return MeasuredResults(path, segment.time - start, columns, units, record, measurement.filter)

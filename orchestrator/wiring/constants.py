@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InvalidValueError, ScenarioError, code_of, text_of
-from ..messages import fold, hint
+from ..messages import fold, hint, resolved, span
 from ..plan import InputSeries, Value, ValueOrigin, Variable
 from ..scenario.loader import LoadedScenario
 from ..scenario.quantities import measure_of
@@ -59,7 +59,7 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
     scenario, fmus, inputs = system.scenario, system.fmus, system.inputs
     read = None
     if any(isinstance(raw, SeriesSpec) for raw in scenario.inputs.values()):
-        read = _series_reader(scenario)
+        read = _series_reader(system)
     by_input = dict(_of_facts(system))
     fact_changed = any(constant.precedence == CHANGED_FACT for constant in by_input.values())
     for pattern, raw in scenario.inputs.items():
@@ -147,14 +147,21 @@ Reader = Callable[[SeriesSpec, str, Variable], InputSeries]
 """Callback: (specification, part matched by the `*` of its key, input) -> time series."""
 
 
-def _series_reader(scenario: LoadedScenario) -> Reader:
-    """Return a reader for the time series of a scenario, which reads every file once.
+RECORDED = 100
+"""Rows from which a file that no measurement file describes counts as recorded. Chosen: fewer are written by
+hand, with times as far apart as a ramp is long."""
+
+
+def _series_reader(system: WiringContext) -> Reader:
+    """Return a reader for the time series of a scenario, which reads every file once, and notes gaps in them.
 
     The reader raises ValueError if the file or a column is missing or unusable, the unit is incompatible, or
     the times do not cover the run.
     """
+    scenario = system.scenario
     # NumPy takes long to import
     from ..measured.clocks import seconds_of
+    from ..measured.gaps import Gap, gaps_in
     from ..measured.measurement import ENDINGS, Measurement, load_measurement
     from ..measured.recording_formats import ColumnFile, reading_series
 
@@ -176,6 +183,19 @@ def _series_reader(scenario: LoadedScenario) -> Reader:
             raise ValueError(f"{spec.file} has no segments: only measurement files have")
         return file.column(name, spec.time)
 
+    def gaps_of(spec: SeriesSpec, name: str, times: np.ndarray, held: bool) -> list[Gap]:
+        """Return the gaps of a column during the run; tables written by hand or of held values have none."""
+        file = opened(spec.file)
+        found: tuple[Gap, ...] = ()
+        if isinstance(file, Measurement):
+            segment = file.segment(spec.segment)
+            shift = float(times[0] - segment.time[0])
+            found = tuple(gap.later(shift) for gap in segment.gaps.get(name, ()))
+        elif not held and len(times) >= RECORDED:
+            found = gaps_in(times)
+        start, stop = float(scenario.start_time), float(scenario.stop_time)
+        return [gap for gap in found if gap.overlaps(start, stop)]
+
     def read(spec: SeriesSpec, part: str, variable: Variable) -> InputSeries:
         name = (spec.column or variable.name).replace("*", part)
         asked.setdefault(spec.file, [spec.time, name])
@@ -191,6 +211,11 @@ def _series_reader(scenario: LoadedScenario) -> Reader:
             values = _values(column, name, variable)
             _check_times(times, scenario, spec)
         held = spec.interpolation == "held" or variable.type != "Real"
+        how = "holds the value before it" if held else "is interpolated"
+        for gap in gaps_of(spec, name, times, held):
+            words = f"{spec.file}: {name} has no samples from {gap} of the run, and {how} there"
+            if all(note.message != words for note in system.notes):  # once for all wheels
+                system.note("series-gap", words, "warning")
         return InputSeries(spec.file, name, file.sha256, held, times, values)
 
     return read
@@ -240,7 +265,8 @@ def _check_times(times: np.ndarray, scenario: LoadedScenario, spec: SeriesSpec) 
     back = np.flatnonzero(np.diff(times) <= 0)
     if back.size:
         at = int(back[0]) + 1
-        raise ValueError(f"time must increase: {times[at]:g} s follows {times[at - 1]:g} s (value {at + 1})")
+        after, before = resolved(times[at], times[at - 1])
+        raise ValueError(f"time must increase: {after} s follows {before} s (value {at + 1})")
     if spec.extrapolate == "hold":
         return
     start, stop = float(scenario.start_time), float(scenario.stop_time)
@@ -250,6 +276,6 @@ def _check_times(times: np.ndarray, scenario: LoadedScenario, spec: SeriesSpec) 
         last += float(times[-1] - times[-2])  # the last value holds as long as the previous one
     if times[0] > start + slack or last < stop - slack:
         raise ValueError(
-            f"covers {times[0]:g} to {times[-1]:g} s of a run from {start:g} to {stop:g} s; "
+            f"covers {span(times[0], times[-1])} s of a run from {span(start, stop)} s; "
             "'extrapolate: hold' would hold its ends"
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -99,6 +100,19 @@ def write(folder: Path, signals: dict[str, np.ndarray], time: np.ndarray = T) ->
     return path
 
 
+def write_named(folder: Path, signals: dict[str, np.ndarray], time: np.ndarray) -> Path:
+    """Write a recording of some of the signals, in any order, and its measurement file."""
+    every = ("steering_wheel_angle", "yaw_rate", "acceleration_y", "velocity_x", "velocity_y")
+    path = write(folder, {name: signals.get(name, np.zeros(time.size)) for name in every}, time)
+    lines = [
+        line
+        for line in path.read_text().splitlines()
+        if not line.startswith("  ") or line.split(":")[0].strip() in signals
+    ]
+    path.write_text("\n".join([*lines, ""]))
+    return path
+
+
 SEEDS = (0, *(pytest.param(seed, marks=pytest.mark.exhaustive) for seed in (1, 2)))
 
 
@@ -175,6 +189,118 @@ def test_flaws_of_other_cars_and_drives_are_named_and_no_other(car, driven, tmp_
         (flaw,) = flaws_of(write(tmp_path, signals))
         assert (flaw.kind, flaw.signal) == (kind, name)
         assert flaw.value == pytest.approx(value, abs=max(2.0 * within, 1e-9))
+
+
+JITTERS = ("of the sampling", "of the times alone")
+
+
+def jittered(
+    signals: dict[str, np.ndarray], which: str, seed: int = 0
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Return signals and times that jitter by 3 ms: sampled at these times, or only said to be."""
+    times = T + np.random.default_rng(seed).uniform(-0.003, 0.003, T.size)
+    if which == "of the times alone":
+        return signals, times
+    return {name: np.interp(times, T, x) for name, x in signals.items()}, times
+
+
+@pytest.mark.sampled(4)
+@pytest.mark.parametrize("driven", [drive, lane_changes])
+@pytest.mark.parametrize("car", [SALOON, *CARS.values()], ids=["saloon", *CARS])
+@pytest.mark.parametrize("which", JITTERS)
+def test_jitter_hides_no_flaw(which, car, driven, tmp_path):
+    whole = recording(1, car, driven)
+    (alone,) = flaws_of(write(tmp_path, *jittered(whole, which)))
+    assert alone.kind is FlawKind.UNEVEN_TIME
+    assert "even times" in alone.text and "interpolate" in alone.text  # what to do about it
+    for spoil, kind, name, value, within in FLAWS.values():
+        signals = {key: x.copy() for key, x in whole.items()}
+        spoil(signals)
+        found_in = JITTERS[1] if kind == "spikes" else which  # samples of a spike are not between others
+        signals, times = jittered(signals, found_in)
+        found = flaws_of(write(tmp_path, signals, times))
+        assert {(flaw.kind.value, flaw.signal) for flaw in found} == {("uneven time", ""), (kind, name)}
+        (flaw,) = [flaw for flaw in found if flaw.kind == kind]
+        assert flaw.value == pytest.approx(value, abs=max(2.0 * within, 1e-9))
+
+
+GAPS = {
+    "at a swing": [(12.0, 14.5)],
+    "short": [(8.0, 8.1)],
+    "several": [(5.0, 5.3), (12.0, 14.5), (20.0, 21.0)],
+}
+
+
+@pytest.mark.parametrize("jitter", [None, *JITTERS])
+@pytest.mark.parametrize("gaps", GAPS.values(), ids=GAPS)
+def test_gaps_hide_no_flaw_and_make_none(gaps, jitter, tmp_path):
+    whole, times = recording(0), T
+    kept = np.ones(T.size, dtype=bool)
+    for begin, end in gaps:
+        kept &= (begin + 1e-9 >= T) | (end - 1e-9 <= T)
+    uneven = [("uneven time", "")] * (jitter is not None)
+    for spoil, kind, name, _, _ in [(dict, None, "", 0.0, 0.0), *FLAWS.values()]:
+        signals = {key: x.copy() for key, x in whole.items()}
+        spoil(signals)
+        if jitter:
+            signals, times = jittered(signals, JITTERS[1] if kind == "spikes" else jitter)
+        found = flaws_of(write(tmp_path, {key: x[kept] for key, x in signals.items()}, times[kept]))
+        lost = [flaw for flaw in found if flaw.kind is FlawKind.GAP]
+        assert [flaw.gap for flaw in lost] == [pytest.approx(gap, abs=0.0031) for gap in gaps]
+        others = [flaw for flaw in found if flaw not in lost]
+        if kind == "lag" and len(gaps) > 1:  # what is left of the drive tells a lag from a position less well
+            assert any(name in f"{flaw.signal} {flaw.text}" for flaw in others)
+        else:
+            wanted = {*uneven, *([(kind, name)] if kind else [])}
+            assert {(flaw.kind.value, flaw.signal) for flaw in others} == wanted
+
+
+@pytest.mark.parametrize("reversed_", ["yaw_rate", "acceleration_y"])
+@pytest.mark.parametrize("jitter", [None, *JITTERS])
+def test_without_a_steering_signal_both_of_two_opposed_signals_are_named(reversed_, jitter, tmp_path):
+    names = ("yaw_rate", "acceleration_y", "velocity_x")
+    whole = recording(0)
+    whole[reversed_] *= -1.0
+    for more, blamed in (((), "yaw_rate, acceleration_y"), (("steering_wheel_angle",), reversed_)):
+        signals = {name: whole[name] for name in (*more, *names)}
+        times = T
+        if jitter:
+            signals, times = jittered(signals, jitter)
+        path = write_named(tmp_path, signals, times)
+        (flaw,) = [flaw for flaw in flaws_of(path) if flaw.kind is FlawKind.SIGN]
+        assert flaw.signal == blamed
+        if not more:
+            assert "steering_wheel_angle" in flaw.text and "do not tell which" in flaw.text
+    assert status_of("measured", "show", path) == 1
+
+
+def test_a_steering_channel_without_a_signal_decides_nothing(tmp_path):
+    whole = recording(0)
+    whole["yaw_rate"] *= -1.0
+    whole["steering_wheel_angle"] = np.zeros(T.size)
+    (flaw,) = flaws_of(write(tmp_path, whole))
+    assert (flaw.kind, flaw.signal) == (FlawKind.SIGN, "yaw_rate, acceleration_y")
+
+
+def test_signals_of_a_straight_drive_contradict_nothing(tmp_path):
+    rng = np.random.default_rng(0)
+    signals = {
+        "yaw_rate": rng.normal(0.0, 0.01, T.size),
+        "acceleration_y": rng.normal(0.0, 1.5, T.size),
+        "velocity_x": 30.0 + rng.normal(0.0, 0.03, T.size),
+    }
+    assert flaws_of(write_named(tmp_path, signals, T)) == ()
+
+
+@pytest.mark.parametrize("lacking", ["yaw_rate", "acceleration_y", "velocity_x"])
+def test_no_flaws_without_a_comparison_says_what_was_not_examined(lacking, tmp_path, capsys):
+    signals = {name: x for name, x in recording(0).items() if name != lacking}
+    path = write_named(tmp_path, signals, T)
+    assert status_of("measured", "show", path) == 0
+    said = capsys.readouterr().err
+    assert "not examined" in said and lacking in said
+    assert status_of("measured", "show", path, "--json") == 0
+    assert json.loads(capsys.readouterr().out)["examined"] is False
 
 
 def test_at_one_speed_a_late_gyro_and_a_place_are_both_named(tmp_path):

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from orchestrator.errors import ScenarioError
-from orchestrator.figures.plots import LabelledRun, shown_by
+from orchestrator.evaluation.standard_tests import Evaluation
+from orchestrator.experiments.result_tables import run_table
+from orchestrator.experiments.tables import metrics_of_run
+from orchestrator.figures.plots import LabelledRun, draw, shown_by
 from orchestrator.figures.style import digits_of, shown, shown_unit
 from orchestrator.metrics import measures
 from orchestrator.metrics.expressions import AT_A_TIME, STANDARD, MetricValue, evaluate, evaluate_all, metric
 from orchestrator.metrics.measures import catalogue
+from orchestrator.metrics.verdict import compare
+from orchestrator.pages.comparison import divergence, partings_table
 from orchestrator.results.run_record import ConnectionRecord
 from tests.sentences import golden, golden_in, refused
 from vocabulary.wheels import WHEELS
@@ -208,9 +214,42 @@ def test_every_measure_can_be_applied_and_says_its_formula_and_unit():
         assert measure.definition
 
 
+def test_a_ratio_has_the_unit_of_its_number_and_is_shown_in_per_cent():
+    ratio = evaluate_all(car(0.8))["relative_peak_error(sideslip)"]
+    assert (ratio.number, ratio.unit) == (pytest.approx(0.2), "1")
+    assert shown(ratio.number, ratio.shown_in) == "20.0 %"
+    table = metrics_of_run(car(0.8), ["relative_peak_error(sideslip)"])
+    assert table.text()[0][-1] == "20.0 %"
+    assert (table.unit(2), table.values(2)) == ("1", [pytest.approx(0.2)])
+    again = replace(ratio, half=0.01)
+    assert (again.unit, again.shown_in) == ("1", "%")
+    verdict = compare(0.206, "at_most", 0.35, "%")
+    assert (verdict.value, verdict.unit, verdict.as_data()["unit"]) == (0.206, "1", "1")
+    judged = Evaluation("run")
+    judged.add("ratio", "a ratio", 0.206, "%")
+    quantity = judged.quantities["ratio"]
+    assert (quantity.value, quantity.unit, quantity.shown_in) == (0.206, "1", "%")
+    data = judged.as_data()["quantities"]["ratio"]
+    assert data == {"name": "a ratio", "value": 0.206, "unit": "1", "reading": ""}
+    (row,) = run_table(judged, "").text()
+    assert row[1] == "20.6 %"
+
+
+def test_a_recorded_signal_in_per_cent_is_shown_as_it_was_recorded():
+    charge = results({"battery.charge": [20.0, 20.6]}, units={"battery.charge": "%"})
+    other = results({"battery.charge": [20.0, 30.6]}, units={"battery.charge": "%"})
+    (parting,) = divergence(charge, other).partings
+    assert partings_table([parting]).text()[0][4] == "10.0 %"
+    figure = draw([LabelledRun("run", charge)], ["battery.charge"])
+    (line,) = figure.axes[0].get_lines()[:1]
+    assert line.get_ydata().tolist() == [20.0, 20.6]
+    value = evaluate(charge, metric("peak(battery.charge)"))
+    assert (value.number, value.unit) == (pytest.approx(0.206), "1")
+
+
 def test_units_of_metrics_follow_from_the_signal():
     units = {name: value.unit for name, value in evaluate_all(car()).items()}
-    assert units["relative_peak_error(sideslip)"] == "%"
+    assert units["relative_peak_error(sideslip)"] == "1"  # shown in per cent
     assert units["rms_error(yaw_rate)"] == "rad/s"
     assert units["effort(yaw_moment)"] == "N.m.s"
     assert units["total_variation_rate(yaw_moment)"] == "N.m/s"

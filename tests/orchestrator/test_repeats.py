@@ -149,8 +149,8 @@ def test_a_metric_may_have_median_and_range_or_a_share_over_its_repeats(load, fi
     assert median.between == pytest.approx((numbers[0], numbers[-1]))
     assert over("median")["right/quiet", "last"].between is None
     share = over("share")["right/noisy", "last"]
-    assert (share.number, share.unit, share.between) == (1.0, "%", tuple(share_bounds(4, 4)))
-    assert golden(shown(share.number, share.unit, between=share.between))
+    assert (share.number, share.unit, share.between) == (1.0, "1", tuple(share_bounds(4, 4)))
+    assert golden(shown(share.number, share.shown_in, between=share.between))
 
 
 def test_a_grid_says_how_far_down_its_columns_hold(findings):

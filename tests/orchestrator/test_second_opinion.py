@@ -190,6 +190,17 @@ def test_the_command_prints_every_signal_and_the_times(fmus, capsys, monkeypatch
     assert golden_in(said)
 
 
+@pytest.mark.parametrize("master", ["fmpy", "libcosim"])
+def test_a_second_opinion_without_a_comparison_is_no_agreement(master, fmus, capsys, monkeypatch):
+    monkeypatch.setattr(module, "installed", lambda master: False)
+    scenario = SCENARIOS / "fuzzy_feedback/single_sine.yaml"
+    options = ["--set", "stop_time=0.1", "--master", master, "--no-one-core"]
+    with pytest.raises(SystemExit) as exit_:
+        main(["second-opinion", str(scenario), "--fmus", str(fmus), *options])
+    assert exit_.value.code == 1
+    assert "nothing was compared" in capsys.readouterr().err
+
+
 def test_an_unknown_master_is_refused(capsys):
     with pytest.raises(SystemExit) as exit_:
         main(["second-opinion", "any.yaml", "--master", "libcosmi"])

@@ -1,0 +1,347 @@
+"""Gaps of recordings: each is named, and nothing that reads a recording goes through one in silence."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import yawbench as yb
+from orchestrator.errors import ScenarioError
+from orchestrator.evaluation.steering_tests import evaluate_step
+from orchestrator.evaluation.trace import trace_of
+from orchestrator.experiments.fit import load_fit
+from orchestrator.figures.plots import spans_of
+from orchestrator.figures.style import LabelledRun
+from orchestrator.measured.flaws import FlawKind, flaws_of
+from orchestrator.measured.gaps import gaps_in
+from orchestrator.measured.measurement import load_measurement
+from orchestrator.measured.single_track import effects_in
+from orchestrator.planner import Planner
+from orchestrator.results.measurement_results import load_run
+from orchestrator.scenario.loader import load_scenario
+from tests.commands import status_of
+
+UNITS = ("tyre_linear",)
+T = np.round(np.arange(0.0, 8.005, 0.01), 2)
+SIGNALS = "signals: {velocity_x: speed, yaw_rate: gyro, acceleration_y: lat}\n"
+
+
+def kept(*gaps: tuple[float, float]) -> np.ndarray:
+    """Return the times without those inside gaps."""
+    times = T
+    for begin, end in gaps:
+        times = times[(times <= begin) | (times >= end)]
+    return times
+
+
+def recording(folder: Path, times: np.ndarray, *, steep: bool = False, more: str = "") -> Path:
+    """Write a drive through swings of 2.5 s, or steeper ones, and its measurement file."""
+    r = 0.2 * np.sin(2.0 * np.pi * times / (1.0 if steep else 2.5))
+    table = np.column_stack([times, 25.0 + 0.0 * times, r, 25.0 * r])
+    header = "time [s],speed [m/s],gyro [rad/s],lat [m/s2]"
+    np.savetxt(folder / "m.csv", table, "%.9g", ",", header=header, comments="")
+    path = folder / "m.yaml"
+    path.write_text(f"files: [m.csv]\ntime: time\n{SIGNALS}{more}")
+    return path
+
+
+@pytest.mark.parametrize("steep", [False, True])
+@pytest.mark.parametrize(
+    "gaps",
+    [[(3.0, 5.5)], [(3.0, 5.0)], [(0.5, 0.6), (3.0, 5.5), (7.0, 7.9)], [(7.8, 7.9)], [(3.13, 3.21)]],
+    ids=["a swing", "two seconds", "several", "at the end", "short"],
+)
+def test_a_stretch_without_samples_is_named_with_its_ends_and_nothing_else_is(gaps, steep, tmp_path, capsys):
+    path = recording(tmp_path, kept(*gaps), steep=steep)
+    flaws = flaws_of(path)
+    assert [flaw.kind for flaw in flaws] == [FlawKind.GAP] * len(gaps)
+    assert [tuple(flaw.gap) for flaw in flaws] == gaps
+    for flaw, (begin, end) in zip(flaws, gaps, strict=True):
+        assert f"from {begin:g} to {end:g} s" in flaw.text
+    assert status_of("measured", "show", path) == 1
+    said = capsys.readouterr().err
+    assert "spike" not in said and "no flaws" not in said
+    assert status_of("measured", "show", path, "--json") == 1
+    first = json.loads(capsys.readouterr().out)["flaws"][0]
+    assert (first["kind"], first["begin"], first["end"]) == ("gap", *gaps[0])
+
+
+def test_of_many_gaps_the_rest_is_counted(tmp_path):
+    rows = np.arange(T.size)
+    flaws = flaws_of(recording(tmp_path, T[(rows % 50 > 5) | (rows < 50)]))
+    assert len(flaws) == 11
+    assert "5 more stretches" in flaws[-1].text
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        T,
+        T[np.arange(T.size) % 40 != 7],  # a sample is lost now and then
+        T + np.random.default_rng(0).uniform(-0.003, 0.003, T.size),
+        np.cumsum(np.random.default_rng(1).uniform(0.002, 0.02, 500)),
+        np.concatenate([np.arange(0.0, 4.0, 0.01), np.arange(4.0, 8.0, 0.1)]),  # another rate
+        np.arange(0.0, 60.0, 1.0),
+        np.array([0.0, 5.0]),
+    ],
+    ids=["even", "single losses", "jitter", "uneven", "two rates", "slow", "two"],
+)
+def test_sampling_of_other_kinds_has_no_gaps(times):
+    assert gaps_in(times) == ()
+
+
+def test_gaps_on_the_clock_of_unix_can_be_told_apart(tmp_path):
+    path = recording(tmp_path, kept((3.0, 5.5)))
+    table = np.loadtxt(tmp_path / "m.csv", delimiter=",", skiprows=1)
+    table[:, 0] += 1.7e9
+    header = "time [s],speed [m/s],gyro [rad/s],lat [m/s2]"
+    np.savetxt(tmp_path / "m.csv", table, "%.15g", ",", header=header, comments="")
+    (flaw,) = flaws_of(path)
+    assert "1700000003 to 1700000005.5 s" in flaw.text
+
+
+def test_times_that_go_back_on_that_clock_can_be_told_apart(tmp_path):
+    path = recording(tmp_path, T)
+    lines = (tmp_path / "m.csv").read_text().splitlines()
+    rows = [
+        f"{1.7e9 + k / 100.0 - (k > 400):.2f},{line.partition(',')[2]}" for k, line in enumerate(lines[1:])
+    ]
+    (tmp_path / "m.csv").write_text("\n".join([lines[0], *rows]) + "\n")
+    (flaw,) = flaws_of(path)
+    assert flaw.kind is FlawKind.REFUSED
+    assert "1700000004" in flaw.text and "1700000003.01" in flaw.text
+
+
+def test_a_gap_of_one_channel_is_named_with_its_signal(tmp_path):
+    asammdf = pytest.importorskip("asammdf")
+    r = 0.2 * np.sin(2.0 * np.pi * T / 2.5)
+    lost = (T <= 3.0) | (T >= 5.5)
+    with asammdf.MDF(version="4.10") as mdf:
+        mdf.append([asammdf.Signal(25.0 + 0.0 * T, T, name="speed", unit="m/s")])
+        mdf.append([asammdf.Signal(25.0 * r, T, name="lat", unit="m/s2")])
+        mdf.append([asammdf.Signal(r[lost], T[lost], name="gyro", unit="rad/s")])
+        mdf.save(tmp_path / "m.mf4")
+    path = tmp_path / "m.yaml"
+    path.write_text(f"files: [m.mf4]\n{SIGNALS}")
+    (flaw,) = flaws_of(path)
+    assert (flaw.kind, flaw.signal, tuple(flaw.gap)) == (FlawKind.GAP, "yaw_rate", (3.0, 5.5))
+    (note,) = [one for one in load_measurement(path).notes if one.code == "measurement-gap"]
+    assert note.location.signal == "yaw_rate" and "yaw_rate" in note.message
+    path.write_text(f"files: [m.mf4]\n{SIGNALS}segments: {{by: gaps}}\n")
+    ends = [(float(one.time[0]), float(one.time[-1])) for one in load_measurement(path).segments]
+    assert ends == [(0.0, 3.0), (5.5, 8.0)]
+
+
+def test_a_recording_can_be_divided_at_its_gaps(tmp_path):
+    path = recording(tmp_path, kept((3.0, 5.5), (7.0, 7.5)), more="segments: {by: gaps}\n")
+    measurement = load_measurement(path)
+    ends = [(float(one.time[0]), float(one.time[-1])) for one in measurement.segments]
+    assert ends == [(0.0, 3.0), (5.5, 7.0), (7.5, 8.0)]
+    assert not [one for one in measurement.notes if one.code == "measurement-gap"]
+    assert flaws_of(path) == ()
+
+
+def test_a_filter_takes_nothing_from_beyond_a_gap(tmp_path):
+    times = kept((3.0, 5.5))
+    path = recording(tmp_path, times, more="filter: {low_pass: 6 Hz}\n")
+    table = np.loadtxt(tmp_path / "m.csv", delimiter=",", skiprows=1)
+    table[times > 4.0, 2] += 1.0
+    header = "time [s],speed [m/s],gyro [rad/s],lat [m/s2]"
+    before = load_measurement(path).segments[0].signals["yaw_rate"]
+    np.savetxt(tmp_path / "m.csv", table, "%.9g", ",", header=header, comments="")
+    after = load_measurement(path).segments[0].signals["yaw_rate"]
+    assert after[times < 4.0].tolist() == before[times < 4.0].tolist()
+    assert after[times > 4.0] == pytest.approx(before[times > 4.0] + 1.0, abs=1e-6)
+
+
+FOLLOWING = """stop_time: STOP
+step_size: 0.01
+units: {tyre: {fmu: tyre_linear}}
+inputs:
+  slip_angle_*: SERIES
+  slip_ratio_*: 0
+  friction_*: 1
+  vertical_load_*: 4000
+"""
+STEERED = "files: [m.csv]\ntime: time\nsignals: {steer_angle: {column: angle, unit: rad}}\n"
+
+
+def warnings_on_series(folder: Path, fmus: Path, stop: float, series: str) -> list[str]:
+    """Return the warnings on gaps in the inputs of a run that follows a file."""
+    path = folder / "scenario.yaml"
+    path.write_text(FOLLOWING.replace("STOP", str(stop)).replace("SERIES", series))
+    plan = Planner().plan(load_scenario(path), fmus=fmus)
+    return [one.message for one in plan.diagnostics if one.code == "series-gap"]
+
+
+@pytest.mark.parametrize(
+    ("file", "column"), [("steer.yaml", "steer_angle"), ("m.csv", "angle")], ids=["measurement", "table"]
+)
+@pytest.mark.parametrize(
+    ("stop", "begin", "named"),
+    [(6.0, 1.0, "from 2 to 4.5 s"), (6.0, 0.0, "from 3 to 5.5 s"), (1.0, 1.0, None), (2.0, 6.0, None)],
+)
+def test_a_run_that_follows_a_recording_through_a_gap_has_a_warning(
+    file, column, stop, begin, named, tmp_path, fmus
+):
+    times = kept((3.0, 5.5))
+    table = np.column_stack([times, 0.1 * np.sin(2.0 * times)])
+    np.savetxt(tmp_path / "m.csv", table, "%.9g", ",", header="time [s],angle [rad]", comments="")
+    (tmp_path / "steer.yaml").write_text(STEERED)
+    series = f"{{file: {file}, column: {column}, from: {begin} s}}"
+    said = warnings_on_series(tmp_path, fmus, stop, series)
+    assert len(said) == (named is not None)  # once for all wheels
+    for message in said:
+        assert named in message and file in message and column in message
+
+
+def test_a_table_written_by_hand_has_no_gaps(tmp_path, fmus):
+    (tmp_path / "m.csv").write_text("time,angle [rad]\n0,0\n0.1,0.1\n0.2,0.2\n0.3,0.1\n9,0\n")
+    assert warnings_on_series(tmp_path, fmus, 6.0, "{file: m.csv, column: angle}") == []
+
+
+def test_results_of_a_measurement_tell_of_its_gap_at_the_time_of_the_run(tmp_path):
+    path = recording(tmp_path, kept((3.0, 5.5)))
+    run = yb.measured(path, start=1.0)
+    (note,) = [one for one in run.diagnostics if one.code == "measurement-gap"]
+    assert (note.severity, note.location.time, note.value) == ("warning", 2.0, 2.5)
+    assert "2 to 4.5 s" in note.message
+    (span,) = spans_of([LabelledRun("car", load_run(path, start=1.0))])
+    assert (span.begin, span.end) == (2.0, 4.5) and "no samples" in span.label
+    saved = run.save(tmp_path / "saved")
+    assert [one.location.time for one in yb.open(saved).diagnostics if one.code == "measurement-gap"] == [2.0]
+
+
+def test_a_test_that_needs_a_signal_with_a_gap_is_not_judged(tmp_path, capsys):
+    times = kept((3.0, 5.5))
+    hand = np.radians(30.0) * np.clip((times - 1.0) / 0.1, 0.0, 1.0)
+    r = 0.2 * np.clip((times - 1.1) / 0.2, 0.0, 1.0)
+    table = np.column_stack([times, 25.0 + 0.0 * times, r, 25.0 * r, hand])
+    header = "time [s],speed [m/s],gyro [rad/s],lat [m/s2],hand [rad]"
+    np.savetxt(tmp_path / "m.csv", table, "%.9g", ",", header=header, comments="")
+    path = tmp_path / "m.yaml"
+    path.write_text(
+        "files: [m.csv]\nsignals: {velocity_x: speed, yaw_rate: gyro, acceleration_y: lat, "
+        "steering_wheel_angle: hand}\n"
+    )
+    judged = evaluate_step(trace_of(load_run(path)))
+    (why,) = [one.message for one in judged.diagnostics if one.code == "test-not-judged"]
+    assert "3 to 5.5 s" in why and "by: gaps" in why
+    assert judged.judges_nothing
+    assert status_of("evaluate", "step-steer", path, "--out", tmp_path / "out", "--no-figures") == 1
+    assert "3 to 5.5 s" in "".join(capsys.readouterr())
+    path.write_text(path.read_text() + "segments: {by: gaps}\n")
+    assert evaluate_step(trace_of(load_run(f"{path}#1"))).quantities["yaw_rate_gain"].value is not None
+
+
+FIT = """title: Fit
+scenario: scenario.yaml
+measured: m.yaml
+training: [{begin: 0, end: 2 s}]
+held_out: [{begin: 2 s, end: END}]
+compared: {yaw_rate: 0.1 deg/s}
+settling: SETTLING
+free: {vehicle.yaw_inertia: {low: 800, high: 4000, start: 2200}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("end", "settling", "said"),
+    [("4 s", "0.2 s", "3 to 5.5 s"), ("3 s", "0.2 s", ""), ("3 s", "5 s", "settling")],
+    ids=["a gap", "none", "nothing is left to compare"],
+)
+def test_a_fit_refuses_a_window_of_which_samples_are_missing(end, settling, said, tmp_path):
+    recording(tmp_path, kept((3.0, 5.5)))
+    (tmp_path / "fit.yaml").write_text(FIT.replace("END", end).replace("SETTLING", settling))
+    if not said:
+        assert len(load_fit(tmp_path / "fit.yaml").held_out) == 1
+        return
+    with pytest.raises(ScenarioError) as refused:
+        load_fit(tmp_path / "fit.yaml")
+    assert {one.code for one in refused.value.diagnostics} == {"fit-window"}
+    assert all(said in one.message for one in refused.value.diagnostics)
+
+
+def test_the_effects_of_parameters_are_those_outside_gaps(tmp_path):
+    known = "vehicle: {mass: 1600 kg, cg_to_front_axle: 1.2 m, cg_to_rear_axle: 1.5 m}\n"
+    path = recording(tmp_path, kept((3.0, 5.5)), more=known)
+    text = path.read_text().replace("acceleration_y: lat", "steer_angle: {column: lat, unit: deg}")
+    path.write_text(text)
+    (tmp_path / "m.csv").write_text((tmp_path / "m.csv").read_text().replace("lat [m/s2]", "lat"))
+    with pytest.raises(ValueError, match="gap"):  # the only window, of 10 s, has one
+        effects_in(load_measurement(path))
+    path.write_text(text + "segments: {by: gaps}\n")
+    assert effects_in(load_measurement(path))
+
+
+def test_a_validation_compares_no_values_that_were_not_measured(tmp_path):
+    asammdf = pytest.importorskip("asammdf")
+    a_y = 4.0 * np.sin(2.0 * np.pi * T / 8.0)
+    lost = (T <= 1.0) | (T >= 3.0)  # the hand wheel is not recorded while a_y is largest
+    with asammdf.MDF(version="4.10") as mdf:
+        mdf.append([asammdf.Signal(a_y, T, name="lat", unit="m/s2")])
+        mdf.append([asammdf.Signal(0.1 * a_y[lost], T[lost], name="hand", unit="rad")])
+        mdf.save(tmp_path / "car.mf4")
+    path = tmp_path / "car.yaml"
+    path.write_text("files: [car.mf4]\nsignals: {acceleration_y: lat, steering_wheel_angle: hand}\n")
+    table = np.column_stack([T, a_y, 0.1 * a_y])
+    np.savetxt(tmp_path / "run.csv", table, "%.9g", ",", header="time [s],lat [m/s2],hand [rad]", comments="")
+    (tmp_path / "run.yaml").write_text(path.read_text().replace("car.mf4", "run.csv"))
+    validation = yb.validate(yb.measured(tmp_path / "run.yaml"), path)
+    assert validation.verdicts["steering_wheel_angle"].value < 0.05
+    assert [one.code for one in validation.diagnostics].count("measurement-gap") == 1
+
+
+@pytest.fixture
+def compared(tmp_path) -> Path:
+    """A folder with the results of a run, which begins at 0 s."""
+    yb.measured(recording(tmp_path, T)).save(tmp_path / "run")
+    return tmp_path
+
+
+def diff_of(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, dict]:
+    capsys.readouterr()
+    status = status_of("diff", *arguments, "--json")
+    return status, json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize("begin", [123.0, 1.7e9])
+def test_a_comparison_at_no_time_is_no_agreement(begin, compared, capsys):
+    path = recording(compared, T)
+    table = np.loadtxt(compared / "m.csv", delimiter=",", skiprows=1)
+    table[:, 0] += begin
+    np.savetxt(compared / "m.csv", table, "%.15g", ",", header="time [s],speed [m/s],gyro [rad/s],lat [m/s2]",
+               comments="")  # fmt: skip
+    status, found = diff_of(capsys, compared / "run", path)
+    assert (status, found["identical"], found["compared"]["times"]) == (1, False, 0)
+    assert status_of("diff", compared / "run", path) == 1
+    said = "".join(capsys.readouterr())
+    assert f"{begin:.0f} to {begin + 8.0:.0f} s" in said and "0 to 8 s" in said
+    assert f"--from '{begin:.0f} s'" in said and "the same" not in said
+    status, found = diff_of(capsys, compared / "run", path, "--from", f"{begin:.0f} s")
+    assert (status, found["compared"]["times"]) == (0, T.size)
+    assert all(one["visibly_from"] is None for one in found["signals"])
+
+
+def test_runs_without_a_common_signal_are_not_the_same(compared, capsys):
+    recording(compared, T)
+    (compared / "m.yaml").write_text("files: [m.csv]\nsignals: {roll_rate: gyro}\n")
+    status, found = diff_of(capsys, compared / "run", compared / "m.yaml")
+    assert (status, found["identical"], found["compared"]["signals"]) == (1, False, 0)
+
+
+@pytest.mark.parametrize(("factor", "seen"), [(1.0, set()), (1.1, {"plant.yaw_rate"})])
+def test_a_recording_with_times_of_its_own_is_compared_there_and_not_in_gaps(factor, seen, compared, capsys):
+    times = kept((3.0, 5.5)) + 0.0037
+    times = times[times < 8.0]
+    path = recording(compared, times)
+    table = np.loadtxt(compared / "m.csv", delimiter=",", skiprows=1)
+    table[:, 2] *= factor
+    np.savetxt(compared / "m.csv", table, "%.12g", ",", header="time [s],speed [m/s],gyro [rad/s],lat [m/s2]",
+               comments="")  # fmt: skip
+    status, found = diff_of(capsys, compared / "run", path)
+    assert (status, found["compared"]["times"]) == (0, times.size)
+    assert {one["signal"] for one in found["signals"] if one["visibly_from"] is not None} == seen
