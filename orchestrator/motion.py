@@ -4,8 +4,8 @@ The angle of a vector of length zero is undefined, and that of a short one is no
 sideslip. Whatever judges, summarises or draws such a signal (`ANGLES`) leaves out the samples
 in which the car is slower than `LEAST_SPEED`; recorded signals stay what the FMU or the sensor gave.
 
-The speed is sqrt(v_x^2 + v_y^2). Where v_y is not known, it is |v_x| / |cos(beta)|, so that a car which
-slides sideways moves, or |v_x| without sideslip. Without v_x it is unknown, and nothing is left out.
+The speed is sqrt(v_x^2 + v_y^2), or |v_x| where v_y is not known: then a car that slides sideways, within some
+degrees of 90, seems to stand, too. Without v_x the speed is unknown, and nothing is left out.
 """
 
 from __future__ import annotations
@@ -22,36 +22,19 @@ LEAST_SPEED = 10.0 / 3.6
 """Speed below which the angle of a velocity means nothing [m/s]. Chosen: an error of 0.1 m/s in v_y is 2
 degrees of sideslip there; inertial navigation systems for tests of cars give a slip angle above about this
 speed only (Advanced Navigation, packet 73 of their protocol: above 3.45 m/s)."""
-LEAST_COSINE = 0.2
-"""Least cos(beta) by which v_x is divided. Chosen: beyond 78 degrees of sideslip the noise of a v_x at rest
-would become a speed."""
-SPEED_SIGNALS = ("velocity_x", "velocity_y", "sideslip")
+SPEED_SIGNALS = ("velocity_x", "velocity_y")
 """Signals that the speed is computed from."""
 
 
-def speed_of(signals: Mapping[str, np.ndarray]) -> np.ndarray | None:
-    """Return the speed of a car [m/s] from those of `SPEED_SIGNALS` that are known, in SI; None: unknown."""
+def standing(signals: Mapping[str, np.ndarray]) -> np.ndarray | None:
+    """Return the rows in which a car is slower than `LEAST_SPEED`, from those of `SPEED_SIGNALS` that are
+    known, in SI; None if there are no such rows, or if the speed is unknown.
+    """
     forward = signals.get("velocity_x")
     if forward is None:
         return None
-    if "velocity_y" in signals:
-        return np.hypot(forward, signals["velocity_y"])
-    along = np.abs(np.cos(signals["sideslip"])) if "sideslip" in signals else np.ones(1)
-    return np.asarray(np.abs(forward) / np.maximum(along, LEAST_COSINE))
-
-
-def standing(signals: Mapping[str, np.ndarray]) -> np.ndarray | None:
-    """Return the rows in which a car is slower than `LEAST_SPEED`; None if there is none, or if its speed is
-    unknown."""
-    speed = speed_of(signals)
-    stands = None if speed is None else speed < LEAST_SPEED  # an unknown speed is not below it
-    return stands if stands is not None and stands.any() else None
-
-
-def while_moving(signals: Mapping[str, np.ndarray], name: str) -> np.ndarray:
-    """Return an angle of the velocity, NaN in the rows in which the car stands."""
-    stands = standing(signals)
-    return signals[name] if stands is None else np.where(stands, np.nan, signals[name])
+    stands = np.hypot(forward, signals.get("velocity_y", 0.0)) < LEAST_SPEED
+    return np.asarray(stands) if stands.any() else None
 
 
 def largest(values: np.ndarray) -> float | None:

@@ -26,7 +26,7 @@ from ..errors import ResultsError
 from ..figures.plots import changes_of, spans_of
 from ..figures.style import LINES, MEASURED_LINE, LabelledRun, digits_apart, line_style, shown, shown_unit
 from ..messages import listed
-from ..metrics.expressions import MetricValue, columns_of, evaluate, metric, reference_of
+from ..metrics.expressions import MetricValue, columns_of, evaluate, metric, reference_of, while_moving
 from ..metrics.measures import words
 from ..results.measurement_results import MeasuredResults
 from ..results.reader import Results
@@ -385,7 +385,7 @@ def still_of(results: Sequence[Results]) -> float:
     """
     for signal in STILL:
         peaks = []
-        for run in results:
+        for run in map(while_moving, results):
             for column in columns_of(run, signal)[:1]:
                 size = np.nan_to_num(np.abs(run.columns[column]), posinf=0.0)
                 peaks.append((float(size.max()), -float(run.time[np.argmax(size)])))
