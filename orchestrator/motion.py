@@ -1,11 +1,11 @@
 """Whether a car moves fast enough for the angles of its velocity: sideslip, its rate, slip angles of wheels.
 
 The angle of a vector of length zero is undefined, and that of a short one is noise: a car that stands has any
-sideslip. Whatever judges, summarises or draws such a signal (`ANGLES`) leaves out the samples
-in which the car is slower than `LEAST_SPEED`; recorded signals stay what the FMU or the sensor gave.
+sideslip. Whatever judges, summarises or draws such a signal (`ANGLES`) leaves out the samples in which the
+car is slower than `LEAST_SPEED`; recorded signals stay what the FMU or the sensor gave.
 
-The speed is sqrt(v_x^2 + v_y^2), or |v_x| where v_y is not known: then a car that slides sideways, within some
-degrees of 90, seems to stand, too. Without v_x the speed is unknown, and nothing is left out.
+The speed is sqrt(v_x^2 + v_y^2), or |v_x| where v_y is not known: then a car that slides sideways, within
+some degrees of 90, seems to stand, too. Without v_x the speed is unknown, and nothing is left out.
 """
 
 from __future__ import annotations
