@@ -333,8 +333,8 @@ def compare_run(results: Results, measurement: Measurement, bands: Bands) -> Val
         if not (np.any(rows) and own):
             verdicts[name] = not_judged(f"the car is not faster than {3.6 * LEAST_SPEED:.0f} km/h")
             continue
-        signals = over[rows], trace[name][rows]
-        band = _Band(trace.time[rows], *signals, bands.tolerances[bands.over], bands.tolerances[name])
+        line = trace.time[rows], over[rows], trace[name][rows]
+        band = _Band(*line, bands.tolerances[bands.over], bands.tolerances[name])
         sides = [band.side_of(segment.signals[bands.over], (bands.over, name)) for segment in own]
         compared = [
             band.test(segment, side, (bands.over, name)) for segment, side in zip(own, sides, strict=True)
