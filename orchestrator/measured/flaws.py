@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import ScenarioError
+from ..motion import ANGLES, standing
 from .measurement import MEASURABLE, load_measurement
 from .segment import LowPass, Segment, running_median
 
@@ -131,7 +132,11 @@ def _contradiction(even: Segment) -> Flaw | None:
     if not {"yaw_rate", "acceleration_y", "velocity_x"} <= even.signals.keys() or even.rate < 3.0 * BAND:
         return None
     low, edge = LowPass(BAND), int(even.rate)
-    smooth = {name: low(x, even.rate) for name, x in even.signals.items()}
+    stands = standing(even.signals)
+    smooth = {
+        name: low(x if stands is None or name not in ANGLES else np.where(stands, 0.0, x), even.rate)
+        for name, x in even.signals.items()
+    }
     r, a_y, v = (smooth[name] for name in ("yaw_rate", "acceleration_y", "velocity_x"))
     inner = slice(edge, -edge)
     if a_y[inner].size < 10 or np.std(a_y[inner]) < 0.1:

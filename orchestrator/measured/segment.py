@@ -17,6 +17,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..motion import LEAST_SPEED
+
 Position = tuple[float, float, float]
 """x, y, z [m] relative to the centre of mass, vehicle axes."""
 POLES = 12
@@ -168,9 +170,9 @@ def to_centre_of_mass(segment: Segment, positions: Mapping[str, Position]) -> di
             signals[name] = recorded - (dr * x - dp * z - (p * p + r * r) * y + q * (p * x + r * z))
         elif name == "sideslip" and "velocity_x" in segment.signals:
             forward = segment.signals["velocity_x"]
-            signals[name] = np.arctan2(
-                (forward - r * y) * np.tan(recorded) - (r * x - p * z), np.maximum(forward, 0.1)
-            )
+            moved = np.arctan2((forward - r * y) * np.tan(recorded) - (r * x - p * z), forward)
+            # at rest, and near 90 degrees, where v_x says nothing of v_y, it stays as recorded
+            signals[name] = np.where(np.abs(forward) < LEAST_SPEED, recorded, moved)
     return signals
 
 

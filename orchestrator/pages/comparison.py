@@ -19,8 +19,9 @@ from ..experiments.experiment_result import ExperimentResult
 from ..experiments.tables import Table, marked, remarks
 from ..figures.style import LabelledRun, digits_of, shown, shown_unit
 from ..messages import counted, star
-from ..metrics.expressions import MetricValue, metric
+from ..metrics.expressions import MetricValue, angles_in, metric, standing_in
 from ..metrics.measures import variable_of
+from ..motion import nearest_turn
 from ..results.reader import Results
 from ..results.run_record import RunRecord
 from ..scenario.overrides import changed
@@ -76,8 +77,16 @@ def divergence(first: Results, second: Results) -> RunComparison:
     shared = [name for name in first if name in second]
     time = first.time[rows]
     by_signal: dict[str, SignalDifference] = {}
+    angles = angles_in(first)
     for name in shared if rows.size else []:
-        parting = _parting(name, time, first.columns[name][rows], second.columns[name][others], first)
+        ours, theirs = first.columns[name][rows], second.columns[name][others]
+        if name in angles:  # they mean something while both cars move
+            for run, at in ((first, rows), (second, others)):
+                if (stands := standing_in(run, name)) is not None:
+                    ours, theirs = (np.where(stands[at], np.nan, values) for values in (ours, theirs))
+            if first.units[name] == second.units[name] == "rad":
+                ours = nearest_turn(ours, theirs)
+        parting = _parting(name, time, ours, theirs, first)
         if parting is not None:
             known = by_signal.get(parting.signal)
             by_signal[parting.signal] = parting if known is None else _together(known, parting)
