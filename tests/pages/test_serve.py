@@ -397,7 +397,7 @@ def test_every_slider_of_a_shipped_scenario_begins_where_its_run_does(planner, n
     for fact, unit in (("friction", "1"), ("speed", "m/s")):
         stated = getattr(loaded, fact)
         if fact in knobs:
-            assert knobs[fact].value == (convert(stated, unit) if isinstance(stated, str) else stated)
+            assert knobs[fact].value == float(convert(stated, unit) if isinstance(stated, str) else stated)
     shown = shown_first([*knobs.values()], plan)
     settings = [f"{target}={knobs[target].value!r}" for target in shown if target != "friction"]
     again = planned(Job(name, loader.named(name), Path(), read_changes((), settings, ())), planner)[1]
