@@ -42,6 +42,7 @@ class PlausibilityCheck:
     message: str
     why: str  # source of the limit
     below: bool = False  # warn of values below the limit instead
+    from_setting_off: bool = False  # of a sideslip: counted from straight back for a car that reverses
     over_friction: bool = False  # the value is divided by the highest friction of the road
 
 
@@ -49,15 +50,14 @@ def _degrees(x: SignalArrays) -> np.ndarray:
     return np.degrees(np.abs(x[0]))
 
 
-SPINS = "car-spins"
 BACKWARDS = math.radians(135.0)
 """Sideslip beyond which a car that sets off does so backwards [rad]; chosen: nearer to back than to aside."""
 
 CHECKS: tuple[PlausibilityCheck, ...] = (
     PlausibilityCheck(
-        SPINS, ("sideslip",), _degrees, 45.0,
+        "car-spins", ("sideslip",), _degrees, 45.0,
         "the car spins: its sideslip angle passes {limit} degrees at {time} s and reaches {value} degrees",
-        "chosen: more than front wheels can be steered against",
+        "chosen: more than front wheels can be steered against", from_setting_off=True,
     ),
     PlausibilityCheck(
         "wheel-lifts", ("vertical_load_*",), itemgetter(0), 1.0,
@@ -171,7 +171,7 @@ class _CheckState:
     def look(self, rows: np.ndarray) -> None:
         signals = [place.of(rows) for place in self._places]
         stands = standing({name: place.of(rows) for name, place in self._moving.items()})
-        if self.check.code == SPINS:
+        if self.check.from_setting_off:
             signals = [self._from_setting_off(signals[0], stands)]
         x = self._sign * self._scale * self.check.value(signals)
         if stands is not None:
