@@ -19,6 +19,7 @@ does. A run in which it never moves does not have such a metric.
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Iterable
@@ -32,7 +33,7 @@ from vocabulary.wheels import WHEELS, wheels
 
 from ..errors import ScenarioError
 from ..messages import closest, fold, hint, listed, short
-from ..motion import ANGLES, SPEED_SIGNALS, nearest_turn, standing
+from ..motion import ANGLES, LEAST_SPEED, SPEED_SIGNALS, nearest_turn, standing
 from ..plan import SENSING
 from ..scenario.quantities import convert
 from ..signal_names import VARIABLE, SignalName
@@ -387,6 +388,12 @@ def why_none(results: Results, chosen: Metric, window: TimeWindow | None, end: f
         return f"{chosen.name}: {_unfit(results, chosen)}"
     if window is not None and not 0.0 <= window[0] <= window[1] <= end:
         return f"{chosen.name}: the window is not within the run, 0 to {end:g} s"
+    angles = angles_in(results) & {*itertools.chain(*_signals(results, chosen))}
+    stands = standing_in(results, min(angles)) if angles and results.time.size else None
+    if stands is not None:
+        first, last = window or (-math.inf, math.inf)
+        if np.all(stands[(results.time >= first - 1e-9) & (results.time <= last + 1e-9)]):
+            return f"{chosen.name}: the car is not faster than {3.6 * LEAST_SPEED:.0f} km/h{during(window)}"
     return ""
 
 

@@ -20,6 +20,7 @@ from orchestrator.metrics.expressions import (
     evaluate_all,
     metric,
     while_moving,
+    why_none,
 )
 from orchestrator.metrics.measures import catalogue
 from orchestrator.results.reader import Results
@@ -515,7 +516,9 @@ def test_a_car_that_spins_at_speed_and_comes_to_rest_has_spun():
 def test_a_car_that_starts_from_rest_and_one_that_never_moves():
     run = moving_car([0.0, 0.0, 5.0, 10.0], [np.pi, -np.pi, 0.1, 0.05])
     assert of(run, "peak(sideslip)") == pytest.approx(0.1)
-    assert of(moving_car([0.0, 0.1, 0.0], [np.pi, 1.0, 2.0]), "peak(sideslip)") is None
+    stands = moving_car([0.0, 0.1, 0.0], [np.pi, 1.0, 2.0])
+    assert of(stands, "peak(sideslip)") is None
+    assert "10 km/h" in why_none(stands, metric("peak(sideslip)"), None, 0.2)
 
 
 def test_the_clock_of_a_mean_stands_while_the_car_does():
