@@ -249,6 +249,7 @@ def _line(axes: Axes, t: np.ndarray, x: np.ndarray, unit: str, style: dict[str, 
         turned = np.flatnonzero(np.abs(np.diff(x)) > 180.0) + 1
         t, x = np.insert(t, turned, t[turned]), np.insert(x, turned, np.nan)
     axes.plot(t, x, **style)
+    axes.update_datalim([(t[0], 0.0), (t[-1], 0.0)], updatey=False)  # a gap at an end is part of the time
 
 
 def thinned(t: np.ndarray, x: np.ndarray, buckets: int = POINTS) -> tuple[np.ndarray, np.ndarray]:

@@ -550,3 +550,15 @@ def test_without_a_speed_a_sideslip_is_taken_as_it_is():
     run = moving_car([0.0, 0.0], [3.0, 0.1])
     del run.columns["plant.velocity_x"]
     assert of(run, "peak(sideslip)") == 3.0
+
+
+def test_a_line_has_a_gap_while_the_car_stands_and_keeps_its_time():
+    from orchestrator.figures.plots import draw
+
+    run = moving_car([20.0, 15.0, 10.0, 5.0, 0.0, 0.0], [0.0, 0.02, 0.01, 0.0, np.pi, -np.pi])
+    figure = draw([LabelledRun("a", run)], ["sideslip", "velocity_x", "velocity_x(sideslip)"])
+    of_slip, of_speed = figure.axes[:2]
+    (line,) = of_slip.get_lines()
+    assert np.nanmax(np.abs(line.get_ydata())) == pytest.approx(np.degrees(0.02))
+    assert of_slip.get_xlim() == pytest.approx(of_speed.get_xlim())
+    assert max(map(abs, figure.axes[2].get_xlim())) < 2.0
