@@ -15,7 +15,7 @@ from orchestrator.pages.page_parts import packed
 from orchestrator.pages.viewer import SETTINGS, Settings, page
 from orchestrator.pages.viewer import View as Selection
 from orchestrator.safe_files import reason, write_whole
-from orchestrator.scenario.overrides import changed, with_changes
+from orchestrator.scenario.overrides import changed
 
 from . import arguments
 from ._run import Run
@@ -64,7 +64,9 @@ def view(
     settings = Settings((Selection(panels=wanted),)) if wanted else SETTINGS
     title = arguments.text(title, "title", empty=True)
     names = tuple(run.label for run in labelled)
-    html = packed(page(labelled, settings, title=title or listed(names, last="and")))
+    if names != (labelled[0].results.record.title,):  # a single run's own title is followed by its overrides
+        title = title or listed(names, last="and")
+    html = packed(page(labelled, settings, title=title))
     return View(names, html, arguments.count(height, "height", least=LEAST, most=MOST))
 
 
@@ -77,8 +79,6 @@ def _labelled(runs: object) -> list[LabelledRun]:
     else:
         several = arguments.items(runs, "runs", "a run, a list of runs, or a mapping of labels to runs")
         titles = [run.title if arguments.is_a(run, Run) else "" for run in several]
-        if len(several) == 1 and arguments.is_a(several[0], Run):
-            titles = [with_changes(titles[0], several[0].results.record.overrides)]
         if len(set(titles)) < len(titles):
             changes = [run.changes if arguments.is_a(run, Run) else () for run in several]
             shared = [change for change in changes[0] if all(change in made for made in changes)]

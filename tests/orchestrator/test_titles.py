@@ -176,7 +176,7 @@ def test_the_heading_of_a_page_on_one_run_and_its_text_in_python_name_what_was_c
     full = f"{run.record.title} (changed: plant.initial_speed = 50 km/h)"
     assert html.fromstring(page([LabelledRun("a", run)])).findtext(".//h1") == full
     assert full in repr(yb.Run(run))
-    assert full in yb.view(yb.Run(run)).labels
+    assert html.fromstring(yb.view(yb.Run(run)).html).findtext(".//h1") == full
     assert html.fromstring(page([LabelledRun("a", made())])).findtext(".//h1") == made().record.title
 
 
