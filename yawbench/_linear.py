@@ -11,6 +11,7 @@ import numpy as np
 
 from orchestrator.errors import ScenarioError
 from orchestrator.messages import listed, short
+from orchestrator.scenario.overrides import with_changes
 
 from . import arguments
 from ._operating_point import LARGE, SMALL, OperatingPoint
@@ -141,7 +142,8 @@ def linearize(
     for name, names in (("inputs", into), ("outputs", of)):
         if not names or len(set(names)) < len(names) or (name == "outputs" and set(names) & set(into)):
             raise ValueError(f"{name}: must be signals, each once (got {short(names)})")
-    with bar(f"Linearize {scenario.title}"):
+    title = with_changes(scenario.title, scenario.changes)
+    with bar(f"Linearize {title}"):
         point = OperatingPoint(scenario, time, into, of)
         sampled = _reduced(_differences(point))
         model = sampled.named() if discrete else sampled.continuous(point.dt)
@@ -150,7 +152,7 @@ def linearize(
         raise ScenarioError(f"{scenario.title}: {text}: request discrete=True", code="option-invalid")
     a, b, c, d, states = model
     dt = point.dt if discrete else 0.0
-    return LinearModel(a, b, c, d, point.inputs, point.outputs, states, dt, point.time, scenario.title)
+    return LinearModel(a, b, c, d, point.inputs, point.outputs, states, dt, point.time, title)
 
 
 Matrices = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, str]]

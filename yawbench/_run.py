@@ -20,6 +20,7 @@ from orchestrator.metrics.expressions import STANDARD, MetricValue, evaluate, ev
 from orchestrator.plan import Override
 from orchestrator.results.measurement_results import filtered_alike, measured_results
 from orchestrator.results.reader import Results
+from orchestrator.scenario.overrides import with_changes
 
 from . import arguments
 
@@ -245,9 +246,14 @@ class Run:
         write_results(self.results, path, format=arguments.text(format, "format"))
         return path
 
+    @property
+    def _full_title(self) -> str:
+        """The title with the overrides: numbers in it may be those of the file."""
+        return with_changes(self.title, self.results.record.overrides)
+
     def __repr__(self) -> str:
         noted = "".join(f"; {text}" for text in warnings_in(self.diagnostics))
-        return f"<Run {self.title!r}: {len(self)} rows of {len(self.results.columns)} variables{noted}>"
+        return f"<Run {self._full_title!r}: {len(self)} rows of {len(self.results.columns)} variables{noted}>"
 
     def _repr_html_(self) -> str:
         from orchestrator.figures.style import shown

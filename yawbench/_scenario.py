@@ -26,7 +26,7 @@ from orchestrator.messages import hint, short
 from orchestrator.plan import Fmu, Instance, Override, Plan, Value
 from orchestrator.planner import Planner
 from orchestrator.scenario import loader
-from orchestrator.scenario.overrides import faults_at, setting
+from orchestrator.scenario.overrides import faults_at, setting, with_changes
 from orchestrator.scenario.schema import LoadedScenario
 from orchestrator.signal_names import Target
 from orchestrator.wiring.context import FACTS
@@ -286,10 +286,10 @@ class Scenario:
                     opened.clear()
                     run = Run(simulate_in_memory(again, opener=opener))  # fails again, now with the exception
             except SimulationError as error:
-                warn(plan.title, (*plan.diagnostics, *error.warnings))
+                warn(with_changes(plan.title, plan.changes), (*plan.diagnostics, *error.warnings))
                 ended = [instance for instance in opened if instance.name == error.instance]
                 raise error from next((getattr(instance, "error", None) for instance in ended), None)
-        warn(run.title, run.diagnostics)
+        warn(run._full_title, run.diagnostics)
         return run
 
     def _in_python(self, plan: Plan) -> Plan:

@@ -31,6 +31,7 @@ except ImportError:
 from orchestrator.errors import ScenarioError
 from orchestrator.evaluation.sine_with_dwell import SPUN, amplitudes
 from orchestrator.master.simulate import simulate_in_memory
+from orchestrator.motion import LEAST_SPEED
 from orchestrator.plan import Plan
 from orchestrator.results.reader import Results
 
@@ -116,9 +117,9 @@ class SineWithDwell(gymnasium.Env[Observation, np.ndarray]):
         names = arguments.texts(signals, "signals")
         if not names:
             raise ValueError("signals: must not be empty")
-        self._hand = _Hand(tuple(dict.fromkeys((*names, "sideslip"))))
+        self._hand = _Hand(tuple(dict.fromkeys((*names, "sideslip", "velocity_x"))))
         self._indices = [self._hand.inputs.index(name) for name in names]
-        self._sideslip = self._hand.inputs.index("sideslip")
+        self._sideslip, self._velocity = map(self._hand.inputs.index, ("sideslip", "velocity_x"))
         self._scenario = load(scenario).swap(controller=self._hand)
         self._plans: dict[float, Plan] = {}
         self._thread: threading.Thread | None = None
@@ -181,7 +182,8 @@ class SineWithDwell(gymnasium.Env[Observation, np.ndarray]):
             reward, info = self._judged(request)
             return self._last, reward, True, False, info
         self._last = np.array([request[index] for index in self._indices])
-        if abs(request[self._sideslip]) > SPUN:
+        moving = abs(request[self._velocity]) >= LEAST_SPEED
+        if moving and abs(request[self._sideslip]) > SPUN:
             self._abandon()
             return self._last, WORST, True, False, {"passed": False}
         return self._last, 0.0, False, False, {}

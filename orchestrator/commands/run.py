@@ -261,6 +261,7 @@ def converge(
     )
     from ..experiments.tables import to_csv
     from ..figures.style import save
+    from ..motion import ANGLES, SPEED_SIGNALS
     from ..pages.page_parts import image_of
     from ..results.run_folder import default_folder
     from ..safe_files import write_whole
@@ -280,7 +281,8 @@ def converge(
         algorithms=algorithm or (),
         changes=options.changes,
     )
-    findings = conduct(experiment, folder, options, each, record=(signal,))
+    moving = [f"{name}*" for name in SPEED_SIGNALS if signal.rpartition(".")[2] in ANGLES]
+    findings = conduct(experiment, folder, options, each, record=(signal, *moving))
     rows = measure(findings, signal)
     table = convergence_table(rows, experiment.spec.title)
     write_whole(folder / "converge.csv", to_csv(columns_of(rows)))

@@ -9,7 +9,7 @@ has stopped:
     yaw                    largest yaw rate, within the first second and in all, and largest yaw angle
     deviation              largest distance from the line along which the car was travelling
     hand wheel             largest angle, and rate over 0.1 s
-    sideslip               largest above 10 km/h: below that speed it is meaningless
+    sideslip               largest above 10 km/h: below that speed it is meaningless (`motion`)
 
 If the friction under the front wheels jumps meanwhile:
 
@@ -57,8 +57,9 @@ import numpy as np
 
 from ..metrics.measures import running_integral
 from ..metrics.verdict import NotJudged
+from ..motion import LEAST_SPEED, largest
 from .standard_tests import Evaluation, evaluation
-from .trace import Trace, at, first_crossing, refuse_opposed, running_mean
+from .trace import Trace, at, first_crossing, known, refuse_opposed, running_mean
 
 BRAKED = 1.0
 """Deceleration at which braking starts, if the pedal is not recorded [m/s2]."""
@@ -66,8 +67,6 @@ STOPPED = 0.1
 """Speed below which a car has stopped [m/s]; chosen."""
 UPPER, LOWER = 0.8, 0.1
 """Fractions of v_0 between which the mean deceleration is computed: UN R13-H."""
-SLOW = 10.0 / 3.6
-"""Speed above which sideslip is evaluated [m/s]; chosen."""
 MEAN = 0.1
 """Width of the running mean of rates and decelerations [s]; chosen."""
 JUMP = 0.05
@@ -85,6 +84,8 @@ def evaluate_braking(judged: Evaluation, trace: Trace) -> None:
     way = running_integral(t, speed)
     way = way - at(t, way, begin)
     v_0 = at(t, speed, begin)
+    if v_0 < LEAST_SPEED:
+        raise NotJudged(f"the car is slower than {3.6 * LEAST_SPEED:.0f} km/h when it is braked")
     stop = first_crossing(t, -speed, -STOPPED, begin)
     end = float(t[-1]) if stop is None else stop
     judged.add("speed", "speed at the start of braking", v_0, "m/s")
@@ -112,8 +113,8 @@ def evaluate_braking(judged: Evaluation, trace: Trace) -> None:
         judged.add("hand", "largest correction of the hand wheel", _peak(correction, within), "rad")
         judged.add("hand_rate", "its largest rate", _peak(turning, within), "rad/s", f"mean over {MEAN:g} s")
     if "sideslip" in trace:
-        fast = during & (speed > SLOW)
-        judged.add("sideslip", "peak sideslip", _peak(trace["sideslip"], fast), "rad", "above 10 km/h")
+        peak = _peak(trace.while_moving("sideslip"), during)
+        judged.add("sideslip", "peak sideslip", peak, "rad", "above 10 km/h")
     _add_jump(judged, trace, begin, end)
 
 
@@ -134,7 +135,7 @@ def _braking_start(trace: Trace) -> float:
 
 
 def _peak(x: np.ndarray, where: np.ndarray) -> float | None:
-    return float(np.abs(x[where]).max()) if where.any() else None
+    return largest(x[where])
 
 
 def _mean_deceleration(
@@ -219,34 +220,38 @@ def evaluate_turn(judged: Evaluation, trace: Trace) -> None:
     judged.add("radius", "radius of the steady turn", side * radius, "m", "v / r, positive: to the left")
     judged.add("speed", "speed of the steady turn", v_0, "m/s")
     judged.add("acceleration", "lateral acceleration of the steady turn", float(a_y[before].mean()), "m/s2")
-    later = at(t, v, now + AFTER_ACTION)
     judged.add(
         "deceleration",
         f"mean deceleration over {AFTER_ACTION:g} s",
-        (at(t, v, now) - later) / AFTER_ACTION,
+        (at(t, v, now) - at(t, v, now + AFTER_ACTION)) / AFTER_ACTION,
         "m/s2",
     )
-    ratio = side * r * radius / np.maximum(v, 0.1)
+    moving = np.where(v < LEAST_SPEED, np.nan, v)  # below it, ratios over the speed mean nothing
+    ratio = side * r * radius / moving
     judged.add(
         "yaw_ratio",
         f"yaw rate ratio after {AFTER_ACTION:g} s",
-        at(t, ratio, now + AFTER_ACTION),
+        known(at(t, ratio, now + AFTER_ACTION)),
         "1",
         "r R_0 / v",
     )
     during = (t >= now) & (t <= now + AFTER_ACTION)
+    highest = float(np.fmax.reduce(ratio[during]))
+    judged.add("yaw_ratio_peak", f"largest yaw rate ratio within {AFTER_ACTION:g} s", known(highest), "1")
+    aside = side * at(t, a_y, now + AFTER_ACTION) * radius / at(t, moving, now + AFTER_ACTION) ** 2
     judged.add(
-        "yaw_ratio_peak", f"largest yaw rate ratio within {AFTER_ACTION:g} s", float(ratio[during].max()), "1"
-    )
-    aside = side * at(t, a_y, now + AFTER_ACTION) * radius / max(later, 0.1) ** 2
-    judged.add(
-        "a_y_ratio", f"lateral acceleration ratio after {AFTER_ACTION:g} s", aside, "1", "a_y R_0 / v^2"
+        "a_y_ratio",
+        f"lateral acceleration ratio after {AFTER_ACTION:g} s",
+        known(aside),
+        "1",
+        "a_y R_0 / v^2",
     )
     if "sideslip" in trace:
-        change = at(t, trace["sideslip"], now + AFTER_ACTION) - float(trace["sideslip"][before].mean())
-        judged.add("sideslip", f"change of sideslip after {AFTER_ACTION:g} s", change, "rad")
-        peak = float(np.abs(trace["sideslip"][t >= now]).max())
-        judged.add("sideslip_peak", "peak sideslip from the action on", peak, "rad")
+        sideslip = trace.while_moving("sideslip")
+        change = at(t, sideslip, now + AFTER_ACTION) - float(sideslip[before].mean())
+        judged.add("sideslip", f"change of sideslip after {AFTER_ACTION:g} s", known(change), "rad")
+        judged.add("sideslip_peak", "peak sideslip from the action on", largest(sideslip[t >= now]), "rad",
+                   "above 10 km/h")  # fmt: skip
 
 
 AFTER_GUST, BEFORE_GUST = 2.0, 0.5
@@ -287,7 +292,8 @@ def evaluate_side_wind(judged: Evaluation, trace: Trace) -> None:
     ):
         if name == "sideslip" and name not in trace:
             continue
-        values = np.where(during, trace[name] - float(trace[name][before].mean()), 0.0)
+        signal = trace.while_moving(name) if name == "sideslip" else trace[name]
+        values = np.nan_to_num(np.where(during, signal - float(signal[before].mean()), 0.0))
         k = int(np.argmax(np.abs(values)))
         judged.add(name, says, float(values[k]), unit, f"within {AFTER_GUST:g} s")
         if name != "sideslip":

@@ -42,7 +42,9 @@ def draw_dwell_run(trace: Trace, judged: Evaluation) -> Figure | None:
         _yaw_rate(panels[1], course, judged)
         _displaced(panels[2], course, judged, trace)
         if len(names) > 3:
-            panels[3].plot(trace.time, np.degrees(course.side * trace["sideslip"]), **line_style(0))
+            panels[3].plot(
+                trace.time, np.degrees(course.side * trace.while_moving("sideslip")), **line_style(0)
+            )
             panels[3].set_title("Sideslip angle [°]")
         late = min(float(course.time[-1]), course.end + RATIOS[-1][0] + 0.35)
         for axes in panels:
@@ -214,7 +216,8 @@ def draw_lane_change_run(trace: Trace, judged: Evaluation) -> Figure:
         axes = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
         _from_above(axes[0], trace, track, start)
         for panel, (name, says, factor) in zip(axes[1:], panels, strict=True):
-            panel.plot(x - start, factor * trace[name], **line_style(0))
+            values = trace.while_moving(name) if name == "sideslip" else trace[name]
+            panel.plot(x - start, factor * values, **line_style(0))
             panel.set_title(says)
             if name != "velocity_x":
                 panel.axhline(0.0, color="#444444", linewidth=0.7, zorder=1)

@@ -40,6 +40,7 @@ from ..figures.style import shown
 from ..messages import listed
 from ..metrics.measures import running_integral
 from ..metrics.verdict import NotJudged, Status, Verdict, apart, compare, not_judged, worst
+from ..motion import largest
 from .standard_tests import Evaluation, Limit, Mark, SeriesDriver, SeriesRun, TestSeries, evaluation
 from .trace import Trace, at, first_crossing, likeness, opposed, prepared, refuse_opposed, running_mean
 
@@ -317,9 +318,9 @@ def _add_beyond(judged: Evaluation, course: DwellCourse, trace: Trace) -> None:
     """Add quantities and diagnostics beyond the regulation: sideslip and speeds."""
     after = trace.time >= course.begin
     if "sideslip" in trace:
-        peak = float(np.abs(trace["sideslip"][after]).max())
+        peak = largest(trace.while_moving("sideslip")[after])
         judged.add("sideslip", "peak sideslip", peak, "rad", "from BOS to the end of the record")
-        if peak > SPUN:
+        if peak is not None and peak > SPUN:
             stable = judged.criteria["stability"].status.value
             reached = apart(math.degrees(peak), math.degrees(SPUN), decimals=0)
             why = f"sideslip reaches {reached} degrees (stability: {stable})"

@@ -74,11 +74,12 @@ from vocabulary.lane_change import lanes_of
 
 from ..errors import ScenarioError, text_of
 from ..metrics.verdict import NotJudged, apart, compare, not_judged
+from ..motion import LEAST_SPEED, largest
 from ..plan import Plan
 from ..signal_names import Target
 from .sine_with_dwell import AMPLITUDE
 from .standard_tests import Evaluation, SeriesDriver, SeriesRun, TestSeries, evaluation
-from .trace import SLOWEST, Trace, at, first_crossing, opposed, prepared, refuse_opposed
+from .trace import SLOWEST, Trace, at, first_crossing, known, opposed, prepared, refuse_opposed
 
 FIT_RANGE = (0.5, 2.0)
 """Range of lateral acceleration of the cubic fit [m/s2]."""
@@ -96,7 +97,9 @@ def evaluate_understeer(judged: Evaluation, trace: Trace) -> None:
     The run must provide `steering_ratio` and, for the wheelbase, `cg_to_front_axle` and `cg_to_rear_axle`.
     """
     names = ("steering_wheel_angle", "yaw_rate", "velocity_x", "acceleration_y")
-    hand, r, v, a_y = (trace[name] for name in names)
+    hand, r, v, a_y = (trace[name][~trace.standing] for name in names)  # curvature is r / v
+    if not v.size:
+        raise NotJudged(f"the car is never faster than {3.6 * LEAST_SPEED:.0f} km/h")
     ratio, front, rear = map(trace.parameter, ("steering_ratio", "cg_to_front_axle", "cg_to_rear_axle"))
     side = math.copysign(1.0, float(a_y[np.argmax(np.abs(a_y))]))
     a_y = side * a_y
@@ -274,10 +277,12 @@ def evaluate_step(judged: Evaluation, trace: Trace) -> None:
         over = float(x[largest]) / steady - 1.0 if steady > 0 else None
         judged.add(f"{key}_overshoot", f"overshoot of the {name}", over, "%")
     if "sideslip" in trace:
-        sideslip = float(trace["sideslip"][end].mean() - trace["sideslip"][0])
+        moving = trace.while_moving("sideslip")
+        sideslip = known(float(moving[end].mean() - moving[0]))
         judged.add("sideslip_steady", "steady sideslip", sideslip, "rad")
         peak = judged["yaw_rate_peak"]
-        judged.add("t_beta", "T_beta", None if peak is None else peak * abs(sideslip), "rad.s")
+        t_beta = None if peak is None or sideslip is None else peak * abs(sideslip)
+        judged.add("t_beta", "T_beta", t_beta, "rad.s")
 
 
 def _since(instant: float | None, zero: float) -> float | None:
@@ -380,7 +385,7 @@ def evaluate_lane_change(judged: Evaluation, trace: Trace) -> None:
     else:
         judged.rule(CLEAN, compare(0.0, "at_most", 0.0, "m", why="no cone was touched"))
     if "sideslip" in trace:
-        judged.add("sideslip", "peak sideslip", float(np.abs(trace["sideslip"]).max()), "rad")
+        judged.add("sideslip", "peak sideslip", largest(trace.while_moving("sideslip")), "rad")
     a_y = float(np.abs(trace["acceleration_y"]).max())
     judged.add("acceleration", "largest lateral acceleration", a_y, "m/s2")
     if "steering_wheel_angle" in trace:

@@ -15,6 +15,7 @@ opposes the hand wheel is an error in the data, not a property of the car, and s
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -26,6 +27,7 @@ import numpy as np
 
 from vocabulary.signals import SIGNALS
 
+from .. import motion
 from ..errors import ResultsError
 from ..measured.gaps import gaps_noted
 from ..measured.segment import LowPass, even_grid, resample
@@ -90,6 +92,11 @@ def at(time: np.ndarray, x: np.ndarray, instant: float) -> float:
     return float(np.interp(instant, time, x))
 
 
+def known(value: float) -> float | None:
+    """Return a value, None for NaN."""
+    return None if math.isnan(value) else value
+
+
 @dataclass(frozen=True)
 class Trace:
     """The signals of one run or measurement."""
@@ -140,6 +147,16 @@ class Trace:
         if not isinstance(value, (int, float)) or isinstance(value, bool):
             raise NotJudged(f"the run has no parameter {name}{f', {meaning}' if meaning else ''}")
         return float(value)
+
+    @cached_property
+    def standing(self) -> np.ndarray:
+        """Whether the car stands, as far as angles of its velocity are concerned; shape (rows,)."""
+        stands = motion.standing(self.signals)
+        return np.zeros(self.time.shape, bool) if stands is None else stands
+
+    def while_moving(self, name: str) -> np.ndarray:
+        """Return an angle of the velocity, NaN while the car stands; shape (rows,)."""
+        return np.where(self.standing, np.nan, self[name]) if self.standing.any() else self[name]
 
     @cached_property
     def even(self) -> Trace:

@@ -7,23 +7,23 @@ holds it:
 
     d = min over the cross plot of sqrt(((x_m - x) / eps_x)^2 + ((y_m - y) / eps_y)^2)
 
-The band of d <= 1 has the boundaries that the source gives; (dx, dy) is the direction of the cross plot:
-
-    (x - dy eps_x^2 / D, y + dx eps_y^2 / D)    and    (x + dy eps_x^2 / D, y - dx eps_y^2 / D)
-    D = sqrt((dx eps_y)^2 + (dy eps_x)^2)
+The band that is drawn is all of d <= 1, with round ends. Angles of velocities are compared while the cars
+move (`motion`).
 
 A signal passes if no measured point is further than 1 from its cross plot. A run that turns to one side is
 compared with tests to the other side by its mirror image.
 
-Source: the VVUQ framework of TUMFTM, which states these boundaries after ISO 19364; the standard itself was
-not read. Tolerances are data, in files with a source of their own (`load_bands`).
+Source: the VVUQ framework of TUMFTM, which states the boundaries of this band along a cross plot after ISO
+19364; the standard itself was not read. Tolerances are data, in files with a source of their own
+(`load_bands`).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -39,6 +39,7 @@ from ..measured.segment import Segment
 from ..messages import counted, hint, resolved
 from ..metrics.measures import words
 from ..metrics.verdict import Verdict, apart, compare, not_judged, worst
+from ..motion import ANGLES, LEAST_SPEED, standing
 from ..results.reader import Results
 from ..safe_files import reads
 from ..scenario import loader, yaml_lines
@@ -60,8 +61,13 @@ LONGEST = 20_000
 """Most points of a cross plot; chosen: some seconds for an hour of measurement."""
 POINTS = 2000
 """Points drawn of each test; those outside are all drawn. Chosen: dense on the page."""
-ELLIPSES = 500
-"""Ellipses of the tolerance that are drawn around a cross plot; chosen: they look like a band."""
+CELLS = 10
+"""Points of the grid, on which the band's boundary is found, within a tolerance; chosen: exact to 1 %, and to
+5 % in corners between stretches."""
+MOST_CELLS = 2000
+"""Most points of that grid along an axis; chosen: a page has no more pixels."""
+REACH = 0.5
+"""Distance beyond the band up to which the grid has distances, over the tolerance; chosen: some points."""
 BAND = "#DCE9F5"
 MEASURED = "#111111"
 MIRRORED = ("steering_wheel_angle", "steer_angle", "yaw_rate", "acceleration_y", "velocity_y", "sideslip",
@@ -197,17 +203,39 @@ class CrossPlot:
     of_values: np.ndarray
     tests: Sequence[ComparedTest]
 
-    @property
+    @cached_property
     def outline(self) -> tuple[np.ndarray, np.ndarray]:
-        """Both boundaries of the band as one closed line: (over, values), as the source gives them."""
-        along, up = np.gradient(self.over), np.gradient(self.values)
-        length = np.hypot(along * self.of_values, up * self.of_over)
-        length = np.where(length > 0.0, length, 1.0)
-        aside, above = up * self.of_over**2 / length, along * self.of_values**2 / length
-        return (
-            np.concatenate([self.over - aside, (self.over + aside)[::-1]]),
-            np.concatenate([self.values + above, (self.values - above)[::-1]]),
-        )
+        """The boundary of the band, where the distance is 1: (over, values); NaN between closed lines."""
+        from contourpy import contour_generator
+
+        x, y = _spread(self.over, self.of_over), _spread(self.values, self.of_values)
+        squared = np.full((y.size, x.size), (1.0 + REACH) ** 2)
+        for at_x, at_y, eps_x, eps_y in zip(
+            self.over, self.values, self.of_over, self.of_values, strict=True
+        ):
+            across, up = (
+                slice(*np.searchsorted(axis, (centre - (1.0 + REACH) * eps, centre + (1.0 + REACH) * eps)))
+                for axis, centre, eps in ((x, at_x, eps_x), (y, at_y, eps_y))
+            )
+            part = squared[up, across]
+            aside, above = (x[across] - at_x) / eps_x, (y[up] - at_y) / eps_y
+            np.minimum(part, (aside * aside)[None, :] + (above * above)[:, None], out=part)
+        lines = [np.asarray(line) for line in contour_generator(x, y, np.sqrt(squared)).lines(1.0)]
+        gap = np.full((1, 2), np.nan)
+        joined = np.concatenate([part for line in lines for part in (line, gap)][:-1] or [gap])
+        return joined[:, 0], joined[:, 1]
+
+
+def _spread(values: np.ndarray, tolerances: np.ndarray) -> np.ndarray:
+    """Return coordinates around values, so dense that `CELLS` of them lie within a tolerance."""
+    order = np.argsort(values)
+    values, tolerances = values[order], tolerances[order]
+    room = 1.0 + 2.0 * REACH
+    ends = values[0] - room * tolerances[0], values[-1] + room * tolerances[-1]
+    values, tolerances = np.concatenate([ends[:1], values, ends[1:]]), np.pad(tolerances, 1, "edge")
+    within = np.append(0.0, np.cumsum(np.diff(values) / np.minimum(tolerances[1:], tolerances[:-1])))
+    count = min(MOST_CELLS, math.ceil(CELLS * float(within[-1])))
+    return np.unique(np.interp(np.linspace(0.0, within[-1], count), within, values))
 
 
 @dataclass(frozen=True)
@@ -280,6 +308,11 @@ def compare_run(results: Results, measurement: Measurement, bands: Bands) -> Val
         ResultsError: the signal over which the others are plotted was not recorded, or not measured.
     """
     trace = trace_of(results)
+    moving = (
+        np.interp(trace.even.time, trace.time, trace.standing) == 0.0
+        if measurement.filter
+        else ~trace.standing
+    )
     if measurement.filter:
         low_pass, even = measurement.filter, trace.even
         signals = {name: low_pass(even[name], even.rate) for name in bands.tolerances if name in even}
@@ -297,7 +330,14 @@ def compare_run(results: Results, measurement: Measurement, bands: Bands) -> Val
         if name not in trace or not own:
             verdicts[name] = not_judged("not measured" if name in trace else "not recorded in the run")
             continue
-        band = _Band(trace.time, over, trace[name], bands.tolerances[bands.over], bands.tolerances[name])
+        rows = moving if name in ANGLES else np.ones_like(moving)
+        own = [_while_moving(segment) for segment in own] if name in ANGLES else own
+        own = [segment for segment in own if segment.time.size]
+        if not (np.any(rows) and own):
+            verdicts[name] = not_judged(f"the car is not faster than {3.6 * LEAST_SPEED:.0f} km/h")
+            continue
+        line = trace.time[rows], over[rows], trace[name][rows]
+        band = _Band(*line, bands.tolerances[bands.over], bands.tolerances[name])
         sides = [band.side_of(segment.signals[bands.over], (bands.over, name)) for segment in own]
         compared = [
             band.test(segment, side, (bands.over, name)) for segment, side in zip(own, sides, strict=True)
@@ -314,6 +354,15 @@ def compare_run(results: Results, measurement: Measurement, bands: Bands) -> Val
         ),
         plots, bands.over,
     )  # fmt: skip
+
+
+def _while_moving(segment: Segment) -> Segment:
+    """Return the rows of a segment in which the car moves."""
+    stands = standing(segment.signals)
+    if stands is None:
+        return segment
+    signals = {name: values[~stands] for name, values in segment.signals.items()}
+    return replace(segment, time=segment.time[~stands], signals=signals)
 
 
 def _verdict(over: str, tests: Sequence[ComparedTest]) -> Verdict:
@@ -396,21 +445,21 @@ class _Band:
 
 def _draw(validation: Validation) -> Figure:
     """Return the cross plots of a validation."""
-    from matplotlib.collections import EllipseCollection
     from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
+    from matplotlib.patches import Patch, PathPatch
+    from matplotlib.path import Path as Line
 
     unit_x, factor_x = shown_unit(SIGNALS[validation.horizontal].unit)
     with new_figure() as figure:
         panels = figure.subplots(1, max(1, len(validation.plots)), squeeze=False)[0]
         for axes, plot in zip(panels, validation.plots, strict=False):
             unit, factor = shown_unit(SIGNALS[plot.signal].unit)
-            every = slice(None, None, max(1, plot.over.size // ELLIPSES))
-            axes.add_collection(EllipseCollection(
-                2.0 * factor_x * plot.of_over[every], 2.0 * factor * plot.of_values[every], 0.0, units="xy",
-                offsets=np.column_stack([factor_x * plot.over, factor * plot.values])[every],
-                offset_transform=axes.transData, facecolor=BAND, edgecolor="none", zorder=0,
-            ))  # fmt: skip
+            edges = np.column_stack([factor_x * plot.outline[0], factor * plot.outline[1]])
+            parts = [part for part in np.split(edges, np.flatnonzero(np.isnan(edges[:, 0]))) if len(part) > 2]
+            loops = [Line(part[~np.isnan(part[:, 0])], closed=True) for part in parts]
+            axes.add_patch(
+                PathPatch(Line.make_compound_path(*loops), facecolor=BAND, edgecolor="none", zorder=0)
+            )
             axes.plot(factor_x * plot.over, factor * plot.values, **line_style(0))
             for test in plot.tests:
                 beyond = test.distance > 1.0

@@ -41,6 +41,7 @@ from ..measured.measurement import Measurement, load_measurement
 from ..measured.segment import LowPass, Segment
 from ..measured.single_track import start_states
 from ..messages import hint, span
+from ..motion import ANGLES, LEAST_SPEED, standing
 from ..plan import InputSeries, Instance, Override, Value, Variable
 from ..planner import Planner
 from ..results.freshness import key_of
@@ -236,6 +237,15 @@ def _windows(
                 break
             label = f"{segment.name}, {span(part.time[0], part.time[-1])} s"
             measured = {signal: part.signals[signal] for signal in compared}
+            if (angle := next((signal for signal in compared if signal in ANGLES), None)) and (
+                standing(part.signals) is not None
+            ):
+                words = (
+                    f"{label}: there the car is slower than {3.6 * LEAST_SPEED:.0f} km/h, and {angle} means "
+                    "nothing; end the window before, or leave that signal out of 'compared'"
+                )
+                document.report((name, number), words, "fit-window")
+                break
             yield FitWindow(Window(label, part.time, measured), segment, unfiltered)
 
 

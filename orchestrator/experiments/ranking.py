@@ -177,8 +177,9 @@ METRICS = {
 STEERING_BEGINS = "start_time"
 """Parameter of the driver: beginning of steer [s]."""
 RECORDED = (
-    "steering_wheel_angle*", "yaw_rate*", "sideslip*", "acceleration_y*", "velocity_x*", "yaw_moment*",
-    "wheel_torque*", "torque_request*", "position_x*", "position_y*", "yaw_angle*", "steer_angle*",
+    "steering_wheel_angle*", "yaw_rate*", "sideslip*", "acceleration_y*", "velocity_x*", "velocity_y*",
+    "yaw_moment*", "wheel_torque*", "torque_request*", "position_x*", "position_y*", "yaw_angle*",
+    "steer_angle*",
 )  # fmt: skip
 """The recorded signals: those of the test, the metrics and the car on the road; others would take space."""
 

@@ -30,8 +30,9 @@ from ..evaluation.standard_tests import Evaluation, SeriesRun, StandardTest
 from ..evaluation.steering_tests import SLOW_STEER, slow_steer_amplitude
 from ..evaluation.trace import Trace, trace_of
 from ..figures.style import QUIET, frame, line_style, new_figure
-from ..metrics.expressions import MetricValue, metric
+from ..metrics.expressions import MetricValue, metric, while_moving
 from ..metrics.measures import variable_of, words
+from ..motion import largest
 from ..plan import Override, Plan
 from ..plan import Value as Plain
 from ..results.reader import load_results
@@ -226,9 +227,9 @@ def measure(findings: ExperimentResult, signal: str) -> list[ConvergenceRow]:
         number = np.issubdtype(results[signal].dtype, np.number)
         failed[name] = "" if number else f"{signal} is not a number"
         if number:
-            samples[name] = results[signal]
+            samples[name] = while_moving(results)[signal]
     reference = samples.get(finest.name)
-    peak = math.nan if reference is None else float(np.max(np.abs(reference)))
+    peak = math.nan if reference is None else largest(reference) or 0.0
     if peak == 0:
         raise ResultsError(f"{signal} is zero throughout: choose another --signal.", code="signal-zero")
     rows = []
@@ -260,8 +261,8 @@ def _distance(a: np.ndarray | None, b: np.ndarray | None) -> float | None:
     """Return the largest difference; 0 if it is within rounding."""
     if a is None or b is None:
         return None
-    distance = float(np.max(np.abs(a - b)))
-    return distance if distance > ROUNDING * float(np.max(np.abs(b))) else 0.0
+    distance = largest(a - b) or 0.0
+    return distance if distance > ROUNDING * (largest(b) or 0.0) else 0.0
 
 
 def convergence_table(rows: Sequence[ConvergenceRow], title: str) -> Table:

@@ -16,16 +16,26 @@ import numpy as np
 
 from vocabulary.wheels import WHEELS
 
-from ..errors import Diagnostic, ModelDescriptionError, ScenarioError, text_of
+from ..errors import Diagnostic, ModelDescriptionError, ResultsError, ScenarioError, text_of
 from ..figures.style import shown
 from ..fmu.archive import open_fmu, runs_as
 from ..messages import printable, star
-from ..metrics.expressions import STANDARD, MetricValue, columns_of, evaluate_all, metric
+from ..metrics.expressions import (
+    STANDARD,
+    MetricValue,
+    angles_in,
+    columns_for,
+    columns_of,
+    evaluate,
+    evaluate_all,
+    metric,
+    motion_of,
+)
 from ..metrics.measures import catalogue as measures
-from ..metrics.measures import symbol
+from ..metrics.measures import si_of, symbol
+from ..motion import LEAST_SPEED
 from ..plan import Fmu, Plan
-from ..results.reader import FoundRun, Results
-from ..results.run_record import RunRecord
+from ..results.reader import FoundRun, Results, load_results
 from ..scenario import loader
 from ..scenario.overrides import changed, with_changes
 
@@ -273,7 +283,7 @@ def runs_table(runs: Sequence[FoundRun]) -> Table:
         scenario = "/".join([*file.parts[-2:-1], file.stem])
         cells: list[Cell] = [
             str(run.folder), _local(run.record.started), scenario or None,
-            changed(run.record.overrides) or None, run.status.value, *(_peak(run.record, s) for s in PEAKS),
+            changed(run.record.overrides) or None, run.status.value, *(_peak(run, s) for s in PEAKS),
         ]  # fmt: skip
         table.rows.append(cells)
     table.notes = [f"{run.folder}: {_one_line(run.problem)}" for run in runs if run.problem]
@@ -288,16 +298,36 @@ def _local(started: Any) -> str | None:
         return None
 
 
-def _peak(record: RunRecord, signal: str) -> MetricValue | None:
-    """Return the peak of a signal from the run record, without reading the results."""
+def _peak(run: FoundRun, signal: str) -> MetricValue | None:
+    """Return the peak of a signal from the run record; from the results if the car stood meanwhile."""
+    record = run.record
     units = {name: unit or "" for name, unit in record.units.items()}
     columns = {name: np.empty(0) for name in units if name != "time"}
-    names = columns_of(Results(Path(), np.empty(0), columns, units, record), signal)
+    known = Results(Path(), np.empty(0), columns, units, record)
+    names = columns_of(known, signal)
     ends = [of_column.get(name) for name in names for of_column in (record.smallest, record.largest)]
     numbers = [float(end) for end in ends if end is not None]
     if not numbers or any(map(math.isnan, numbers)):
         return None
+    if names[0] in angles_in(known) and _may_stand(known, names[0]):
+        chosen = metric(f"peak({signal})")
+        try:
+            return evaluate(
+                load_results(run.folder, only=lambda one: columns_for(one, [chosen.name])), chosen
+            )
+        except ResultsError:
+            return None
     return MetricValue(max(map(abs, numbers)), units[names[0]] or "1")
+
+
+def _may_stand(run: Results, column: str) -> bool:
+    """Return whether the longitudinal velocity alone leaves open that the car stood, from the run record."""
+    speed = motion_of(run, column).get("velocity_x")
+    ends = [of_column.get(speed or "") for of_column in (run.record.smallest, run.record.largest)]
+    low, high = (
+        si_of(run.units[speed])[1] * float(end) if speed and end is not None else 0.0 for end in ends
+    )
+    return speed is not None and low < LEAST_SPEED and high > -LEAST_SPEED
 
 
 def files_table(folder: Path | None, kinds: Sequence[str]) -> Table:

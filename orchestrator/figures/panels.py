@@ -7,7 +7,7 @@ run has are omitted.
 
 A signal over another is a phase portrait: every run is a curve with a dot at its end, over the curve of the
 references where both signals have one. A curve or a line that goes much further than the others may leave the
-axes; a note then gives how far it goes.
+axes; a note then gives how far it goes. Lines of sideslip and slip angles have a gap while the car stands.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ from vocabulary.wheels import WHEEL_NAMES, wheels
 
 from ..errors import ScenarioError
 from ..messages import cut, fold, hint
-from ..metrics.expressions import columns_of, reference_of
+from ..metrics.expressions import columns_of, reference_of, while_moving
 from ..metrics.measures import variable_of, words
+from ..motion import largest
 from ..results.reader import Results
 from ..signal_names import VARIABLE
 from .style import (
@@ -82,6 +83,7 @@ def panels_of(runs: Sequence[LabelledRun], name: str, *, whole: bool = False) ->
 
     `whole`: axes include all lines, however far they go.
     """
+    runs = [LabelledRun(run.label, while_moving(run.results)) for run in runs]
     if name == "path":
         drawn = [run for run in runs if _path_columns(run)]
         return [Panel(name, True, lambda axes: draw_path(axes, runs), over_time=False)] if drawn else []
@@ -250,6 +252,7 @@ def _line(axes: Axes, t: np.ndarray, x: np.ndarray, unit: str, style: dict[str, 
         turned = np.flatnonzero(np.abs(np.diff(x)) > 180.0) + 1
         t, x = np.insert(t, turned, t[turned]), np.insert(x, turned, np.nan)
     axes.plot(t, x, **style)
+    axes.update_datalim([(t[0], 0.0), (t[-1], 0.0)], updatey=False)  # a gap at an end is part of the time
 
 
 def thinned(t: np.ndarray, x: np.ndarray, buckets: int = POINTS) -> tuple[np.ndarray, np.ndarray]:
@@ -259,7 +262,10 @@ def thinned(t: np.ndarray, x: np.ndarray, buckets: int = POINTS) -> tuple[np.nda
     edges = np.linspace(0, x.size, buckets + 1).astype(int)
     keep = {0, x.size - 1}
     for first, last in pairwise(edges):
-        keep.update((first + int(np.argmin(x[first:last])), first + int(np.argmax(x[first:last]))))
+        part = x[first:last]
+        gap = np.isnan(part)
+        ends = np.where(gap, np.inf, part).argmin(), np.where(gap, -np.inf, part).argmax(), gap.argmax()
+        keep.update(first + int(end) for end in (ends if gap.any() else ends[:2]))
     chosen = np.array(sorted(keep))
     return t[chosen], x[chosen]
 
@@ -275,16 +281,17 @@ def _finish(axes: Axes, signal: str, unit: str, more: str = "") -> None:
     axes.locator_params(axis="x", nbins=9, steps=[1, 2, 5, 10])
     axes.margins(x=0.01)
     low, high = axes.get_ylim()
-    if all(np.ptp(line.get_ydata()) == 0 for line in axes.get_lines()):
+    if all(_span([np.asarray(line.get_ydata(), float)]) == 0 for line in axes.get_lines()):
         axes.set_ylim(min(low, -1.0), max(high, 1.0))
 
 
 def _peak(x: np.ndarray) -> float:
-    return float(np.max(np.abs(x))) if x.size else 0.0
+    return largest(x) or 0.0
 
 
 def _span(arrays: list[np.ndarray]) -> float:
     joined = np.concatenate(arrays)
+    joined = joined[~np.isnan(joined)]
     return float(np.ptp(joined)) if joined.size else 0.0
 
 
@@ -368,7 +375,8 @@ def draw_portrait(axes: Axes, runs: Sequence[LabelledRun], x: str, y: str) -> No
     for curve in curves:
         style: dict[str, Any] = line_style(curve.number)
         axes.plot(curve.x, curve.y, **style)
-        axes.plot(curve.x[-1:], curve.y[-1:], "o", ms=3.5, color=style["color"])
+        end = np.flatnonzero(~np.isnan(curve.x + curve.y))[-1:]
+        axes.plot(curve.x[end], curve.y[end], "o", ms=3.5, color=style["color"])
     results = next(results for _, results in runs if columns_of(results, x) and columns_of(results, y))
     units = [shown_unit(unit_of_signal(results.units[columns_of(results, name)[0]]))[0] for name in (x, y)]
     over, up = (words(variable_of(signal)) for signal in (x, y))
@@ -397,10 +405,10 @@ def _limit_portrait(
     units: list[str],
 ) -> None:
     """Limit the axes of a portrait to the nearby curves; note how far the others go."""
-    reach = [np.array([np.max(np.abs(curve.x)), np.max(np.abs(curve.y))]) for curve in curves]
+    reach = [np.array([_peak(curve.x), _peak(curve.y)]) for curve in curves]
     nearest = np.min(reach, axis=0)
     for x, y in references:
-        nearest = np.maximum(nearest, [np.max(np.abs(x)), np.max(np.abs(y))])
+        nearest = np.maximum(nearest, [_peak(x), _peak(y)])
     stay = [bool(np.all(far <= FAR * nearest)) for far in reach]
     if all(stay) or not any(stay):
         return

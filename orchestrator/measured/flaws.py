@@ -22,6 +22,7 @@ import numpy as np
 
 from ..errors import ScenarioError
 from ..messages import counted, listed
+from ..motion import ANGLES, standing
 from .gaps import Gap, by_signals
 from .measurement import MEASURABLE, Measurement, load_measurement
 from .segment import LowPass, Segment, running_median, without_spikes
@@ -229,7 +230,11 @@ def _motion(parts: Sequence[Segment], names: Iterable[str], cut_off: float) -> _
         if even.time.size < 2 * edge + 10:
             continue
         low = LowPass(cut_off)
-        smooth = {name: low(x, even.rate) for name, x in even.signals.items()}
+        stands = standing(even.signals)
+        smooth = {
+            name: low(x if stands is None or name not in ANGLES else np.where(stands, 0.0, x), even.rate)
+            for name, x in even.signals.items()
+        }
         if (side := _lateral_velocity(smooth)) is not None:
             smooth["side"] = side
         slopes = {name: np.gradient(x, even.time) for name, x in smooth.items()}

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..errors import InvalidValueError
 from ..messages import span
+from ..motion import LEAST_SPEED
 from .gaps import Gap, outside, parts_between
 
 Position = tuple[float, float, float]
@@ -248,9 +249,9 @@ def to_centre_of_mass(segment: Segment, positions: Mapping[str, Position]) -> di
             signals[name] = recorded - (dr * x - dp * z - (p * p + r * r) * y + q * (p * x + r * z))
         elif name == "sideslip" and "velocity_x" in segment.signals:
             forward = segment.signals["velocity_x"]
-            signals[name] = np.arctan2(
-                (forward - r * y) * np.tan(recorded) - (r * x - p * z), np.maximum(forward, 0.1)
-            )
+            moved = np.arctan2((forward - r * y) * np.tan(recorded) - (r * x - p * z), forward)
+            # at rest, and near 90 degrees, where v_x says nothing of v_y, it stays as recorded
+            signals[name] = np.where(np.abs(forward) < LEAST_SPEED, recorded, moved)
     return signals
 
 

@@ -26,6 +26,7 @@ import numpy as np
 
 from vocabulary.gravity import G
 
+from ..motion import standing
 from .least_squares import Simulated, Window
 from .measurement import Measurement
 from .segment import Segment
@@ -180,6 +181,8 @@ def start_states(segment: Segment, time: float) -> dict[str, float]:
     sideslip = at.get("sideslip")
     if sideslip is None and sideways is not None and forward:
         sideslip = math.atan2(sideways, forward)
+    if sideslip is not None and standing({name: np.array([x]) for name, x in at.items()}) is not None:
+        sideslip = 0.0  # of a car at rest
     states = {"initial_yaw_rate": at.get("yaw_rate"), "initial_sideslip": sideslip}
     if forward is not None:
         along = math.cos(sideslip or 0.0) if "velocity_x" in at else 1.0

@@ -12,14 +12,18 @@ makes explicit against which truth a metric judges. Measures that need no refere
 `rms(estimator.sideslip - plant.sideslip)`. Of four wheels (`*`) the largest value counts. A metric whose
 signals a run does not have is absent, never zero. A metric may be restricted to a time window,
 `peak(sideslip) from 1 s to 3 s`, or to a point in time, `value(sideslip) at 2 s`.
+
+Sideslip, its rate and slip angles are measured while the car moves (`motion`): the clock stands while the car
+does. A run in which it never moves does not have such a metric.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,6 +33,7 @@ from vocabulary.wheels import WHEELS, wheels
 
 from ..errors import ScenarioError
 from ..messages import closest, fold, hint, listed, short, span
+from ..motion import ANGLES, LEAST_SPEED, SPEED_SIGNALS, nearest_turn, standing
 from ..plan import SENSING
 from ..scenario.quantities import convert
 from ..signal_names import VARIABLE, SignalName
@@ -267,27 +272,77 @@ def evaluate(results: Results, chosen: Metric, window: TimeWindow | None = None)
     first, last = window or (-math.inf, math.inf)
     if window and not time[0] - 1e-9 <= first <= last <= time[-1] + 1e-9:
         return None
-    if first == last:  # a point in time: the nearest recorded row
-        inside: np.ndarray | slice = np.array([np.argmin(np.abs(time - first))])
+    point = first == last
+    if point:  # the nearest recorded row
+        inside = np.array([np.argmin(np.abs(time - first))])
     else:
-        rows = np.flatnonzero((time >= first - 1e-9) & (time <= last + 1e-9))
-        if rows.size < 2:
-            return None
-        together = rows.size == 1 + rows[-1] - rows[0]
-        inside = slice(rows[0], rows[-1] + 1) if together else rows  # a slice needs no copies
-    t = time[inside]
-    numbers = []
+        inside = np.flatnonzero((time >= first - 1e-9) & (time <= last + 1e-9))
+    angles, numbers = angles_in(results), []
     for columns in signals:
-        samples = [results.columns[c][inside] * si_of(results.units[c])[1] for c in columns]
+        of_velocity = [column for column in columns if column in angles]
+        stands = standing_in(results, of_velocity[0]) if of_velocity else None
+        wraps = bool(of_velocity) and si_of(results.units[columns[0]])[0] == "rad"
+        rows = inside if stands is None else inside[~stands[inside]]
+        if rows.size < (1 if point else 2):
+            return None
+        stretches = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+        whole = slice(rows[0], rows[-1] + 1) if len(stretches) == 1 else rows  # a slice needs no copies
+        t = time[whole]
+        if len(stretches) > 1:  # the clock stands while the car does
+            t = t[0] + np.append(0.0, np.cumsum(time[rows[1:]] - time[rows[1:] - 1]))
+        samples = [results.columns[c][whole] * si_of(results.units[c])[1] for c in columns]
+        if wraps and (chosen.other or chosen.measure.needs_reference):
+            samples[0] = nearest_turn(samples[0], samples[1])
+        if wraps and chosen.measure.of_changes:
+            samples[0] = np.unwrap(samples[0])
         if chosen.other and not chosen.measure.needs_reference:
             samples = [samples[0] - samples[1]]
         if chosen.measure.needs_rate and len(samples) == 1:
-            samples.append(np.gradient(samples[0], t))
+            ends = np.cumsum([stretch.size for stretch in stretches])[:-1]
+            turning = np.unwrap(samples[0]) if wraps else samples[0]
+            parts = zip(np.split(turning, ends), np.split(t, ends), strict=True)
+            samples.append(np.concatenate([np.gradient(x, at) if x.size > 1 else 0.0 * x for x, at in parts]))
         numbers.append(chosen.measure.function(t, *samples))
     number = float(np.max(numbers))  # np.max, unlike max, propagates the NaN of any wheel
     if math.isnan(number):
         return None
     return MetricValue(number, chosen.unit(si_of(results.units[signals[0][0]])[0]))
+
+
+def angles_in(results: Results) -> set[str]:
+    """Return the columns that are angles of velocities, by their names or by the inputs that they feed."""
+    return {column for name in ANGLES for column in results.candidates(name)}
+
+
+def motion_of(results: Results, column: str) -> dict[str, str]:
+    """Return the columns from which the speed at an angle of a velocity is computed, by their signals.
+
+    Those of the same instance, unless it measures or estimates; else the car's.
+    """
+    own = results.names[column].instance
+    beside = {name: f"{own}.{name}" for name in SPEED_SIGNALS if f"{own}.{name}" in results}
+    if "velocity_x" in beside and not _is_measured_or_estimated(results, column):
+        return beside
+    return {name: columns[0] for name in SPEED_SIGNALS if (columns := columns_of(results, name))} or beside
+
+
+def standing_in(results: Results, column: str) -> np.ndarray | None:
+    """Return the rows in which an angle of a velocity means nothing; None if there are none."""
+    motion = {
+        name: results.columns[source] * si_of(results.units[source])[1]
+        for name, source in motion_of(results, column).items()
+    }
+    return standing(motion)
+
+
+def while_moving(results: Results) -> Results:
+    """Return results in which angles of velocities are NaN while the car stands, as figures show them."""
+    columns = dict(results.columns)
+    for column in angles_in(results):
+        stands = standing_in(results, column)
+        if stands is not None:
+            columns[column] = np.where(stands, np.nan, columns[column])
+    return replace(results, columns=columns)
 
 
 def results_to_be(plan: Plan) -> Results:
@@ -335,6 +390,12 @@ def why_none(results: Results, chosen: Metric, window: TimeWindow | None, end: f
         return f"{chosen.name}: {_unfit(results, chosen)}"
     if window is not None and not 0.0 <= window[0] <= window[1] <= end:
         return f"{chosen.name}: the window is not within the run, 0 to {end:g} s"
+    angles = angles_in(results) & {*itertools.chain(*_signals(results, chosen))}
+    stands = standing_in(results, min(angles)) if angles and results.time.size else None
+    if stands is not None:
+        first, last = window or (-math.inf, math.inf)
+        if np.all(stands[(results.time >= first - 1e-9) & (results.time <= last + 1e-9)]):
+            return f"{chosen.name}: the car is not faster than {3.6 * LEAST_SPEED:.0f} km/h{during(window)}"
     return ""
 
 
@@ -363,7 +424,13 @@ def unit_in(results: Results, chosen: Metric) -> str | None:
 def columns_for(results: Results, names: Iterable[str]) -> list[str]:
     """Return the columns that metrics need; `results` may have no rows."""
     every = [signals for name in names for signals in _signals(results, metric(name))]
-    return list(dict.fromkeys(column for columns in every for column in columns))
+    needed = dict.fromkeys(column for columns in every for column in columns)
+    angles = angles_in(results)
+    moving = [motion_of(results, column).values() for column in needed if column in angles]
+    return [
+        *needed,
+        *dict.fromkeys(column for columns in moving for column in columns if column not in needed),
+    ]
 
 
 def _signals(results: Results, chosen: Metric) -> list[list[str]]:

@@ -58,6 +58,7 @@ class Measure:
     unit: str  # "{x}": the signal's; "{x}/s": that per second; "%": a ratio shown in per cent; else a unit
     takes: tuple[str, ...]
     signal_unit: str | None = None  # the only unit that a signal may have
+    of_changes: bool = False  # measures changes over time: an angle goes on where it wraps at 180 degrees
 
     @property
     def needs_reference(self) -> bool:
@@ -83,13 +84,19 @@ MEASURES: dict[str, Measure] = {}
 
 
 def measure(
-    formula: str, definition: str, unit: str, *, signal_unit: str | None = None, name: str = ""
+    formula: str,
+    definition: str,
+    unit: str,
+    *,
+    signal_unit: str | None = None,
+    name: str = "",
+    of_changes: bool = False,
 ) -> Callable[[F], F]:
     """Return a decorator that registers a function in the table, by default under its own name."""
 
     def enter(function: F) -> F:
         takes = tuple(inspect.signature(function).parameters)[1:]
-        row = Measure(function, formula, definition, unit, takes, signal_unit)
+        row = Measure(function, formula, definition, unit, takes, signal_unit, of_changes)
         MEASURES[name or function.__name__] = row
         return function
 
@@ -173,7 +180,7 @@ def peak(t: np.ndarray, x: np.ndarray) -> float:
     return float(np.max(np.abs(x)))
 
 
-@measure("max|{x} - {x}(0)|", "largest distance from the first value", "{x}")
+@measure("max|{x} - {x}(0)|", "largest distance from the first value", "{x}", of_changes=True)
 def displacement(t: np.ndarray, x: np.ndarray) -> float:
     return peak(t, x - x[0])
 
@@ -200,17 +207,19 @@ def effort(t: np.ndarray, x: np.ndarray) -> float:
     return integral(t, np.abs(x))
 
 
-@measure("Σ|Δ{x}|", "total variation: sum of the absolute changes", "{x}")
+@measure("Σ|Δ{x}|", "total variation: sum of the absolute changes", "{x}", of_changes=True)
 def total_variation(t: np.ndarray, x: np.ndarray) -> float:
     return float(np.sum(np.abs(np.diff(x))))
 
 
-@measure("Σ|Δ{x}| / T", "chatter: total variation per second", "{x}/s")
+@measure("Σ|Δ{x}| / T", "chatter: total variation per second", "{x}/s", of_changes=True)
 def total_variation_rate(t: np.ndarray, x: np.ndarray) -> float:
     return total_variation(t, x) / float(t[-1] - t[0])
 
 
-@measure("Σ|Δ(d{x}/dt)| / T", "chatter of the rate: total variation per second of dx/dt", "{x}/s2")
+@measure(
+    "Σ|Δ(d{x}/dt)| / T", "chatter of the rate: total variation per second of dx/dt", "{x}/s2", of_changes=True
+)
 def slope_variation_rate(t: np.ndarray, x: np.ndarray) -> float:
     return total_variation_rate(t, np.diff(x) / np.diff(t))
 
@@ -232,6 +241,7 @@ def worst_second(t: np.ndarray, x: np.ndarray) -> float:
     "√(1/T ∫(Δ{x} / 0.1 s)² dt), {x} in means over 0.1 s",
     "comfort: root mean square of the slope between means over successive 0.1 s",
     "{x}/s",
+    of_changes=True,
 )
 def jerk(t: np.ndarray, x: np.ndarray) -> float:
     total = running_integral(t, x)

@@ -1,14 +1,15 @@
 """Plausibility warnings for a run: the car spins, lifts wheels, leaves the range of its model.
 
-`CHECKS` lists all checks; to add one, add an entry. Each looks at the recorded signals block by block during
-the run. None is an error: a car without control does spin.
+`CHECKS` lists all checks; to add one, add an entry. Each looks at the recorded signals, in SI, block by block
+during the run. None is an error: a car without control does spin. A car spins only while it moves (`motion`),
+and one that sets off backwards does not: its sideslip counts from there.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from operator import itemgetter
 
 import numpy as np
@@ -17,9 +18,11 @@ from vocabulary.gravity import G
 from vocabulary.wheels import WHEEL_NAMES, wheels
 
 from ..errors import Diagnostic, Location
+from ..motion import standing
 from ..plan import Plan
 from ..results.freshness import recorded_variables
-from .expressions import columns_of, results_to_be
+from .expressions import angles_in, columns_of, motion_of, results_to_be
+from .measures import si_of
 
 SignalArrays = Sequence[np.ndarray]
 """The values of a check's signals over a block, in their order; shape (rows,) each."""
@@ -39,6 +42,7 @@ class PlausibilityCheck:
     message: str
     why: str  # source of the limit
     below: bool = False  # warn of values below the limit instead
+    from_setting_off: bool = False  # of a sideslip: counted from straight back for a car that reverses
     over_friction: bool = False  # the value is divided by the highest friction of the road
 
 
@@ -46,11 +50,14 @@ def _degrees(x: SignalArrays) -> np.ndarray:
     return np.degrees(np.abs(x[0]))
 
 
+BACKWARDS = math.radians(135.0)
+"""Sideslip beyond which a car that sets off does so backwards [rad]; chosen: nearer to back than to aside."""
+
 CHECKS: tuple[PlausibilityCheck, ...] = (
     PlausibilityCheck(
         "car-spins", ("sideslip",), _degrees, 45.0,
         "the car spins: its sideslip angle passes {limit} degrees at {time} s and reaches {value} degrees",
-        "chosen: more than front wheels can be steered against",
+        "chosen: more than front wheels can be steered against", from_setting_off=True,
     ),
     PlausibilityCheck(
         "wheel-lifts", ("vertical_load_*",), itemgetter(0), 1.0,
@@ -94,6 +101,11 @@ class PlausibilityWatch:
         results = results_to_be(plan)
         reals = [column for column, variable in recorded_variables(plan).items() if variable.type == "Real"]
         index = {column: 1 + k for k, column in enumerate(reals)}
+        angles = angles_in(results)
+
+        def place(column: str) -> _Place:
+            return _Place(index[column], si_of(results.units[column])[1])
+
         friction = _highest_friction(plan)
         self._states: list[_CheckState] = []
         for check in (*checks, *_ranges(plan)):
@@ -102,8 +114,14 @@ class PlausibilityWatch:
             scale = 1 / friction if check.over_friction and friction else 1.0
             per_signal = [columns_of(results, signal) for signal in check.signals]
             for columns in zip(*per_signal, strict=False):
-                if all(column in index for column in columns):
-                    self._states.append(_CheckState(check, columns, [index[c] for c in columns], scale))
+                if not all(column in index for column in columns):
+                    continue
+                places = [place(column) for column in columns]
+                if check.code == "range-left":  # its limit is in the signal's own unit
+                    places = [replace(at, factor=1.0) for at in places]
+                motion = motion_of(results, columns[0]).items() if columns[0] in angles else ()
+                moving = {name: place(column) for name, column in motion if column in index}
+                self._states.append(_CheckState(check, columns, places, scale, moving))
 
     def look(self, rows: np.ndarray) -> None:
         """Check rows: shape (n, 1 + Real columns), time first."""
@@ -115,28 +133,65 @@ class PlausibilityWatch:
         return tuple(filter(None, (state.warning() for state in self._states)))
 
 
+@dataclass(frozen=True)
+class _Place:
+    """Where a signal stands in rows, and the factor that makes it SI."""
+
+    index: int
+    factor: float
+
+    def of(self, rows: np.ndarray) -> np.ndarray:
+        return rows[:, self.index] if self.factor == 1.0 else rows[:, self.index] * self.factor
+
+
 class _CheckState:
-    """The state of one check: the columns it looks at, and the largest value so far."""
+    """The state of one check: the columns it looks at, and the largest value so far.
+
+    `moving`: the places of the signals of the car's speed, for the angle of a velocity.
+    """
 
     def __init__(
-        self, check: PlausibilityCheck, columns: Sequence[str], indices: list[int], scale: float
+        self,
+        check: PlausibilityCheck,
+        columns: Sequence[str],
+        places: Sequence[_Place],
+        scale: float,
+        moving: Mapping[str, _Place],
     ) -> None:
         self.check = check
         self.columns = columns
-        self._indices = indices
+        self._places = places
         self._scale = scale
+        self._moving = moving
+        self._backwards: bool | None = None  # of the present stretch of motion; None: the car stands
         self._sign = -1.0 if check.below else 1.0
         self._time: float | None = None
         self._most = -math.inf
 
     def look(self, rows: np.ndarray) -> None:
-        x = self._sign * self._scale * self.check.value([rows[:, k] for k in self._indices])
+        signals = [place.of(rows) for place in self._places]
+        stands = standing({name: place.of(rows) for name, place in self._moving.items()})
+        if self.check.from_setting_off:
+            signals = [self._from_setting_off(signals[0], stands)]
+        x = self._sign * self._scale * self.check.value(signals)
+        if stands is not None:
+            x[stands] = -math.inf
         largest = float(np.fmax.reduce(x, initial=-math.inf))
         if largest <= self._sign * self.check.limit:
             return
         if self._time is None:
             self._time = float(rows[np.argmax(x > self._sign * self.check.limit), 0])
         self._most = max(self._most, largest)
+
+    def _from_setting_off(self, sideslip: np.ndarray, stands: np.ndarray | None) -> np.ndarray:
+        """Return the sideslip [rad] from straight ahead, or from straight back where the car set off so."""
+        moves = np.ones(sideslip.size, bool) if stands is None else ~stands
+        begins = moves & ~np.append(self._backwards is not None, moves[:-1])
+        begun = np.maximum.accumulate(np.where(begins, np.arange(sideslip.size), -1))
+        backwards = np.where(begun < 0, bool(self._backwards), np.abs(sideslip[begun]) > BACKWARDS)
+        if sideslip.size:
+            self._backwards = bool(backwards[-1]) if moves[-1] else None
+        return np.where(backwards, np.pi - np.abs(sideslip), sideslip)
 
     def warning(self) -> Diagnostic | None:
         if self._time is None:

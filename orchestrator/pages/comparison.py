@@ -20,8 +20,9 @@ from ..experiments.tables import Table, marked, remarks
 from ..figures.style import LabelledRun, digits_of, shown, shown_unit, unit_of_signal
 from ..measured.gaps import gaps_noted, outside
 from ..messages import counted, resolved, span, star
-from ..metrics.expressions import MetricValue, metric
+from ..metrics.expressions import MetricValue, angles_in, metric, standing_in
 from ..metrics.measures import variable_of
+from ..motion import nearest_turn
 from ..results.measurement_results import MeasuredResults
 from ..results.reader import Results
 from ..results.run_record import RunRecord
@@ -99,8 +100,17 @@ def divergence(first: Results, second: Results) -> RunComparison:
         elif rows.size < max(first.time.size, second.time.size):
             notes.append(f"compared at the {rows.size} times that both runs have")
     by_signal: dict[str, SignalDifference] = {}
+    angles = angles_in(first)
     for name in shared if time.size else []:
-        parting = _parting(name, time, values[0][name], values[1][name], first)
+        ours, theirs = (run[name] for run in values)
+        if name in angles:  # they mean something while both cars move
+            for run in (first, second):
+                if (stands := standing_in(run, name)) is not None:
+                    there = np.interp(time, run.time, stands) > 0.0
+                    ours, theirs = (np.where(there, np.nan, x) for x in (ours, theirs))
+            if first.units[name] == second.units[name] == "rad":
+                ours = nearest_turn(ours, theirs)
+        parting = _parting(name, time, ours, theirs, first)
         if parting is not None:
             known = by_signal.get(parting.signal)
             by_signal[parting.signal] = parting if known is None else _together(known, parting)

@@ -191,8 +191,6 @@ def validation_sentence(validation: Validation) -> str:
     return f"{text[:1].upper()}{text[1:]}"
 
 
-OUTLINE = 4000
-"""Most points of a band's outline; chosen: dense at any width of a page."""
 DISTANCE = "distance"
 """Name of the signal that tells how far points lie from the run, over the tolerance."""
 
@@ -211,10 +209,10 @@ def _cross_plots(validation: Validation) -> tuple[list[LabelledRun], Settings]:
             columns = {over: test.over, signal: test.values, distance: test.distance}
             runs.append(LabelledRun(test.name, _drawn(MeasuredResults, test.time, columns)))
         x, y = plot.outline
-        every = slice(None, None, 1 + x.size // OUTLINE)
-        band = {over: x[every], signal: y[every]}
+        band = {over: x, signal: y}
         bands.append(len(runs))
-        runs.append(LabelledRun("tolerance", _drawn(Results, np.arange(float(x[every].size)), band)))
+        times = np.linspace(plot.time[0], plot.time[-1], x.size)  # it has none: those of the run
+        runs.append(LabelledRun("tolerance", _drawn(Results, times, band)))
         title = f"{words(plot.signal)} over {words(validation.horizontal).lower()}"
         views.append(View(title, [signal, distance], range(first, len(runs)), over))
         views.append(

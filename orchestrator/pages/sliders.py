@@ -32,8 +32,11 @@ from ..planner import Planner
 from ..results.reader import Results
 from ..scenario import loader
 from ..scenario.overrides import is_path, read_changes
+from ..scenario.quantities import convert
 from ..scenario.schema import LoadedScenario
-from ..wiring.context import FACTS
+from ..signal_names import Target
+from ..wiring.context import FACTS, facts_of, reached
+from ..wiring.parameters import value_for
 from ..workers import Pool, default_workers
 from .page_parts import render
 from .viewer import Settings, assets, viewer
@@ -93,8 +96,11 @@ def knobs_of(scenario: LoadedScenario, plan: Plan) -> list[Knob]:
             value = instance.parameter(variable.name)
             if variable.type != "Real" or not isinstance(value, (int, float)):
                 continue
-            of_car = variable.name in CAR and variable.name in scenario.vehicle_file.parameters
-            target = f"vehicle.{variable.name}" if of_car else f"{instance.name}.{variable.name}"
+            of_file = scenario.vehicle_file.parameters.get(variable.name)
+            own = variable.name in scenario.units[instance.name].parameters
+            target = f"{instance.name}.{variable.name}"
+            if variable.name in CAR and of_file is not None and not own:
+                target, value = f"vehicle.{variable.name}", float(value_for(variable, of_file))
             if any(
                 knob.target in FACTS and variable.name in FACTS[knob.target].parameters
                 for knob in knobs.values()
@@ -105,19 +111,12 @@ def knobs_of(scenario: LoadedScenario, plan: Plan) -> list[Knob]:
 
 
 def _facts(scenario: LoadedScenario, plan: Plan) -> Iterator[Knob]:
-    for name, fact in FACTS.items():
-        values = [
-            value
-            for instance in plan.instances
-            for quantity in (*fact.parameters, *fact.inputs)
-            if isinstance(value := instance.constants.get(quantity, instance.parameter(quantity)), float)
-        ]
-        if getattr(scenario, name) is not None and values:
+    for name, fact, raw, _ in facts_of(scenario):
+        if any(True for _ in reached(plan, Target("fact", variable=name))):
+            value = float(convert(raw, fact.unit) if isinstance(raw, str) else raw)
             low, high = FACT_RANGES[name]
             unit = "" if fact.unit == "1" else fact.unit
-            yield Knob(
-                name, unit, values[0], min(low, values[0]), max(high, values[0]), f"{name} for all instances"
-            )
+            yield Knob(name, unit, value, min(low, value), max(high, value), f"{name} for all instances")
 
 
 def _knob(target: str, variable: Variable, value: float) -> Knob:

@@ -35,12 +35,13 @@ from ..figures.style import (
     unit_of_signal,
 )
 from ..messages import listed
-from ..metrics.expressions import MetricValue, columns_of, evaluate, metric, reference_of
+from ..metrics.expressions import MetricValue, columns_of, evaluate, metric, reference_of, while_moving
 from ..metrics.measures import words
 from ..results.measurement_results import MeasuredResults
 from ..results.reader import Results
 from ..results.run_folder import RunStatus
 from ..safe_files import write_whole
+from ..scenario.overrides import with_changes
 from .page_parts import document, render, static
 from .road import legend_of, notes_of, road_of, without_tyres
 from .viewer_data import PackedRun, is_numeric, pack
@@ -266,16 +267,16 @@ def page(runs: Sequence[LabelledRun], settings: Settings = SETTINGS, *, title: s
 
     Args:
         runs, settings: see `viewer`.
-        title: of the page; default: the scenario's title of a single run, else the labels, of many runs the
-            first.
+        title: of the page; default: the scenario's title of a single run with its overrides, else the
+            labels, of many runs the first.
     """
     titles = list(dict.fromkeys(filter(None, (run.results.record.title for run in runs))))
-    alone = titles[0] if titles and len(runs) == 1 else ""
+    alone = with_changes(titles[0], runs[0].results.record.overrides) if titles and len(runs) == 1 else ""
     return document(
         title or alone or _title(runs),
         sentence=answer_of(runs),
         below="" if alone else "; ".join(titles),
-        changed=changes_of(runs),
+        changed="" if alone and not title else changes_of(runs),
         viewer=viewer(runs, settings, name="run", alone=True),
         assets=assets(),
     )
@@ -394,7 +395,7 @@ def still_of(results: Sequence[Results]) -> float:
     """
     for signal in STILL:
         peaks = []
-        for run in results:
+        for run in map(while_moving, results):
             for column in columns_of(run, signal)[:1]:
                 size = np.nan_to_num(np.abs(run.columns[column]), posinf=0.0)
                 peaks.append((float(size.max()), -float(run.time[np.argmax(size)])))

@@ -23,6 +23,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..metrics.expressions import while_moving
 from ..results.reader import Results
 
 LEVELS = {2: 2**16 - 2, 3: 2**24 - 2}
@@ -95,13 +96,14 @@ class PackedRun:
 
 
 def pack(runs: Sequence[Results], *, raw: bool = False) -> list[PackedRun]:
-    """Pack all numeric columns of runs.
+    """Pack all numeric columns of runs; angles of velocities are NaN while a car stands.
 
     Args:
         runs: those of one page.
         raw: leave all columns 32-bit floats, for a page that gets the bytes from a server: nothing to
             compress, and the page reads them at once.
     """
+    runs = [*map(while_moving, runs)]
     ranges = _ranges(runs)
     return [_packed(run, ranges, fine, raw) for run, fine in zip(runs, _close(runs, ranges), strict=True)]
 

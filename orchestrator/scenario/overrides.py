@@ -302,6 +302,7 @@ def _put(document: Document, key: KeyPath, change: Override, value: Any = None) 
     if isinstance(document.data, dict):
         holder[key[-1]] = value
         document.overrides[key] = change
+        document.before.setdefault(key, before)
     return before != value or isinstance(before, bool) != isinstance(value, bool)
 
 

@@ -12,7 +12,7 @@ exact for slow roll about an axis on the road.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NamedTuple
@@ -123,6 +123,14 @@ NEUTRAL = {"front_unsprung_share": 0.5}
 """Defaults of quantities that nothing gives, as in the plants: equal unsprung masses of both axles."""
 
 
+GIVES_WAY = {
+    "mass": ("sprung_mass", "unsprung_mass"),
+    "sprung_mass": ("mass", "unsprung_mass"),
+}
+"""Changed quantity -> the one that gives way, and the one that stays: a heavier car is heavier above its
+springs, not in its wheels."""
+
+
 @dataclass(frozen=True)
 class CarQuantities:
     """All known quantities of a car: SI values by name, and the formulas of the derived ones."""
@@ -156,6 +164,42 @@ def _derived(quantities: tuple[tuple[str, float], ...]) -> CarQuantities:
             used.update(derivation.inputs)
             progress = True
     return CarQuantities(values, formulas, frozenset(used))
+
+
+def adapted(
+    quantities: Mapping[str, float], before: Mapping[str, float], changed: Collection[str]
+) -> tuple[dict[str, float], list[str]]:
+    """Return the given quantities of a car after changes, without those that give way, and what it means.
+
+    Args:
+        quantities: name of `CAR` -> value in SI, changes included.
+        before: the same without them.
+        changed: names of the changed ones.
+    """
+    after, known, follow = dict(quantities), car_of(before).values, []
+    for name, (yielding, stays) in GIVES_WAY.items():
+        if name in changed and yielding in after and not {yielding, stays} & {*changed} and stays in known:
+            del after[yielding]
+            if stays not in car_of(after).values:
+                after[stays] = known[stays]
+            follow.append((name, stays, yielding))
+    arm = "roll_arm"
+    if "cg_height" in changed and arm in after and arm not in changed and "sprung_mass" in known:
+        # the wheels stay as high as they are: the sprung mass makes all of the difference
+        after[arm] += (after["cg_height"] - before["cg_height"]) * known["mass"] / known["sprung_mass"]
+        follow.append(("cg_height", "unsprung_height", arm))
+    for name, stays in (axles := ("cg_to_front_axle", "cg_to_rear_axle")), axles[::-1]:
+        if name in changed and stays not in changed and stays in after and "wheelbase" not in after:
+            follow.append((name, stays, "wheelbase"))
+    now, notes = car_of(after).values, []
+    for name, stays, other in follow:
+        unit = CAR[other].unit
+        if other in now and other in known and abs(now[other] - known[other]) > 1e-9 * abs(known[other]):
+            notes.append(
+                f"vehicle.{name} = {after[name]:.6g} {unit}: {stays} stays as it is, so {other} becomes "
+                f"{now[other]:.6g} {unit} ({known[other]:.6g} {unit} before)"
+            )
+    return after, notes
 
 
 def contradictions(quantities: Mapping[str, float]) -> list[tuple[str, str]]:

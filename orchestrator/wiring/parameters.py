@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache, lru_cache
 from pathlib import Path
@@ -28,7 +29,7 @@ from ..scenario.loader import LoadedScenario
 from ..scenario.schema import TextSpec
 from ..scenario.yaml_lines import Document, KeyPath
 from .context import WiringContext, facts_of
-from .derivations import CarQuantities, car_of, contradictions
+from .derivations import GIVES_WAY, CarQuantities, adapted, car_of, contradictions
 
 STIFFNESSES = ("cornering_stiffness_front", "cornering_stiffness_rear")
 STATIC_LOADS = ("static_load_front", "static_load_rear")
@@ -155,11 +156,13 @@ class Parameters:
         self._from_tyre_files()
         self._from_vehicle()
         by_change = self._from_facts()
+        of_car = {instance: dict(given) for instance, given in self._given.items()}
         for instance in self._fmus:
             for name, raw in self._scenario.units[instance].parameters.items():
                 key = ("units", instance, "parameters", name)
                 if (instance, name) not in by_change or self._scenario.document.override(key):
                     self._give_own(instance, name, raw, key)
+            self._give_way(instance, of_car[instance])
         self._settle_stiffnesses()
         self._refuse_half_a_car()
         return self._given
@@ -208,6 +211,40 @@ class Parameters:
             else:
                 came = _from_file(raw.file, f"file {raw.file}", place)
                 self._give(instance, name, text, place, came, f"{raw.file}: ")
+
+    def _give_way(self, instance: str, of_car: Mapping[str, Value]) -> None:
+        """Keep the wheels of an instance's car where only its mass, or only its sprung mass, is changed.
+
+        Args:
+            instance: its name.
+            of_car: its parameters by the vehicle file.
+        """
+        fmu, given, document = self._fmus[instance], self._given[instance], self._scenario.document
+        for name, (yielding, stays) in GIVES_WAY.items():
+            key, other = (("units", instance, "parameters", each) for each in (name, yielding))
+            change = document.override(key)
+            if not change or document.override(other) or name not in given or _is_parameter(fmu, stays):
+                continue
+            if not _is_parameter(fmu, yielding):
+                continue
+            raw = document.before.get(key)
+            before = of_car.get(name, fmu.variables[name].start) if raw is None else raw
+            was = given.get(yielding, fmu.variables[yielding].start)
+            if before is None or was is None:
+                continue
+            try:
+                added = float(given[name]) - float(value_for(fmu.variables[name], before))
+                moved = float(was) + added
+            except ValueError:
+                continue  # of a value that is not valid, which is reported elsewhere
+            if added:
+                came = ValueOrigin.derived(f"the wheels keep their mass, {added:+.6g} kg as {name}")
+                self._give(instance, yielding, moved, (document, key), came, f"{yielding}: ")
+                self._system.note(
+                    "quantity-follows",
+                    f"{instance}.{name} = {given[name]:.6g} kg: the wheels keep their mass, so {yielding} "
+                    f"becomes {moved:.6g} kg ({was:.6g} kg before)",
+                )
 
     def _from_facts(self) -> set[tuple[str, str]]:
         """Set the parameters that facts reach; return the (instance, parameter) of overridden facts."""
@@ -279,6 +316,7 @@ class Parameters:
                 self._system.report(
                     key, f"no instance has a parameter {name!r}{guess}", "parameter-unknown", document
                 )
+        numbers = self._adapted(numbers)
         for name, sentence in contradictions(numbers):
             self._system.report(("parameters", name), sentence, "vehicle-contradictory", document)
         self.car = car_of(numbers)
@@ -291,6 +329,25 @@ class Parameters:
                 self._system.note(
                     "value-unused", f"vehicle.{name} changes nothing: no instance takes it or what follows"
                 )
+
+    def _adapted(self, given: Mapping[str, float]) -> dict[str, float]:
+        """Return the vehicle file's quantities after changes, with those that follow; note them."""
+        document, before = self._scenario.vehicle_document, {**given}
+        changed = [name for name in given if document.override(("parameters", name))]
+        for name in changed:
+            del before[name]
+            if (raw := document.before.get(("parameters", name))) is not None:
+                with suppress(ValueError):  # of a value that is not valid
+                    before[name] = float(value_for(_quantity(name), raw))
+        after, notes = adapted(given, before, changed)
+        for sentence in notes:
+            self._system.note("quantity-follows", sentence)
+        for name, value in after.items():
+            if value != given.get(name):
+                for instance in self._takers(name):
+                    came = ValueOrigin.derived(f"follows from {listed(changed)}")
+                    self._give(instance, name, value, (document, ("parameters",)), came, f"{name}: ")
+        return after
 
     def _settle_stiffnesses(self) -> None:
         """Leave out the vehicle file's stiffness of an axle where the scenario gives that of one tyre."""

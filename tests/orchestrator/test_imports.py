@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 ORCHESTRATOR = Path(__file__).parents[2] / "orchestrator"
 STAGES = (
     {"errors", "messages", "signal_names", "plan", "cache", "safe_files"}
-    | {"coupling_algorithms", "fault_kinds"},
+    | {"coupling_algorithms", "fault_kinds", "motion"},
     {"fork_server", "supervised_process", "workers", "interrupts"},
     {"scenario"},
     {"measured"},

@@ -1,10 +1,13 @@
 """`yawbench list` and `yawbench diff`: tables of what there is, and of what differs between two runs."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from orchestrator.experiments.tables import runs_table
 from orchestrator.metrics.expressions import columns_for, evaluate_all
+from orchestrator.motion import LEAST_SPEED
 from orchestrator.pages.comparison import differences
 from orchestrator.results.reader import found_runs, load_results
 from orchestrator.results.run_folder import RunStatus
@@ -43,6 +46,26 @@ def test_a_list_of_runs_tells_when_what_changed_and_what_came_out(tmp_path):
         assert row["status"] == "completed"
         assert row["max|β|"].number == np.max(np.abs(results["plant.sideslip"]))
         assert row["max|r|"].unit == "rad/s"
+
+
+def test_the_peak_of_a_listed_run_is_that_while_it_moved(tmp_path):
+    stops, spun = car(), car()
+    braking = stops.time / stops.time[-1]
+    slip = np.where(braking > 0.95, np.pi, stops["plant.sideslip"])
+    for run, sideslip in ((stops, slip), (spun, np.where(braking > 0.5, 2.5, slip))):
+        run.columns["plant.sideslip"] = sideslip
+        run.columns["plant.velocity_x"] = 20.0 * (1.0 - braking)
+    for name, run in (("stops", stops), ("spun", spun)):
+        write(run, tmp_path / name, **ends(run))
+    moving = stops["plant.velocity_x"] >= LEAST_SPEED
+    rows = [
+        dict(zip(table.headings, row, strict=True))
+        for table in [runs_table(found_runs(tmp_path))]
+        for row in table.rows
+    ]
+    peaks = {Path(row["run"]).name: row["max|β|"].number for row in rows}
+    assert peaks["stops"] == pytest.approx(np.max(np.abs(slip[moving]))) and peaks["stops"] < 1.0
+    assert peaks["spun"] == pytest.approx(2.5)
 
 
 def test_what_differs_between_two_runs_stands_in_two_tables(yawbench, tmp_path):
@@ -122,7 +145,8 @@ def test_metrics_need_only_the_columns_that_they_are_made_of(tmp_path):
     folder = write(car(), tmp_path / "one")
     names = ["relative_peak_error(sideslip)", "peak(wheel_torque_*)", "stability_index(sideslip)"]
     some = load_results(folder, only=lambda recorded: columns_for(recorded, names))
-    assert len(some.columns) == 6 < len(load_results(folder).columns)
+    assert len(some.columns) == 7 < len(load_results(folder).columns)
+    assert "plant.velocity_x" in some.columns  # sideslip counts while the car moves
     assert evaluate_all(some, names) == evaluate_all(load_results(folder), names)
 
 

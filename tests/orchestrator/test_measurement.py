@@ -13,7 +13,8 @@ import yawbench as yb
 from orchestrator.cli import main
 from orchestrator.errors import ResultsError, ScenarioError
 from orchestrator.measured.measurement import load_measurement
-from orchestrator.measured.segment import LowPass
+from orchestrator.measured.segment import LowPass, Segment, to_centre_of_mass
+from orchestrator.measured.single_track import start_states
 from orchestrator.plan import InputSeries
 from orchestrator.planner import Planner
 from orchestrator.results.measurement_results import load_run
@@ -274,3 +275,21 @@ def test_a_measurement_drives_an_input(tmp_path, fmus):
 
 
 UNITS = ("tyre_linear",)
+
+
+def test_the_sideslip_of_a_car_that_spins_is_moved_to_its_centre_of_mass_and_that_at_rest_is_left():
+    turned = np.radians([0.0, 40.0, 120.0, 170.0, 90.0])
+    speed, r, ahead = np.array([20.0, 20.0, 10.0, 8.0, 0.01]), 0.5, 1.2
+    v_x, v_y = speed * np.cos(turned), speed * np.sin(turned)
+    signals = {
+        "velocity_x": v_x,
+        "yaw_rate": np.full(5, r),
+        "sideslip": np.arctan2(v_y + r * ahead, v_x),
+    }
+    moved = to_centre_of_mass(Segment("a", np.arange(5.0), signals), {"sideslip": (ahead, 0.0, 0.0)})
+    np.testing.assert_allclose(moved["sideslip"][:4], turned[:4], atol=1e-9)
+    assert moved["sideslip"][4] == signals["sideslip"][4]
+    at_rest = Segment(
+        "a", np.array([0.0, 1.0]), {"velocity_x": np.array([0.01, 0.01]), "sideslip": np.full(2, 3.1)}
+    )
+    assert start_states(at_rest, 0.5) == {"initial_sideslip": 0.0, "initial_speed": 0.01}

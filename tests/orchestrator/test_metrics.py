@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,11 +16,21 @@ from orchestrator.experiments.tables import metrics_of_run
 from orchestrator.figures.plots import LabelledRun, draw, shown_by
 from orchestrator.figures.style import digits_of, shown, shown_unit
 from orchestrator.metrics import measures
-from orchestrator.metrics.expressions import AT_A_TIME, STANDARD, MetricValue, evaluate, evaluate_all, metric
+from orchestrator.metrics.expressions import (
+    AT_A_TIME,
+    STANDARD,
+    MetricValue,
+    evaluate,
+    evaluate_all,
+    metric,
+    while_moving,
+    why_none,
+)
 from orchestrator.metrics.measures import catalogue
 from orchestrator.metrics.verdict import compare
 from orchestrator.pages.comparison import divergence, partings_table
-from orchestrator.results.run_record import ConnectionRecord
+from orchestrator.results.reader import Results
+from orchestrator.results.run_record import ConnectionRecord, FmuRecord, RunRecord
 from tests.sentences import golden, golden_in, refused
 from vocabulary.wheels import WHEELS
 
@@ -489,3 +500,104 @@ def test_a_value_may_be_of_a_point_of_time():
 def test_a_window_that_is_none_is_said(name, sentence):
     with pytest.raises(ScenarioError, match=sentence):
         metric(name)
+
+
+# Angles of a velocity, while the car moves
+
+
+def moving_car(speeds, sideslip, *, rate=None, sideways=True, unit="rad", speed_unit="m/s", **more):
+    """Return a run with a speed [m/s] and a sideslip [rad] per row, every 0.1 s."""
+    speeds, sideslip = np.array(speeds, float), np.array(sideslip, float)
+    columns = {"plant.velocity_x": speeds * np.cos(sideslip) * (3.6 if speed_unit == "km/h" else 1.0)}
+    units = {"plant.velocity_x": speed_unit, "plant.velocity_y": "m/s"}
+    if sideways:
+        columns["plant.velocity_y"] = speeds * np.sin(sideslip)
+    columns["plant.sideslip"] = np.degrees(sideslip) if unit == "deg" else sideslip
+    if rate is not None:
+        columns["plant.sideslip_rate"] = np.array(rate, float)
+    columns |= {name.replace("__", "."): np.array(values, float) for name, values in more.items()}
+    units |= {name: "rad" for name in columns if name not in units} | {"plant.sideslip": unit, "time": "s"}
+    record = RunRecord(fmus={"plant": FmuRecord(name="plant_x", role="plant")})
+    return Results(Path(), 0.1 * np.arange(speeds.size), columns, units, record)
+
+
+def of(results, name):
+    value = evaluate(results, metric(name))
+    return None if value is None else value.number
+
+
+@pytest.mark.parametrize("sideways", [True, False])
+@pytest.mark.parametrize(("unit", "speed_unit"), [("rad", "m/s"), ("deg", "km/h")])
+def test_the_sideslip_of_a_car_that_brakes_straight_to_rest_is_that_while_it_moves(
+    sideways, unit, speed_unit
+):
+    speeds = [20.0, 10.0, 4.0, 0.001, 0.0, 0.0]
+    run = moving_car(
+        speeds, [0.0, 0.02, 0.01, np.pi, -np.pi, 3.0], sideways=sideways, unit=unit, speed_unit=speed_unit
+    )
+    assert of(run, "peak(sideslip)") == pytest.approx(0.02)
+    assert of(run, "final(sideslip)") == pytest.approx(0.01)
+    assert of(run, "value(sideslip) at 0.4 s") is None
+    assert of(run, "peak(sideslip) from 0.3 s to 0.5 s") is None
+    assert of(run, "peak(velocity_x)") == pytest.approx(20.0)
+    shown = while_moving(run).columns["plant.sideslip"]
+    assert np.isnan(shown).tolist() == [False] * 3 + [True] * 3
+    assert not np.isnan(run.columns["plant.sideslip"]).any()  # what was recorded stays
+
+
+def test_a_car_that_spins_at_speed_and_comes_to_rest_has_spun():
+    turned = np.radians([0.0, 30.0, 90.0, 150.0, -170.0, -170.0])
+    run = moving_car([20.0, 18.0, 15.0, 12.0, 8.0, 0.0], turned)
+    assert of(run, "peak(sideslip)") == pytest.approx(np.radians(170.0))
+    assert of(run, "total_variation(sideslip)") == pytest.approx(np.radians(190.0))  # on through 180 degrees
+
+
+def test_a_car_that_starts_from_rest_and_one_that_never_moves():
+    run = moving_car([0.0, 0.0, 5.0, 10.0], [np.pi, -np.pi, 0.1, 0.05])
+    assert of(run, "peak(sideslip)") == pytest.approx(0.1)
+    stands = moving_car([0.0, 0.1, 0.0], [np.pi, 1.0, 2.0])
+    assert of(stands, "peak(sideslip)") is None
+    assert "10 km/h" in why_none(stands, metric("peak(sideslip)"), None, 0.2)
+
+
+def test_the_clock_of_a_mean_stands_while_the_car_does():
+    stop = moving_car([10, 10, 10, 0, 0, 0, 0, 10, 10, 10], [0.1, 0.1, 0.1, 3, -3, 3, -3, 0.3, 0.3, 0.3])
+    assert of(stop, "rms(sideslip)") == pytest.approx(
+        of(moving_car([10] * 6, [0.1] * 3 + [0.3] * 3), "rms(sideslip)")
+    )
+    assert of(stop, "effort(sideslip)") == pytest.approx(0.02 + 0.02 + 0.06)
+
+
+def test_no_rate_jumps_where_a_sideslip_wraps_at_180_degrees():
+    turned = np.radians([150.0, 170.0, -170.0, -150.0, -130.0])
+    run = moving_car([10.0] * 5, turned)
+    assert of(run, "phase_area(sideslip)") == pytest.approx(np.radians(200.0) ** 2 * 0.4)
+    reference = moving_car([10.0] * 5, turned, reference__sideslip_ref=np.radians([150, 175, 178, 179, 180]))
+    assert of(reference, "peak_error(sideslip)") == pytest.approx(np.radians(50.0))
+
+
+def test_slip_angles_and_estimates_count_while_the_true_car_moves():
+    more = {f"plant__slip_angle_{wheel}": [0.1, 0.2, np.pi] for wheel in ("fl", "fr", "rl", "rr")}
+    run = moving_car([10.0, 10.0, 0.0], [0.0, 0.0, 2.0], estimator__sideslip=[0.01, 0.02, -3.0], **more)
+    run.record.fmus["estimator"] = FmuRecord(name="estimator_x", role="estimator")
+    assert of(run, "peak(slip_angle_*)") == pytest.approx(0.2)
+    assert of(run, "peak(estimator.sideslip)") == pytest.approx(0.02)
+    assert of(run, "peak(estimator.sideslip - plant.sideslip)") == pytest.approx(0.02)
+
+
+def test_without_a_speed_a_sideslip_is_taken_as_it_is():
+    run = moving_car([0.0, 0.0], [3.0, 0.1])
+    del run.columns["plant.velocity_x"]
+    assert of(run, "peak(sideslip)") == 3.0
+
+
+def test_a_line_has_a_gap_while_the_car_stands_and_keeps_its_time():
+    from orchestrator.figures.plots import draw
+
+    run = moving_car([20.0, 15.0, 10.0, 5.0, 0.0, 0.0], [0.0, 0.02, 0.01, 0.0, np.pi, -np.pi])
+    figure = draw([LabelledRun("a", run)], ["sideslip", "velocity_x", "velocity_x(sideslip)"])
+    of_slip, of_speed = figure.axes[:2]
+    (line,) = of_slip.get_lines()
+    assert np.nanmax(np.abs(line.get_ydata())) == pytest.approx(np.degrees(0.02))
+    assert of_slip.get_xlim() == pytest.approx(of_speed.get_xlim())
+    assert max(map(abs, figure.axes[2].get_xlim())) < 2.0

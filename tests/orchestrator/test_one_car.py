@@ -12,7 +12,7 @@ from orchestrator.commands.check import show
 from orchestrator.errors import WiringError
 from orchestrator.plan import ValueOrigin
 from orchestrator.scenario.loader import load_scenario
-from orchestrator.wiring.derivations import DERIVATIONS, car_of, contradictions
+from orchestrator.wiring.derivations import DERIVATIONS, adapted, car_of, contradictions
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.sentences import golden, golden_in, refused, texts_of
@@ -219,3 +219,63 @@ def test_a_reference_is_told_what_the_tyres_have_at_their_static_loads(plan):
 def test_a_reference_without_tyres_to_ask_is_refused(plan):
     with refused(WiringError, "vehicle-incomplete"):
         plan(more="  reference: {fmu: reference_x}\n", measure=lambda tyres, loads: {})
+
+
+# Changes of one quantity where others that are given would contradict it
+
+
+@pytest.mark.parametrize("given", [(), ("unsprung_mass",)])
+@pytest.mark.parametrize(("name", "value", "follows"), [("mass", 2000.0, "sprung_mass"),
+                                                        ("sprung_mass", 1800.0, "mass")])  # fmt: skip
+def test_a_heavier_car_keeps_its_wheels(saloon, given, name, value, follows):
+    whole = car_of(saloon).values
+    before = saloon | {each: whole[each] for each in given}
+    after, notes = adapted(before | {name: value}, before, {name})
+    now = car_of(after).values
+    assert contradictions(after) == []
+    assert now["mass"] - now["sprung_mass"] == pytest.approx(whole["mass"] - whole["sprung_mass"])
+    assert now[follows] == pytest.approx(whole[follows] + value - whole[name])
+    (note,) = notes
+    assert (
+        name in note and f"{follows} becomes {now[follows]:.6g} kg ({whole[follows]:.6g} kg before)" in note
+    )
+
+
+def test_what_is_changed_together_is_taken_as_it_is(saloon):
+    both = {"mass": 2000.0, "sprung_mass": 1700.0}
+    after, notes = adapted(saloon | both, saloon, both)
+    assert (after, notes) == (saloon | both, [])
+
+
+def test_a_quantity_that_is_set_to_what_it_was_changes_nothing(saloon):
+    after, notes = adapted(saloon, saloon, {"mass"})
+    assert car_of(after).values["sprung_mass"] == pytest.approx(saloon["sprung_mass"])
+    assert notes == []
+
+
+def test_a_higher_centre_of_mass_lifts_a_given_roll_arm_and_a_longer_front_is_a_longer_car(saloon):
+    whole = car_of(saloon).values
+    before = saloon | {"roll_arm": whole["roll_arm"]}
+    after, _ = adapted(before | {"cg_height": 0.6}, before, {"cg_height"})
+    assert after["roll_arm"] == pytest.approx(car_of(saloon | {"cg_height": 0.6}).values["roll_arm"])
+    front = saloon["cg_to_front_axle"] + 0.1
+    _, (note,) = adapted(saloon | {"cg_to_front_axle": front}, saloon, {"cg_to_front_axle"})
+    assert f"wheelbase becomes {whole['wheelbase'] + 0.1:.6g} m" in note
+
+
+@pytest.mark.parametrize("target", ["vehicle.mass", "plant.mass"])
+def test_a_change_of_mass_reaches_the_sprung_mass_of_the_plant_with_a_note(plan, target):
+    masses = [Var("mass", "kg", start=1100.0), Var("sprung_mass", "kg", start=900.0, minimum=1.0)]
+    make_fmu(Path("fmus/plant_sprung.fmu"), outputs=[out("yaw_rate")], parameters=masses)
+
+    def planned(*settings):
+        return plan("mass: 1500, sprung_mass: 1320", "plant_sprung", settings)
+
+    made = planned(f"{target}=1.6 t")
+    assert unit(made, "plant").parameters == {"mass": 1600.0, "sprung_mass": 1420.0}
+    (note,) = [one for one in made.diagnostics if one.code == "quantity-follows"]
+    assert "sprung_mass becomes 1420 kg (1320 kg before)" in note.message
+    both = planned(f"{target}=1.6 t", target.replace("mass", "sprung_mass") + "=1300")
+    assert unit(both, "plant").parameters == {"mass": 1600.0, "sprung_mass": 1300.0}
+    with pytest.raises(WiringError, match=r"sprung_mass.*got -80"):
+        planned(f"{target}=100")

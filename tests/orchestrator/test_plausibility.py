@@ -131,3 +131,40 @@ def test_records_of_earlier_versions_give_diagnostics():
     where = Location(signal="plant.sideslip", time=1.0)
     assert warning == Diagnostic("car-spins", "the car spins", "warning", where, math.inf)
     assert record.course_warnings == (warning,)
+
+
+def spins(speeds, degrees, sideways=True, units=("rad", "m/s")):
+    """Return whether a car that moves like this is said to spin."""
+    sideslip, speeds = np.radians(degrees), np.array(speeds, float)
+    signals = {
+        "sideslip": sideslip if units[0] == "rad" else np.degrees(sideslip),
+        "velocity_x": speeds * np.cos(sideslip) * (3.6 if units[1] == "km/h" else 1.0),
+        "velocity_y": speeds * np.sin(sideslip),
+    }
+    of = {"sideslip": {"unit": units[0]}, "velocity_x": {"unit": units[1]}, "velocity_y": {"unit": "m/s"}}
+    names = [name for name in signals if sideways or name != "velocity_y"]
+    return [
+        "car-spins"
+        in found(
+            plan(**{name: of[name] for name in names}), *(signals[name] for name in names), blocks=blocks
+        )
+        for blocks in (1, 3, len(speeds))
+    ]
+
+
+@pytest.mark.parametrize("sideways", [True, False])
+@pytest.mark.parametrize(
+    ("speeds", "degrees", "spun"),
+    [
+        ([20, 10, 3, 0.01, 0, 0], [0, 1, 2, 180, -180, 90], False),  # brakes straight to rest
+        ([20, 18, 15, 9, 2, 0], [0, 60, 120, 180, 180, 180], True),  # spins, then comes to rest
+        ([20, 18, 15, 9, 5, 5], [0, 60, 120, 180, 180, 180], True),  # spins, then rolls backwards
+        ([0, 0, 3, 6, 6, 6], [180, 90, 180, 180, -179, 178], False),  # reverses
+        ([6, 6, 6, 6, 6, 6], [180, 180, 150, 120, 90, 60], True),  # reverses, and turns round
+        ([9, 4, 0, 0, 4, 6], [0, 0, 180, 180, 180, 180], False),  # stops, and rolls back
+        ([0, 0, 0, 5, 9, 15], [180, 45, -90, 0, 1, 2], False),  # starts from rest
+    ],
+)
+def test_a_car_spins_only_while_it_moves(speeds, degrees, spun, sideways):
+    assert spins(speeds, degrees, sideways) == [spun] * 3
+    assert spins(speeds, degrees, sideways, ("deg", "km/h")) == [spun] * 3

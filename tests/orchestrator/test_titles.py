@@ -165,6 +165,21 @@ def test_dollars_in_titles_and_labels_are_no_formulas(tmp_path):
     assert (tmp_path / "dollars.png").stat().st_size > 0
 
 
+def test_the_heading_of_a_page_on_one_run_and_its_text_in_python_name_what_was_changed():
+    from lxml import html
+
+    import yawbench as yb
+    from orchestrator.pages.viewer import page
+
+    run = made(SLOW)
+    run.record.title = "ISO 3888-2 at 60 km/h, mu 0.9"
+    full = f"{run.record.title} (changed: plant.initial_speed = 50 km/h)"
+    assert html.fromstring(page([LabelledRun("a", run)])).findtext(".//h1") == full
+    assert full in repr(yb.Run(run))
+    assert html.fromstring(yb.view(yb.Run(run)).html).findtext(".//h1") == full
+    assert html.fromstring(page([LabelledRun("a", made())])).findtext(".//h1") == made().record.title
+
+
 def test_changes_are_told_in_words():
     assert golden(changed([OFF, ICE]))
     assert golden(changed([Override.of("plant.locked", True, "--set")]))

@@ -108,3 +108,25 @@ def test_signals_of_one_run_alone_are_named():
 )
 def test_differences_carry_their_sign_and_unit(first, second, text):
     assert difference(first, second) == text
+
+
+def test_angles_of_cars_that_stand_do_not_differ_and_those_that_wrap_differ_by_little():
+    speed = np.where(T < 0.5, 20.0, 0.0)
+    signs = ((np.pi, -np.pi), (-np.pi, np.pi))
+    stopped = [
+        results({"plant.velocity_x": speed, "plant.sideslip": np.where(T < 0.5, 0.1, at_rest)}, T)
+        for at_rest, _ in signs
+    ]
+    assert divergence(*stopped).partings == ()
+    spun = [
+        results(
+            {
+                "plant.velocity_x": np.full(T.size, -20.0),
+                "plant.sideslip": sign * np.radians(179.0) + 0.0 * T,
+            },
+            T,
+        )
+        for sign in (1.0, -1.0)
+    ]
+    (one,) = divergence(*spun).partings
+    assert one.largest == pytest.approx(np.radians(2.0))

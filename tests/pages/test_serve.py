@@ -23,10 +23,13 @@ import pytest
 from orchestrator.experiments.jobs import Job, planned
 from orchestrator.interrupts import StopFlag
 from orchestrator.pages.server import ResultsServer
-from orchestrator.pages.sliders import Bench, Superseded, Wanted
+from orchestrator.pages.sliders import Bench, Superseded, Wanted, knobs_of, shown_first
 from orchestrator.pages.viewer import page
+from orchestrator.planner import Planner
+from orchestrator.scenario import loader
 from orchestrator.scenario.loader import find
 from orchestrator.scenario.overrides import read_changes
+from orchestrator.scenario.quantities import convert
 from tests.orchestrator.recorded import write
 from tests.sentences import golden
 from vocabulary.vehicle import CAR
@@ -56,6 +59,11 @@ def folder(tmp_path_factory) -> Path:
     (place / "linked/results.csv").unlink()
     (place / "linked/results.csv").symlink_to(outside / "run/results.csv")
     return place
+
+
+@pytest.fixture(scope="module")
+def planner() -> Planner:
+    return Planner()
 
 
 @pytest.fixture(scope="module")
@@ -380,6 +388,22 @@ def test_sliders_have_units_and_the_vocabularys_ranges(server):
         assert knob["low"] <= knob["value"] <= knob["high"] and knob["low"] < knob["high"]
     options = re.search(r'data-instance="controller">(.*?)</select>', content.decode())[1]
     assert "<option selected>controller_fnn</option>" in options and "controller_off" in options
+
+
+@pytest.mark.parametrize("name", loader.names("a scenario"))
+def test_every_slider_of_a_shipped_scenario_begins_where_its_run_does(planner, name):
+    loaded, plan = planned(Job(name, loader.named(name), Path()), planner)
+    knobs = {knob.target: knob for knob in knobs_of(loaded, plan)}
+    for fact, unit in (("friction", "1"), ("speed", "m/s")):
+        stated = getattr(loaded, fact)
+        if fact in knobs:
+            assert knobs[fact].value == float(convert(stated, unit) if isinstance(stated, str) else stated)
+    shown = shown_first([*knobs.values()], plan)
+    settings = [f"{target}={knobs[target].value!r}" for target in shown if target != "friction"]
+    again = planned(Job(name, loader.named(name), Path(), read_changes((), settings, ())), planner)[1]
+    for one, other in zip(plan.instances, again.instances, strict=True):
+        names = [variable.name for variable in one.fmu.of("parameter")]
+        assert {n: one.parameter(n) for n in names} == {n: other.parameter(n) for n in names}
 
 
 def test_a_slider_runs_the_car_and_the_link_opens_the_same(server, chromium: Browser):

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lxml import html
+from matplotlib.path import Path as Line
 
 import yawbench as yb
 from orchestrator.evaluation.validation import CrossPlot
@@ -78,13 +79,29 @@ def test_a_distance_next_to_the_bound_never_reads_as_the_bound(made):
     assert "1.00004 of" in validation_sentence(near)
 
 
-def test_the_outline_of_a_band_is_at_one_tolerance_from_its_line():
-    x = np.linspace(-1.0, 3.0, 50)
-    wide, high = np.full(50, 0.2), 0.1 + 0.03 * np.abs(x)
-    (plot,) = [CrossPlot("roll_angle", x, x, np.zeros(50), wide, high, ())]
-    over, values = plot.outline
-    np.testing.assert_allclose(over, np.concatenate([x, x[::-1]]))
-    np.testing.assert_allclose(values, np.concatenate([high, -high[::-1]]))
+@pytest.mark.parametrize("turns", [0.0, 6.0])
+def test_the_band_drawn_is_the_band_judged_with_its_ends(turns):
+    t = np.linspace(-1.0, 3.0, 400)
+    x, y = t, 0.5 * np.sin(turns * t)
+    wide, high = 0.2 + 0.06 * np.abs(x), 0.1 + 0.03 * np.abs(y)
+    over, values = CrossPlot("roll_angle", t, x, y, wide, high, ()).outline
+
+    def distance(at_x, at_y):
+        return np.sqrt((((at_x[:, None] - x) / wide) ** 2 + ((at_y[:, None] - y) / high) ** 2).min(axis=1))
+
+    edge = ~np.isnan(over)
+    off = np.abs(distance(over[edge], values[edge]) - 1.0)
+    assert np.quantile(off, 0.95) < 0.01 and off.max() < 0.05  # corners between two stretches are rounded
+    assert (np.nanmin(over), np.nanmax(over)) == pytest.approx((-1.26, 3.38), abs=0.02)  # an end is round
+    rng = np.random.default_rng(2)
+    points = np.column_stack([rng.uniform(-2.0, 4.0, 3000), rng.uniform(-1.0, 1.0, 3000)])
+    loops = np.split(np.column_stack([over, values]), np.flatnonzero(~edge))
+    inside = np.zeros(len(points), dtype=int)
+    for loop in loops:
+        inside += Line(loop[~np.isnan(loop[:, 0])], closed=True).contains_points(points)
+    far = distance(*points.T)
+    clear = np.abs(far - 1.0) > 0.05
+    assert np.array_equal((inside % 2 == 1)[clear], (far < 1.0)[clear])
 
 
 def test_the_page_carries_run_band_and_tests_to_the_side_of_the_run(made, page):
@@ -123,9 +140,13 @@ def test_decoded_samples_equal_those_of_the_car(chromium: Browser, made, page):
         assert abs(value - wanted) <= spans[name] / 131068 * (1 + 1e-9), name
 
 
-def test_the_band_is_filled_behind_the_points(chromium: Browser, page):
+def test_the_band_is_filled_behind_the_points(chromium: Browser, made, page):
     chromium.open(page)
     chromium.wait_for("document.querySelector('.yv-ready')")
+    (plot,) = made[2].plots
+    times = [plot.time, *(test.time for test in plot.tests)]
+    ends = min(float(t[0]) for t in times), max(float(t[-1]) for t in times)
+    assert chromium.run(VIEWER + "return viewer.ends()") == pytest.approx(ends)  # the band adds no time
     lines = VIEWER + "return viewer.panels[0].shown.map(({run}) => Boolean(run.band))"
     assert chromium.run(lines) == [True] + 5 * [False]
     values = chromium.run(VIEWER + "return viewer.panels[0].cells.map((one) => one.textContent)")

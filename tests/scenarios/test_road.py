@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from orchestrator.experiments.tables import runs_table
 from orchestrator.master.simulate import simulate_in_memory
+from orchestrator.results.reader import found_runs, load_results
 from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
@@ -114,3 +117,29 @@ def test_the_other_roads_are_driven_to_their_end(run, name):
     else:
         assert results["road.wind_force_y"].min() == -1500.0
         assert np.abs(results["plant.position_y"]).max() > 0.05
+
+
+def test_a_car_that_brakes_straight_to_rest_does_not_spin(tmp_path, yawbench):
+    call = ("run", "proving_ground/friction_jump_braking", "--set", "stop_time=6", "--out", tmp_path / "jump")
+    status, out, said = yawbench(*call, "--metric", "peak(sideslip)", "--json")
+    assert status == 0 and "spins" not in said
+    assert json.loads(out)["metrics"]["peak(sideslip)"]["value"] == pytest.approx(0.0, abs=1e-6)
+    status, out, said = yawbench("run", "road/split_braking", "--metric", "peak(sideslip)", "--json",
+                                 "--out", tmp_path / "split")  # fmt: skip
+    assert status == 0 and "spins" not in said
+    assert 4.0 < np.degrees(json.loads(out)["metrics"]["peak(sideslip)"]["value"]) < 7.0
+    recorded = load_results(tmp_path / "split")
+    assert np.degrees(np.max(np.abs(recorded["plant.sideslip"]))) > 90.0  # what the plant gave stays
+    peaks = {Path(row[0]).name: row[5].number for row in runs_table(found_runs(tmp_path)).rows}
+    assert np.degrees(peaks["split"]) < 7.0 and peaks["jump"] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_turn_that_ends_at_rest_is_evaluated_while_the_car_moves(tmp_path, yawbench):
+    folder = tmp_path / "turn"
+    call = ("run", "proving_ground/braking_in_turn", "--set", "stop_time=16", "--out", folder)
+    status, _, said = yawbench(*call)
+    assert status == 0 and "spins" not in said
+    status = yawbench("evaluate", "turn-response", folder)[0]
+    assert status == 0
+    (run,) = json.loads((folder / "evaluation.json").read_text())["runs"]
+    assert 1.0 < np.degrees(run["quantities"]["sideslip_peak"]["value"]) < 4.0

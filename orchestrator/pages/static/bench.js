@@ -22,6 +22,7 @@ bytesOf = ({dataset: {address}}) => {
 class Bench {
   constructor(form) {
     this.form = form;
+    this.title = form.querySelector('h1').textContent;
     this.find = (name) => form.querySelector('.' + name);
     this.facts = JSON.parse(this.find('facts').textContent);
     this.page = Math.random().toString(36).slice(2);
@@ -155,7 +156,8 @@ class Bench {
 
   async run() {
     const {changes} = this;
-    const label = [...changes.settings, ...changes.swaps, ...changes.faults].join(', ') || 'the scenario';
+    const all = [...changes.settings, ...changes.swaps, ...changes.faults];
+    const label = all.join(', ') || 'the scenario';
     const before = this.now && this.now[1] !== label ? this.now : this.before;
     const ghosts = [this.pinned, before].filter(Boolean).filter(([, text], k, all) => text !== label && all.findIndex((one) => one[1] === text) === k);
     this.remember();
@@ -172,6 +174,7 @@ class Bench {
     [this.before, this.now] = [before, [key, label]];
     await this.show(html);
     this.find('command').textContent = command;
+    this.form.querySelector('h1').textContent = this.title + (all.length ? ` (changed: ${all.map((one) => one.replace('=', ' = ')).join(', ')})` : '');
     const shown = Math.round(performance.now() - this.began);
     this.form.dataset.shown = shown;
     this.tell(`${warnings.length ? warnings.join(' ') + ' ' : ''}Run in ${milliseconds} ms, shown after ${shown} ms.`);

@@ -1,18 +1,12 @@
 // The road from above and a close-up of each car, at the cursor's time; plays.
 
-const STANDS = 0.5; // speed below which a car counts as standing, with undefined sideslip [m/s]; chosen: below walking pace
-
 // What scene and close-ups need of a run: channels in SI units at every recorded row.
 function channelsOf(run) {
   const {road} = run;
   const column = (name) => (road[name] ? run.column(road[name]) : null);
   const channels = {time: run.shifted, x: column('x'), y: column('y'), yaw: unwrapped(column('yaw'))};
   for (const name of ['yaw_rate', 'steer_angle', 'yaw_moment', 'cone_overrun']) if (road[name]) channels[name] = column(name);
-  const [along, across] = [column('velocity_x'), column('velocity_y')];
-  if (along) channels.speed = across ? along.map((v, i) => Math.hypot(v, across[i])) : along.map(Math.abs);
-  if (road.sideslip) {
-    channels.sideslip = column('sideslip').map((angle, i) => (channels.speed && channels.speed[i] < STANDS ? NaN : angle));
-  }
+  if (road.sideslip) channels.sideslip = column('sideslip'); // NaN while the car stands
   if (road.path_offset) {
     const off = column('path_offset');
     channels.path_y = channels.y.map((y, i) => y - off[i]);
