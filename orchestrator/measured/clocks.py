@@ -21,7 +21,7 @@ UNIX = ("unix time", "unix")
 MILLISECONDS = 1e11
 """Unix times from here on are in ms. Chosen: 1e11 s is the year 5138, 1e11 ms is 1973."""
 SECOND = parse_unit("s")
-DAY = 86_400.0
+DAY, HOUR = 86_400.0, 3600.0
 _TIME_OF_DAY = re.compile(r"(\d{1,2}):(\d\d):(\d\d(?:[.,:]\d+)?)")
 _MINUTES = re.compile(r"(\d+):(\d\d[.,]\d+)")
 
@@ -102,7 +102,7 @@ def _of_text(cells: np.ndarray, what: str) -> np.ndarray:
     if all(map(_TIME_OF_DAY.fullmatch, texts)):
         seconds[there] = _past_midnight(_whole(texts))
     elif all(map(_MINUTES.fullmatch, texts)):
-        seconds[there] = _whole([f"0:{text}" for text in texts])
+        seconds[there] = _past_midnight(_whole([f"0:{text}" for text in texts]), HOUR)
     elif all(re.search(r"\d:\d\d", text) for text in texts):
         return _of_dates(cells, there, what)
     else:
@@ -121,10 +121,10 @@ def _whole(texts: list[str]) -> np.ndarray:
     return np.array([3600.0 * int(h) + 60.0 * int(m) + float(s.replace(":", ".")) for h, m, s in parts])
 
 
-def _past_midnight(seconds: np.ndarray) -> np.ndarray:
-    """Return times of day that go on where a day ends."""
+def _past_midnight(seconds: np.ndarray, period: float = DAY) -> np.ndarray:
+    """Return times of day, or of an hour, that go on where it ends."""
     steps = np.diff(seconds, prepend=seconds[:1])
-    return np.asarray(seconds + DAY * np.cumsum(steps < -DAY / 2))
+    return np.asarray(seconds + period * np.cumsum(steps < -0.9 * period))
 
 
 def _of_dates(cells: np.ndarray, there: np.ndarray, what: str) -> np.ndarray:

@@ -129,8 +129,9 @@ def read_text_table(
     text = raw.decode(encoding_of(raw))
     if "\r" in text:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
-    lines = text[: HEAD[0]].split("\n")[: HEAD[1]]
-    if len(text) > HEAD[0] and len(lines) < HEAD[1]:
+    first = HEAD[1] + (header or 0)
+    lines = text[: HEAD[0]].split("\n")[:first]
+    if len(text) > HEAD[0] and len(lines) < first:
         lines = lines[:-1]
     if any(line.strip().lower() == "[data]" for line in lines):
         frame = _of_vbo(lines)
@@ -249,13 +250,14 @@ def _frame(lines: list[str], asked: Collection[str], header: int | None) -> _Fra
         if found[0] > most:
             rows, separator, (most, kinds) = split, candidate, found
     if not kinds:
-        filled = [line for line in lines if line.strip()]
-        raise ValueError("has no rows" if len(filled) < 3 else "has no table of numbers")
+        few = sum(bool(line.strip()) for line in lines) < 3
+        where = "; if it begins below, write 'header: ...', the line of its names"
+        raise ValueError("has no rows" if few else f"has no table in its first {len(lines)} lines{where}")
     if header is not None and not 0 < header < len(lines):
         raise ValueError(f"has no names of columns in line {header} (key 'header')")
     at = header - 1 if header else _line_asked_for(lines, rows, kinds, separator, asked)
-    below = range(0 if at is None else at + 1, len(rows))
-    begin = next((row for row in below if _alike(rows[row][1], kinds)), None)
+    after = range(0 if at is None else at + 1, len(rows))
+    begin = next((row for row in after if _alike(rows[row][1], kinds)), None)
     if begin is None:
         raise ValueError(f"has no numbers below line {(at or 0) + 1}")
     if at is None:
@@ -326,7 +328,7 @@ def _no_names(lines: list[str], rows: list[_Row], begin: int, kinds: str, separa
 
 
 _HEADER = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*")
-_IN_BRACKETS = re.compile(r"(?P<name>.*\S)\s*(?:\((?P<round>[^()]*)\)|\"(?P<quoted>[^\"]*)\")\s*")
+_IN_BRACKETS = re.compile(r"(?P<name>.*\S)\s*(?P<unit>\([^()]*\)|\{[^{}]*\}|\"[^\"]*\"|'[^']*')\s*")
 
 
 def split_header(header: str) -> tuple[str, str | None]:
@@ -334,7 +336,7 @@ def split_header(header: str) -> tuple[str, str | None]:
     if parts := _HEADER.fullmatch(header):
         return parts["name"], stated_unit(parts["unit"])
     if parts := _IN_BRACKETS.fullmatch(header):
-        unit = (parts["round"] or parts["quoted"] or "").strip()
+        unit = parts["unit"][1:-1].strip()
         if unit and not unit.isdigit() and unit_in_file(unit) is not None:
             return parts["name"], unit
     return header.strip(), None

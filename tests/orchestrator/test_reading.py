@@ -67,6 +67,9 @@ FORMS = {
     "units and sources below": "time;v;r;a\ns;km/h;deg/s;g\n;gps;imu;imu\n" + TABLE.partition("\n")[2],
     "units and a gap below": "time;v;r;a\ns;km/h;deg/s;g\n\n;;;\n" + TABLE.partition("\n")[2],
     "units in parentheses": TABLE.replace("[", "(").replace("]", ")"),
+    "units in braces": TABLE.replace("[", "{").replace("]", "}"),
+    "units in quotes": TABLE.replace("[", "'").replace("]", "'"),
+    "a row of numbers in the head": "7;100;1;2\n" + TABLE,
     "a footer": TABLE + "\nMax;120;30;0.5\nEnd of data\n",
     "blank rows": "\n".join([NAMES, *LINES[:5], ";;;", "", *LINES[5:]]) + "\n",
     "names twice": "\n".join([NAMES, *LINES[:5], NAMES, *LINES[5:]]) + "\n",
@@ -98,6 +101,9 @@ def test_the_line_of_names_can_be_given(tmp_path):
     text = "time;v;r;a\n" + TABLE
     is_the_table(segment(tmp_path, text, ALL, more="header: 2\n"))
     assert "header" in refusal(tmp_path, TABLE, ALL, more="header: 900\n")
+    far = "Lap;Time\n" * 500 + TABLE
+    assert "header" in refusal(tmp_path, far, ALL)
+    is_the_table(segment(tmp_path, far, ALL, more="header: 501\n"))
 
 
 @pytest.mark.parametrize(
@@ -223,6 +229,7 @@ def clock(cells: list[str], folder: Path, time: str = "time", header: str = "tim
         ["12:00:00:000", "12:00:00:500", "12:00:01:250"],
         ["23:59:59.50", "0:00:00.00", "0:00:00.75"],
         ["0:59.5", "1:00.0", "1:00.75"],
+        ["59:59.5", "00:00.0", "00:00.75"],
         ["2026-05-17T12:00:00.00Z", "2026-05-17T12:00:00.50Z", "2026-05-17T12:00:01.25Z"],
         ["2026-05-17T12:00:00Z", "2026-05-17T12:00:00.5Z", "2026-05-17T12:00:01.25Z"],
         ["2026-05-17 12:00:00.00", "2026-05-17 12:00:00.50", "2026-05-17 12:00:01.25"],
