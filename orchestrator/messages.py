@@ -97,8 +97,9 @@ def counted(number: int, noun: str, several: str = "") -> str:
     return f"{number} {noun if number == 1 else several or f'{noun}s'}"
 
 
-RESOLVED = 3
-"""Digits of the distance of two numbers that a range shows. Chosen: exact to a thousandth of it."""
+RESOLVED, FINEST = 3, 6
+"""Digits after the first one of the distance of numbers in a range, and of the smallest of them up to so many
+decimals. Chosen: both read as exact to a thousandth, and no rounding is shown."""
 EXACT = 1e15
 """Size beyond which numbers have no decimals as double precision."""
 
@@ -120,14 +121,24 @@ def span(begin: float, end: float, digits: int = 0) -> str:
 
 
 def resolved(*numbers: float) -> list[str]:
-    """Return numbers as text, with the decimals that show their least distance to a thousandth."""
+    """Return numbers as text, with the decimals that tell them apart.
+
+    >>> resolved(0.2, 1.7e9 + 0.3), resolved(5.0, 5.0)
+    (['0.2', '1700000000.3'], ['5', '5'])
+    """
     ordered = sorted(set(numbers))
-    least = min((b - a for a, b in pairwise(ordered)), default=abs(ordered[0]))
-    if not math.isfinite(sum(numbers)) or not least or max(map(abs, numbers)) >= EXACT:
+    distances = [b - a for a, b in pairwise(ordered)]
+    sizes = [abs(number) for number in ordered if number]
+    if not math.isfinite(sum(numbers)) or max(sizes, default=0.0) >= EXACT:
         return [f"{number:.16g}" for number in numbers]
-    decimals = max(0, RESOLVED - math.floor(math.log10(least)))
+    decimals = max(_decimals(distances), min(FINEST, _decimals(sizes)))
     texts = [f"{round(number, decimals) + 0.0:.{decimals}f}" for number in numbers]
     return [text.rstrip("0").rstrip(".") if decimals else text for text in texts]
+
+
+def _decimals(sizes: Sequence[float]) -> int:
+    """Return the decimals that show the smallest of some sizes to a thousandth; 0 without any."""
+    return min(17, max(0, RESOLVED - math.floor(math.log10(min(sizes))))) if sizes else 0
 
 
 def fold(names: Sequence[str]) -> list[str]:
