@@ -337,7 +337,7 @@ def find(source: str | Path, kind: str) -> Path:
         return path
     known = [name.removeprefix(f"{HOMES.get(kind)}/") for name in names(kind)]
     elsewhere = [name for name in known if path.stem == name.rpartition("/")[2]]
-    if path.suffix in ENDINGS and not elsewhere or path.suffix.lower() in ARCHIVES:
+    if (path.suffix in ENDINGS and not elsewhere) or path.suffix.lower() in ARCHIVES:
         return path
     if file := named(source, kind):
         return file

@@ -118,7 +118,9 @@ class SspArchive:
         """Name of the member that describes the system."""
         self.root = "." if inside else self.path.name
         """Path of the archive, from the folder of `path`."""
-        if inside and self.path.is_dir() and path.is_file():
+        if inside and self.path.is_dir():
+            if not path.exists():
+                raise SspError("no such file", code="file-missing")
             raise SspError(
                 "an .ssd file is read inside its archive: pack its folder as an .ssp file and give that",
                 code="file-wrong-kind",

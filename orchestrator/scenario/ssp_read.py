@@ -141,7 +141,7 @@ def read(path: Path, *, what: str = "SSP archive") -> Document:
     try:
         document.data = _scenario(SspArchive(path, what=what), document)
     except SspError as refused:
-        document.add(refused.diagnostic(path.parent if path.suffix.lower() == ".ssd" else path))
+        document.add(refused.diagnostic(path if path.parent.is_dir() else path.parent))
     return document
 
 
