@@ -225,9 +225,9 @@ class SspArchive:
 def _declared(description: _Element) -> Iterator[tuple[str, SspVariable]]:
     """Yield the variables of a model description of FMI 2.0 or 3.0."""
     types = {
-        str(definition.get("name")): definition
-        if definition.tag != "SimpleType"
-        else next(iter(definition), definition)
+        str(definition.get("name")): dict(
+            (definition if definition.tag != "SimpleType" else next(iter(definition), definition)).attrib
+        )
         for definition in description.iterfind("TypeDefinitions/*")
     }
     definitions = unit_definitions(description.iterfind("UnitDefinitions/Unit"))
