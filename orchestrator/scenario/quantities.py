@@ -7,6 +7,9 @@ m, s, A, K, mol, cd, rad (FMI 2.0.4, section 2.2.2), a factor and an offset. Fac
 a separate power of pi, so that 90 km/h is 25 m/s to the last bit. The definition of an FMU takes precedence
 over the tables, unless both agree except for rounding: then the tables have more digits.
 
+Offsets of units, such as that of degC, apply to absolute quantities. FMI marks differences
+(`relativeQuantity`): to them, and to what a fault adds to a signal, no offset applies.
+
 A lone `g` is standard gravity, 9.80665 m/s2, where an acceleration is expected, otherwise a gram.
 """
 
