@@ -161,9 +161,7 @@ class InstanceSpec(StrictModel):
     """An instance of an FMU."""
 
     fmu: str = Field(description="Name of an FMU in fmus/, or the path of any .fmu", min_length=1)
-    step_size: Time | None = Field(
-        None, description="s, an integer multiple of the communication step; default: that step"
-    )
+    step_size: Time | None = Field(None, description="s, an integer multiple of the communication step")
     parameters: dict[str, ParameterValue] = Field({}, description="Values of the instance's parameters")
     tolerance: Tolerance | None = Field(
         None,
