@@ -227,10 +227,20 @@ def _add_connection(above: _Element, wire: Wire, plan: Plan) -> None:
         connection.set(f"{which}Connector", name)
         if shape:
             connection.set(f"{which}Indices", variable[len(name) + 1 : -1].replace(",", " "))
-    if wire.converts:
+    source, target = fmus[wire.source].variables[wire.output], fmus[wire.target].variables[wire.input]
+    if wire.converts or _by_units(source, target) != (1.0, 0.0):
         connection.set("suppressUnitConversion", "true")
         scale = {"factor": repr(wire.gain), "offset": repr(wire.offset)}
         SubElement(connection, f"{{{SSC}}}LinearTransformation", scale)
+
+
+def _by_units(source: Variable, target: Variable) -> tuple[float, float] | None:
+    """Return what other programs make of the units of two variables, None if these are incompatible.
+
+    SSP does not say which quantities are differences, so offsets apply to all.
+    """
+    of, to = (measure_of(v.unit, v.definition) for v in (source, target))
+    return conversion(of, to) if of and to else (1.0, 0.0)
 
 
 def _in_order_of_scenario(plan: Plan) -> list[Instance]:
@@ -428,9 +438,7 @@ def for_omsimulator(plan: Plan) -> tuple[Plan, list[str]]:
 
     def by_units(wire: Wire) -> bool:
         source, target = fmus[wire.source][wire.output], fmus[wire.target][wire.input]
-        of, to = (measure_of(v.unit, v.definition) for v in (source, target))
-        theirs = conversion(of, to) if of and to else None  # with the offsets, of differences too
-        return (theirs or (1.0, 0.0)) == (wire.gain, wire.offset)
+        return (_by_units(source, target) or (1.0, 0.0)) == (wire.gain, wire.offset)
 
     problems = [
         f"{wire.source}.{wire.output} to {wire.target}.{wire.input}: OMSimulator applies no gain and "

@@ -166,6 +166,8 @@ def test_a_run_of_differences_gives_the_same_numbers_as_its_archive(standard, li
         with pytest.raises(SystemExit) as exit_:
             main(arguments)
         assert not exit_.value.code, capsys.readouterr().err
+    with zipfile.ZipFile(ssp) as held:
+        assert b'suppressUnitConversion="true"' in held.read("SystemStructure.ssd")  # others would add 273.15
     assert load_results(folders[0])["b.Real_out"][-1] == 28.0
     assert (folders[0] / "results.csv").read_bytes() == (folders[1] / "results.csv").read_bytes()
 
