@@ -82,7 +82,7 @@ def scale(structure: SspStructure, chain: Sequence[SspEnd]) -> Scale:
             stops = [inside, outside]
         else:
             connection = structure.sources[end][1]
-            if connection.get("suppressUnitConversion") in ("true", "1"):
+            if _suppresses(connection):
                 measure = None
             total, measure = _converted(total, measure, outside, end, connection, relative)
             total = _then(total, linear(connection))
@@ -90,6 +90,10 @@ def scale(structure: SspStructure, chain: Sequence[SspEnd]) -> Scale:
         for stop in stops:
             total, measure = _converted(total, measure, stop, end, connection, relative)
     return total
+
+
+def _suppresses(element: _Element) -> bool:
+    return element.get("suppressUnitConversion") in ("true", "1")
 
 
 def _relative(structure: SspStructure, chain: Sequence[SspEnd]) -> bool | None:
@@ -294,6 +298,10 @@ def _connections(
         }
         gain, offset = scale(structure, [source, *way])
         usual = automatic(structure, source, end)
+        if _relative(structure, [source, end]) is None and any(
+            _suppresses(structure.sources[stop][1]) for stop in way
+        ):
+            usual = None  # the archive has decided what a difference means here
         if usual is None or not all(map(math.isclose, (gain, offset), usual)):
             ends |= {"gain": gain, "offset": offset}
         connections.append(ends)
@@ -485,7 +493,7 @@ def _check_type(element: _Element, allowed: str) -> None:
 
 def _transformed(value: SspValue, entry: _Element) -> SspValue:
     """Return a value with the transformation of a mapping entry."""
-    if entry.get("suppressUnitConversion") in ("true", "1"):
+    if _suppresses(entry):
         value = replace(value, unit=None)
     for child in entry.iterchildren("{*}*"):
         kind = etree.QName(child).localname

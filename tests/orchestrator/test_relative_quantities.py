@@ -195,9 +195,10 @@ def test_a_difference_and_a_temperature_are_not_connected_by_an_archive(tmp_path
         make_plan(load_scenario(joined(tmp_path), changes=changed(step_size=0.1)))
     assert "relativeQuantity" in str(caught.value)
     linear = '<ssc:LinearTransformation factor="1" offset="300"/>'
-    path = joined(tmp_path, linear, suppressUnitConversion="true")
-    (only,) = make_plan(load_scenario(path, changes=changed(step_size=0.1))).wires
-    assert (only.gain, only.offset) == (1.0, 300.0)
+    for inner, offset in ((linear, 300.0), ("", 0.0)):
+        path = joined(tmp_path, inner, suppressUnitConversion="true")
+        (only,) = make_plan(load_scenario(path, changes=changed(step_size=0.1))).wires
+        assert (only.gain, only.offset) == (1.0, offset)
 
 
 def test_a_value_of_an_archive_for_a_difference_has_no_offset(tmp_path):
