@@ -134,6 +134,7 @@ class FaultKind:
     most: float | None = None  # maximum of the value
     drawn: bool = False  # random: takes seed and every
     shared: bool = False  # takes share
+    adds: bool = False  # its value is a difference: an offset of a unit does not apply to it
 
 
 def _value(signal: FaultySignal) -> float:
@@ -285,12 +286,12 @@ FaultName = Literal[
 """Names of the kinds, for type checkers and editors."""
 
 KINDS: dict[str, FaultKind] = {
-    "bias": FaultKind("x + value", _linear(lambda value: (1.0, value)), "{x}"),
+    "bias": FaultKind("x + value", _linear(lambda value: (1.0, value)), "{x}", adds=True),
     "gain": FaultKind("x * value", _linear(lambda value: (value, -0.0)), "1"),
     "drift": FaultKind("x + value * (time since the fault began)", _drift, "{x}/s"),
     "noise": FaultKind(
         "x + value * normally distributed numbers, a new one every message",
-        _noise, "{x}", least=0, drawn=True,
+        _noise, "{x}", least=0, drawn=True, adds=True,
     ),
     "freeze": FaultKind("the x at which the fault began", _freeze),
     "value": FaultKind("value", _changing(_constant), "{x}"),
@@ -298,7 +299,8 @@ KINDS: dict[str, FaultKind] = {
         "a share of the messages is lost, the last x before holds", _dropout, drawn=True, shared=True
     ),
     "outlier": FaultKind(
-        "a share of the messages is x + value or x - value", _outlier, "{x}", drawn=True, shared=True
+        "a share of the messages is x + value or x - value",
+        _outlier, "{x}", drawn=True, shared=True, adds=True,
     ),
     "delay": FaultKind("the x of so long ago", _delay, "s", least=0),
     "saturation": FaultKind(

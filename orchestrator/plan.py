@@ -42,6 +42,12 @@ SENSING = {"sensor": "measurement", "estimator": "estimate"}
 """Role of an instance -> kind of values that its outputs are, as opposed to the truth."""
 
 
+def integer_limits(kind: str) -> tuple[int, int]:
+    """Return the smallest and the largest number of an integer type of FMI 3.0, such as "UInt8"."""
+    bits = int(kind.partition("Int")[2])
+    return (0, 2**bits - 1) if kind.startswith("U") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+
+
 class ValueRef(NamedTuple):
     """Reference to a scalar value in an FMU."""
 
@@ -84,6 +90,7 @@ class Variable:
     element: int = 0  # of an array, counted row by row
     elements: int = 1  # of the whole array
     alias_of: str | None = None  # of an input: the input of which this is another name (FMI 3.0)
+    relative: bool = False  # a difference (`relativeQuantity`): offsets of units do not apply to it
 
     @cached_property
     def ref(self) -> ValueRef:
@@ -154,6 +161,10 @@ class Fmu:
     """Functions of the standard that the library does not export."""
     tolerance: float | None = None
     """Relative tolerance of the default experiment."""
+    fixed_step: float | None = None
+    """Step that it declares to be made for [s], None if it takes any."""
+    takes_multiples: bool = False
+    """Whether it takes multiples of `fixed_step` too, as its internal step."""
     runs_as: RunsAs | None = None
     """Execution of plain Python, which has no archive that says it."""
     needs_tool: bool = False

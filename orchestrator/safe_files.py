@@ -19,8 +19,8 @@ import os
 import re
 import stat
 import zipfile
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path, PurePosixPath
 from typing import BinaryIO, Concatenate, ParamSpec, TypeVar
 
 from .errors import YawbenchError
@@ -47,6 +47,10 @@ NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
 
 class TooLargeError(ValueError):
     """A file is too large to read; the message has the file as its subject ("it is larger than ...")."""
+
+
+class ArchiveError(ValueError):
+    """The members of an archive cannot be taken; the message is a sentence of its own."""
 
 
 def check_regular(path: Path) -> None:
@@ -116,19 +120,69 @@ def read_bytes(path: Path, *, largest: int, follow: bool = True) -> bytes:
         return stream.read(size)  # allocates that much even for a short file, so not `largest`
 
 
-def check_archive(archive: zipfile.ZipFile) -> None:
+_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
+
+
+def members(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
+    """Return the files of an archive by path: with /, and without the ./ and \\ that some programs write.
+
+    Raises:
+        TooLargeError: too many members, too many bytes, or too deeply nested folders.
+        ArchiveError: a path leads out of the archive or names two things, or a file is encrypted or packed
+            by an unknown method.
+    """
+    _check_size(archive)
+    files: dict[str, zipfile.ZipInfo] = {}
+    for info in archive.infolist():
+        name = info.filename.replace("\\", "/")
+        parts = PurePosixPath(name).parts
+        if name.startswith("/") or ".." in parts or ":" in name or "\0" in name:
+            raise ArchiveError(f"the archive is unsafe: it contains the path {info.filename!r}")
+        if name.endswith("/") or not parts:
+            continue
+        if info.flag_bits & 0x1:
+            raise ArchiveError(f"the archive is encrypted ({info.filename}): pack it without a password")
+        if info.compress_type not in _METHODS:
+            raise ArchiveError(
+                f"{info.filename} is compressed by a method that is not supported, number "
+                f"{info.compress_type}: pack the archive with 'deflate'"
+            )
+        other = files.setdefault("/".join(parts), info)
+        if (other.CRC, other.file_size) != (info.CRC, info.file_size):
+            raise ArchiveError(f"the archive contains {'/'.join(parts)} twice, with different contents")
+    for name in files:
+        if both := next((str(above) for above in PurePosixPath(name).parents if str(above) in files), None):
+            raise ArchiveError(f"the archive contains {both} as a file and as a folder")
+    return files
+
+
+def misplaced(files: Iterable[str], wanted: str) -> str:
+    """Return why an archive with these files lacks the file `wanted` in its first folder."""
+    for name in files:
+        folder, _, last = name.rpartition("/")
+        if last == wanted and folder.split("/")[0] not in ("resources", "extra", "sources"):
+            return (
+                f"{wanted} is in the folder {folder!r} of the archive: pack the content of that folder, not "
+                "the folder"
+            )
+        if name.lower() == wanted.lower():
+            return f"the archive contains {name}, which has to be called {wanted}"
+    return f"the archive contains no {wanted}"
+
+
+def _check_size(archive: zipfile.ZipFile) -> None:
     """Check the size of an archive by its directory; `zipfile` never reads more than that declares.
 
     Raises:
         TooLargeError: too many members, too many bytes, or too deeply nested folders.
     """
-    members = archive.infolist()
-    if len(members) > MEMBERS:
-        raise TooLargeError(f"it contains {len(members)} files, more than {MEMBERS}")
-    size = sum(member.file_size for member in members)
+    infos = archive.infolist()
+    if len(infos) > MEMBERS:
+        raise TooLargeError(f"it contains {len(infos)} files, more than {MEMBERS}")
+    size = sum(info.file_size for info in infos)
     if size > UNPACKED:
         raise TooLargeError(f"unpacked it has {_in_words(size)}, more than {_in_words(UNPACKED)}")
-    depth = max((re.sub(r"[/\\\\]+", "/", member.filename).count("/") for member in members), default=0)
+    depth = max((re.sub(r"[/\\\\]+", "/", info.filename).count("/") for info in infos), default=0)
     if depth > DEPTH:
         raise TooLargeError(f"it contains {depth} nested folders, more than {DEPTH}")
 

@@ -135,7 +135,10 @@ ArchiveOption = Annotated[
 ]
 
 
-Standard = Annotated[Literal["1.0", "2.0"], typer.Option("--standard", help="Version of SSP.")]
+Standard = Annotated[
+    Literal["1.0", "2.0"] | None,
+    typer.Option("--standard", help="Version of SSP. Default: 1.0, or 2.0 for FMUs of FMI 3.0."),
+]
 For = Annotated[
     Literal["all", "omsimulator"],
     typer.Option("--for", help="Omit what OMSimulator does not support, and list it."),
@@ -148,7 +151,7 @@ def export_ssp(
     options: RunOptions,
     out: ArchiveOption = None,
     for_: For = "all",
-    standard: Standard = "1.0",
+    standard: Standard = None,
 ) -> None:
     """Write a scenario and its FMUs as an SSP archive.
 
@@ -166,5 +169,7 @@ def export_ssp(
     for note in notes:
         say(f"note: {note}")
     path = out or Path(f"{scenario.stem}.ssp")
+    if for_ == "omsimulator":
+        standard = standard or "1.0"  # which alone it reads
     write_ssp(plan, path, standard, named=out is not None)
     say(f"{path}: {len(plan.instances)} instances, {len(plan.wires)} connections")

@@ -47,7 +47,7 @@ from ..planner import Planner
 from ..results.freshness import key_of
 from ..safe_files import reads
 from ..scenario import yaml_lines
-from ..scenario.quantities import convert, gain_and_offset, measure_of
+from ..scenario.quantities import convert, gain_and_offset, unit_of
 from ..scenario.schema import Scalar, SeriesSpec
 from ..scenario.schema_validation import Instant, StrictModel, Time, validated
 from ..scenario.yaml_lines import Document
@@ -183,14 +183,14 @@ def load_fit(path: Path | str) -> LoadedFit:
     return LoadedFit(path, spec, filtered, errors, parts["training"], parts["held_out"])
 
 
-def number_in(value: Value, unit: str | None) -> float:
-    """Return a number in SI; text has a unit.
+def number_in(value: Value, unit: str | None, *, relative: bool = False) -> float:
+    """Return a number in SI; text has a unit, whose offset does not apply if the number is `relative`.
 
     Raises:
         ValueError: it is not a number, or its unit does not fit.
     """
     if isinstance(value, str):
-        return float(convert(value, unit))
+        return float(convert(value, unit, relative=relative))
     if isinstance(value, bool):
         raise ValueError(f"must be a number (got {value})")
     return float(value)
@@ -450,5 +450,5 @@ def delay_and_offset(values: Mapping[str, float], signal: str) -> tuple[float, f
 
 def _conversion(signal: str, variable: Variable) -> tuple[float, float] | None:
     """Return gain and offset from a measured signal to an input, None if their units differ in kind."""
-    wanted = measure_of(variable.unit, variable.definition)
+    wanted = unit_of(variable)
     return gain_and_offset(SIGNALS[signal].unit, wanted) if wanted else (1.0, 0.0)

@@ -389,7 +389,7 @@ def free_parameters(fit: LoadedFit, model: ScenarioModel) -> list[Parameter]:
 def _parameter(
     name: str, spec: FreeSpec, fit: LoadedFit, model: ScenarioModel, followed: set[str]
 ) -> Parameter:
-    kind, signal, start, unit = "run", "", None, None
+    kind, signal, start, unit, relative = "run", "", None, None, False
     if name.startswith(f"{MEASURED}."):
         _, signal, *rest = [*name.split("."), ""]
         if rest[:1] not in (["delay"], ["offset"]) or signal not in {*fit.errors, *followed}:
@@ -397,26 +397,27 @@ def _parameter(
             guess = hint(name, known, lead="known are")
             raise ValueError(f"must be delay or offset of a signal that is compared or followed{guess}")
         unit = "s" if rest[0] == "delay" else SIGNALS[signal].unit
-        start, kind = 0.0, "run" if signal in followed else rest[0]
+        start, kind, relative = 0.0, "run" if signal in followed else rest[0], True
     else:
-        start, unit = _value_of(Target.parse(name), model)
+        start, unit, relative = _value_of(Target.parse(name), model)
     if spec.start is not None:
-        start = number_in(spec.start, unit)
-    low, high = number_in(spec.low, unit), number_in(spec.high, unit)
+        start = number_in(spec.start, unit, relative=relative)
+    low, high = (number_in(bound, unit, relative=relative) for bound in (spec.low, spec.high))
     if start is None:
         raise ValueError("'start' is missing: the scenario gives no single value")
     if not low < start < high:
         raise ValueError(f"start {start:g} must lie between low {low:g} and high {high:g}")
     prior = None
     if spec.prior is not None:
-        prior = number_in(spec.prior.mean, unit), number_in(spec.prior.deviation, unit)
+        mean = number_in(spec.prior.mean, unit, relative=relative)
+        prior = mean, number_in(spec.prior.deviation, unit, relative=True)
         if not prior[1] > 0.0:
             raise ValueError("prior: its deviation must be above 0")
     return Parameter(name, start, low, high, kind, signal, prior, unit or "1")  # type: ignore[arg-type]
 
 
-def _value_of(target: Target, model: ScenarioModel) -> tuple[float | None, str | None]:
-    """Return the scenario's value of a target and its unit; None where it has none.
+def _value_of(target: Target, model: ScenarioModel) -> tuple[float | None, str | None, bool]:
+    """Return the scenario's value of a target and its unit, None where it has none; and if it is relative.
 
     Raises:
         ValueError: nothing in the scenario takes it.
@@ -424,18 +425,18 @@ def _value_of(target: Target, model: ScenarioModel) -> tuple[float | None, str |
     name = target.variable
     if target.kind == "fact":
         value = model.planner.load(model.fit.scenario).friction if name == "friction" else None
-        return (value if isinstance(value, float) else None), FACTS[name].unit
+        return (value if isinstance(value, float) else None), FACTS[name].unit, False
     having = [
         instance
         for instance in model.base.instances
         if name in instance.fmu.variables and target.instance in ("", instance.name)
     ]
     if target.kind == "vehicle_parameter" and not having and name in CAR:
-        return None, CAR[name].unit
+        return None, CAR[name].unit, False
     if target.kind == "input":
-        return None, None
+        return None, None, False
     if target.kind not in ("parameter", "vehicle_parameter") or not having:
         raise ValueError(f"{target}: nothing in the scenario takes it")
     value = having[0].parameter(name)
     number = float(value) if isinstance(value, (int, float)) else None
-    return number, having[0].fmu.variables[name].unit
+    return number, having[0].fmu.variables[name].unit, having[0].fmu.variables[name].relative

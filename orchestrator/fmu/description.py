@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import hashlib
 import io
-import itertools
 import math
 import platform as machine
 import sys
+import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -20,6 +20,8 @@ from xml.etree import ElementTree
 from ..errors import Diagnostic, ModelDescriptionError
 from ..messages import short
 from ..plan import Fmu, UnitDefinition, Value, Variable
+from ..safe_files import misplaced
+from ..signal_names import element_names
 
 _ALWAYS = ("EnterInitializationMode", "ExitInitializationMode", "DoStep", "FreeInstance")
 CORE = {
@@ -43,12 +45,6 @@ _REFUSED = {
 }
 MOST = 100_000
 """Largest number of elements of an array; chosen: more than any interface has."""
-
-
-def integer_limits(kind: str) -> tuple[int, int]:
-    """Return the smallest and the largest number of an integer type of FMI 3.0, such as "UInt8"."""
-    bits = int(kind.partition("Int")[2])
-    return (0, 2**bits - 1) if kind.startswith("U") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
 
 
 def scalars(description: Any, root: ElementTree.Element) -> tuple[dict[str, Variable], dict[str, str]]:
@@ -105,17 +101,17 @@ def scalars(description: Any, root: ElementTree.Element) -> tuple[dict[str, Vari
                     element=i,
                     elements=len(names),
                     alias_of=aliases[i],
+                    relative=_relative(element, declared),
                 ),
             )
     return variables, refused
 
 
-def element_names(name: str, shape: tuple[int, ...]) -> list[str]:
-    """Return the names of an array's elements, row by row and counted from 1; for a scalar, its name."""
-    if not shape:
-        return [name]
-    indices = itertools.product(*(range(1, n + 1) for n in shape))
-    return [f"{name}[{','.join(map(str, index))}]" for index in indices]
+def _relative(element: ElementTree.Element, declared: Any) -> bool:
+    """Return whether a variable is a difference: as its element says, else its type."""
+    own = element if element.tag != "ScalarVariable" else element.find("Real")
+    text = None if own is None else own.get("relativeQuantity")  # fmpy reads that of types alone
+    return bool(declared and declared.relativeQuantity) if text is None else text in ("true", "1")
 
 
 def _reason(v: Any) -> str | None:
@@ -200,6 +196,7 @@ def hashes_of_modules(files: Mapping[str, bytes]) -> dict[str, str]:
     return {module: digest.hexdigest() for module, digest in hashes.items()}
 
 
+MODEL_DESCRIPTION = "modelDescription.xml"
 SUPPORTED = "supported are FMI 2.0 and 3.0 for co-simulation"
 
 
@@ -211,9 +208,9 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
     Raises:
         ModelDescriptionError: it is missing, malformed, unusable, or of a kind that is not supported.
     """
-    if "modelDescription.xml" not in files:
-        raise ModelDescriptionError(f"{path}: not an FMU: the archive contains no modelDescription.xml")
-    root = _parsed(files["modelDescription.xml"], path)
+    if MODEL_DESCRIPTION not in files:
+        raise ModelDescriptionError(f"{path}: not an FMU: {misplaced(files, MODEL_DESCRIPTION)}")
+    root = _parsed(files[MODEL_DESCRIPTION], path)
     fmi = int(root.get("fmiVersion", "")[0])
     if wrong := _dangling(root, fmi):
         raise ModelDescriptionError(f"{path}: the model description cannot be used: {wrong}")
@@ -223,10 +220,10 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
     violations: list[str] = []
     try:
         try:
-            description = read_model_description(io.BytesIO(raw))
+            description = read_model_description(_for_fmpy(files))
         except ValidationError as error:
             violations = [_one_line(violation) for violation in error.problems]
-            description = read_model_description(io.BytesIO(raw), validate=False)
+            description = read_model_description(_for_fmpy(files), validate=False)
         variables, refused = scalars(description, root)
     except Exception as error:  # fmpy raises whatever its parsing meets
         reason = _one_line(error) or type(error).__name__
@@ -241,6 +238,8 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
     kind = description.coSimulation
     experiment = description.defaultExperiment
     identifier = kind.modelIdentifier or ""
+    fixed = _above_zero(kind.fixedInternalStepSize)
+    preferred = _above_zero(experiment.stepSize if experiment else None)
     return Fmu(
         name=path.stem,
         path=path,
@@ -261,10 +260,23 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
             for text in violations
         ),
         lacking=lacking(files.get(binary_of(fmi, identifier)), fmi),
-        tolerance=_tolerance(experiment),
+        tolerance=_above_zero(experiment.tolerance if experiment else None),
+        fixed_step=fixed or (None if kind.canHandleVariableCommunicationStepSize else preferred),
+        takes_multiples=fixed is not None,
         needs_tool=kind.needsExecutionTool,
         host_packages=tuple(_annotated(root, "hostPackages", "names").split()),
     )
+
+
+def _for_fmpy(files: Mapping[str, bytes]) -> io.BytesIO:
+    """Return an archive of the files that fmpy reads, with their plain paths."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        for name in (MODEL_DESCRIPTION, "sources/buildDescription.xml"):
+            if name in files:
+                archive.writestr(name, files[name])
+    content.seek(0)
+    return content
 
 
 def platform(fmi: int = 2) -> tuple[str, str]:
@@ -326,11 +338,13 @@ def _one_line(problem: object) -> str:
     return " ".join(str(problem).split())
 
 
-def _tolerance(experiment: Any) -> float | None:
-    """Return the tolerance of a default experiment, None if it has no valid one."""
-    text = experiment.tolerance if experiment else None
-    value = None if text is None else float(text)
-    return value if value is not None and 0.0 < value < math.inf else None
+def _above_zero(text: str | float | None) -> float | None:
+    """Return an optional number of a description, None if there is none or it is not above 0 and finite."""
+    try:
+        value = float("nan" if text is None else text)
+    except ValueError:
+        return None
+    return value if 0.0 < value < math.inf else None
 
 
 def _parsed(xml: bytes, path: Path) -> ElementTree.Element:

@@ -9,6 +9,9 @@ Only connected inputs have a connector. A constant is a parameter value with the
 and Ecos read it that way, and fmpy gives an input connector without a connection the value of another one.
 Equal plans give equal bytes.
 
+Arrays and the types of FMI 3.0 are written as SSP 2.0 has them: an array is one connector and one parameter
+with its dimensions, and a connection names the indices of the element that it connects. SSP 1.0 has neither.
+
 `for_omsimulator` reduces a plan to what OMSimulator can run: no texts, no steps of instances, no
 transformations.
 """
@@ -36,7 +39,7 @@ from ..messages import fold, listed
 from ..plan import Fmu, Instance, Plan, Value, Variable, Wire
 from ..safe_files import write_whole
 from ..scenario.overrides import with_changes
-from ..scenario.quantities import BASE_UNITS, Unit, measure_of
+from ..scenario.quantities import BASE_UNITS, Unit, conversion, measure_of
 from ..scenario.ssp_archive import (
     DESCRIPTION_FILE,
     NAMESPACES,
@@ -52,17 +55,24 @@ from ..scenario.ssp_archive import (
     SSD,
     SSV,
 )
-from ..wiring.connections import conversion_between
 
 _FILE_TIME = (1980, 1, 1, 0, 0, 0)
 
 
 Version = Literal["1.0", "2.0"]
-"""Version of the SSP standard; the files written differ only in this number."""
+"""Version of the SSP standard; for FMUs of FMI 2.0, the files written differ only in this number."""
+OLD_TYPES = {"Float64": "Real", "Int32": "Integer"}
+"""Type of FMI 3.0 that SSP 1.0 has -> its name there."""
 
 
-def write_ssp(plan: Plan, path: Path, standard: Version = "1.0", *, named: bool = False) -> None:
-    """Write the plan and its FMUs into the archive `path`; `named`: as in `write_whole`.
+def write_ssp(plan: Plan, path: Path, standard: Version | None = None, *, named: bool = False) -> None:
+    """Write the plan and its FMUs into an archive.
+
+    Args:
+        plan: the run.
+        path: of the archive.
+        standard: version of SSP; None: 1.0, or 2.0 if there are FMUs of FMI 3.0.
+        named: as in `write_whole`.
 
     Raises:
         ResultsError: the archive cannot be written, or a text or value cannot be represented in it.
@@ -80,6 +90,13 @@ def write_ssp(plan: Plan, path: Path, standard: Version = "1.0", *, named: bool 
             code="ssp-unsupported",
         )
     sources = _sources(plan)
+    standard = standard or ("2.0" if any(instance.fmu.fmi > 2 for instance in plan.instances) else "1.0")
+    if standard == "1.0" and (lost := _lost(plan)):
+        raise ResultsError(
+            f"{path}: SSP 1.0 has no arrays, and of the types of FMI 3.0 only Float64, Int32, Boolean and "
+            f"String: {listed(fold(lost))} needs SSP 2.0",
+            code="ssp-unsupported",
+        )
     try:
         structure = system_structure(plan, standard)
     except ValueError as error:  # a control character in a text
@@ -97,6 +114,43 @@ def write_ssp(plan: Plan, path: Path, standard: Version = "1.0", *, named: bool 
         raise ResultsError(
             f"{path}: cannot write this archive: {error.strerror or error}", code="results-unwritable"
         ) from None
+
+
+def _lost(plan: Plan) -> list[str]:
+    """Return the variables that an archive would contain and SSP 1.0 cannot express."""
+    return [
+        f"{instance.name}.{v.name}"
+        for instance in plan.instances
+        for v in (*_shown(instance, plan), *(instance.fmu.variables[name] for name in _given(instance)))
+        if v.elements > 1 or (_type(v) not in ("Real", "Integer", *OLD_TYPES, "Boolean", *UNREAD))
+    ]
+
+
+def _shown(instance: Instance, plan: Plan) -> list[Variable]:
+    """Return the variables of an instance that have connectors: connected inputs, and outputs."""
+    driven = {wire.input for wire in plan.wires if wire.target == instance.name}
+    return [v for v in instance.fmu.of("input") if v.name in driven] + instance.fmu.of("output")
+
+
+def _given(instance: Instance) -> dict[str, Value]:
+    """Return the values of an instance; start values that are no numbers stay in the FMU."""
+    values = {**instance.parameters, **instance.constants}
+    return {k: v for k, v in values.items() if not isinstance(v, float) or math.isfinite(v)}
+
+
+def _type(variable: Variable) -> str:
+    """Return the type of a variable, as SSP 2.0 names it."""
+    plain = variable.type in ("Boolean", *UNREAD)
+    return variable.type if plain or variable.encoding is None else variable.encoding
+
+
+def _array(fmu: Fmu, variable: Variable) -> tuple[str, tuple[int, ...], list[Variable]]:
+    """Return the name, shape and elements of the array that a variable belongs to; a scalar is its own."""
+    if variable.elements == 1:
+        return variable.name, (), [variable]
+    name = variable.name.rpartition("[")[0]
+    every = [v for v in fmu.variables.values() if v.name.rpartition("[")[0] == name]
+    return name, tuple(map(int, every[-1].name[len(name) + 1 : -1].split(","))), every
 
 
 def _put(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
@@ -125,11 +179,13 @@ def system_structure(plan: Plan, standard: Version = "1.0") -> _Element:
     system = SubElement(root, f"{{{SSD}}}System", name="system")
     elements = SubElement(system, f"{{{SSD}}}Elements")
     for instance in instances:
-        _add_component(elements, instance, plan, sources[instance.fmu.sha256], spelled, enumerations)
+        _add_component(
+            elements, instance, plan, sources[instance.fmu.sha256], spelled, enumerations, standard
+        )
     if plan.wires:
         connections = SubElement(system, f"{{{SSD}}}Connections")
         for wire in plan.wires:
-            _add_connection(connections, wire)
+            _add_connection(connections, wire, plan)
     _add_step(system, plan)
     for parameter_set in root.iter(f"{{{SSV}}}ParameterSet"):
         parameter_set.set("version", standard)
@@ -160,20 +216,31 @@ def _add_step(system: _Element, plan: Plan) -> None:
     master.attrib.update({"description": "oms-ma", "stepSize": step, **tolerances})
 
 
-def _add_connection(above: _Element, wire: Wire) -> None:
+def _add_connection(above: _Element, wire: Wire, plan: Plan) -> None:
     """Write a wire, with its conversion as an explicit gain and offset for programs that ignore units."""
-    connection = SubElement(
-        above,
-        f"{{{SSD}}}Connection",
-        startElement=wire.source,
-        startConnector=wire.output,
-        endElement=wire.target,
-        endConnector=wire.input,
-    )
-    if wire.converts:
+    connection = SubElement(above, f"{{{SSD}}}Connection")
+    fmus = {instance.name: instance.fmu for instance in plan.instances}
+    ends = (("start", wire.source, wire.output), ("end", wire.target, wire.input))
+    for which, instance, variable in ends:
+        name, shape, _ = _array(fmus[instance], fmus[instance].variables[variable])
+        connection.set(f"{which}Element", instance)
+        connection.set(f"{which}Connector", name)
+        if shape:
+            connection.set(f"{which}Indices", variable[len(name) + 1 : -1].replace(",", " "))
+    source, target = fmus[wire.source].variables[wire.output], fmus[wire.target].variables[wire.input]
+    if wire.converts or _by_units(source, target) != (1.0, 0.0):
         connection.set("suppressUnitConversion", "true")
         scale = {"factor": repr(wire.gain), "offset": repr(wire.offset)}
         SubElement(connection, f"{{{SSC}}}LinearTransformation", scale)
+
+
+def _by_units(source: Variable, target: Variable) -> tuple[float, float] | None:
+    """Return what other programs make of the units of two variables, None if these are incompatible.
+
+    SSP does not say which quantities are differences, so offsets apply to all.
+    """
+    of, to = (measure_of(v.unit, v.definition) for v in (source, target))
+    return conversion(of, to) if of and to else (1.0, 0.0)
 
 
 def _in_order_of_scenario(plan: Plan) -> list[Instance]:
@@ -201,6 +268,7 @@ def _add_component(
     source: str,
     spelled: Mapping[str, Unit],
     enumerations: dict[str, Mapping[str, int]],
+    standard: Version,
 ) -> None:
     component = SubElement(
         elements, f"{{{SSD}}}Component", name=instance.name, type="application/x-fmu-sharedlibrary"
@@ -209,46 +277,70 @@ def _add_component(
     component.set("implementation", "CoSimulation")
     if instance.fmu.description:
         component.set("description", instance.fmu.description)
-    driven = {wire.input for wire in plan.wires if wire.target == instance.name}
-    shown = [v for v in instance.fmu.of("input") if v.name in driven] + instance.fmu.of("output")
+    shown = {(array := _array(instance.fmu, v))[0]: (v, array[1]) for v in _shown(instance, plan)}
     if shown:
         connectors = SubElement(component, f"{{{SSD}}}Connectors")
-        for variable in shown:
-            connector = SubElement(
-                connectors, f"{{{SSD}}}Connector", name=variable.name, kind=variable.causality
-            )
+        for name, (variable, shape) in shown.items():
+            connector = SubElement(connectors, f"{{{SSD}}}Connector", name=name, kind=variable.causality)
             if variable.description:
                 connector.set("description", variable.description)
-            kind = SubElement(connector, f"{{{SSC}}}{variable.type}")
+            kind = SubElement(connector, f"{{{SSC}}}{_spelled_type(variable, standard)}")
             if variable.type == "Real" and variable.unit in spelled:
                 kind.set("unit", str(variable.unit))
             elif variable.type == "Enumeration":
-                name = f"{instance.name}.{variable.name}"
-                enumerations[name] = variable.items or {}
-                kind.set("name", name)
-    values = {**instance.parameters, **instance.constants}
+                of_items = f"{instance.name}.{name}"
+                enumerations[of_items] = variable.items or {}
+                kind.set("name", of_items)
+            _add_dimensions(connector, shape)
+    values = _given(instance)
     if values:
         bindings = SubElement(component, f"{{{SSD}}}ParameterBindings")
         binding = SubElement(bindings, f"{{{SSD}}}ParameterBinding")
-        _add_values(SubElement(binding, f"{{{SSD}}}ParameterValues"), values, instance.fmu, spelled)
+        above = SubElement(binding, f"{{{SSD}}}ParameterValues")
+        _add_values(above, values, instance.fmu, spelled, standard)
     if instance.period > 1:
         annotation = _annotation(component, OSP_ANNOTATION)
         hint = SubElement(annotation, f"{{{OSP}}}StepSizeHint")
         hint.set("value", _decimal(instance.period * plan.step))
 
 
-def _add_values(above: _Element, values: Mapping[str, Value], fmu: Fmu, spelled: Mapping[str, Unit]) -> None:
+def _spelled_type(variable: Variable, standard: Version) -> str:
+    return _type(variable) if standard == "2.0" else OLD_TYPES.get(_type(variable), variable.type)
+
+
+def _add_dimensions(above: _Element, shape: tuple[int, ...]) -> None:
+    for size in shape:
+        SubElement(above, f"{{{SSC}}}Dimension", size=str(size))
+
+
+def _add_values(
+    above: _Element, values: Mapping[str, Value], fmu: Fmu, spelled: Mapping[str, Unit], standard: Version
+) -> None:
     parameter_set = SubElement(above, f"{{{SSV}}}ParameterSet", version="1.0", name=PARAMETER_SET)
     parameters = SubElement(parameter_set, f"{{{SSV}}}Parameters")
     present = []
-    for name, value in values.items():
-        variable = fmu.variables[name]
+    arrays = {(array := _array(fmu, fmu.variables[name]))[0]: array for name in values}
+    for name, shape, elements in arrays.values():
+        variable = elements[0]
         parameter = SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
-        kind = SubElement(parameter, f"{{{SSV}}}{variable.type}", value=_text(variable, value))
+        kind = SubElement(parameter, f"{{{SSV}}}{_spelled_type(variable, standard)}")
+        texts = [_text(v, _value(v, values)) for v in elements]
+        if shape and variable.type in UNREAD:
+            for text in texts:
+                SubElement(kind, f"{{{SSV}}}Value", value=text)
+        else:
+            kind.set("value", " ".join(texts))
+        _add_dimensions(parameter, shape)
         if variable.type == "Real" and variable.unit in spelled:
             kind.set("unit", str(variable.unit))
             present.append(variable.unit)
     _add_units(parameter_set, {unit: spelled[unit] for unit in spelled if unit in present})
+
+
+def _value(variable: Variable, values: Mapping[str, Value]) -> Value:
+    """Return the value of an element of an array, of one without a value that which it has at the start."""
+    start = variable.start if variable.start is not None else "" if variable.type == "String" else 0
+    return values.get(variable.name, start)
 
 
 def _text(variable: Variable, value: Value) -> str:
@@ -346,8 +438,7 @@ def for_omsimulator(plan: Plan) -> tuple[Plan, list[str]]:
 
     def by_units(wire: Wire) -> bool:
         source, target = fmus[wire.source][wire.output], fmus[wire.target][wire.input]
-        known = source.unit is not None and target.unit is not None
-        return not wire.converts or (known and conversion_between(source, target) == (wire.gain, wire.offset))
+        return (_by_units(source, target) or (1.0, 0.0)) == (wire.gain, wire.offset)
 
     problems = [
         f"{wire.source}.{wire.output} to {wire.target}.{wire.input}: OMSimulator applies no gain and "

@@ -38,7 +38,7 @@ def load_scenario(
     """Read a scenario file, or an SSP archive.
 
     Args:
-        path: the YAML file, or the archive.
+        path: the YAML file, or the archive; of an archive with variants also `system.ssp/other.ssd`.
         changes: overrides of the file; see `overrides`.
         data: its content, if there is no such file: messages name `path`.
         read: reads a file, called like `yaml_lines.read`; the returned document is modified.
@@ -47,7 +47,7 @@ def load_scenario(
     Raises:
         ScenarioError: with all errors of the file, its vehicle file and the overrides.
     """
-    archive = Path(path).suffix.lower() == ".ssp"
+    archive = Path(path).suffix.lower() in ARCHIVES
     if data is not None:
         document = Document(Path(path), data=data)
     else:
@@ -231,6 +231,8 @@ SHIPPED = Path(__file__).resolve().parents[2] / FOLDER
 """Folder of the scenarios that come with this program."""
 YAML = (".yaml", ".yml")
 ENDINGS = (*YAML, ".ssp")
+ARCHIVES = (".ssp", ".ssd")
+"""Endings of an SSP archive, and of a description in one."""
 LOOKED_AT = 20_000
 """Maximum number of examined entries of a folder. Chosen: a second, and more than real folders have."""
 COMMANDS = {
@@ -258,7 +260,7 @@ def folders() -> list[Path]:
 
 def kind_of(path: Path) -> str:
     """Guess the kind of a file (`schema_validation.KINDS`) from its keys, unparsed; "" if unknown."""
-    if path.suffix == ".ssp":
+    if path.suffix.lower() in ARCHIVES:
         return "a scenario"
     try:
         keys = _KEY.findall(read_bytes(path, largest=TEXT).decode("utf-8-sig"))
@@ -335,7 +337,7 @@ def find(source: str | Path, kind: str) -> Path:
         return path
     known = [name.removeprefix(f"{HOMES.get(kind)}/") for name in names(kind)]
     elsewhere = [name for name in known if path.stem == name.rpartition("/")[2]]
-    if path.suffix in ENDINGS and not elsewhere:
+    if (path.suffix in ENDINGS and not elsewhere) or path.suffix.lower() in ARCHIVES:
         return path
     if file := named(source, kind):
         return file

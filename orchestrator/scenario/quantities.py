@@ -7,6 +7,9 @@ m, s, A, K, mol, cd, rad (FMI 2.0.4, section 2.2.2), a factor and an offset. Fac
 a separate power of pi, so that 90 km/h is 25 m/s to the last bit. The definition of an FMU takes precedence
 over the tables, unless both agree except for rounding: then the tables have more digits.
 
+Offsets of units, such as that of degC, apply to absolute quantities. FMI marks differences
+(`relativeQuantity`): to them, and to what a fault adds to a signal, no offset applies.
+
 A lone `g` is standard gravity, 9.80665 m/s2, where an acceleration is expected, otherwise a gram.
 """
 
@@ -22,7 +25,7 @@ from functools import cache, lru_cache
 
 from ..errors import InvalidValueError
 from ..messages import closest, listed, short
-from ..plan import UnitDefinition
+from ..plan import UnitDefinition, Variable
 
 BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 Powers = tuple[int, int, int, int, int, int, int, int]  # of BASE_UNITS
@@ -38,6 +41,7 @@ class Unit:
     pi: int
     powers: Powers
     offset: Fraction = Fraction(0)
+    relative: bool = False  # of differences, to which no offset applies: a rise of 7 degC is one of 7 K
 
     def __mul__(self, other: Unit) -> Unit:
         powers = tuple(a + b for a, b in zip(self.powers, other.powers, strict=True))
@@ -195,16 +199,26 @@ def measure_of(unit: str | None, definition: UnitDefinition | None = None) -> Un
     return known if known is not None and conversion(defined, known) == (1.0, 0.0) else defined
 
 
+def unit_of(variable: Variable) -> Unit | None:
+    """Return the unit of a variable, None if neither its FMU nor the tables define it."""
+    measure = measure_of(variable.unit, variable.definition)
+    return replace(measure, relative=True) if measure and variable.relative else measure
+
+
+def _offset(source: Unit, target: Unit) -> Fraction:
+    return Fraction(0) if source.relative or target.relative else source.offset - target.offset
+
+
 def conversion(source: Unit, target: Unit) -> tuple[float, float] | None:
     """Return gain and offset that convert from `source` to `target`, None if they are incompatible.
 
-    They are exactly 1 and 0 for equal units (see `ROUNDING`).
+    They are exactly 1 and 0 for equal units (see `ROUNDING`). If one of them is relative, so is the other.
     """
     if source.powers != target.powers:
         return None
     try:
         gain = float(source.factor / target.factor) * math.pi ** (source.pi - target.pi)
-        offset = float((source.offset - target.offset) / target.factor) / math.pi**target.pi
+        offset = float(_offset(source, target) / target.factor) / math.pi**target.pi
     except OverflowError:  # extreme definitions in FMUs
         return None
     same = math.isclose(gain, 1.0, rel_tol=ROUNDING) and abs(offset) <= ROUNDING
@@ -247,10 +261,16 @@ def number_and_unit(text: str) -> tuple[str, str] | None:
     return (match["number"], match["unit"]) if match and match["unit"] else None
 
 
-def convert(text: str, unit: str | None, definition: UnitDefinition | None = None) -> Fraction | float:
+def convert(
+    text: str, unit: str | None, definition: UnitDefinition | None = None, *, relative: bool = False
+) -> Fraction | float:
     """Convert the quantity `text` to a number in `unit`: a Fraction where that is exact.
 
-    `definition` is that of the FMU which declares the unit.
+    Args:
+        text: a number with its unit.
+        unit: of the result.
+        definition: that of the FMU which declares the unit.
+        relative: whether the quantity is a difference, to which offsets of units do not apply.
 
     Raises:
         ValueError: not such a quantity; the message says what is expected.
@@ -284,7 +304,7 @@ def convert(text: str, unit: str | None, definition: UnitDefinition | None = Non
             f"{text!r} is not a value in {unit}: use {listed(_spellings(unit, target), last='or')}",
             code="unit-mismatch",
         )
-    value = converted(number, source, target)
+    value = converted(number, source, replace(target, relative=relative))
     if value == math.inf:
         raise ValueError(f"must be a finite number in {unit} (got {text!r})")
     return value
@@ -312,7 +332,7 @@ def converted(number: Fraction, source: Unit, target: Unit) -> Fraction | float:
 
     The result is exact where possible, and infinite where it is too large for a float.
     """
-    exact = (number * source.factor + source.offset - target.offset) / target.factor
+    exact = (number * source.factor + _offset(source, target)) / target.factor
     turns = source.pi - target.pi
     try:
         value = float(exact) * math.pi**turns

@@ -206,8 +206,9 @@ InputValue = Annotated[
 class Connection(StrictModel):
     """Connections in addition to equal names; a `*` in both ends connects all matching pairs.
 
-    Numbers are converted from the unit of the output to that of the input. With `gain` or `offset`, units
-    are ignored: the input is gain times the output plus offset, in plain numbers.
+    Numbers are converted from the unit of the output to that of the input, those of differences
+    (`relativeQuantity` of FMI) without the offset of a unit: a rise of 7 degC is one of 7 K. With `gain` or
+    `offset`, units are ignored: the input is gain times the output plus offset, in plain numbers.
 
     Lists of instances choose among equal names: with
     `{from: [estimator, sensor], to: [controller, reference]}`, each input of the latter takes the output of

@@ -1,6 +1,11 @@
 """SSP archives: their members, and components and connections, with nested systems flattened.
 
-Nothing is unpacked to disk, and references outside of the archive are refused.
+Nothing is unpacked to disk, and references outside of the archive are refused. An archive may have several
+descriptions, variants of a system: `SystemStructure.ssd` is the default, another is named as if the archive
+were a folder, `system.ssp/other.ssd`.
+
+Arrays are taken apart: an array `u` has the elements `u[1]`, `u[2]`, row by row, which connections and values
+reach one by one or all at once.
 
 The start and end of a connection do not determine its direction: the kinds of its connectors do. Inside a
 system, its own inputs are sources and its outputs are targets.
@@ -10,11 +15,12 @@ from __future__ import annotations
 
 import contextlib
 import io
+import math
 import posixpath
 import zipfile
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import unquote, urlsplit
@@ -23,9 +29,10 @@ from lxml import etree
 from lxml.etree import _Element
 
 from ..errors import Diagnostic, Location
-from ..messages import short
+from ..messages import listed, short
 from ..plan import Causality, UnitDefinition
-from ..safe_files import PACKED, TooLargeError, check_archive, read_bytes, reason
+from ..safe_files import PACKED, ArchiveError, TooLargeError, members, misplaced, read_bytes, reason
+from ..signal_names import element_names
 from .quantities import BASE_UNITS, Unit, measure_of
 
 DESCRIPTION_FILE = "SystemStructure.ssd"
@@ -52,6 +59,8 @@ OSP_ANNOTATION = "com.opensimulationplatform"
 OMS_ANNOTATION = "org.openmodelica"
 OWN_ANNOTATION = "yawbench"
 
+LARGEST_ARRAY = 100_000
+"""Largest number of elements of an array; chosen: more than any interface has."""
 LARGEST = 100_000_000
 """Maximum bytes of an unpacked description. Chosen: a thousand times the size of ours."""
 
@@ -80,36 +89,67 @@ class SspVariable(NamedTuple):
     causality: Causality | None
     unit: str | None = None
     definition: UnitDefinition | None = None
+    relative: bool = False  # a difference, to which offsets of units do not apply
+    shape: tuple[int, ...] | None = ()  # of an array; None: the archive does not give it
+    alias_of: str | None = None  # the variable of which this is another name (FMI 3.0)
 
     @property
     def measure(self) -> Unit | None:
         """Its parsed unit, None if it has none or an unknown one."""
-        return measure_of(self.unit, self.definition)
+        measure = measure_of(self.unit, self.definition)
+        return replace(measure, relative=True) if measure and self.relative else measure
 
 
 class SspArchive:
     """An SSP archive, read into memory.
+
+    Args:
+        path: of the archive, or of a description in it, `system.ssp/other.ssd`.
+        what: kind of the file, for messages.
 
     Raises:
         SspError: the archive is missing or damaged.
     """
 
     def __init__(self, path: Path, *, what: str) -> None:
-        self.path = path
+        inside = path.suffix.lower() == ".ssd"
+        self.path = path.parent if inside else path
+        self.description = path.name if inside else DESCRIPTION_FILE
+        """Name of the member that describes the system."""
+        self.root = "." if inside else self.path.name
+        """Path of the archive, from the folder of `path`."""
+        if inside and self.path.is_dir():
+            if not path.exists():
+                raise SspError("no such file", code="file-missing")
+            raise SspError(
+                "an .ssd file is read inside its archive: pack its folder as an .ssp file and give that",
+                code="file-wrong-kind",
+            )
         try:
-            raw = read_bytes(path, largest=PACKED)
+            raw = read_bytes(self.path, largest=PACKED)
         except FileNotFoundError:
             raise SspError(f"no such {what}", code="file-missing") from None
         except (OSError, ValueError) as error:
             raise SspError(f"cannot read this {what}: {reason(error)}", code="file-unreadable") from None
         try:
             self._archive = zipfile.ZipFile(io.BytesIO(raw))
-            check_archive(self._archive)
-        except TooLargeError as error:
+            self._members = members(self._archive)
+        except (ArchiveError, TooLargeError) as error:
             raise SspError(f"cannot read this {what}: {error}", code="file-unreadable") from None
         except _DAMAGE as error:
             raise SspError(f"no {what}, or damaged: {error}") from None
         self._variables: dict[str, dict[str, SspVariable]] = {}
+
+    def variants(self) -> dict[str, str]:
+        """Return the descriptions in the archive, with their names: member -> name."""
+        names = {}
+        for member in self._members:
+            if "/" not in member and member.lower().endswith(".ssd"):
+                try:
+                    names[member] = self.xml(member, f"{{{SSD}}}SystemStructureDescription").get("name", "")
+                except SspError:
+                    names[member] = ""
+        return names
 
     def member(self, element: _Element) -> str:
         """Return the name of the member that the `source` of an element refers to.
@@ -139,19 +179,29 @@ class SspArchive:
         Raises:
             SspError: the member is missing or damaged, or its root is not a `tag`.
         """
+        if member not in self._members:
+            raise SspError(f"no SSP archive, or not all of it: {self._lacks(member)}")
         try:
-            if self._archive.getinfo(member).file_size > LARGEST:
+            if self._members[member].file_size > LARGEST:
                 raise SspError(f"{member} is larger than {LARGEST // 10**6} MB")
-            root = etree.fromstring(self._archive.read(member), _parser(), base_url=member)
-        except KeyError:
-            raise SspError(f"no SSP archive, or not all of it: there is no {member}") from None
+            root = etree.fromstring(self._archive.read(self._members[member]), _parser(), base_url=member)
         except etree.XMLSyntaxError as error:
             raise SspError(f"{member} is not well-formed: {error.msg}") from None
         except _DAMAGE as error:
             raise SspError(f"{member} is damaged: {error}") from None
         if root.tag != tag:
-            raise SspError(f"{member} is not a {etree.QName(tag).localname} of SSP 1.0")
+            raise SspError(f"{member} is not a {etree.QName(tag).localname} of SSP 1.0 or 2.0")
+        check_version(root)
         return root
+
+    def _lacks(self, member: str) -> str:
+        """Return what the archive has in place of a missing member."""
+        others = [] if member in self._members else [n for n in self.variants() if n != member]
+        if member == self.description and others:
+            return f"there is no {member}; it has {listed(others)}, run as {self.path}/{others[0]}"
+        if member == self.description:
+            return misplaced(self._members, member)
+        return f"there is no {member}"
 
     def variables(self, member: str, component: _Element) -> dict[str, SspVariable]:
         """Return the variables of an FMU; none if it cannot be read, which is reported when it is opened.
@@ -160,13 +210,13 @@ class SspArchive:
             SspError: the FMU is not in the archive.
         """
         if member not in self._variables:
+            if member not in self._members:
+                raise SspError(f"there is no {member} in the archive", component)
             try:
-                with zipfile.ZipFile(io.BytesIO(self._archive.read(member))) as fmu:
-                    check_archive(fmu)
-                    description = etree.fromstring(fmu.read("modelDescription.xml"), _parser())
+                with zipfile.ZipFile(io.BytesIO(self._archive.read(self._members[member]))) as fmu:
+                    content = fmu.read(members(fmu)["modelDescription.xml"])
+                    description = etree.fromstring(content, _parser())
             except (KeyError, *_DAMAGE, etree.XMLSyntaxError):
-                if member not in self._archive.namelist():
-                    raise SspError(f"there is no {member} in the archive", component) from None
                 description = etree.Element("none")
             self._variables[member] = dict(_declared(description))
         return self._variables[member]
@@ -175,19 +225,65 @@ class SspArchive:
 def _declared(description: _Element) -> Iterator[tuple[str, SspVariable]]:
     """Yield the variables of a model description of FMI 2.0 or 3.0."""
     types = {
-        str(definition.get("name")): (
-            definition if definition.get("unit") else next(iter(definition), definition)
-        ).get("unit")
+        str(definition.get("name")): dict(
+            (definition if definition.tag != "SimpleType" else next(iter(definition), definition)).attrib
+        )
         for definition in description.iterfind("TypeDefinitions/*")
     }
     definitions = unit_definitions(description.iterfind("UnitDefinitions/Unit"))
+    sizes = {v.get("valueReference"): v.get("start") for v in description.iterfind("ModelVariables/*")}
     for variable in description.iterfind("ModelVariables/*"):
         kind = variable if variable.tag != "ScalarVariable" else variable.find("Real")
-        unit = None
-        if kind is not None:
-            unit = kind.get("unit") or types.get(str(kind.get("declaredType")))
-        declared = SspVariable(variable.get("causality", "local"), unit, definitions.get(str(unit)))
-        yield str(variable.get("name")), declared
+        said = {} if kind is None else {**types.get(str(kind.get("declaredType")), {}), **kind.attrib}
+        unit, name = said.get("unit"), str(variable.get("name"))
+        sized = (
+            dimension.get("start") or sizes.get(dimension.get("valueReference"))
+            for dimension in variable.iterfind("Dimension")
+        )
+        declared = SspVariable(
+            variable.get("causality", "local"),
+            unit,
+            definitions.get(str(unit)),
+            said.get("relativeQuantity") in ("true", "1"),
+            _whole(sized),
+        )
+        yield from _elements(name, declared)
+        for alias in variable.iterfind("Alias"):
+            for (other, of_alias), (element, _) in zip(
+                _elements(str(alias.get("name")), declared), _elements(name, declared), strict=True
+            ):
+                yield other, of_alias._replace(alias_of=element)
+
+
+def _whole(sizes: Iterable[str | None]) -> tuple[int, ...] | None:
+    """Return the sizes of the dimensions of an array, None if one is not given."""
+    found = [int(size) if size and size.isascii() and size.isdigit() else None for size in sizes]
+    if None in found or math.prod(size for size in found if size) > LARGEST_ARRAY:
+        return None
+    return tuple(size for size in found if size is not None)
+
+
+def _elements(name: str, declared: SspVariable) -> Iterator[tuple[str, SspVariable]]:
+    """Yield a variable or connector, and the elements of an array."""
+    yield name, declared
+    if declared.shape:
+        for element in element_names(name, declared.shape):
+            yield element, declared._replace(shape=())
+
+
+def check_version(root: _Element) -> None:
+    """Check that a description or parameter set is of a version of SSP that is read.
+
+    Raises:
+        SspError: it is of a later version.
+    """
+    version = root.get("version", "1.0")
+    if not version.startswith(("1.", "2.")):
+        raise SspError(
+            f"a {etree.QName(root).localname} of SSP {short(version)}: supported are 1.0 and 2.0",
+            root,
+            code="ssp-unsupported",
+        )
 
 
 def unit_definitions(units: Iterable[_Element]) -> dict[str, UnitDefinition]:
@@ -243,7 +339,10 @@ def number(element: _Element, attribute: str, default: float | None = None) -> f
 ElementPath = tuple[str, ...]
 """Path of an element: the names of the systems that contain it, without the outermost, then its own."""
 
-_GIVES = {"output": True, "calculatedParameter": True, "input": False, "parameter": False}
+_GIVES = {
+    "output": True, "calculatedParameter": True, "local": True, "constant": True,
+    "input": False, "parameter": False, "structuralParameter": False,
+}  # fmt: skip
 
 
 class SspEnd(NamedTuple):
@@ -278,18 +377,39 @@ class SspStructure:
     sources: dict[SspEnd, tuple[SspEnd, _Element]] = field(default_factory=dict)
     """Target -> its source and the connection between them."""
 
+    def variable(self, end: SspEnd) -> SspVariable | None:
+        """Return the declaration of a variable by its FMU, None if it is not one of an FMU."""
+        return (
+            self.components[end.element].variables.get(end.name) if end.element in self.components else None
+        )
+
     def unit_inside(self, end: SspEnd) -> Unit | None:
         """Return the unit of a variable from its FMU, else that of its connector."""
-        known = self.components[end.element].variables if end.element in self.components else {}
-        return (known[end.name].measure if end.name in known else None) or self.connector(end).measure
+        variable = self.variable(end)
+        return (variable.measure if variable else None) or self.connector(end).measure
 
     def unit_outside(self, end: SspEnd) -> Unit | None:
         """Return the unit of a connector, else that of its variable."""
         return self.connector(end).measure or self.unit_inside(end)
 
     def connector(self, end: SspEnd) -> SspVariable:
-        """Return the declaration of a connector, an empty one if the archive has none."""
-        return self.connectors[end.element].get(end.name, SspVariable(None))
+        """Return the declaration of a connector, of an element that of its array; empty if there is none."""
+        known = self.connectors[end.element]
+        return known.get(end.name) or known.get(end.name.rpartition("[")[0]) or SspVariable(None)
+
+    def elements(self, end: SspEnd) -> tuple[tuple[int, ...], list[SspEnd]]:
+        """Return the shape of a variable or connector, and its elements; a scalar is its own.
+
+        Raises:
+            SspError: the size of an array is not given.
+        """
+        variable = self.variable(end)
+        declared = variable or self.connector(end)
+        if declared.shape is None:
+            raise SspError(f"the archive does not say how many elements the array {end} has")
+        shape = () if variable is None and end.name.endswith("]") else declared.shape
+        name = declared.alias_of or end.name
+        return shape, [SspEnd(end.element, element) for element in element_names(name, shape)]
 
     def upstream(self, end: SspEnd) -> list[SspEnd]:
         """Return the chain of sources of an end: connectors of systems, then a component's output, if any.
@@ -307,19 +427,16 @@ class SspStructure:
                 break
         return ends
 
-    def find(self, path: ElementPath, name: str) -> SspEnd | None:
-        """Resolve a hierarchical name in the element `path`, None if there is no such variable."""
+    def find(self, path: ElementPath, name: str) -> list[SspEnd]:
+        """Return the variables with a hierarchical name in the element `path`; several if names have dots."""
         if path in self.components:
             known = self.components[path].variables
-            return SspEnd(path, name) if name in known or not known else None
-        if name in self.connectors[path]:
-            return SspEnd(path, name)
+            return [SspEnd(path, name)] if name in known or not known else []
+        found = [SspEnd(path, name)] if name in self.connectors[path] else []
         for inner in (*self.components, *self.systems):
             if inner[:-1] == path and inner and name.startswith(f"{inner[-1]}."):
-                end = self.find(inner, name[len(inner[-1]) + 1 :])
-                if end is not None:
-                    return end
-        return None
+                found += self.find(inner, name[len(inner[-1]) + 1 :])
+        return found
 
 
 def read_structure(archive: SspArchive, system: _Element) -> SspStructure:
@@ -361,25 +478,31 @@ def _add_system(
                 f"an element of kind {kind} ({name}) is not supported", element, code="ssp-unsupported"
             )
     for connection in system.iterfind(f"{{{SSD}}}Connections/{{{SSD}}}Connection"):
-        source, sink = _directed(structure, connection, path)
-        before, _ = structure.sources.setdefault(sink, (source, connection))
-        if before != source:
-            raise SspError(f"{sink} has more than one source: {before} and {source}", connection)
+        for source, sink in _directed(structure, connection, path):
+            before, _ = structure.sources.setdefault(sink, (source, connection))
+            if before != source:
+                raise SspError(f"{sink} has more than one source: {before} and {source}", connection)
     structure.systems[path] = system
 
 
 def _connectors(element: _Element, definitions: Mapping[str, UnitDefinition]) -> dict[str, SspVariable]:
-    connectors = {}
+    connectors: dict[str, SspVariable] = {}
     for connector in element.iterfind(f"{{{SSD}}}Connectors/{{{SSD}}}Connector"):
         unit = next((kind.get("unit") for kind in connector if kind.get("unit")), None)
-        connectors[str(connector.get("name"))] = SspVariable(
-            connector.get("kind", ""), unit, definitions.get(str(unit))
-        )
+        shape = _whole(dimension.get("size") for dimension in connector.iterfind(f"{{{SSC}}}Dimension"))
+        declared = SspVariable(connector.get("kind", ""), unit, definitions.get(str(unit)), shape=shape)
+        connectors.update(_elements(str(connector.get("name")), declared))
     return connectors
 
 
 def _component(archive: SspArchive, element: _Element, path: ElementPath) -> SspComponent:
     name, kind, source = ".".join(path), element.get("type", FMU_TYPE), element.get("source", "")
+    if not source:
+        raise SspError(
+            f"component {name!r} names no FMU (it has no source): only FMUs can be run",
+            element,
+            code="ssp-unsupported",
+        )
     if kind != FMU_TYPE or not source.lower().endswith(".fmu"):
         raise SspError(
             f"component {name!r} is not an FMU (type {kind}, source {source!r}): only FMUs are supported",
@@ -397,14 +520,38 @@ def _component(archive: SspArchive, element: _Element, path: ElementPath) -> Ssp
     return SspComponent(path, element, member, archive.variables(member, element))
 
 
-def _directed(structure: SspStructure, connection: _Element, path: ElementPath) -> tuple[SspEnd, SspEnd]:
-    """Return source and target of a connection in the system `path`."""
+def _directed(
+    structure: SspStructure, connection: _Element, path: ElementPath
+) -> list[tuple[SspEnd, SspEnd]]:
+    """Return source and target of a connection in the system `path`, of arrays those of every element."""
     start, end = (_end(structure, connection, which, path) for which in ("start", "end"))
     start_gives, end_gives = (_gives(structure, side, path) for side in (start, end))
     if start_gives is not None and start_gives == end_gives:
         what = "gives a value" if start_gives else "takes a value"
         raise SspError(f"cannot connect {start} and {end}: each {what}", connection)
-    return (end, start) if start_gives is False or end_gives else (start, end)
+    shapes, elements = zip(
+        *(_elements_at(structure, e, connection, w) for e, w in ((start, "start"), (end, "end"))), strict=True
+    )
+    if len(elements[0]) != len(elements[1]) or (len(elements[0]) > 1 and shapes[0] != shapes[1]):
+        sizes = " and ".join("x".join(map(str, shape)) or "1" for shape in shapes)
+        raise SspError(f"cannot connect {start} and {end}: they have {sizes} elements", connection)
+    turned = start_gives is False or end_gives
+    return list(zip(*(reversed(elements) if turned else elements), strict=True))
+
+
+def _elements_at(
+    structure: SspStructure, end: SspEnd, connection: _Element, which: str
+) -> tuple[tuple[int, ...], list[SspEnd]]:
+    """Return the shape and the elements of an end of a connection, or the one that it is restricted to."""
+    shape, elements = structure.elements(end)
+    text = connection.get(f"{which}Indices")
+    if text is None:
+        return shape, elements
+    at = _whole(text.split())
+    if not at or len(at) != len(shape) or not all(1 <= i <= n for i, n in zip(at, shape, strict=True)):
+        size = f"it has {'x'.join(map(str, shape))} elements, counted from 1" if shape else "it is no array"
+        raise SspError(f"{which}Indices {text!r} is no element of {end}: {size}", connection)
+    return (), [SspEnd(end.element, f"{elements[0].name.rpartition('[')[0]}[{','.join(map(str, at))}]")]
 
 
 def _end(structure: SspStructure, connection: _Element, which: str, path: ElementPath) -> SspEnd:

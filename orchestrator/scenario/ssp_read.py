@@ -1,4 +1,4 @@
-"""Reads an SSP 1.0 archive as a scenario, with the content of an equivalent YAML file.
+"""Reads an SSP archive, of version 1.0 or 2.0, as a scenario with the content of an equivalent YAML file.
 
 Every component becomes an instance whose FMU is the member of the archive. Only the connections of the
 archive are made, and an input without connection and value keeps its FMU's start value, as the standard
@@ -14,8 +14,8 @@ Parameter values are bound to variables by name, first those of inner systems, t
 several values for a variable, that of the outermost system wins, on the same level the last. Unknown names
 are ignored, as the standard requires, but with a note.
 
-Unsupported features are refused by name: signal dictionaries, mappings in connections, components that are
-not FMUs.
+Unsupported features are refused by name: signal dictionaries, transformations other than linear ones in
+connections, components that are not FMUs.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from lxml.etree import _Element
 
 from ..errors import Diagnostic, Location
 from ..messages import fold, listed
-from ..plan import UnitDefinition
+from ..plan import UnitDefinition, Value, integer_limits
 from ..signal_names import RESERVED
 from .quantities import Unit, conversion, converted, measure_of
 from .ssp_archive import (
@@ -42,6 +42,7 @@ from .ssp_archive import (
     OMS,
     OSP,
     OWN,
+    SSC,
     SSD,
     SSM,
     SSV,
@@ -51,7 +52,7 @@ from .ssp_archive import (
     SspEnd,
     SspError,
     SspStructure,
-    SspVariable,
+    check_version,
     linear,
     number,
     read_structure,
@@ -74,36 +75,61 @@ def scale(structure: SspStructure, chain: Sequence[SspEnd]) -> Scale:
     total = AS_IT_IS
     measure: Unit | None = None
     connection: _Element | None = None
+    relative = _relative(structure, chain)
     for end in chain:
         outside, inside = structure.unit_outside(end), structure.unit_inside(end)
         if end is chain[0]:
             stops = [inside, outside]
         else:
             connection = structure.sources[end][1]
-            if connection.get("suppressUnitConversion") in ("true", "1"):
+            if _suppresses(connection):
                 measure = None
-            total, measure = _converted(total, measure, outside, end, connection)
+            total, measure = _converted(total, measure, outside, end, connection, relative)
             total = _then(total, linear(connection))
             stops = [inside]
         for stop in stops:
-            total, measure = _converted(total, measure, stop, end, connection)
+            total, measure = _converted(total, measure, stop, end, connection, relative)
     return total
+
+
+def _suppresses(element: _Element) -> bool:
+    return element.get("suppressUnitConversion") in ("true", "1")
+
+
+def _relative(structure: SspStructure, chain: Sequence[SspEnd]) -> bool | None:
+    """Return whether the quantity on a chain of connectors is a difference, None if its ends disagree."""
+    ends = [structure.variable(end) for end in (chain[0], chain[-1])]
+    said = {end.relative for end in ends if end is not None}
+    return None if len(said) > 1 else said == {True}
 
 
 def automatic(structure: SspStructure, source: SspEnd, target: SspEnd) -> Scale | None:
     """Return the conversion that wiring makes from the units of two FMUs; None if they are incompatible."""
-    of, to = (structure.components[end.element].variables.get(end.name) for end in (source, target))
+    of, to = structure.variable(source), structure.variable(target)
     if of is None or to is None or of.measure is None or to.measure is None:
         return AS_IT_IS
     return conversion(of.measure, to.measure)
 
 
 def _converted(
-    total: Scale, measure: Unit | None, target: Unit | None, end: SspEnd, element: _Element | None
+    total: Scale,
+    measure: Unit | None,
+    target: Unit | None,
+    end: SspEnd,
+    element: _Element | None,
+    relative: bool | None,
 ) -> tuple[Scale, Unit | None]:
+    """Return the scale and the unit after the conversion to `target`; `relative`: see `_relative`."""
     if measure is None or target is None:
         return total, target or measure
-    between = conversion(measure, target)
+    if relative is None and measure.offset != target.offset:
+        raise SspError(
+            f"the offset of the units on the way to {end} is ambiguous: one end is a difference "
+            "(relativeQuantity), the other is not; suppressUnitConversion with a LinearTransformation says "
+            "what is meant",
+            element,
+        )
+    between = conversion(replace(measure, relative=bool(relative)), target)
     if between is None:
         raise SspError(f"the units on the way to {end} differ", element)
     return _then(total, between), target
@@ -119,7 +145,7 @@ def read(path: Path, *, what: str = "SSP archive") -> Document:
     try:
         document.data = _scenario(SspArchive(path, what=what), document)
     except SspError as refused:
-        document.add(refused.diagnostic(path))
+        document.add(refused.diagnostic(path if path.parent.is_dir() else path.parent))
     return document
 
 
@@ -139,16 +165,22 @@ def missing_times(document: Document) -> list[Diagnostic]:
 
 def _scenario(archive: SspArchive, document: Document) -> dict[str, Any]:
     """Return the content of an equivalent scenario file."""
-    root = archive.xml(DESCRIPTION_FILE, f"{{{SSD}}}SystemStructureDescription")
+    root = archive.xml(archive.description, f"{{{SSD}}}SystemStructureDescription")
     system = root.find(f"{{{SSD}}}System")
     if system is None:
-        raise SspError(f"{DESCRIPTION_FILE} contains no system")
+        raise SspError(f"{archive.description} contains no system")
+    if note := _variants(archive):
+        document.notes.append(Diagnostic("ssp-variants", note, "info"))
     structure = read_structure(archive, system)
     names = _instance_names(structure, document)
     values = read_values(archive, structure)
     if values.unknown:
         shown = listed(fold(list(dict.fromkeys(values.unknown))))
         sentence = f"the archive gives values to {shown}: ignored, as there are no such variables"
+        document.notes.append(Diagnostic("variable-unknown", sentence, "info"))
+    if values.unmapped:
+        shown = listed(fold(list(dict.fromkeys(values.unmapped))))
+        sentence = f"the archive maps {shown}: ignored, as its parameter sets have no such parameters"
         document.notes.append(Diagnostic("variable-unknown", sentence, "info"))
     by_end = _values_through_connectors(structure, values.known)
     connections, driven = _connections(structure, names)
@@ -158,7 +190,7 @@ def _scenario(archive: SspArchive, document: Document) -> dict[str, Any]:
     inputs: dict[str, Any] = {}
     for path, component in structure.components.items():
         name = names[path]
-        instances[name] = {"fmu": f"{archive.path.name}/{component.member}", "parameters": {}}
+        instances[name] = {"fmu": f"{archive.root}/{component.member}", "parameters": {}}
         document.lines[("units", name)] = component.element.sourceline or 1
         hint = component.element.find(f".//{{{OSP}}}StepSizeHint")
         if hint is not None:
@@ -166,8 +198,9 @@ def _scenario(archive: SspArchive, document: Document) -> dict[str, Any]:
     for (path, variable), ssp_value in by_end.items():
         if path not in structure.components:
             continue
-        declared = structure.components[path].variables.get(variable)
-        value = ssp_value.for_variable(declared)
+        end = SspEnd(path, variable)
+        declared = structure.variable(end)
+        value = ssp_value.to(structure.unit_inside(end))
         if declared is not None and declared.causality == "input":
             inputs[f"{names[path]}.{variable}"] = value
         else:
@@ -179,6 +212,20 @@ def _scenario(archive: SspArchive, document: Document) -> dict[str, Any]:
         "connections": connections,
         "inputs": inputs,
     } | _experiment(root)
+
+
+def _variants(archive: SspArchive) -> str:
+    """Return a note on the other descriptions in the archive, "" if there are none."""
+    variants = archive.variants()
+    others = [f"{member} ({name})" if name else member for member, name in variants.items()]
+    if len(others) < 2:
+        return ""
+    path, other = archive.path, next(member for member in variants if member != archive.description)
+    way = str(path) if other == DESCRIPTION_FILE else f"{path}/{other}"
+    return (
+        f"the archive has the variants {listed(others)}, of which {archive.description} is taken; give {way} "
+        f"as the scenario to take {other}"
+    )
 
 
 def _title(root: _Element) -> str:
@@ -227,7 +274,7 @@ def _passed_on(structure: SspStructure, ssp_value: SspValue, connector: SspEnd, 
     way = scale(structure, [*reversed(ways[: ways.index(connector) + 1]), end])
     if way == AS_IT_IS:
         return ssp_value
-    value = ssp_value.for_variable(structure.connector(connector))
+    value = ssp_value.to(structure.unit_outside(connector))
     if not isinstance(value, float):
         raise SspError(
             f"{end}: only numbers can be converted on the way from {connector}", ssp_value.parameter
@@ -251,6 +298,10 @@ def _connections(
         }
         gain, offset = scale(structure, [source, *way])
         usual = automatic(structure, source, end)
+        if _relative(structure, [source, end]) is None and any(
+            _suppresses(structure.sources[stop][1]) for stop in way
+        ):
+            usual = None  # the archive has decided what a difference means here
         if usual is None or not all(map(math.isclose, (gain, offset), usual)):
             ends |= {"gain": gain, "offset": offset}
         connections.append(ends)
@@ -285,56 +336,61 @@ def _experiment(root: _Element) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class SspValue:
-    """A parameter value as in the archive."""
+    """A parameter value as in the archive; of an array, one element."""
 
-    value: Any
+    value: Value
     unit: str | None
     parameter: _Element
     definition: UnitDefinition | None = None  # of the unit, if the archive gives one
     factor: float = 1.0
     offset: float = 0.0
 
-    def for_variable(self, declared: SspVariable | None) -> Any:
-        """Return the value for a variable as in a scenario file: a plain value, or one with its unit.
+    def to(self, measure: Unit | None) -> Value:
+        """Return the value in a unit, as in a scenario file: a plain value, or one with its unit.
 
         Raises:
             SspError: a transformation of something other than a number, or with an incompatible unit.
         """
-        value = self._in_unit_of(declared)
+        value = self._in(measure)
         if (self.factor, self.offset) == (1.0, 0.0):
             return value
         if isinstance(value, (bool, str)):
             raise SspError(
-                f"{self._name}: a LinearTransformation is for numbers (got {value})", self.parameter
+                f"{self.name}: a LinearTransformation is for numbers (got {value})", self.parameter
             )
         result = self.factor * value + self.offset
         if isinstance(value, float):
             return result
         if not result.is_integer():
-            raise SspError(f"{self._name}: {result:g} is not a whole number", self.parameter)
+            raise SspError(f"{self.name}: {result:g} is not a whole number", self.parameter)
         return int(result)
 
-    def _in_unit_of(self, declared: SspVariable | None) -> Any:
+    def _in(self, measure: Unit | None) -> Value:
         """Return the converted value; if units are incompatible, with its unit, so that wiring refuses it."""
-        unit = declared.unit if declared else None
-        if not isinstance(self.value, float) or self.unit is None or unit is None or self.unit == unit:
+        if not isinstance(self.value, float) or self.unit is None or measure is None:
             return self.value
-        source, target = measure_of(self.unit, self.definition), declared.measure if declared else None
-        if source is None or target is None or source.powers != target.powers:
+        source = measure_of(self.unit, self.definition)
+        if source is None or source.powers != measure.powers:
             return f"{self.value!r} {self.unit}"
-        return float(converted(Fraction(repr(self.value)), source, target))
+        if conversion(source, measure) == (1.0, 0.0) or not math.isfinite(self.value):
+            return self.value
+        return float(converted(Fraction(repr(self.value)), source, measure))
 
     @property
-    def _name(self) -> str:
+    def name(self) -> str:
+        """How messages call it."""
         return f"parameter {self.parameter.get('name')!r}"
 
 
 @dataclass
 class SspValues:
-    """The values of variables and connectors, and the unknown names."""
+    """The values of variables and connectors, and the names that mean nothing."""
 
     known: dict[SspEnd, SspValue] = field(default_factory=dict)
     unknown: list[str] = field(default_factory=list)
+    """Names without a variable."""
+    unmapped: list[str] = field(default_factory=list)
+    """Names in mappings without a parameter."""
 
 
 def read_values(archive: SspArchive, structure: SspStructure) -> SspValues:
@@ -346,33 +402,69 @@ def read_values(archive: SspArchive, structure: SspStructure) -> SspValues:
     values = SspValues()
     elements = {path: component.element for path, component in structure.components.items()}
     for path, element in (elements | structure.systems).items():  # outer ones last
-        for name, value in _bound(archive, element):
-            end = structure.find(path, name)
-            if end is not None:
-                values.known[end] = value
-            else:
+        for name, given in _bound(archive, element, values.unmapped):
+            ends = structure.find(path, name)
+            for end in ends:
+                values.known.update(_spread(structure, end, given))
+            if not ends:
                 values.unknown.append(str(SspEnd(path, name)))
     return values
 
 
-def _bound(archive: SspArchive, element: _Element) -> Iterator[tuple[str, SspValue]]:
-    """Yield (name, value) of an element's parameter bindings."""
+Array = tuple[list[SspValue], tuple[int, ...]]
+"""The values of a parameter, row by row, and the sizes of its dimensions as far as given."""
+
+
+def _spread(structure: SspStructure, end: SspEnd, given: Array) -> Iterator[tuple[SspEnd, SspValue]]:
+    """Yield (element, value) of a variable.
+
+    Raises:
+        SspError: there are not as many values as elements.
+    """
+    values, sizes = given
+    shape, elements = structure.elements(end)
+    if len(values) != len(elements) or (sizes and shape and sizes != shape):
+        has, takes = ("x".join(map(str, n)) for n in (sizes or (len(values),), shape or (1,)))
+        one = values[0]
+        raise SspError(f"{one.name} has values for {has} elements, and {end} has {takes}", one.parameter)
+    yield from zip(elements, values, strict=True)
+
+
+def _bound(archive: SspArchive, element: _Element, unmapped: list[str]) -> Iterator[tuple[str, Array]]:
+    """Yield (name, values) of an element's parameter bindings; add names that map nothing to `unmapped`."""
     for binding in element.iterfind(f"{{{SSD}}}ParameterBindings/{{{SSD}}}ParameterBinding"):
         _check_type(binding, VALUES_TYPE)
-        values = binding.find(f"{{{SSD}}}ParameterValues/{{{SSV}}}ParameterSet")
-        if values is None:
-            if not binding.get("source"):
-                raise SspError("parameters are bound that are nowhere", binding)
-            values = archive.xml(archive.member(binding), f"{{{SSV}}}ParameterSet")
+        values = _content(
+            archive, binding, f"{{{SSD}}}ParameterValues/", f"{{{SSV}}}ParameterSet", "parameters"
+        )
         mapping = _mapping(archive, binding)
         definitions = unit_definitions(values.iterfind(f"{{{SSV}}}Units/*"))
+        names: set[str] = set()
         for parameter in values.iterfind(f"{{{SSV}}}Parameters/{{{SSV}}}Parameter"):
-            name, value = binding.get("prefix", "") + parameter.get("name", ""), _value(parameter)
-            value = replace(value, definition=definitions.get(str(value.unit)))
+            name = binding.get("prefix", "") + parameter.get("name", "")
+            if name in names:
+                raise SspError(f"parameter {parameter.get('name')!r} is given twice in one set", parameter)
+            names.add(name)
+            given, sizes = _values(parameter)
+            given = [replace(value, definition=definitions.get(str(value.unit))) for value in given]
             if mapping is None:
-                yield name, value
+                yield name, (given, sizes)
             for entry in (mapping or {}).get(name, ()):
-                yield entry.get("target", ""), _transformed(value, entry)
+                yield entry.get("target", ""), ([_transformed(value, entry) for value in given], sizes)
+        unmapped += [name for name in mapping or () if name not in names]
+
+
+def _content(archive: SspArchive, element: _Element, inside: str, tag: str, what: str) -> _Element:
+    """Return the content of a binding or mapping: that in place, or that of the member it names."""
+    content, source = element.find(inside + tag), element.get("source")
+    if content is not None and source:
+        raise SspError(f"{what} are given both in place and by the source {source!r}", element)
+    if content is None and not source:
+        raise SspError(f"{what} are bound that are nowhere", element)
+    if content is None:
+        return archive.xml(archive.member(element), tag)
+    check_version(content)
+    return content
 
 
 def _mapping(archive: SspArchive, binding: _Element) -> dict[str, list[_Element]] | None:
@@ -381,12 +473,14 @@ def _mapping(archive: SspArchive, binding: _Element) -> dict[str, list[_Element]
     if mapping is None:
         return None
     _check_type(mapping, MAPPING_TYPE)
-    content = mapping.find(f"{{{SSM}}}ParameterMapping")
-    if content is None:
-        content = archive.xml(archive.member(mapping), f"{{{SSM}}}ParameterMapping")
+    content = _content(archive, mapping, "", f"{{{SSM}}}ParameterMapping", "mappings")
     entries: dict[str, list[_Element]] = {}
+    targets: set[str] = set()
     for entry in content.iterfind(f"{{{SSM}}}MappingEntry"):
         entries.setdefault(entry.get("source", ""), []).append(entry)
+        if (target := entry.get("target", "")) in targets:
+            raise SspError(f"two parameters are mapped to {target!r}", entry)
+        targets.add(target)
     return entries
 
 
@@ -399,36 +493,102 @@ def _check_type(element: _Element, allowed: str) -> None:
 
 def _transformed(value: SspValue, entry: _Element) -> SspValue:
     """Return a value with the transformation of a mapping entry."""
-    if entry.get("suppressUnitConversion") in ("true", "1"):
+    if _suppresses(entry):
         value = replace(value, unit=None)
+    for child in entry.iterchildren("{*}*"):
+        kind = etree.QName(child).localname
+        if kind in TABLES:
+            return replace(value, value=_looked_up(value, child, TABLES[kind]))
     factor, offset = linear(entry)
     return replace(value, factor=factor, offset=offset)
 
 
-def _value(parameter: _Element) -> SspValue:
-    for kind in parameter.iterchildren("{*}*"):
-        name, text = etree.QName(kind).localname, kind.get("value", "")
-        try:
-            if name == "Real":
-                unit = kind.get("unit")
-                if unit and (bare := re.fullmatch(r"\[(.+)\]", unit.strip())):
-                    unit = bare[1]  # as tools write units behind names
-                return SspValue(float(text), unit, parameter)
-            if name == "Integer":
-                return SspValue(int(text), None, parameter)
-            if name == "Boolean":
-                meant = {"true": True, "1": True, "false": False, "0": False}[text.strip()]
-                return SspValue(meant, None, parameter)
-        except (ValueError, KeyError):
-            raise SspError(
-                f"parameter {parameter.get('name')!r}: {text!r} is not of type {name}", parameter
-            ) from None
-        if name in ("String", "Enumeration"):
-            return SspValue(text, None, parameter)
-        if name == "Binary":
-            raise SspError(
-                f"parameter {parameter.get('name')!r} is Binary: not supported",
-                parameter,
-                code="ssp-unsupported",
-            )
-    raise SspError(f"parameter {parameter.get('name')!r} has no value", parameter)
+TABLES = {
+    "BooleanMappingTransformation": "Boolean",
+    "IntegerMappingTransformation": "Integer",
+    "EnumerationMappingTransformation": "Enumeration",
+}
+"""Transformation that replaces some values by others -> their type."""
+
+
+def _looked_up(value: SspValue, table: _Element, kind: str) -> Value:
+    """Return what a table of values has in place of a value, which is kept if it is not there."""
+    if type(value.value) is not {"Boolean": bool, "Integer": int, "Enumeration": str}[kind]:
+        raise SspError(
+            f"{value.name}: a table of values of type {kind} cannot be applied to {value.value}", table
+        )
+    found: dict[Value, Value] = {}
+    for entry in table.iterchildren(f"{{{SSC}}}MapEntry"):
+        source, target = (_plain(kind, entry.get(key, ""), value.name, entry) for key in ("source", "target"))
+        if found.setdefault(source, target) != target:
+            raise SspError(f"{value.name}: the table of values has {entry.get('source')} twice", entry)
+    return found.get(value.value, value.value)
+
+
+REALS = ("Real", "Float64", "Float32")
+INTEGERS = ("Integer", *(f"{sign}Int{bits}" for bits in (8, 16, 32, 64) for sign in ("", "U")))
+TEXTS = ("String", "Enumeration")
+BESIDES = ("Dimension", "Annotations", "MetaData", "Signature")
+"""Elements of a parameter that are no values."""
+
+
+def _values(parameter: _Element) -> Array:
+    """Return the values of a parameter.
+
+    Raises:
+        SspError: it has no value, several, or one that cannot be read.
+    """
+    name = f"parameter {parameter.get('name')!r}"
+    kinds = [child for child in parameter.iterchildren("{*}*") if etree.QName(child).localname not in BESIDES]
+    if len(kinds) != 1:
+        raise SspError(f"{name} has {'more than one' if kinds else 'no'} value", parameter)
+    (element,) = kinds
+    kind, text = etree.QName(element).localname, element.get("value")
+    if kind not in (*REALS, *INTEGERS, *TEXTS, "Boolean"):
+        raise SspError(f"{name} is of type {kind}: not supported", parameter, code="ssp-unsupported")
+    inner = list(element.iterchildren("{*}*"))
+    if (text is None) == (not inner):
+        what = "no value" if text is None else "values both as an attribute and as elements"
+        raise SspError(f"{name} has {what}", parameter)
+    if any(etree.QName(child).localname != "Value" or child.get("value") is None for child in inner):
+        raise SspError(f"{name} has an element in its {kind} that is no Value with a value", parameter)
+    if inner:
+        texts = [str(child.get("value")) for child in inner]
+    else:
+        texts = [str(text)] if kind in TEXTS else str(text).split()
+    sizes = [d.get("size", "") for d in parameter.iterchildren("{*}Dimension")]
+    if not all(size.isascii() and size.isdigit() for size in sizes):
+        raise SspError(f"{name} does not give the size of its dimensions", parameter)
+    shape = tuple(map(int, sizes))
+    if len(texts) != (math.prod(shape) if shape else max(len(texts), 1)):
+        size = "x".join(map(str, shape))
+        raise SspError(
+            f"{name} has {len(texts) or 'no'} values" + f" for {size} elements" * bool(shape), parameter
+        )
+    unit = element.get("unit") if kind in REALS else None
+    if unit and (bare := re.fullmatch(r"\[(.+)\]", unit.strip())):
+        unit = bare[1]  # as tools write units behind names
+    return [SspValue(_plain(kind, one, name, parameter), unit, parameter) for one in texts], shape
+
+
+def _plain(kind: str, text: str, name: str, element: _Element) -> Value:
+    """Return a value of a type of SSP from its text.
+
+    Raises:
+        SspError: the text is not of this type.
+    """
+    if kind in TEXTS:
+        return text
+    try:
+        if "_" in text:  # which Python allows in numbers
+            raise ValueError
+        if kind in REALS:
+            return float(text)
+        if kind == "Boolean":
+            return {"true": True, "1": True, "false": False, "0": False}[text.strip()]
+        lowest, highest = integer_limits("Int32" if kind == "Integer" else kind)
+        if not lowest <= (number := int(text)) <= highest:
+            raise ValueError
+    except (ValueError, KeyError):
+        raise SspError(f"{name}: {text!r} is not of type {kind}", element) from None
+    return number

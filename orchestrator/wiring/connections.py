@@ -18,7 +18,7 @@ from itertools import pairwise
 from ..messages import fold, hint, listed
 from ..plan import Variable, Wire
 from ..scenario.loader import Connection
-from ..scenario.quantities import conversion, measure_of
+from ..scenario.quantities import conversion, measure_of, parse_unit, unit_of
 from ..scenario.yaml_lines import KeyPath, dotted
 from ..signal_names import SignalName, alike, matching
 from .constants import Constant, Input
@@ -322,6 +322,7 @@ class Connector:
             self._report(key, f"cannot connect {ends}: the {what} differ{way_out}", DIFFERENCES[what])
             return wire
         assert scale is not None
+        self._check_relative(wire, key, source, target)
         whole = source.type == "Integer" and all(x.is_integer() for x in scale)
         if scaling and target.type != "Real" and not whole:
             self._report(
@@ -345,6 +346,24 @@ class Connector:
             sentence = f"{wire.target}.{wire.input} has no start value to begin with, which a delay needs"
             self._report(key, sentence, "connection-invalid")
         return replace(wire, gain=scale[0], offset=scale[1], delayed=delayed)
+
+    def _check_relative(self, wire: Wire, key: KeyPath, source: Variable, target: Variable) -> None:
+        """Report a difference that meets an absolute quantity on a wire without a gain, see `mixed`."""
+        how = None if self._scale(key) else mixed(source, target)
+        if how is None:
+            return
+        ends = [f"{wire.source}.{wire.output} [{source.unit}]", f"{wire.target}.{wire.input} [{target.unit}]"]
+        one, other = ends if source.relative else reversed(ends)
+        sentence = f"{one} is a difference (relativeQuantity) and {other} is not"
+        if how:
+            sentence = (
+                f"cannot connect {' to '.join(ends)}: {sentence}, so the offset of the units is ambiguous"
+            )
+            way = "; give the connection the gain and offset that are meant"
+            self._report(key, sentence + way, "wiring-relative-mismatch")
+        else:
+            sentence += "; the number is passed on as it is"
+            self._system.note("wiring-relative-mismatch", sentence, "warning")
 
     def _note_units(self, wires: Iterable[Wire]) -> None:
         """Note variables without a unit, and units that an FMU defines otherwise than usual."""
@@ -382,10 +401,27 @@ def conversion_between(source: Variable, target: Variable) -> tuple[float, float
     ends = (source.unit, source.definition), (target.unit, target.definition)
     if source.unit is None or target.unit is None or ends[0] == ends[1]:
         return 1.0, 0.0
-    of, to = (measure_of(*end) for end in ends)
+    of, to = unit_of(source), unit_of(target)
     if of is None or to is None:
         return (1.0, 0.0) if source.unit == target.unit else None
     return conversion(of, to)
+
+
+_KELVIN = parse_unit("K")
+
+
+def mixed(source: Variable, target: Variable) -> str | None:
+    """Return how a difference meets an absolute quantity: "offset" if a conversion between them is ambiguous.
+
+    "" if their units have no offset between them, None where it makes no difference: both ends are of the
+    same kind, or their quantity has no units with an offset.
+    """
+    of, to = (measure_of(v.unit, v.definition) for v in (source, target))
+    if source.relative == target.relative or of is None or to is None or of.powers != to.powers:
+        return None
+    if of.offset != to.offset:
+        return "offset"
+    return "" if of.offset or of.powers == _KELVIN.powers else None
 
 
 DIFFERENCES = {

@@ -13,7 +13,7 @@ from ..errors import InvalidValueError, ScenarioError, code_of, text_of
 from ..messages import fold, hint, resolved, span
 from ..plan import InputSeries, Value, ValueOrigin, Variable
 from ..scenario.loader import LoadedScenario
-from ..scenario.quantities import measure_of
+from ..scenario.quantities import measure_of, unit_of
 from ..scenario.schema import SeriesSpec
 from ..scenario.yaml_lines import KeyPath
 from ..signal_names import SignalName
@@ -238,7 +238,7 @@ def _values(column: FileColumn, name: str, variable: Variable) -> np.ndarray:
     from ..measured.recording_formats import numbers_in
 
     if variable.type == "Real":
-        wanted = measure_of(variable.unit, variable.definition)
+        wanted = unit_of(variable)
         numbers = numbers_in(column.values, column.unit, wanted, variable.unit or "none", f"column {name!r}")
         for extreme in (numbers.min(), numbers.max()):
             value_for(variable, float(extreme))

@@ -71,7 +71,8 @@ def _value(fault: Fault, variable: Variable) -> float | None:
     if isinstance(value, str):
         if "{x}" in kind.unit and variable.unit is None:
             raise ValueError(f"{value!r} names a unit, but the FMU declares none: give a plain number")
-        value = float(convert(value, unit, variable.definition if kind.unit == "{x}" else None))
+        definition = variable.definition if kind.unit == "{x}" else None
+        value = float(convert(value, unit, definition, relative=kind.adds or variable.relative))
     if not math.isfinite(value):
         raise ValueError(f"must be a finite number (got {fault.value!r})")
     if (kind.least is not None and value < kind.least) or (kind.most is not None and value > kind.most):

@@ -7,9 +7,11 @@ given by name before one given by a pattern. An input without a source, or with 
 the start value of an input in its FMU is never used silently.
 
 Units of measurement are compatible if they have the same dimension, and the wire converts; where an FMU
-declares no unit, nothing can be checked and a note says so. Types must be equal or convert without loss
-(`connections`), and an enumeration's items must all be among those of the enumeration that it feeds, with
-the same numbers.
+declares no unit, nothing can be checked and a note says so. Between differences (`relativeQuantity`) offsets
+of units do not apply; a difference that meets an absolute quantity is refused if the offset of their units
+would decide the number, and a warning if they only have the same one. Types must be equal or convert without
+loss (`connections`), and an enumeration's items must all be among those of the enumeration that it feeds,
+with the same numbers.
 """
 
 from __future__ import annotations

@@ -20,9 +20,19 @@ from vocabulary.patches import patches_of
 from vocabulary.vehicle import CAR
 
 from ..errors import code_of
-from ..fmu.description import integer_limits
 from ..messages import closest, fold, hint, listed, short
-from ..plan import DEFAULT, LITERATURE, VARIED, Fmu, OriginKind, Value, ValueOrigin, ValueSource, Variable
+from ..plan import (
+    DEFAULT,
+    LITERATURE,
+    VARIED,
+    Fmu,
+    OriginKind,
+    Value,
+    ValueOrigin,
+    ValueSource,
+    Variable,
+    integer_limits,
+)
 from ..safe_files import TEXT, read_bytes
 from ..scenario import quantities
 from ..scenario.loader import LoadedScenario
@@ -66,7 +76,9 @@ def _real(variable: Variable, raw: Value) -> float:
     if isinstance(raw, bool):
         raise ValueError(f"must be a number{in_unit} (got {str(raw).lower()})")
     value = float(
-        quantities.convert(raw, variable.unit, variable.definition) if isinstance(raw, str) else raw
+        quantities.convert(raw, variable.unit, variable.definition, relative=variable.relative)
+        if isinstance(raw, str)
+        else raw
     )
     if not abs(value) <= (LARGEST_SINGLE if variable.encoding == "Float32" else LARGEST):
         raise ValueError(f"must be a finite number{in_unit} (got {short(raw)})")

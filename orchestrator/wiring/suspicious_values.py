@@ -26,7 +26,7 @@ from ..errors import Diagnostic, Location
 from ..messages import fold, listed
 from ..plan import DEFAULT, SENSING, Instance, OriginKind, Value, Variable, Wire
 from ..scenario.loader import LoadedScenario
-from ..scenario.quantities import meant_unit, number_and_unit
+from ..scenario.quantities import exact_text, meant_unit, number_and_unit
 from .context import FACTS
 from .parameters import STIFFNESSES, known_car
 
@@ -210,6 +210,7 @@ def suspicious_values(scenario: LoadedScenario, instances: Mapping[str, Instance
         *_of_tyres(scenario, instances, parameters),
         *suspicious_car(scenario, instances),
         *_idle_units(scenario, instances),
+        *_other_steps(scenario, instances),
     ]
 
 
@@ -225,6 +226,45 @@ def _idle_units(scenario: LoadedScenario, instances: Mapping[str, Instance]) -> 
                 f"run, {float(lasts):g} s; its outputs keep their initial values"
             )
             yield _warning("instance-never-steps", f"{instance.name}.step_size", says, float(step))
+
+
+STEP_TOLERANCE = 1e-6
+"""Relative difference up to which two steps are the same; chosen: FMUs round theirs to as few digits."""
+FINEST = 100
+"""Smallest part of the communication step to propose; chosen: a run a hundred times as long helps nobody."""
+
+
+def _other_steps(scenario: LoadedScenario, instances: Mapping[str, Instance]) -> Iterator[Diagnostic]:
+    """Yield a warning for every instance that runs with another step than its FMU declares."""
+    for instance in instances.values():
+        fixed, step = instance.fmu.fixed_step, instance.period * scenario.step_size
+        if fixed is None:
+            continue
+        times = round(float(step) / fixed) if instance.fmu.takes_multiples else 1
+        if math.isclose(step, max(times, 1) * fixed, rel_tol=STEP_TOLERANCE):
+            continue
+        what = "an internal step" if instance.fmu.takes_multiples else "a fixed step"
+        says = (
+            f"{instance.name} ({instance.fmu.name}) declares {what} of {exact_text(Fraction(repr(fixed)))} s "
+            f"and runs with one of {exact_text(step)} s, so its results may be wrong; "
+            f"{_with_step(instance, Fraction(repr(fixed)), scenario.step_size)}"
+        )
+        yield _warning("instance-step-differs", f"{instance.name}.step_size", says, float(step))
+
+
+def _with_step(instance: Instance, fixed: Fraction, base: Fraction) -> str:
+    """Return how to give an instance its own step when the communication step is `base`."""
+    own = f"--set {instance.name}.step_size={exact_text(fixed)}"
+    if fixed % base == 0:
+        return f"'{own}' gives it that step"
+    common = Fraction(
+        math.gcd(fixed.numerator * base.denominator, base.numerator * fixed.denominator),
+        fixed.denominator * base.denominator,
+    )
+    if base / common > FINEST:
+        return "it needs a communication step that divides its own"
+    both = f"--set step_size={exact_text(common)}"
+    return f"'{both}{f' {own}' if common != fixed or instance.period > 1 else ''}' gives it that step"
 
 
 def _of_tyres(

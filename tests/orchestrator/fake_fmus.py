@@ -28,6 +28,7 @@ class Var:
     items: tuple[str, ...] = ()
     choices: tuple[str, ...] = field(default=())
     optional: bool = False
+    relative: bool = False
 
 
 def out(name: str, *follows: str, unit: str | None = "1", **rest: object) -> Var:
@@ -141,6 +142,8 @@ def _scalar_variable(causality: str, var: Var, reference: int) -> str:
     attributes = {"declaredType": f"{var.name}_type"} if var.items else {}
     if var.unit and var.type == "Real":
         attributes["unit"] = var.unit
+    if var.relative:
+        attributes["relativeQuantity"] = "true"
     if var.minimum is not None:
         attributes["min"] = str(var.minimum)
     if var.maximum is not None:

@@ -209,7 +209,14 @@ def converting(folder: Path, connection: str = "{from: a.y, to: b.x}") -> Plan:
     return make_plan(load_scenario(folder / "s.yaml"))
 
 
-@pytest.mark.parametrize("connection", ["{from: a.y, to: b.x}", "{from: a.y, to: b.x, gain: 7, offset: -1}"])
+@pytest.mark.parametrize(
+    "connection",
+    [
+        "{from: a.y, to: b.x}",
+        "{from: a.y, to: b.x, gain: 7, offset: -1}",
+        "{from: a.y, to: b.x, gain: 1}",  # of another unit: it must not be converted
+    ],
+)
 def test_a_converting_wire_is_written_in_full_and_read_back_the_same(connection, tmp_path):
     plan = converting(tmp_path, connection)
     write_ssp(plan, tmp_path / "s.ssp")
