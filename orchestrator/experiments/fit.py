@@ -28,6 +28,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
@@ -103,6 +104,10 @@ class FitSpec(StrictModel):
     most_sets: int = Field(300, ge=2, description="Sets of values after which the search stops")
 
 
+Part = Literal["training", "held_out"]
+PARTS: tuple[Part, ...] = ("training", "held_out")
+
+
 @dataclass(frozen=True)
 class FitWindow:
     """A window, and the segment that it is cut from: filtered for comparison, unfiltered for inputs."""
@@ -172,8 +177,8 @@ def load_fit(path: Path | str) -> LoadedFit:
             document.report(key, str(error), code_of(error))
     parts = {}
     if not document.errors:
-        for name in ("training", "held_out"):
-            parts[name] = list(_windows(document, name, getattr(spec, name), filtered, raw, errors))
+        for part in PARTS:
+            parts[part] = list(_windows(document, part, spec, filtered, raw, errors))
     _refuse_overlaps(document, spec)
     document.raise_errors()
     return LoadedFit(path, spec, filtered, errors, parts["training"], parts["held_out"])
@@ -194,13 +199,13 @@ def number_in(value: Value, unit: str | None) -> float:
 
 def _windows(
     document: Document,
-    name: str,
-    stretches: Sequence[StretchSpec],
+    name: Part,
+    spec: FitSpec,
     filtered: Measurement,
     raw: Measurement,
     compared: Mapping[str, float],
 ) -> Iterator[FitWindow]:
-    for number, stretch in enumerate(stretches):
+    for number, stretch in enumerate(getattr(spec, name)):
         try:
             segment, unfiltered = filtered.segment(stretch.segment), raw.segment(stretch.segment)
         except ValueError as error:
@@ -219,6 +224,11 @@ def _windows(
             part = segment.between(start, min(start + longest, end)).even()
             if len(part.time) < 3:
                 document.report((name, number), "a window has less than three samples", "fit-window")
+                break
+            if not np.any(part.time >= part.time[0] + float(spec.settling) - 1e-9):
+                lasts = f"a window of {part.time[-1] - part.time[0]:g} s ends within"
+                words = f"{lasts} 'settling', {float(spec.settling):g} s: nothing of it is compared"
+                document.report((name, number), words, "fit-window")
                 break
             label = f"{segment.name}, {part.time[0]:g} to {part.time[-1]:g} s"
             measured = {signal: part.signals[signal] for signal in compared}
