@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import copy
+import io
 import json
 import os
 import random
@@ -107,7 +108,8 @@ class Folder:
 def call(*arguments: object) -> int:
     """Return the exit status of a command in this process."""
     try:
-        yawbench([str(argument) for argument in arguments])
+        with contextlib.redirect_stdout(io.StringIO()):
+            yawbench([str(argument) for argument in arguments])
     except SystemExit as ended:
         return int(ended.code or 0)
     return 0
@@ -216,6 +218,8 @@ def other_value(value: Any, others: list[Any], r: random.Random) -> Any:
         return {"empty": [], "one": made[:1], "twice": made * 2, "turned": made[::-1], "nested": [made]}.get(
             how, made
         )
+    if not isinstance(value, dict):  # a date
+        return r.choice(TEXTS)
     made = dict(value)
     if made and r.random() < 0.7:
         del made[r.choice(list(made))]
