@@ -58,6 +58,8 @@ MEASURED = "measured"
 """Prefix of the free parameters of a measurement."""
 MARGIN = 0.5
 """Time before and after a window [s] for which inputs are kept; chosen: longer than any delay."""
+LARGEST = 1e9
+"""Largest measured value over its expected difference. Chosen: sums of their squares keep some digits."""
 TRANSIENT = 2.0
 """Periods of the filter's cut-off by which a run is longer than its window; chosen: its end has died away."""
 
@@ -232,6 +234,12 @@ def _windows(
                 break
             label = f"{segment.name}, {part.time[0]:g} to {part.time[-1]:g} s"
             measured = {signal: part.signals[signal] for signal in compared}
+            if large := [name for name, x in measured.items() if np.abs(x / compared[name]).max() > LARGEST]:
+                words = (
+                    f"{large[0]} reaches more than {LARGEST:g} times the difference expected in 'compared'"
+                )
+                document.report((name, number), f"{words}; check its unit and that", "fit-window")
+                break
             yield FitWindow(Window(label, part.time, measured), segment, unfiltered)
 
 

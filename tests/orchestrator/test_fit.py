@@ -251,3 +251,12 @@ def test_a_window_of_which_nothing_is_compared_is_refused_at_its_line(settling, 
         lines[one.location.line - 1].startswith(("training", "held_out")) for one in caught.value.diagnostics
     )
     assert "settling" in str(caught.value)
+
+
+def test_values_too_large_to_be_compared_are_refused(folder):
+    file = folder / "large.yaml"
+    file.write_text(FIT.replace("yaw_rate: 0.1 deg/s", "yaw_rate: 1e-290"))
+    with pytest.raises(ScenarioError) as caught:
+        load_fit(file)
+    assert {one.code for one in caught.value.diagnostics} == {"fit-window"}
+    assert "yaw_rate" in str(caught.value)

@@ -30,7 +30,7 @@ import threading
 import time
 import urllib.request
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -453,7 +453,6 @@ def trial(
 
 
 GROUPS: tuple[str, ...] = ("vehicle", "fit", "measurement", "record")
-Each = Callable[[str], list[int]]
 
 
 def main() -> None:
