@@ -29,6 +29,7 @@ import tempfile
 import threading
 import time
 import urllib.request
+import warnings
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -41,6 +42,7 @@ from ruamel.yaml import YAML
 
 from orchestrator.cache import KEY, with_checksums
 from orchestrator.cli import main as yawbench
+from orchestrator.errors import RecordWarning
 from tests.orchestrator.test_batch_commands import SCENARIO as HALF
 from tests.orchestrator.test_batch_commands import STUDY
 from tests.orchestrator.test_fit import FIT, MEASURED
@@ -322,23 +324,33 @@ def command_of(group: str, file: Path, place: Path, r: random.Random) -> tuple[o
             ("diff", "measured.yaml", "out/truth"),
         ))  # fmt: skip
     folder = file.parent
-    run = folder if (folder / "run.json").exists() else Path("out/truth")
-    return r.choice((
+    run = folder if file.name == "run.json" else Path("out/truth")
+    made = (*FMUS, *jobs, "--out")
+    readers: list[tuple[object, ...]] = [
         ("list", "runs", "out"),
         ("diff", run, "out/truth"),
         ("plot", run, "--out", "made"),
         ("animate", run, "out/truth", "--out", "made.html"),
         ("evaluate", "turn-response", run, "--no-figures", "--out", "made"),
-        ("study", "study.yaml", *FMUS, *jobs, "--out", "out/study"),
-        ("report", "study.yaml", *FMUS, *jobs, "--out", "out/study"),
-        ("study", "study.yaml", *FMUS, *jobs, "--out", "out/study", "--no-run"),
-        ("sweep", "sweep.yaml", *FMUS, *jobs, "--out", "out/sweep"),
-        ("sweep", "sweep.yaml", *FMUS, *jobs, "--out", "out/sweep", "--no-run"),
-        ("compare", "half.yaml", *FMUS, *jobs, "--out", "out/study",
-         "--swap", "controller=controller_off,controller_fuzzy_sideslip"),
-        ("fit", "one.yaml", *FMUS, *jobs, "--out", "out/fit"),
         ("serve", run),
-    ))  # fmt: skip
+    ]
+    swap = ("--swap", "controller=controller_off,controller_fuzzy_sideslip")
+    makers: dict[str, list[tuple[object, ...]]] = {
+        "study": [
+            ("study", "study.yaml", *made, "out/study"),
+            ("study", "study.yaml", *made, "out/study", "--no-run"),
+            ("report", "study.yaml", *made, "out/study"),
+            ("compare", "half.yaml", *swap, *made, "out/study"),
+        ],
+        "sweep": [
+            ("sweep", "sweep.yaml", *made, "out/sweep"),
+            ("sweep", "sweep.yaml", *made, "out/sweep", "--no-run"),
+        ],
+        "fit": [("fit", "one.yaml", *made, "out/fit")],
+        "truth": [("run", "truth.yaml", *FMUS, "--out", "out/truth")],
+    }
+    own = makers[file.parts[1]]
+    return r.choice(readers if file.name == "run.json" and r.random() < 0.5 else own)
 
 
 def served(run: Path) -> None:
@@ -346,6 +358,7 @@ def served(run: Path) -> None:
     from orchestrator.pages.server import ResultsServer
     from orchestrator.pages.sliders import Bench
 
+    warnings.simplefilter("ignore", RecordWarning)  # the command line makes notes of them
     bench = Bench()
     with ResultsServer(Path("out"), bench) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
