@@ -187,6 +187,9 @@ def _status(arguments: Sequence[str]) -> int:
         _print_traceback(error)
         where = f"{error.filename}: " if error.filename else ""
         _print_errors([Diagnostic("results-unwritable", f"{where}{error.strerror or error}")])
+    except MemoryError as error:
+        _print_traceback(error)
+        _print_errors([Diagnostic("memory-exhausted", "the memory of this computer does not suffice")])
     except Exception as error:
         shown = _print_traceback(error)
         _print_errors([Diagnostic(YawbenchError.default_code, _own_error(error, shown))])

@@ -28,7 +28,7 @@ from vocabulary.roles import role_in
 from vocabulary.wheels import WHEELS
 
 from .errors import ModelDescriptionError, SimulationError, WiringError
-from .evaluation.steering_tests import gradients
+from .evaluation.steering_tests import FEWEST, gradients
 from .figures.style import QUIET, ROW, frame, line_style, new_figure
 from .fmu.opener import find_fmu, find_folder
 from .master.simulate import simulate_in_memory
@@ -203,6 +203,8 @@ HAND_RATE = 13.5 / 180.0 * pi
 """Rate of the hand wheel [rad/s], UN R140."""
 WANTED = 9.0
 """Lateral acceleration that a linear car would reach at the end of the steer [m/s2]."""
+STEEPEST = 0.5 * pi
+"""Steer angle below which that must be reached [rad]: a wheel across the car."""
 SMALL = 0.3
 """Approximate lateral acceleration of the sine [m/s2]."""
 SAMPLE = 0.01
@@ -267,7 +269,13 @@ def handling_of(track: TestTrack) -> Handling:
             if number == 0:
                 raise
             handling.failed.append(str(error))
+        except NoFigureError as error:
+            handling.failed.append(str(error))
     return handling
+
+
+class NoFigureError(Exception):
+    """A car moves in such a way that a figure does not exist; the message says how."""
 
 
 def _modes(track: TestTrack, handling: Handling) -> None:
@@ -287,12 +295,18 @@ def _modes(track: TestTrack, handling: Handling) -> None:
         handling.loads = tuple(float(results[f"plant.vertical_load_{w}"][0]) for w in WHEELS)
         states = np.column_stack([results[f"plant.{name}"][::every] for name in names])
         steer = results["driver.steer_angle"][::every]
-        transition, drive = fit(states, steer)
-        yaw, roll = modes_of(transition)
+        try:
+            transition, drive = fit(states, steer)
+            yaw, roll = modes_of(transition)
+            still = np.linalg.solve(np.eye(len(names)) - transition, drive.sum(axis=1))
+        except np.linalg.LinAlgError:
+            handling.failed.append(
+                f"at {3.6 * speed:.0f} km/h the car does not answer a small sine of steering"
+            )
+            continue
         handling.yaw[speed] = yaw
         if speed == TURN_SPEED:
             handling.roll_mode = roll
-        still = np.linalg.solve(np.eye(len(names)) - transition, drive.sum(axis=1))
         handling.gains[speed] = float(still[1])
 
 
@@ -313,6 +327,8 @@ def modes_of(transition: np.ndarray) -> tuple[Mode, Mode | None]:
     values, right = np.linalg.eig(transition)  # the matrix is real, so conjugate pairs are exact
     left = np.linalg.inv(right)
     part = np.abs(right[0] * left[:, 0]) + np.abs(right[1] * left[:, 1])  # in v_y and r
+    if not values.all():
+        raise np.linalg.LinAlgError("a motion that ends within a sample")
     rates = np.log(values.astype(complex)) / SAMPLE
     order = sorted(range(len(rates)), key=lambda k: (rates[k].imag == 0.0, abs(rates[k].imag), -part[k]))
     pairs = [order[i : i + 2] for i in range(0, len(order), 2)]
@@ -328,7 +344,10 @@ def _mode(rates: np.ndarray) -> Mode:
 
 def _turn(track: TestTrack, handling: Handling) -> None:
     """Add understeer and roll over lateral acceleration."""
-    last = WANTED / (handling.gains[TURN_SPEED] * TURN_SPEED)
+    gain = handling.gains.get(TURN_SPEED, 0.0)
+    last = WANTED / (gain * TURN_SPEED) if gain else np.inf
+    if not 0.0 < last < STEEPEST:
+        raise NoFigureError(f"at 80 km/h the car settles in no turn: its steady yaw gain is {gain:.3g} 1/s")
     ratio = 17.0  # cancels: the hand wheel turns so much faster than the road wheels
     duration = max(last * ratio / HAND_RATE, 2.0)
     of_ramp = {
@@ -341,6 +360,10 @@ def _turn(track: TestTrack, handling: Handling) -> None:
     results = track.drive({"fmu": "driver_ramp", "parameters": of_ramp}, TURN_SPEED, 0.5 + duration)
     a_y = results["plant.acceleration_y"]
     after = (results.time > 1.0) & (np.arange(len(a_y)) <= np.argmax(a_y))
+    if np.count_nonzero(after) < FEWEST:
+        raise NoFigureError(
+            "at 80 km/h the car settles in no turn: its lateral acceleration falls within 1 s"
+        )
     a_y = a_y[after]
     rate, speed = results["plant.yaw_rate"][after], results["plant.velocity_x"][after]
     extra = results["driver.steer_angle"][after] - handling.wheelbase * rate / speed
@@ -349,7 +372,8 @@ def _turn(track: TestTrack, handling: Handling) -> None:
     if track.has(BODY[0]):
         handling.roll = roll = results["plant.roll_angle"][after]
         low = a_y < 4.0
-        handling.roll_gradient = float(np.polyfit(a_y[low], roll[low], 1)[0])
+        if np.count_nonzero(low) >= FEWEST:
+            handling.roll_gradient = float(np.polyfit(a_y[low], roll[low], 1)[0])
 
 
 def _bounce(track: TestTrack, handling: Handling) -> None:
@@ -361,7 +385,8 @@ def _bounce(track: TestTrack, handling: Handling) -> None:
     y = results["plant.heave"][::every]
     rows = np.column_stack([y[3 - k : len(y) - 1 - k] for k in range(4)])  # of the body and of the wheels
     order = np.linalg.lstsq(rows, y[4:], rcond=None)[0]
-    rates = np.log(np.roots([1.0, *-order]).astype(complex)) / SAMPLE
+    roots = np.roots([1.0, *-order]).astype(complex)
+    rates = np.log(roots[roots != 0.0]) / SAMPLE
     swinging = sorted((rate for rate in rates if rate.imag > 0.0), key=abs)
     if swinging:
         handling.heave = _mode(np.array([swinging[0], swinging[0].conjugate()]))

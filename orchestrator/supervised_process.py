@@ -153,11 +153,13 @@ class ProcessLost(Exception):
     Args:
         did: what happened to it, such as "died of SIGSEGV".
         late: the cause is the FMI function being called, which did not return in time.
+        killed: by SIGKILL, which the system sends if memory runs out.
     """
 
-    def __init__(self, did: str, *, late: bool = False) -> None:
+    def __init__(self, did: str, *, late: bool = False, killed: bool = False) -> None:
         super().__init__(did)
         self._late = late
+        self.killed = killed
 
     def in_(self, function: str) -> str:
         """Return the message for a loss during a call of an FMI function ("": between two calls)."""
@@ -226,7 +228,9 @@ class SupervisedProcess:
         except EOFError:
             ended = self.child.ended(CLOSING)
             code = self.close(kill=True)
-            raise ProcessLost(how_it_ended(code) if ended else "closed the pipe to the master") from None
+            if not ended:
+                raise ProcessLost("closed the pipe to the master") from None
+            raise ProcessLost(how_it_ended(code), killed=code == -signal.SIGKILL) from None
         except ProtocolError as error:
             raise self.garbled(str(error)) from None
 

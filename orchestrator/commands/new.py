@@ -195,7 +195,12 @@ def write_new(files: dict[PurePosixPath, str], folder: Path, *, also: Iterable[P
         target = folder / path
         target.parent.mkdir(parents=True, exist_ok=True)
         with target.open("x", encoding="utf-8", newline="\n") as file:
-            file.write(text)
+            try:
+                file.write(text)
+                file.flush()
+            except OSError:  # a full disk
+                target.unlink()
+                raise
 
 
 def write_schemas(files: Iterable[PurePosixPath], folder: Path) -> None:

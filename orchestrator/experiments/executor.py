@@ -335,7 +335,7 @@ def finish(
         made += 1
         final = outcome.ok or (outcome.exit_status == 1 and not outcome.died)  # else try again
         if journal:
-            journal.add(outcome.job.key, outcome.record, last=final)
+            journal.add(outcome.job.key, outcome.record, last=final and not outcome.record.of_machine)
         else:
             outcomes.append(outcome)
         on_outcome(outcome)

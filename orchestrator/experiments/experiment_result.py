@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..errors import Diagnostic
+from ..errors import Diagnostic, ResultsError
 from ..evaluation.validation import Validation, compare_run
 from ..figures.style import digits_of
 from ..messages import counted
@@ -92,6 +92,22 @@ class ExperimentResult:
             for case, record in zip(self.experiment.cases, self.records, strict=True)
             if record.failed
         }
+
+    def of_models(self) -> ExperimentResult:
+        """Return this result, if its failures are those of models.
+
+        Raises:
+            ResultsError: runs failed for a reason of the machine, from which nothing may be concluded.
+        """
+        lost = [number for number, record in enumerate(self.records) if record.of_machine]
+        if lost:
+            case = self.words(self.experiment.cases[lost[0]])
+            raise ResultsError(
+                f"{case}: {self.records[lost[0]].reason}; {counted(len(lost), 'run')} failed for a reason of "
+                "this computer, not of the model: start it again to make them again",
+                code="runs-missing",
+            )
+        return self
 
     @property
     def not_made(self) -> int:

@@ -28,6 +28,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
@@ -59,6 +60,8 @@ MEASURED = "measured"
 """Prefix of the free parameters of a measurement."""
 MARGIN = 0.5
 """Time before and after a window [s] for which inputs are kept; chosen: longer than any delay."""
+LARGEST = 1e9
+"""Largest measured value over its expected difference. Chosen: sums of their squares keep some digits."""
 TRANSIENT = 2.0
 """Periods of the filter's cut-off by which a run is longer than its window; chosen: its end has died away."""
 
@@ -103,6 +106,10 @@ class FitSpec(StrictModel):
     free: dict[str, FreeSpec] = Field(min_length=1, description="Free parameters: target -> range")
     settling: Time = Field(Fraction(1, 2), description="s, not compared at the start of each window")
     most_sets: int = Field(300, ge=2, description="Sets of values after which the search stops")
+
+
+Part = Literal["training", "held_out"]
+PARTS: tuple[Part, ...] = ("training", "held_out")
 
 
 @dataclass(frozen=True)
@@ -174,10 +181,8 @@ def load_fit(path: Path | str) -> LoadedFit:
             document.report(key, str(error), code_of(error))
     parts = {}
     if not document.errors:
-        for name in ("training", "held_out"):
-            stretches = getattr(spec, name)
-            settling = float(spec.settling)
-            parts[name] = list(_windows(document, name, stretches, filtered, raw, errors, settling))
+        for part in PARTS:
+            parts[part] = list(_windows(document, part, spec, filtered, raw, errors))
     _refuse_overlaps(document, spec)
     document.raise_errors()
     return LoadedFit(path, spec, filtered, errors, parts["training"], parts["held_out"])
@@ -198,14 +203,13 @@ def number_in(value: Value, unit: str | None, *, relative: bool = False) -> floa
 
 def _windows(
     document: Document,
-    name: str,
-    stretches: Sequence[StretchSpec],
+    name: Part,
+    spec: FitSpec,
     filtered: Measurement,
     raw: Measurement,
     compared: Mapping[str, float],
-    settling: float,
 ) -> Iterator[FitWindow]:
-    for number, stretch in enumerate(stretches):
+    for number, stretch in enumerate(getattr(spec, name)):
         try:
             segment, unfiltered = filtered.segment(stretch.segment), raw.segment(stretch.segment)
         except ValueError as error:
@@ -231,6 +235,7 @@ def _windows(
                 document.report((name, number), words, "fit-window")
                 break
             part = segment.between(start, stop).even()
+            settling = float(spec.settling)
             if np.count_nonzero(part.time >= part.time[0] + settling - 1e-9) < 3:
                 words = f"a window has less than three samples after 'settling', {settling:g} s"
                 document.report((name, number), words, "fit-window")
@@ -245,6 +250,12 @@ def _windows(
                     "nothing; end the window before, or leave that signal out of 'compared'"
                 )
                 document.report((name, number), words, "fit-window")
+                break
+            if large := [name for name, x in measured.items() if np.abs(x / compared[name]).max() > LARGEST]:
+                words = (
+                    f"{large[0]} reaches more than {LARGEST:g} times the difference expected in 'compared'"
+                )
+                document.report((name, number), f"{words}; check its unit and that", "fit-window")
                 break
             yield FitWindow(Window(label, part.time, measured), segment, unfiltered)
 

@@ -33,6 +33,7 @@ from ..planner import Planner
 from ..results import freshness
 from ..results.reader import Results, load_results
 from ..results.run_folder import RunStatus
+from ..safe_files import reason
 from ..workers import Finished, Pool, retire
 from .on_demand import StoredPlans
 
@@ -51,6 +52,9 @@ NEEDED = ("orchestrator.experiments.jobs", "orchestrator.master.simulate", "pyar
 """Modules to preload for runs, because they are slow to import."""
 FOR_TESTS = ("scipy.signal", "orchestrator.evaluation.sine_with_dwell")
 """Further modules to preload if runs are judged by a standard test."""
+
+OF_MACHINE = frozenset({"results-unwritable", "run-process-died", "memory-exhausted"})
+"""Codes of failures that say nothing about the model, such as a full disk; such runs are made again."""
 
 MetricRequests = tuple[tuple[str, str, tuple[float, float] | None], ...]
 """(key, metric, window) of each metric."""
@@ -104,6 +108,11 @@ class MeasuredRun:
     def failed(self) -> bool:
         """Whether the run was executed without yielding a result."""
         return self.made and not self.ok
+
+    @property
+    def of_machine(self) -> bool:
+        """Whether it failed for a reason of the machine (see `OF_MACHINE`)."""
+        return any(diagnostic.code in OF_MACHINE for diagnostic in errors_in(self.diagnostics))
 
     @property
     def status(self) -> MeasuredStatus:
@@ -430,6 +439,16 @@ def _report_of(job: Job, run: Callable[[Job], Any], keep: bool) -> tuple[int, li
         report = 0, [], run(job), False
     except (YawbenchError, Interrupted) as error:
         report = error.exit_status, error.diagnostics, None, isinstance(error, Interrupted)
+    except MemoryError:
+        lost = Diagnostic("memory-exhausted", "the memory of this computer does not suffice")
+        report = 1, [lost], None, False
+    except OSError as error:
+        report = (
+            1,
+            [Diagnostic("results-unwritable", f"{error.filename or job.out}: {reason(error)}")],
+            None,
+            False,
+        )
     except BaseException as error:
         print(printable("".join(traceback.format_exception(error))), file=sys.stderr)
         lost = Diagnostic("internal-error", f"{type(error).__name__}: {error}")

@@ -164,8 +164,9 @@ class Journal:
             except ValueError as error:  # noqa: PERF203 - all are named
                 damaged[number] = str(error)
             else:
-                self.records[entry.key] = entry.record
-                whole.append(line + b"\n")
+                if not entry.record.of_machine:  # written by an earlier version
+                    self.records[entry.key] = entry.record
+                    whole.append(line + b"\n")
         try:
             self._check(_Head.read(lines[0]), head)
         except ValueError as error:

@@ -376,7 +376,7 @@ def run_ranking(
     Raises:
         YawbenchError: a run cannot start, or A cannot be determined.
     """
-    slow = execute(angle_experiment(ranking, execute), keep=False)
+    slow = execute(angle_experiment(ranking, execute), keep=False).of_models()
     for case, record in zip(slow.experiment.cases, slow.records, strict=True):
         if not record.made:
             car = case.run.name
@@ -409,7 +409,8 @@ def _ranked_runs(
     assert result.planned is not None
     names = [*result.spec.axes]
     runs = []
-    for case, job, record in zip(result.experiment.cases, result.planned.jobs, result.records, strict=True):
+    records = result.of_models().records
+    for case, job, record in zip(result.experiment.cases, result.planned.jobs, records, strict=True):
         condition, at = ranking.spec.conditions[case.run.name], dict(zip(names, case.point, strict=True))
         repeat = next((at[place].value for place in condition.repeats), None)
         runs.append(

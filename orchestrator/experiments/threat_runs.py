@@ -22,7 +22,7 @@ from ..signal_names import Target
 from .axes import Level, changes_of_file
 from .executor import Executor, Search, highest_passing, side_by_side
 from .experiment import LoadedExperiment, NamedRun, experiment_of
-from .jobs import MeasuredRun
+from .jobs import OF_MACHINE, MeasuredRun
 from .ranking import CONTROLLER, RECORDED, SERIES, angle_experiment, angles_of
 from .ranking_scores import RankedRun, RankedState
 from .tables import Table, column
@@ -34,7 +34,7 @@ seen even if a higher level passes again."""
 RESOLUTION = 0.02
 """Relative difference of the levels at the end of a search; chosen: below the scatter between cars."""
 LIMIT = f"{CONTROLLER}.moment_limit"
-NO_LOSS = ("signal-unknown", "internal-error", "run-process-died")
+NO_LOSS = OF_MACHINE | {"signal-unknown", "internal-error"}
 """Errors of a run that say nothing about the car; any other end of a run counts as lost."""
 DRIVER = Target.parse(AMPLITUDE).instance
 MOMENT = f"faults.{CONTROLLER}.yaw_moment"

@@ -117,7 +117,7 @@ def search(experiment: LoadedExperiment, judged: JudgeExperiment) -> list[TunedL
             tried = [_changes(law, point) for point in values]
             findings = judged(
                 trials_of(experiment, {f"{name}, {k + 1}": changes for k, changes in enumerate(tried)})
-            )
+            ).of_models()
             objectives = [_objective(experiment, {**fixed, **at}) for at in findings.at.values()]
             number = len(trials) // tuning.population + 1
             trials += [Trial(number, *pair) for pair in zip(values, objectives, strict=True)]
@@ -158,7 +158,7 @@ def _hypercube(number: int, axes: int, chance: np.random.Generator) -> np.ndarra
 def _fixed(experiment: LoadedExperiment, judged: JudgeExperiment) -> MetricTable:
     """Return the metrics of the runs without a tuned law."""
     left = trials_of(experiment, {"untuned": VariantSpec.model_validate({})}, driven=False)
-    return judged(left).values if left.runs else {}
+    return judged(left).of_models().values if left.runs else {}
 
 
 def trials_of(

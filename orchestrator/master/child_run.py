@@ -191,6 +191,8 @@ def _go(course: RunLifecycle, opener: OpenInstance) -> dict[str, Any] | None:
     except (YawbenchError, Interrupted) as error:
         instance = getattr(error, "instance", None)
         return {**error_record(error), "inputs": course.inputs_of(instance) if instance else {}}
+    except MemoryError:
+        return {"kind": MemoryError.__name__, "inputs": {}}
     except BaseException:
         return {"kind": "", "traceback": traceback.format_exc(), "inputs": {}}
     return None
@@ -327,6 +329,8 @@ class ChildRun(RunLifecycle, FmuProcess):
             self.ended = EndRequested(reason, instance=instance, time=at)
         if failed is not None:
             self._inputs = failed["inputs"]
+            if failed["kind"] == MemoryError.__name__:
+                raise MemoryError
             raise rebuilt(failed) if failed["kind"] else RuntimeError(failed["traceback"])
 
     def _forked(self, opener: OpenInstance, stop_pipe: int, commands: int, answers: int) -> ForkedChild:
@@ -426,7 +430,8 @@ class ChildRun(RunLifecycle, FmuProcess):
             )
         if self._stop.requested:
             return self._stop.interrupted(f": {sentence}", instance=instance, time=now)
-        return SimulationError(sentence, instance=instance, time=now, code="fmu-process-died")
+        code = "run-process-died" if lost.killed else "fmu-process-died"
+        return SimulationError(sentence, instance=instance, time=now, code=code)
 
     def end(self) -> None:
         """Let the child terminate and free the instances; a crash there is only a warning."""

@@ -48,6 +48,7 @@ from .instance import (
 )
 from .process_state import (
     FATAL,
+    KILLED,
     OK,
     PROCESS,
     WARNING,
@@ -286,7 +287,7 @@ class IsolatedInstance:
         self._process = None
         errors = self._log.errors(self.name)
         before = f"; its last message: {' '.join(errors[-1].text.split())}" if errors else ""
-        self._log.add(self.name, FATAL, PROCESS, lost.in_(function) + before)
+        self._log.add(self.name, FATAL, KILLED if lost.killed else PROCESS, lost.in_(function) + before)
         return FATAL
 
     def free(self) -> None:

@@ -46,6 +46,8 @@ MASTER = "yawbench"
 """Category of the master's own messages about an instance; always kept."""
 PROCESS = "yawbench process"
 """Category of the message that says how the process of an isolated instance ended; always kept."""
+KILLED = "yawbench process killed"
+"""Category of that message if the process was killed by something else; always kept."""
 
 _HAS_TIME = re.compile(r"^[^:]* failed at t = [^:]* s: ")
 _CONTROLS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
@@ -93,10 +95,10 @@ class Log:
             time: simulation time that it is about [s]; default: the last communication point.
         """
         status = known(status)
-        if status == OK or (self._muted and category not in (MASTER, PROCESS)):
+        if status == OK or (self._muted and category not in (MASTER, PROCESS, KILLED)):
             return
         self._counts[instance] += 1
-        if self._counts[instance] > KEPT and category not in (MASTER, PROCESS):
+        if self._counts[instance] > KEPT and category not in (MASTER, PROCESS, KILLED):
             self.drop(1)
             return
         at = self.time.value if time is None else time
@@ -212,7 +214,8 @@ def describe(instance: str, what: str, time: float, status: int, log: Log) -> st
     elif not errors:
         reason = f"the FMU returned {STATUS[status]} and gave no reason"
     else:
-        ended = (m for m in errors if m.category == PROCESS)  # it already quotes the last error of the FMU
+        # it already quotes the last error of the FMU
+        ended = (m for m in errors if m.category in (PROCESS, KILLED))
         reason = " ".join(next(ended, errors[0]).text.split())
         if _HAS_TIME.match(reason):  # a component of this project, whose message already has place and time
             return f"{instance}: {reason.partition('; inputs: ')[0]}"

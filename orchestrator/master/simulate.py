@@ -162,12 +162,41 @@ class Simulation:
                 self.recorder.announce(self.record)
                 try:
                     self.course.go(opener)
+                except MemoryError:
+                    lost = self._of_machine(
+                        "the memory of this computer does not suffice", "memory-exhausted"
+                    )
+                    self._fail(lost)
+                    raise lost from None
                 except BaseException as error:
                     self._fail(error)
                     raise
-                self._save(RunStatus.COMPLETED)
+                self._save_all()
             finally:
                 self._end()
+
+    def _save_all(self) -> None:
+        """Write the results of a run that has reached its end, if every row of it was recorded.
+
+        Raises:
+            SimulationError: one was not, or they cannot be written.
+        """
+        rows = self.plan.n_steps + 1 if self.course.ended is None else self.course.handed_over
+        if self.recorder.written != rows:
+            lost = self._of_machine(
+                f"{self.recorder.written} of {rows} rows were recorded", "results-unwritable"
+            )
+            self._fail(lost)
+            raise lost
+        try:
+            self._save(RunStatus.COMPLETED)
+        except ResultsError as error:
+            raise self._of_machine(error.diagnostics, error.code) from None
+
+    def _of_machine(self, messages: str | list[Diagnostic], code: str) -> SimulationError:
+        """Return the exception for a failure that is not the model's."""
+        time = self.plan.time(max(0, self.recorder.written - 1))
+        return SimulationError(messages, instance=None, time=time, code=code)
 
     def _fail(self, error: BaseException) -> None:
         """Write the results so far, and the error that ended the run."""
@@ -217,8 +246,11 @@ class Simulation:
         if ended is not None:
             record.ended = EndRecord(instance=ended.instance, time=ended.time, message=str(ended))
         self._note_warnings()
-        self.recorder.finish(record)
-        self._saved, self._saving = True, False
+        try:
+            self.recorder.finish(record)
+            self._saved = True
+        finally:
+            self._saving = False
 
     def _end(self) -> None:
         """Terminate and free the instances; add their last messages to the record already written."""

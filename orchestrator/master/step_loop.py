@@ -29,7 +29,7 @@ from ..plan import Plan, Value
 from .compiled_loop import Answer, CompiledLoop, missing_loop
 from .initialization import initialize
 from .instance import Buffers, FmuInstance, PlainCall, Status
-from .process_state import DISCARD, MASTER, OK, WARNING, Copies, Log, ProcessState, describe, suspects
+from .process_state import DISCARD, KILLED, MASTER, OK, WARNING, Copies, Log, ProcessState, describe, suspects
 from .signal_pool import SignalPool
 from .step_program import Operation, StepProgram
 
@@ -309,7 +309,9 @@ class Master:
         """Return the exception for a failed instance: an interruption if a stop was requested."""
         if self.stop.requested:
             return self.stop.interrupted(f": {sentence}", instance=instance, time=time)
-        return SimulationError(sentence, instance=instance, time=time, code="fmu-call-failed")
+        killed = any(message.category == KILLED for message in self.log.errors(instance))
+        code = "run-process-died" if killed else "fmu-call-failed"
+        return SimulationError(sentence, instance=instance, time=time, code=code)
 
     def _note_warning(self, instance: str, what: str) -> None:
         """Log the status Warning of an instance that has not logged a message itself."""

@@ -128,7 +128,12 @@ class Identifiability:
 
 
 def identifiability(jacobian: np.ndarray, names: Sequence[str]) -> Identifiability:
-    """Return the condition of a Jacobian of shape (rows, parameters) and its weakest direction."""
+    """Return the condition of a Jacobian of shape (rows, parameters) and its weakest direction.
+
+    Of no parameters, as where all have reached a bound, it is 1, and there is no direction.
+    """
+    if not names:
+        return Identifiability(1.0, {})
     lengths = np.linalg.norm(jacobian, axis=0)
     if silent := tuple(name for name, length in zip(names, lengths, strict=True) if not length > 0.0):
         return Identifiability(np.inf, dict.fromkeys(silent, 1.0), silent)
@@ -151,7 +156,7 @@ def covariance(residuals: np.ndarray, jacobian: np.ndarray, pieces: np.ndarray) 
     """
     prior = pieces < 0
     own = np.unique(pieces[~prior])
-    if len(own) < LEAST_PIECES:
+    if len(own) < LEAST_PIECES or jacobian.shape[1] == 0:
         return None
     square = np.where(prior, 0.0, residuals**2)
     score = jacobian * (residuals / np.sqrt(1.0 + square))[:, None]

@@ -1,15 +1,19 @@
 """Server of the results below a folder, for one user on this machine.
 
     /TOKEN/                     pages and runs below the folder
-    /TOKEN/files/PATH           a page, or a file beside it
+    /TOKEN/files/PATH           leads to /OTHER/files/PATH, with a token of that file's own
     /TOKEN/view?run=PATH&...    the viewer of runs
     /TOKEN/bench?scenario=NAME  the bench (see `bench`); it posts to /TOKEN/run and gets /TOKEN/block/KEY
+    /OTHER/files/PATH           a page from the folder, or a file in `data/` beside it
 
 The server listens on 127.0.0.1. Every address begins with a random token, which other users and other pages
 do not know. `Host` must be the server's own, against names that other sites have pointed here; `Origin`, if
-sent, too, and must be sent with a request for a run. Paths are opened part by part below the folder, and no
-link is followed. Pages from the folder run sandboxed: their scripts cannot ask the server for runs or other
-files.
+sent, too, and must be sent with a request for a run; `Sec-Fetch-Site`, if sent, may not be another site's.
+Paths are opened part by part below the folder, and no link is followed.
+
+Pages from the folder may be somebody else's. They run in a sandbox, with an origin that no other page has,
+and the token in their address opens nothing but themselves and their `data/`: their scripts cannot ask for
+runs or other files, and load nothing from elsewhere.
 """
 
 from __future__ import annotations
@@ -23,11 +27,12 @@ import stat
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
+from functools import partial
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from mimetypes import guess_type
 from pathlib import Path
-from urllib.parse import parse_qs, quote, unquote, urlsplit
+from urllib.parse import parse_qs, quote, unquote_to_bytes, urlsplit
 
 from ..errors import ResultsError, YawbenchError
 from ..figures.style import LabelledRun
@@ -45,12 +50,16 @@ LARGEST = 500_000_000
 """Largest file that is served [bytes]. Chosen: far more than a page or its side files have."""
 REQUEST = 100_000
 """Largest request for a run [bytes]. Chosen: a hundred changes take a tenth of it."""
-SANDBOX = "sandbox allow-scripts allow-downloads allow-popups"
-OWN = (
-    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; "
-    "img-src data: blob:; connect-src 'self'"
+DATA = "data/"
+"""Folder beside a page with the files that it loads."""
+INLINE = (
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data: blob:; font-src data:; base-uri 'none'; "
+    "frame-ancestors 'none'; script-src 'unsafe-inline'"
 )
-"""Content security policies: of pages from the folder, and of the server's own."""
+OWN = f"{INLINE}; connect-src 'self'; form-action 'self'"
+SANDBOX = f"sandbox allow-scripts allow-downloads; form-action 'none'; {INLINE}"
+"""Content security policies: what all pages may do, of the server's own, and of pages from the folder; the
+last ends with what scripts it may load."""
 
 
 def open_below(folder: Path, path: str) -> int:
@@ -113,8 +122,23 @@ class ResultsServer(ThreadingHTTPServer):
         super().__init__(("127.0.0.1", port), Request)
         self.folder, self.bench = folder, bench
         self.token = secrets.token_urlsafe(24)
+        self._tokens: dict[str, str] = {}  # path of a file -> the token that opens it
+        self._paths: dict[str, str] = {}
         self.hosts = {f"{name}:{self.server_port}" for name in ("127.0.0.1", "localhost")}
         self.address = f"http://127.0.0.1:{self.server_port}/{self.token}/"
+
+    def place_of(self, path: str) -> str:
+        """Return the address of a file below the folder, with the token that opens it alone."""
+        token = self._tokens.setdefault(path, secrets.token_urlsafe(24))
+        self._paths[token] = path
+        return f"/{token}/files/{_quoted(path)}"
+
+    def opened_by(self, token: str) -> str | None:
+        """Return the path of the file that a token opens; "" for the server's own, which opens all.
+
+        None if it is no token.
+        """
+        return "" if hmac.compare_digest(token.encode(), self.token.encode()) else self._paths.get(token)
 
 
 class Refused(Exception):
@@ -156,8 +180,10 @@ class Request(BaseHTTPRequestHandler):
     def _answer(self, answers: dict[str, Callable[[str, Query], None]]) -> None:
         """Answer by the first part of the path below the token, or say why not."""
         try:
-            path, query = self._checked()
+            page, path, query = self._checked()
             kind, _, rest = path.partition("/")
+            if page:
+                answers = {"files": partial(self._file_of, page)}
             if kind not in answers:
                 raise Refused(HTTPStatus.NOT_FOUND, "there is no such page")
             answers[kind](rest, query)
@@ -172,8 +198,8 @@ class Request(BaseHTTPRequestHandler):
         except OSError:
             self._send_text(HTTPStatus.NOT_FOUND, "there is no such file below the folder")
 
-    def _checked(self) -> tuple[str, Query]:
-        """Return the path below the token and the query, after the checks of `Host`, `Origin` and token."""
+    def _checked(self) -> tuple[str, str, Query]:
+        """Return what the token opens, the path below it and the query, after the checks of all of them."""
         hosts = self.server.hosts
         if self.headers.get("Host") not in hosts:
             raise Refused(HTTPStatus.FORBIDDEN, "the request is for another host")
@@ -187,16 +213,22 @@ class Request(BaseHTTPRequestHandler):
         except ValueError as error:
             raise Refused(HTTPStatus.BAD_REQUEST, "the address cannot be read") from error
         token, _, rest = parts.path.removeprefix("/").partition("/")
-        if not hmac.compare_digest(token.encode(), self.server.token.encode()):
+        page = self.server.opened_by(token)
+        if page is None:
             raise Refused(
                 HTTPStatus.FORBIDDEN, "the address lacks the token that 'yawbench serve' has printed"
             )
-        return unquote(rest), parse_qs(parts.query)
+        if not page and self.headers.get("Sec-Fetch-Site", "none") not in ("none", "same-origin"):
+            raise Refused(
+                HTTPStatus.FORBIDDEN,
+                "another site leads here; open the address that 'yawbench serve' has printed",
+            )
+        return page, os.fsdecode(unquote_to_bytes(rest)), parse_qs(parts.query)
 
     def _index(self, rest: str, query: Query) -> None:
         """Send the list of pages and runs below the folder."""
         folder = self.server.folder
-        pages = [(path, f"files/{quote(path)}") for path in pages_below(folder)]
+        pages = [(printable(path), f"files/{_quoted(path)}") for path in pages_below(folder)]
         runs = list(runs_below(folder))
         text = render(
             "results.html.j2", title=f"Results in {folder}", pages=pages, runs=runs,
@@ -205,13 +237,34 @@ class Request(BaseHTTPRequestHandler):
         self._send_own(text)
 
     def _file(self, path: str, query: Query) -> None:
-        """Send a file from the folder."""
+        """Send a file from the folder; lead a browser, in which scripts learn the address, to its own."""
+        if "Mozilla" not in self.headers.get("User-Agent", "") and "Sec-Fetch-Mode" not in self.headers:
+            self._send_file(path)
+            return
+        os.close(open_below(self.server.folder, path))
+        self._send(HTTPStatus.SEE_OTHER, b"", "text/plain", OWN, Location=self.server.place_of(path))
+
+    def _file_of(self, page: str, path: str, query: Query) -> None:
+        """Send a page from the folder, or what is in `data/` beside it; lead to another page.
+
+        A page cannot see where it has led.
+        """
+        leads = {"Sec-Fetch-Mode": "navigate", "Sec-Fetch-Dest": "document"}
+        if path != page and not path.startswith(f"{page[: page.rfind('/') + 1]}{DATA}"):
+            if not path.endswith(".html") or any(self.headers.get(k) != v for k, v in leads.items()):
+                raise Refused(HTTPStatus.FORBIDDEN, "a page opens nothing but itself and its data")
+            self._file(path, query)
+            return
+        place = self.server.place_of(page).removesuffix(_quoted(page))
+        self._send_file(path, f" http://{self.headers['Host']}{place}")
+
+    def _send_file(self, path: str, scripts: str = "") -> None:
+        """Send a file from the folder, which may load scripts that are below an address."""
         with open(open_below(self.server.folder, path), "rb") as file:
             content = file.read()
         kind = guess_type(path)[0] or "application/octet-stream"
-        self._send(
-            HTTPStatus.OK, content, f"{kind}; charset=utf-8" if kind.startswith("text/") else kind, SANDBOX
-        )
+        text = f"{kind}; charset=utf-8" if kind.startswith("text/") else kind
+        self._send(HTTPStatus.OK, content, text, f"{SANDBOX}{scripts}")
 
     def _view(self, rest: str, query: Query) -> None:
         """Send the viewer of recorded runs."""
@@ -251,22 +304,24 @@ class Request(BaseHTTPRequestHandler):
         self._send(HTTPStatus.OK, json.dumps(answer).encode(), "application/json", OWN)
 
     def _send_own(self, text: str) -> None:
-        self._send(HTTPStatus.OK, text.encode(), "text/html; charset=utf-8", OWN)
+        content = text.encode(errors="backslashreplace")
+        self._send(HTTPStatus.OK, content, "text/html; charset=utf-8", OWN)
 
     def _send_text(self, status: HTTPStatus, sentence: str) -> None:
-        self._send(status, f"{printable(sentence)}\n".encode(), "text/plain; charset=utf-8", OWN)
+        content = f"{printable(sentence)}\n".encode(errors="backslashreplace")
+        self._send(status, content, "text/plain; charset=utf-8", OWN)
 
-    def _send(self, status: HTTPStatus, content: bytes, kind: str, policy: str) -> None:
+    def _send(self, status: HTTPStatus, content: bytes, kind: str, policy: str, **more: str) -> None:
         if self.command == "POST" and status is not HTTPStatus.OK:
             self.close_connection = True  # its content may not have been read
         self.send_response(status)
         headers = {
             "Content-Type": kind, "Content-Length": str(len(content)), "Content-Security-Policy": policy,
             "X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer",
-            "Cache-Control": "no-store", "X-Frame-Options": "DENY",
+            "Cache-Control": "no-store", "X-Frame-Options": "DENY", **more,
         }  # fmt: skip
         if policy is OWN:  # to a sandboxed page, the files beside it are of another origin
-            headers["Cross-Origin-Resource-Policy"] = "same-origin"
+            headers["Cross-Origin-Resource-Policy"] = headers["Cross-Origin-Opener-Policy"] = "same-origin"
         for name, value in headers.items():
             self.send_header(name, value)
         self.end_headers()
@@ -274,6 +329,10 @@ class Request(BaseHTTPRequestHandler):
 
     def log_message(self, format: str, *arguments: object) -> None:
         """Print nothing: the address in each line has the token."""
+
+
+def _quoted(path: str) -> str:
+    return quote(os.fsencode(path))
 
 
 def pages_below(folder: Path) -> Iterator[str]:

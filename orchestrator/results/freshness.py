@@ -16,7 +16,7 @@ from datetime import datetime, timezone
 from functools import cache, lru_cache
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from ..cache import OF_RESULTS, checksum, sources_hash
 from ..errors import ResultsError
@@ -31,6 +31,7 @@ from .run_record import (
     FaultRecord,
     FmuRecord,
     OverrideRecord,
+    RecordedScenario,
     RunRecord,
     SeriesRecord,
     SourceRecord,
@@ -69,7 +70,7 @@ def run_record(plan: Plan, *, status: RunStatus, started: datetime) -> RunRecord
         sources=[*map(_source, sources)],
         changes=[OverrideRecord.model_validate(change.record) for change in plan.changes],
         connections=connections_of(plan),
-        scenario=plan.scenario,
+        scenario=cast(RecordedScenario, plan.scenario),
         diagnostics=[*map(DiagnosticRecord.of, plan.diagnostics)],
         versions=versions(),
     )

@@ -26,9 +26,11 @@ from ..plan import Value
 from ..safe_files import reason, write_whole
 from .file_formats import FORMATS, RESULTS_FILE, check_format, load_class, plain, rows_text
 from .reader import Results
-from .run_folder import PART, RUN_FILE, FolderLock, put_in_place, tidy
-from .run_record import RunRecord
+from .run_folder import PART, RUN_FILE, FolderLock, RunStatus, put_in_place, tidy
+from .run_record import ErrorRecord, RunRecord
 
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""Numbers of the errors of a disk, or a user's share of it, that is full, and of a limit of a file's size."""
 BLOCK = 512
 """Rows buffered in memory before they are written."""
 
@@ -189,16 +191,26 @@ class Recorder(RowBlock):
         """Complete and write the run record, flush everything to disk, and give both files their final names.
 
         On a full disk the last rows are dropped to make room for the record, without which the others are
-        useless. The folder stays locked until `close`.
+        useless; the run is then a failed one. The folder stays locked until `close`.
+
+        Raises:
+            ResultsError: not every row is in the file. The rows that are are kept as those of a failed run,
+                or if the file was changed by something else, none.
         """
+        lost = ""
         try:
             self._complete(record)
             os.fsync(self._file.fileno())
+            self._refuse_altered()
             try:
                 self._write_record(record)
             except OSError as error:
-                if error.errno != errno.ENOSPC or not self._make_room(len(record.to_json().encode())):
+                rows = self.written
+                if error.errno not in FULL or not self._make_room(len(record.to_json().encode())):
                     raise
+                if record.status is RunStatus.COMPLETED:
+                    lost = f"the disk is full, {self.written} of {rows} rows are kept"
+                    record.status, record.error = RunStatus.FAILED, ErrorRecord(message=lost, instance=None)
                 self._write_record(record)
             self._file.close()
             self.written_to = self.folder / put_in_place(self._home).relative_to(self._home)
@@ -208,6 +220,25 @@ class Recorder(RowBlock):
         except OSError as error:
             self.discard()
             raise self._unwritable(error) from None
+        if lost:
+            raise ResultsError(f"{self.written_to / self.file}: {lost}.", code="results-unwritable")
+
+    def _refuse_altered(self) -> None:
+        """Check that the file has the bytes that were written to it, and under its name.
+
+        Raises:
+            ResultsError: something else has removed, replaced or changed it.
+        """
+        try:
+            whole = self._path.stat().st_size == self._size and self._checksum() == checksum(self._path)
+        except FileNotFoundError:
+            whole = False
+        if not whole:
+            raise ResultsError(
+                f"{self.folder / self._path.name}: was removed or changed by something else before the run "
+                "had ended, and its rows are lost; run it again.",
+                code="results-unwritable",
+            )
 
     def close(self, record: RunRecord | None = None) -> None:
         """Release the folder.

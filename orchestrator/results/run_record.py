@@ -22,6 +22,7 @@ from pydantic import (
     ValidationError,
 )
 from pydantic_core import PydanticKnownError
+from typing_extensions import TypedDict
 
 from vocabulary.roles import role_of
 
@@ -231,6 +232,23 @@ NOT_RECORDED = ValueSource(NEUTRAL, "source not recorded")
 """Source of values in records of earlier versions."""
 
 
+class RecordedInstance(TypedDict, total=False):
+    """An instance as in a scenario file."""
+
+    __pydantic_config__ = ConfigDict(extra="allow", strict=True)  # type: ignore[misc]
+    parameters: dict[str, Any]
+
+
+class RecordedScenario(TypedDict, total=False):
+    """The scenario of a run: what of it is read back."""
+
+    __pydantic_config__ = ConfigDict(extra="allow", strict=True)  # type: ignore[misc]
+    file: Any
+    source: Any
+    vehicle_parameters: dict[str, Any]
+    units: dict[str, RecordedInstance]
+
+
 def _run_status(value: object) -> RunStatus:
     if not isinstance(value, str):
         raise PydanticKnownError("string_type")
@@ -267,7 +285,7 @@ class RunRecord(_Part):
     connections: list[ConnectionRecord] = []
     faults: list[FaultRecord] = []
     diagnostics: list[DiagnosticRecord] = []
-    scenario: dict[str, Any] = {}
+    scenario: RecordedScenario = {}
     notes: list[str] = []  # until 0.2
     versions: dict[str, str] = {}
     warnings: list[WarningRecord] = []

@@ -13,7 +13,7 @@ from ..errors import InvalidValueError, ScenarioError, code_of, text_of
 from ..messages import fold, hint, resolved, span
 from ..plan import InputSeries, Value, ValueOrigin, Variable
 from ..scenario.loader import LoadedScenario
-from ..scenario.quantities import measure_of, unit_of
+from ..scenario.quantities import unit_of
 from ..scenario.schema import SeriesSpec
 from ..scenario.yaml_lines import KeyPath
 from ..signal_names import SignalName

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from orchestrator import workers
-from orchestrator.errors import ResultsError, ScenarioError
+from orchestrator.errors import Diagnostic, ResultsError, ScenarioError
 from orchestrator.experiments.axes import DesignAxisSpec, Level, axis_of_levels
 from orchestrator.experiments.executor import Executor, highest_passing, runner_of, side_by_side
 from orchestrator.experiments.experiment import NamedRun, experiment_of
@@ -193,3 +193,28 @@ def test_a_search_where_all_or_no_values_pass_ends_at_the_bounds():
     bounds = {"first": 60.0, "step": 10.0, "resolution": 0.5, "least": 35.0, "most": 82.0}
     assert found_by(lambda v: True, **bounds) == (82.0, None)
     assert found_by(lambda v: False, **bounds) == (None, 35.0)
+
+
+@pytest.mark.parametrize(("code", "counts"), [("results-unwritable", False), ("fmu-call-failed", True)])
+def test_a_search_concludes_nothing_from_a_failure_of_the_machine(code, counts, executor, tmp_path):
+    execute, _ = executor()
+
+    def runner(jobs, done):
+        for job in jobs:
+            done(Outcome(job, (Diagnostic(code, "why it failed"),), 1))
+
+    axis = DesignAxisSpec.model_validate({"vary": GAIN, "values": [0.5, 1.0]})
+    metrics = {"last": {"metric": "final(sensor.yaw_rate)"}}
+    experiment = experiment_of(
+        tmp_path / "e.yaml", named_runs(tmp_path), title="t", axes={"g": axis}, metrics=metrics
+    )
+    with replace(execute, runner=runner) as failing:
+        found = failing(experiment, keep=False)
+    assert [record.status for record in found.records] == ["failed"] * 4
+    if counts:
+        assert found.of_models() is found
+        return
+    with pytest.raises(ResultsError) as caught:
+        found.of_models()
+    assert caught.value.code == "runs-missing"
+    assert "why it failed" in str(caught.value) and "4 runs" in str(caught.value)

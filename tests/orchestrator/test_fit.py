@@ -215,3 +215,48 @@ def test_five_parameters_are_found_from_three_runs_near_the_limit(noise, within,
     for name, (value, *_) in FIVE.items():
         assert found.values[name] == pytest.approx(value, rel=within)
     assert found._result.scenario.estimate.sets <= most
+
+
+@pytest.mark.parametrize(
+    ("free", "most_sets"),
+    [
+        ("vehicle.yaw_inertia: {low: 800, high: 1000, start: 900}", 60),  # the truth lies beyond
+        ("vehicle.yaw_inertia: {low: 800, high: 4000, start: 3999.999}", 2),  # no set but the first
+        ("vehicle.yaw_inertia: {low: 800, high: 4000, start: 2200}", 2),
+    ],
+)
+def test_a_fit_of_one_parameter_that_ends_where_it_began_or_at_a_bound_has_a_result(
+    free, most_sets, folder, tmp_path, capsys
+):
+    head = FIT.partition("free:")[0]
+    file = folder / "one.yaml"
+    file.write_text(f"{head}most_sets: {most_sets}\nfree:\n  {free}\n")
+    assert run("fit", file, "--out", tmp_path / "out", "--jobs", "1") == 0, capsys.readouterr().err
+    data = json.loads((tmp_path / "out" / "fit.json").read_text())
+    own, _ = data["models"].values()
+    (parameter,) = own["parameters"].values()
+    assert 800 <= parameter["value"] <= 4000
+    assert (tmp_path / "out" / "fit.html").is_file()
+
+
+@pytest.mark.parametrize("settling", ["3 s", "2.9999 s", "1000 s"])
+def test_a_window_of_which_nothing_is_compared_is_refused_at_its_line(settling, folder, tmp_path):
+    file = folder / "settling.yaml"
+    file.write_text(FIT.replace("settling: 0.2 s", f"settling: {settling}"))
+    with pytest.raises(ScenarioError) as caught:
+        load_fit(file)
+    assert {one.code for one in caught.value.diagnostics} == {"fit-window"}
+    lines = file.read_text().splitlines()
+    assert all(
+        lines[one.location.line - 1].startswith(("training", "held_out")) for one in caught.value.diagnostics
+    )
+    assert "settling" in str(caught.value)
+
+
+def test_values_too_large_to_be_compared_are_refused(folder):
+    file = folder / "large.yaml"
+    file.write_text(FIT.replace("yaw_rate: 0.1 deg/s", "yaw_rate: 1e-290"))
+    with pytest.raises(ScenarioError) as caught:
+        load_fit(file)
+    assert {one.code for one in caught.value.diagnostics} == {"fit-window"}
+    assert "yaw_rate" in str(caught.value)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -221,3 +222,18 @@ def test_a_name_that_cannot_be_is_refused_in_one_sentence(tmp_path, new, name, s
     assert (status, commands, files(tmp_path)) == (2, [], set())
     assert sentence in said
     assert said.count("\n") == 1
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a limit on the size of files")
+def test_a_full_disk_leaves_no_part_of_a_file(new, tmp_path):
+    import resource
+
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, limits[1]))
+    try:
+        status, _, said = new("follow")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert status == 1 and said.strip()
+    assert files(tmp_path) == set()
+    assert new("follow")[0] == 0

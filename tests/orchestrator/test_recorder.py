@@ -11,11 +11,12 @@ import pytest
 from pydantic import BaseModel
 
 from orchestrator.errors import ResultsError, SimulationError
+from orchestrator.master.instance import StepCalls
 from orchestrator.master.simulate import simulate
 from orchestrator.results import file_formats
 from orchestrator.results import recorder as module
 from orchestrator.results.reader import load_results
-from orchestrator.results.recorder import BLOCK, Recorder
+from orchestrator.results.recorder import BLOCK, Recorder, recorder_of
 from orchestrator.results.run_record import RunRecord
 from orchestrator.safe_files import write_whole
 from tests.sentences import golden, refused, texts_of
@@ -216,11 +217,140 @@ def test_rows_at_the_end_make_room_for_the_record_on_a_full_disk(tmp_path, monke
     monkeypatch.setattr(
         module, "write_whole", lambda *args, **kwargs: next(answers, write_whole)(*args, **kwargs)
     )
-    record(tmp_path, values, run={"title": "x" * 5000})
+    with pytest.raises(ResultsError) as caught:
+        record(tmp_path, values, run={"title": "x" * 5000})
+    assert caught.value.code == "results-unwritable"
     results = load_results(tmp_path)
+    assert f"{len(results.time)} of {len(values)} rows" in str(caught.value)
+    assert results.record.status == "failed" and "disk is full" in results.record.error.message
     assert 0 < len(results.time) < len(values)
     assert results.record.rows == len(results.time)
     assert results.time.tolist() == values[: len(results.time), 0].tolist()
+
+
+def test_a_run_whose_record_did_not_fit_has_failed(tmp_path, monkeypatch):
+    answers = iter([write_whole, no_space])  # the first is of the record that says that the run has begun
+    monkeypatch.setattr(
+        module, "write_whole", lambda *args, **kwargs: next(answers, write_whole)(*args, **kwargs)
+    )
+    units = {"a": Clock(x=math.sin)}
+    with pytest.raises(SimulationError) as caught:
+        simulate(make_plan(units, step="1/1000", n_steps=3000), tmp_path, opener=Stage(units))
+    assert (caught.value.code, caught.value.exit_status) == ("results-unwritable", 1)
+    results = load_results(tmp_path)
+    assert results.record.status == "failed"
+    assert 0 < len(results.time) == results.record.rows < 3001
+
+
+def test_a_failed_run_that_makes_room_for_its_record_leaves_the_results_of_a_completed_one(
+    tmp_path, monkeypatch
+):
+    record(tmp_path, table(2 * BLOCK), run={"title": "first"})
+    answers = iter([no_space])
+    monkeypatch.setattr(
+        module, "write_whole", lambda *args, **kwargs: next(answers, write_whole)(*args, **kwargs)
+    )
+    with pytest.raises(ResultsError):
+        record(tmp_path, table(2 * BLOCK), run={"title": "second"})
+    assert load_results(tmp_path).record.title == "first"
+    assert len(load_results(tmp_path).time) == 2 * BLOCK
+    assert load_results(tmp_path / "failed").record.title == "second"
+
+
+def _truncated(file):
+    os.truncate(file, 0)
+
+
+def _replaced(file):
+    content = file.read_bytes()
+    file.unlink()
+    file.write_bytes(content)
+
+
+def _overwritten(file):
+    with file.open("r+b") as stream:
+        stream.seek(20)
+        stream.write(b"7")
+
+
+def _lengthened(file):
+    with file.open("ab") as stream:
+        stream.write(b"1.0,2.0\n" * 20 * BLOCK)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="open files cannot be removed")
+@pytest.mark.parametrize("format", ["csv", "parquet", "mf4"])
+@pytest.mark.parametrize("change", [os.unlink, _truncated, _replaced, _overwritten, _lengthened])
+def test_a_file_of_results_that_something_else_changes_during_the_run_fails_it(
+    format, change, tmp_path, monkeypatch
+):
+    if format != "csv" and change in (_truncated, _overwritten):
+        pytest.skip("the file is empty until the end")
+    monkeypatch.setattr(recorder_of("parquet"), "CHUNK", BLOCK)
+    file = tmp_path / f"{file_formats.FILES[format]}.part"
+    times = []
+
+    def course(time):
+        times.append(time)
+        if len(times) == 1500:  # after the first blocks
+            change(file)
+        return time
+
+    units = {"a": Clock(x=course)}
+    with pytest.raises(SimulationError) as caught:
+        simulate(make_plan(units, step="1/1000", n_steps=3000), tmp_path, opener=Stage(units), format=format)
+    assert (caught.value.code, caught.value.exit_status) == ("results-unwritable", 1)
+    assert file.name in str(caught.value)
+    with pytest.raises(ResultsError) as missing:
+        load_results(tmp_path)
+    assert missing.value.code == "results-missing"
+
+
+def test_a_run_that_did_not_record_every_row_has_failed(tmp_path, monkeypatch):
+    def forget(self, count):
+        if count < BLOCK:  # the last block
+            self.others.clear()
+        else:
+            plain(self, count)
+
+    plain = Recorder.write
+    monkeypatch.setattr(Recorder, "write", forget)
+    units = {"a": Clock(x=math.sin)}
+    with pytest.raises(SimulationError) as caught:
+        simulate(make_plan(units, step="1/1000", n_steps=800), tmp_path, opener=Stage(units))
+    assert caught.value.code == "results-unwritable"
+    assert f"{BLOCK} of 801 rows" in str(caught.value)
+    assert load_results(tmp_path).record.status == "failed"
+
+
+def test_memory_that_does_not_suffice_is_one_sentence(tmp_path):
+    def greedy(time):
+        if time > 0.5:
+            raise MemoryError
+        return time
+
+    class Greedy(Stage):
+        def __call__(self, *arguments):
+            instance = super().__call__(*arguments)
+            connect = instance.connect
+
+            def connected(buffers):
+                calls = connect(buffers)
+
+                def step():
+                    greedy(buffers.time.value)
+                    return calls.step()
+
+                return StepCalls(calls.set, step, calls.get)
+
+            instance.connect = connected
+            return instance
+
+    units = {"a": Clock(x=math.sin)}
+    with pytest.raises(SimulationError) as caught:
+        simulate(make_plan(units, step="1/100", n_steps=100), tmp_path, opener=Greedy(units))
+    assert caught.value.code == "memory-exhausted"
+    assert load_results(tmp_path).record.status == "failed"
 
 
 def test_earlier_results_stay_if_the_record_cannot_be_written_at_all(tmp_path, monkeypatch):

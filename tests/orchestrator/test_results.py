@@ -8,6 +8,7 @@ from orchestrator.errors import ResultsError
 from orchestrator.results import reader
 from orchestrator.results.file_formats import BLOCK, CsvFile
 from orchestrator.results.reader import load_results
+from orchestrator.results.run_record import check_record
 from tests.sentences import golden, refused, texts_of
 
 RUN = {
@@ -219,3 +220,26 @@ def test_a_line_without_end_is_not_read_to_its_end(tmp_path):
         stream.truncate(10 * BLOCK)
     with refused(ValueError):
         CsvFile(file)
+
+
+@pytest.mark.parametrize(
+    ("scenario", "place"),
+    [
+        ({"units": {"plant": "x"}}, "scenario.units.plant"),
+        ({"units": ["plant"]}, "scenario.units"),
+        ({"units": None}, "scenario.units"),
+        ({"units": {"plant": {"parameters": ["mass"]}}}, "scenario.units.plant.parameters"),
+        ({"vehicle_parameters": 5}, "scenario.vehicle_parameters"),
+        (["units"], "scenario"),
+    ],
+)
+def test_a_record_whose_scenario_was_altered_is_refused_at_its_place(scenario, place, tmp_path):
+    with pytest.raises(ResultsError) as caught:
+        check_record({"status": "completed", "scenario": scenario}, tmp_path / "run.json")
+    assert f"run.json: is not the record of a run: {place}" in str(caught.value)
+
+
+def test_a_recorded_scenario_may_hold_more_than_is_read(tmp_path):
+    scenario = {"units": {"plant": {"fmu": "x", "step_size": 0.1, "own": [1]}}, "title": None, "later": {}}
+    record = check_record({"status": "completed", "scenario": scenario}, tmp_path / "run.json")
+    assert record.content()["scenario"] == scenario

@@ -17,7 +17,8 @@ from lxml import html
 from fmus.build import build_component
 from orchestrator.cli import main
 from orchestrator.errors import Diagnostic, Location, RecordWarning, ResultsError
-from orchestrator.experiments.jobs import MeasuredRun
+from orchestrator.experiments.executor import finish
+from orchestrator.experiments.jobs import Job, MeasuredRun, Outcome
 from orchestrator.experiments.journal import Journal
 from orchestrator.results.reader import load_results
 from tests.pages.made_up import unpacked
@@ -216,6 +217,71 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_is_not_made_again(moods, 
     assert golden_in(err)
     assert (tmp_path / "out" / "runs.jsonl").read_bytes() == before
     assert (tmp_path / "out" / "table.parquet").read_bytes() == table
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a limit on the size of files")
+def test_runs_that_met_a_full_disk_are_made_again(moods, yawbench, tmp_path):
+    import resource
+
+    file = moods(10, 20)
+    file.write_text(file.read_text() + "keep: all\nstop_time: 10\n")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
+    try:
+        assert yawbench(file, "out")[0] in (1, 2)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    yawbench(file, "out")
+    found = rows(tmp_path / "out")
+    assert [row["status"] for row in found] == ["completed"] * 2 + ["failed"] * 2
+    assert "twenty is too much" in found[2]["reason"]
+    completed = [load_results(path.parent) for path in (tmp_path / "out").rglob("results.csv")]
+    assert sorted(len(results.time) for results in completed) == [6, 6, 1001, 1001]
+    assert len(journal(tmp_path / "out")) == 4
+    assert "4 runs, all finished already" in yawbench(file, "out")[2]
+
+
+@pytest.mark.parametrize(
+    ("code", "again"),
+    [
+        ("results-unwritable", True),
+        ("run-process-died", True),
+        ("memory-exhausted", True),
+        ("run-failed", False),
+        ("fmu-call-failed", False),
+        ("fmu-process-died", False),
+        ("value-not-finite", False),
+    ],
+)
+def test_what_failed_for_a_reason_of_the_machine_is_made_again(code, again, tmp_path):
+    """Also if an earlier version has written it into the journal."""
+    failed = MeasuredRun({}, (Diagnostic(code, "why"),))
+    made = Journal(tmp_path, "a/b.yaml")
+    made.add("one", failed)
+    made.add("two", RECORDS["two"])
+    made.close()
+    resumed = Journal(tmp_path, "a/b.yaml")
+    resumed.close()
+    assert resumed.records == ({} if again else {"one": failed}) | {"two": RECORDS["two"]}
+
+    def runner(jobs, done):
+        for job in jobs:
+            done(Outcome(job, failed.diagnostics, 1))
+
+    resumed = Journal(tmp_path, "a/b.yaml")
+    finish([Job("one", tmp_path, tmp_path, key="one")], resumed, runner=runner)
+    resumed.close()
+    assert len(journal(tmp_path)) == (1 if again else 3)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="--isolate needs Linux or macOS")
+@pytest.mark.parametrize("isolated", [(), ("--isolate",)])
+def test_a_run_whose_instance_is_killed_is_made_again_on_resuming(isolated, moods, yawbench, tmp_path):
+    file = moods(10, 30)
+    file.write_text(file.read_text() + "keep: all\n")
+    assert yawbench(file, "out", *isolated)[0] == 1
+    assert len(journal(tmp_path / "out")) == 2
+    assert "4 runs, 2 finished already" in yawbench(file, "out", *isolated)[2]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="--isolate needs Linux or macOS")

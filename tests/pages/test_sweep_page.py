@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import threading
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,6 +12,8 @@ import numpy as np
 import pytest
 
 from orchestrator.cli import main
+from orchestrator.pages.server import ResultsServer
+from orchestrator.pages.sliders import Bench
 from orchestrator.results.reader import load_results
 
 from .browser import DESK, HELD, PHONE, Browser
@@ -286,3 +289,22 @@ def test_runs_that_were_not_made_are_not_shown_as_failures(chromium, sweep, tmp_
     text = chromium.run("return document.querySelector('main').innerText")
     assert "unknown, as no run was made" in text
     assert "at no value tried" not in text
+
+
+def test_the_server_shows_the_page_and_what_it_opens(chromium, sweep):
+    bench = Bench()
+    with ResultsServer(sweep.folder, bench) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        chromium.open(Path("/"))
+        chromium.driver.get(server.address)
+        chromium.console()
+        chromium.run("document.querySelector('a[href=\"files/report.html\"]').click()")
+        chromium.wait_for("document.querySelector('.ys-ready')")
+        chromium.run(VIEW + "view.open(view.data.sides.indexOf(true))")
+        chromium.wait_for("document.querySelector('.ys-run .yv-ready')")
+        assert chromium.console() == []
+        assert chromium.run("return origin") == "null"
+        server.shutdown()
+        thread.join()
+    bench.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from math import pi
 from pathlib import Path
@@ -29,6 +30,7 @@ from orchestrator.handling import (
 )
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.planner import Planner
+from orchestrator.scenario import yaml_lines
 from orchestrator.scenario.loader import load_scenario
 from orchestrator.tyre_stand import cornering_stiffness
 from orchestrator.wiring.derivations import car_of
@@ -232,6 +234,27 @@ def test_what_cannot_be_driven_is_answered_in_sentences(fmus, capsys, tmp_path, 
     said = capsys.readouterr().err
     assert done.value.code == 2
     assert says in said and "Traceback" not in said
+
+
+@pytest.mark.parametrize(("front", "rear"), [(0.72, 0.3), (2.0, 0.05)])
+def test_a_car_that_settles_in_no_turn_has_its_other_figures_and_a_note(fmus, tmp_path, capsys, front, rear):
+    """Its rear tyres are so soft that it is unstable at 80 km/h."""
+    given = yaml_lines.read(file("mid_size"), what="vehicle file").data
+    scales = {f"cornering_stiffness_scale_{k}": v for k, v in (("front", front), ("rear", rear))}
+    car = given | {"parameters": given["parameters"] | scales}
+    car["tyres"] = str(file("mid_size").parent / given["tyres"]) if given.get("tyres") else None
+    car = {key: value for key, value in car.items() if value is not None}
+    (tmp_path / "car.yaml").write_text(json.dumps(car, default=str))
+    with pytest.raises(SystemExit) as done:
+        main([
+            "vehicle", "show", str(tmp_path / "car.yaml"), "--plant", "plant_seven_dof", "--fmus", str(fmus),
+            "--out", str(tmp_path / "car.svg"),
+        ])  # fmt: skip
+    said = capsys.readouterr()
+    assert not done.value.code, said.err
+    assert "80 km/h the car settles in no turn" in said.out + said.err
+    assert "load of a front wheel at rest" in said.out
+    assert (tmp_path / "car.svg").is_file()
 
 
 # The library

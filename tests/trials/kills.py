@@ -20,6 +20,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 from fmus.build import build_all
@@ -49,8 +50,9 @@ COMMANDS = {
     "tune": ("tune", "tuning.yaml", "--out", "out"),
     "rank": ("rank", "ranking.yaml", "--out", "out"),
     "build": ("build", "--out", "out", *UNITS),
+    "export-ssp": ("export-ssp", "half.yaml", "--out", "out/half.ssp"),
 }
-SAME = ("*.csv", "*.parquet", "*.fmu", "experiment.json", "entries.yaml")
+SAME = ("*.csv", "*.ssp", "*.parquet", "*.fmu", "experiment.json", "entries.yaml")
 """Files that are the same to the last byte, whatever happened before; others hold times and versions."""
 MEASURED = "step_time"
 """Prefix of columns of computing time, which no two runs share."""
@@ -78,8 +80,8 @@ class Trial:
         (place / "tuning.yaml").write_text(TUNING)
         (place / "ranking.yaml").write_text(RANKING)
 
-    def start(self, command: str) -> subprocess.Popen[str]:
-        """Start a command in a group of its own."""
+    def start(self, command: str, largest: int | None = None) -> subprocess.Popen[str]:
+        """Start a command in a group of its own; no file that it writes may exceed `largest` [bytes]."""
         arguments = [sys.executable, "-m", "orchestrator.cli", *COMMANDS[command]]
         if command not in ("build", "rank"):  # which has the cars of this checkout
             arguments += ["--fmus", str(self._fmus)]
@@ -87,12 +89,13 @@ class Trial:
         return subprocess.Popen(
             arguments, cwd=self.place, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
             env=environment, start_new_session=True,
+            preexec_fn=None if largest is None else partial(_limit_files, largest),
         )  # fmt: skip
 
-    def call(self, command: str) -> tuple[int, str, float]:
+    def call(self, command: str, largest: int | None = None) -> tuple[int, str, float]:
         """Return exit status, what was said, and the time taken [s]."""
         began = time.monotonic()
-        process = self.start(command)
+        process = self.start(command, largest)
         said = process.communicate()[0]
         return process.returncode, said, time.monotonic() - began
 
@@ -148,6 +151,12 @@ class Trial:
             name = results.file.relative_to(out).as_posix()
             if results.record.status == "completed" and whole.get(name) != (out / name).read_bytes():
                 yield f"half a result passes for whole: {name}"
+
+
+def _limit_files(largest: int) -> None:
+    import resource  # not on Windows
+
+    resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
 
 
 def _computed(file: Path) -> bytes:

@@ -1,0 +1,86 @@
+"""Commands on a disk that is full, and called again: `python -m tests.trials.full_disk --each 20`.
+
+No file that a command writes may exceed a size drawn between nothing and its largest file, as on a disk that
+fills up. The command must fail with a sentence or have done all of its work; what it leaves may not pass for
+whole; called again with room, it must give the same as if nothing had happened.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import shutil
+import sys
+import tempfile
+from collections import Counter
+from pathlib import Path
+
+from fmus.build import build_all
+
+from .kills import COMMANDS, NOISE, UNITS, Trial
+
+
+def trial(command: str, each: int, seed: int, folder: Path, fmus: Path) -> tuple[Counter[str], list[str]]:
+    """Call a command `each` times without enough room.
+
+    Returns:
+        how many trials had which outcome ("held", or what went wrong); sentences on what went wrong.
+    """
+    r = random.Random(f"{seed} {command}")
+    undisturbed = Trial(folder / f"{command} undisturbed", fmus)
+    status, said, _ = undisturbed.call(command)
+    assert status == 0, said
+    whole = undisturbed.numbers()
+    assert whole
+    largest = max(path.stat().st_size for path in undisturbed.place.rglob("out/**/*") if path.is_file())
+    counts: Counter[str] = Counter()
+    notes: list[str] = []
+    for number in range(each):
+        one = Trial(folder / f"{command} {number}", fmus)
+        if command != "sweep" and r.random() < 0.5:  # with results of an earlier call, which a sweep keeps
+            shutil.copytree(undisturbed.place / "out", one.place / "out")
+        room = round(largest * r.random() ** 3)  # most files are small
+        status, said, _ = one.call(command, room)
+        found = [f"{word!r} on the terminal: {said.strip()[-300:]}" for word in NOISE if word in said]
+        if status == 0 and one.numbers() != whole:
+            found.append("exit status 0 with other numbers than undisturbed")
+        if status not in (0, 1, 2):
+            found.append(f"exit status {status}")
+        if status and not said.strip():
+            found.append("no word on what went wrong")
+        found += [*one.halves(whole), *one.litter()]
+        counts["had room" if status == 0 else "failed"] += 1
+        status, said, _ = one.call(command)
+        found += [f"called again, exit status {status}: {said.strip().splitlines()[-1:]}"] if status else []
+        found += [*one.litter()]
+        if one.numbers() != whole:
+            found.append("called again, other numbers than undisturbed")
+        counts["held" if not found else "did not hold"] += 1
+        notes += [f"{command} {number}, {room} bytes: {sentence}" for sentence in found]
+        shutil.rmtree(one.place.parent)
+    return counts, notes
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("commands", nargs="*", default=list(COMMANDS), help="default: all")
+    parser.add_argument("--each", type=int, default=20, help="calls of each command")
+    parser.add_argument("--seed", type=int, default=1)
+    given = parser.parse_args()
+    failed = False
+    print("| command | calls | failed | had room | held |")
+    print("|---|---:|---:|---:|---:|", flush=True)
+    with tempfile.TemporaryDirectory(prefix="full-") as folder:
+        fmus = Path(folder, "fmus")
+        build_all(fmus, components=UNITS)
+        for command in given.commands:
+            counts, notes = trial(command, given.each, given.seed, Path(folder), fmus)
+            numbers = (given.each, counts["failed"], counts["had room"], counts["held"])
+            print(f"| `{command}` | {' | '.join(map(str, numbers))} |", flush=True)
+            print("".join(f"{note}\n" for note in notes), end="", file=sys.stderr, flush=True)
+            failed = failed or bool(notes)
+    sys.exit(failed)
+
+
+if __name__ == "__main__":
+    main()

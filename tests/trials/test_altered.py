@@ -1,0 +1,41 @@
+"""Values altered in files of users and in records, a sample; `python -m tests.trials.altered` tries more."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from .altered import GROUPS, Folder, base, trial
+from .full_disk import trial as on_a_full_disk
+from .kills import COMMANDS, UNITS, build_all
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forks, and limits the child")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Folder]:
+    yield base(tmp_path_factory.mktemp("altered") / "base")
+
+
+@pytest.mark.parametrize("numbers", [range(3), pytest.param(range(1000, 1030), marks=pytest.mark.exhaustive)])
+@pytest.mark.parametrize("group", GROUPS)
+def test_altered_values_are_computed_with_or_answered_in_a_sentence(
+    group: str, numbers: range, folder: Folder
+) -> None:
+    counts, notes = trial(group, [*numbers], 1, folder, 1)
+    assert notes == []
+    assert sum(counts.values()) == len(numbers)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.sampled(1)
+def test_a_command_on_a_full_disk_fails_in_a_sentence_and_the_next_call_gives_all(
+    command: str, tmp_path: Path
+) -> None:
+    build_all(tmp_path / "fmus", components=UNITS)
+    counts, notes = on_a_full_disk(command, 1, 5, tmp_path, tmp_path / "fmus")
+    assert notes == []
+    assert counts["held"] == 1
