@@ -140,7 +140,7 @@ def _unit_rows(plan: Plan) -> Iterable[Sequence[str]]:
         yield instance.name, instance.fmu.name, f"{_number(1000 * instance.period * plan.step)} ms"
 
 
-def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
+def _values(plan: Plan, defaults: bool) -> tuple[Sequence[Sequence[str]], int]:
     """Return a row for every value with its origin, and the number of defaults not shown."""
     files = plan.scenario.get("tyre_files", {})
     of_tyres = {axle: ValueOrigin("file", Path(file["file"]).name) for axle, file in files.items()}
@@ -167,23 +167,23 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
                 takers.append(((name, text, origin), instance.name))
                 if defaults and origin == "default" and name in own:
                     sources.setdefault((name, text, origin), instance.fmu.variables[name].source)
-    rows = [*_run_rows(plan)]
+    rows: list[tuple[str, str, str, str]] = [*_run_rows(plan)]
     for axle, origin_of_file in of_tyres.items():
         takes = [instance.name for instance in plan.instances if origin_of_file in instance.origins.values()]
         what = f"{files[axle]['kind']}, {files[axle]['side']}"
         rows.append((f"tyres, {axle}", what, str(origin_of_file), ", ".join(takes)))
     for key, instances in _grouped(takers).items():
-        rows.append((*key, ", ".join(instances), *filter(None, [sources.get(key)])))
+        rows.append((*key, ", ".join(instances)))
     for instance in plan.instances:
         for name, series in instance.series.items():
             how = "held" if series.held else "linear"
             rows.append(
                 (name, f"{series.file}: {series.column}, {how}", str(instance.origins[name]), instance.name)
             )
-    return rows, hidden
+    return [(*row, sources.get(row[:3], "")) if defaults else row for row in rows], hidden
 
 
-def _run_rows(plan: Plan) -> Iterable[Sequence[str]]:
+def _run_rows(plan: Plan) -> Iterable[tuple[str, str, str, str]]:
     """Yield the rows of values that apply to the whole run."""
     origins = {str(change.target): change.origin for change in plan.changes}
     run = {

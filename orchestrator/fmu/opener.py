@@ -205,7 +205,8 @@ def find_fmu(fmu: str, *, scenario: Path, fmus: Path, opener: Opener, build: boo
         return own
     if fmu in _own():
         raise ModelDescriptionError(
-            f"{fmu} is not built, and may not be now; 'yawbench build' builds it", code="fmu-missing"
+            f"{fmu} is not built, and building is off (--no-build, --no-run); 'yawbench build' builds it",
+            code="fmu-missing",
         )
     names = opener.names(fmus)
     role = role_in(fmu)

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 from rich.cells import cell_len
 
+import yawbench as yb
 from orchestrator.commands import output
 from orchestrator.experiments import tables
 from orchestrator.experiments.tables import Table
@@ -49,9 +50,10 @@ SHORT = ("fnn_sideslip/25mps", "--set", "stop_time=1.5", "--fmus", "FMUS")
 SWAPS = ("--swap", "controller=controller_off,controller_fnn,controller_pid,controller_fuzzy_sideslip")
 COARSE = ("--set", "step_size=0.005", "--fmus", "FMUS")
 JOBS = {
-    **{f"list {what}": [["list", what]] for what in ("scenarios", "vehicles", "metrics", "signals", "fmus")},
+    **{f"list {what}": [["list", what]] for what in ("scenarios", "vehicles", "metrics")},
+    **{f"list {what}": [["list", what, "--fmus", "FMUS"]] for what in ("signals", "fmus")},
     "list": [["list"]],
-    "list --units": [["list", "--units"]],
+    "list --units": [["list", "--units", "--fmus", "FMUS"]],
     "list signals of a scenario": [["list", "signals", "fnn_sideslip/25mps", "--fmus", "FMUS"]],
     "check": [["check", "real_signals/told_fnn", "--all", "--fmus", "FMUS"]],
     "check with faults": [["check", *SHORT, "--fault", "plant.yaw_rate: bias 3 deg/s from 1 s"]],
@@ -76,8 +78,8 @@ JOBS = {
         ["evaluate", "turn-response", "turns", "--no-figures"],
     ],
     "measured show": [["measured", "show", "step.yaml"]],
-    "vehicle show": [["vehicle", "show", "mid_size", "--plant", "plant_seven_dof,plant_eight_dof"]],
-    "validate": [["validate", "turn.yaml", "--measured", "near.yaml", "--out", "v"]],
+    "vehicle show": [["vehicle", "show", "mid_size", "--plant", "plant_seven_dof", "--fmus", "FMUS"]],
+    "validate": [["validate", "turn", "--measured", "near.yaml", "--out", "v"]],
     "fit": [["fit", "FITTED/fit.yaml", "--out", "fit", "--jobs", "1"]],
     "drive": [["drive", "sine-with-dwell", *COARSE, "--angle", "180 deg", "--out", "d"]],
     "rank": [["rank", "ranking.yaml", "--jobs", "2"]],
@@ -126,7 +128,7 @@ def tables_of(monkeypatch, tmp_path, request, capsys):
     Path("step.csv").write_text("time [s],delta [rad],r [rad/s],ay [m/s2],v [m/s]\n" + "".join(rows))
     signals = "steering_wheel_angle: delta, yaw_rate: r, acceleration_y: ay, velocity_x: v"
     Path("step.yaml").write_text(f"files: [step.csv]\nsignals: {{{signals}}}\n")
-    line(tmp_path, "turn")
+    yb.measured(line(tmp_path, "turn"), segment=1).save(tmp_path / "turn")
     line(tmp_path, "near", up=0.05)
 
     def call(commands: list[list[str]]) -> list[Table]:
@@ -153,7 +155,7 @@ def assert_whole(table: Table, printed) -> None:
         assert words <= {*" ".join(lines).split()}, width
         assert not [row for row in lines if cell_len(row) > width and len(row.split()) > 1]
         for k, cells in enumerate(zip(*table.text(), strict=True)):
-            for text in (part for cell in cells for part in cell.splitlines()):
+            for text in (part.replace("\t", "    ") for cell in cells for part in cell.splitlines()):
                 if cell_len(text) <= (32 if table.is_number(k) else 20 if k else width // 2):
                     assert any(text in row for row in lines), (width, text)
     assert words <= {*printed(40, [table]).split()}
