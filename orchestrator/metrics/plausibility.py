@@ -105,6 +105,7 @@ class PlausibilityWatch:
                 if all(column in index for column in columns):
                     self._states.append(_CheckState(check, columns, [index[c] for c in columns], scale))
 
+    @np.errstate(all="ignore")
     def look(self, rows: np.ndarray) -> None:
         """Check rows: shape (n, 1 + Real columns), time first."""
         for state in self._states:

@@ -57,6 +57,7 @@ class RunComparison:
     notes: tuple[str, ...]
 
 
+@np.errstate(all="ignore")
 def divergence(first: Results, second: Results) -> RunComparison:
     """Compare all signals that both runs recorded, at their common times.
 

@@ -167,6 +167,7 @@ def tidy_sides(folder: Path, keys: Collection[str]) -> None:
             file.unlink()
 
 
+@np.errstate(all="ignore")
 def carried(
     runs: Sequence[LabelledRun], settings: Settings = SETTINGS, packed: Sequence[PackedRun] | None = None
 ) -> Carried:

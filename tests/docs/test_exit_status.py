@@ -1,4 +1,4 @@
-"""One table tells the exit statuses; real commands end with them, and no other page tells them differently."""
+"""One table tells the exit statuses; real commands end with them, and no other page contradicts it."""
 
 from __future__ import annotations
 

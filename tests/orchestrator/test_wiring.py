@@ -17,7 +17,7 @@ from orchestrator.planner import Planner
 from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
-from tests.sentences import golden, golden_in, places_of, refused, texts_of
+from tests.sentences import golden, golden_in, places_of, texts_of
 from vocabulary.wheels import WHEELS
 
 from .fake_fmus import Var, make_fmu, out

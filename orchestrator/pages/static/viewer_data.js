@@ -159,7 +159,7 @@ function digitsOf(value, digits) {
   if (value === 0) return '0';
   const rounded = Number(value.toExponential(digits - 1));
   const decimals = digits - 1 - Math.floor(Math.log10(Math.abs(rounded)));
-  if (decimals > 6) return value.toExponential(digits - 1).replace(/e([+-])(\d)$/, 'e$10$2');
+  if (decimals > 6 || Math.abs(value) >= 1e15) return value.toExponential(digits - 1).replace(/e([+-])(\d)$/, 'e$10$2');
   return value.toFixed(Math.max(decimals, 0));
 }
 
