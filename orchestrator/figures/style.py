@@ -77,7 +77,7 @@ RC: Any = {
 NO_LAYOUT = {"figure.autolayout": False, "figure.constrained_layout.use": False}
 """Settings with which a figure whose layout engine is None has none."""
 DRAWN = 1e100
-"""Largest number that is drawn. Chosen: beyond anything that a car does, and well below what matplotlib bears."""
+"""Largest number that is drawn. Chosen: more than any car does, and far less than matplotlib bears."""
 WIDTH, ROW = 10.0, 2.25
 """Width of a figure and height of a row of panels [inches]."""
 KINDS: dict[str, dict[str, None]] = {
@@ -188,18 +188,18 @@ def new_figure() -> Iterator[Figure]:
 
 
 def _end_lines_that_grow(figure: Figure) -> None:
-    """Draw nothing of values beyond `DRAWN`, to which matplotlib has no axis."""
+    """Draw nothing of values beyond `DRAWN`, for which matplotlib has no axis."""
     import numpy as np
-    from matplotlib.lines import Line2D
 
-    for line in figure.findobj(Line2D):
-        assert isinstance(line, Line2D)
-        ends = [np.abs(np.asarray(data, float)) > DRAWN for data in (line.get_xdata(), line.get_ydata())]
-        if any(end.any() for end in ends):
-            line.set_data(*(np.where(ends[0] | ends[1], np.nan, data) for data in line.get_data()))
-            if line.axes is not None:
-                line.axes.relim()
-                line.axes.autoscale_view()
+    for axes in figure.axes:
+        for line in axes.lines:
+            points = np.array(line.get_xydata(), float)
+            beyond = (np.abs(points) > DRAWN).any(axis=1)
+            if beyond.any():
+                points[beyond] = np.nan
+                line.set_data(points.T)
+                axes.relim()
+                axes.autoscale_view()
 
 
 def save(figure: Figure, stem: Path, kinds: Sequence[str] = ("svg", "png")) -> list[Path]:

@@ -12,7 +12,8 @@ import pytest
 
 from orchestrator.errors import RecordWarning
 from orchestrator.figures.panels import LabelledRun
-from orchestrator.figures.style import digits_of
+from orchestrator.figures.plots import draw
+from orchestrator.figures.style import digits_of, save
 from orchestrator.metrics.expressions import STANDARD, evaluate_all
 from orchestrator.metrics.measures import catalogue
 from orchestrator.pages.comparison import divergence
@@ -52,7 +53,7 @@ def silent():
 
 @pytest.mark.parametrize("kind", GROWTH)
 @pytest.mark.usefixtures("silent")
-def test_the_library_warns_of_no_arithmetic(kind):
+def test_the_library_warns_of_no_arithmetic(kind, tmp_path):
     run, usual = grown(kind), whole_car()
     every = [
         f"{one.name}({x})" for one in catalogue() for x in ("sideslip", "yaw_rate") if one.name != "value"
@@ -60,7 +61,9 @@ def test_the_library_warns_of_no_arithmetic(kind):
     evaluate_all(run, [*STANDARD, *every])
     divergence(run, usual)
     divergence(usual, run)
-    page([LabelledRun("grown", run), LabelledRun("usual", usual)])
+    runs = [LabelledRun("grown", run), LabelledRun("usual", usual)]
+    page(runs)
+    save(draw(runs), tmp_path / "drawn")
 
 
 @pytest.mark.parametrize("kind", GROWTH)
