@@ -210,7 +210,7 @@ class _Strip:
 
         def narrowest(whole: int) -> int:
             parts = (([line] if _width(line) <= whole else _words(line)) for line in lines)
-            return max(_widest([*chain.from_iterable(parts), *heading.split()]), min(widest, whole))
+            return max(_widest([*chain.from_iterable(parts), *_words(heading)]), min(widest, whole))
 
         tight, least = narrowest(whole), narrowest(max(whole, NAME))
         broken = _wrapped(heading, max(MIN_HEADING, widest)) if number else [heading]

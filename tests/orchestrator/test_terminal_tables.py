@@ -177,7 +177,7 @@ def test_every_command_with_tables_is_among_them():
 
 ODD = Table(
     "A title that is much longer than a narrow terminal is wide, with a_name_that_is_longer_than_others",
-    ["", "run", "a heading of many words over numbers", "Querbeschleunigung in m/s²", "値", "what it says"],
+    ["", "run", "a heading of many words over numbers", "95 % interval", "値", "what it says"],
     [
         ["α", "no control †", MetricValue(6234.0, "N.m"), "9.81 m/s²", "車両の横すべり角", "words. " * 12],
         ["β" * 3, "a very long name of a run, with 12 words", None, "1e-05 ± 0.12 m/s²", "é" * 9, ""],
