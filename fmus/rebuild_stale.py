@@ -15,7 +15,7 @@ import os
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from orchestrator.cache import cache_folder, keep, recall
 from orchestrator.errors import BuildError
@@ -43,12 +43,13 @@ class FmuUpdater:
         self._report = report
         self._digests = SourceDigests()
         self._recipes: dict[str, Recipe] = {}
-        self._brought: dict[tuple[Path, bool], tuple[Path, BuildInfo | None]] = {}
+        self._brought: dict[tuple[Path, object], tuple[Path, BuildInfo | None]] = {}
 
-    def bring(self, archive: Path, *, build: bool) -> tuple[Path, BuildInfo | None]:
+    def bring(self, archive: Path, *, build: bool | Literal["missing"]) -> tuple[Path, BuildInfo | None]:
         """Return the archive to open instead of `archive`, and its build info if its sources exist.
 
-        If the FMU does not exist and cannot be built, `archive` itself is returned.
+        `build`: whether it is built if it is stale or missing, or only if it is missing. If the FMU does not
+        exist and cannot be built, `archive` itself is returned.
 
         Raises:
             BuildError: the FMU must be built, but the build fails.
@@ -57,7 +58,7 @@ class FmuUpdater:
             self._brought[archive, build] = self._bring(archive, build)
         return self._brought[archive, build]
 
-    def _bring(self, archive: Path, build: bool) -> tuple[Path, BuildInfo | None]:
+    def _bring(self, archive: Path, build: bool | Literal["missing"]) -> tuple[Path, BuildInfo | None]:
         places = dict.fromkeys((archive, build_folder(archive.parent) / archive.name))
         stamps = {place: read_stamp(place) for place in places if os.path.exists(place)}
         if archive in stamps and stamps[archive] is None:
@@ -70,7 +71,7 @@ class FmuUpdater:
             if its and its.is_of(key):
                 return place, _built(its, current=True)
         at_home = _is_at_home(archive, stamp)
-        if key is not None and at_home and build:
+        if key is not None and at_home and (not stamps if build == "missing" else build):
             return self._build(archive, stamp)
         gone = stamp.is_component and at_home  # its source no longer exists
         stale = bool(stamps) and (key is not None or gone)

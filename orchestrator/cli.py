@@ -19,7 +19,7 @@ import typer
 from typer.core import TyperGroup
 
 from .commands import output
-from .errors import Diagnostic, Interrupted, RecordWarning, YawbenchError
+from .errors import Diagnostic, Interrupted, RecordWarning, YawbenchError, hide_library_warnings
 from .interrupts import terminable
 from .messages import cut, printable
 
@@ -212,8 +212,9 @@ def _status_of_printing(printed: output.Output, status: int) -> int:
 
 @contextlib.contextmanager
 def _warnings_as_notes() -> Iterator[None]:
-    """Print this package's warnings as notes, in JSON too; leave other warnings to Python."""
+    """Print this package's warnings as notes, in JSON too; of others, those of users' own files."""
     with warnings.catch_warnings():
+        hide_library_warnings()
         warnings.simplefilter("always", RecordWarning)
         before = warnings.showwarning
 

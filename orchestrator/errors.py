@@ -17,7 +17,10 @@ sentence that says where, what, and what is allowed.
 
 from __future__ import annotations
 
+import os
+import re
 import signal
+import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -237,6 +240,29 @@ class ResultsError(YawbenchError):
     """
 
     default_code = "results-unreadable"
+
+
+_OWN = tuple(
+    str(Path(__file__).resolve().parents[1] / name) + os.sep
+    for name in ("orchestrator", "yawbench", "components", "vocabulary", "fmus")
+)
+_LIBRARIES = re.compile(r"^<|[/\\\\](?:site|dist)-packages[/\\\\]|[/\\\\]lib[/\\\\]python3")
+
+
+def hide_library_warnings() -> None:
+    """Show no warnings that code of this program or of packages raises, such as NumPy's of overflow.
+
+    Users cannot act on them: what they mean for a run is told as a diagnostic. Warnings of users' own files,
+    such as a controller's, are shown. With `YAWBENCH_TRACEBACK`, all are.
+    """
+    before = warnings.showwarning
+
+    def show(message: Any, category: type[Warning], filename: str, *more: Any, **names: Any) -> None:
+        own = filename.startswith(_OWN) or _LIBRARIES.search(filename)
+        if not own or issubclass(category, YawbenchWarning) or os.environ.get("YAWBENCH_TRACEBACK"):
+            before(message, category, filename, *more, **names)
+
+    warnings.showwarning = show
 
 
 class RecordWarning(YawbenchWarning):

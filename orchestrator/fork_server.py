@@ -343,6 +343,9 @@ def _become(request: ForkRequest, shared: Sequence[int]) -> None:
         os.environ.update(request.environment)
         with contextlib.suppress(OSError):
             os.chdir(request.folder)
+        from .errors import hide_library_warnings
+
+        hide_library_warnings()
         run: Callable[..., Any] = import_module(request.module).main
         run(*map(str, shared[len(_OUTPUT) :]))
         sys.stdout.flush()

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import ScenarioError
-from .fmu.opener import Opener, report_to_stderr
+from .fmu.opener import Building, Opener, report_to_stderr
 from .messages import hint
 from .plan import Fmu, Instance, Override, Plan
 from .scenario import yaml_lines
@@ -31,7 +31,7 @@ class Planner:
     def __init__(
         self,
         *,
-        build: bool = False,
+        build: Building = False,
         report: Callable[[str], None] = report_to_stderr,
         opened: Mapping[Path, Fmu] | None = None,
     ) -> None:

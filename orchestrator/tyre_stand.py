@@ -16,7 +16,7 @@ import numpy as np
 
 from .errors import ScenarioError
 from .figures.style import QUIET, ROW, frame, line_style, new_figure
-from .fmu.opener import Opener, find_fmu, find_folder
+from .fmu.opener import Building, Opener, find_fmu, find_folder
 from .master.simulate import simulate_in_memory
 from .messages import listed
 from .plan import Fmu, InputSeries, Instance, Plan, Value
@@ -117,7 +117,7 @@ def stiffnesses(stand: TyreStand, loads: Sequence[float]) -> tuple[np.ndarray, n
     return slopes[0], slopes[1]
 
 
-def put_on_stand(source: str, *, friction: float, fmus: Path | None, build: bool) -> TyreStand:
+def put_on_stand(source: str, *, friction: float, fmus: Path | None, build: Building) -> TyreStand:
     """Return a tyre on a stand.
 
     Args:

@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import fields
 from typing import Any, NamedTuple, TypeVar
 
-from .errors import RecordWarning, YawbenchError
+from .errors import RecordWarning, YawbenchError, hide_library_warnings
 from .fork_server import ServedChild, start
 from .plan import Fmu
 from .supervised_process import LOOK_EVERY, REPLY, REQUEST, PipeChannel, ProcessLost, SupervisedProcess
@@ -254,6 +254,7 @@ def retire() -> None:
 def main(reading: str, writing: str) -> None:
     """Execute calls until the pipe is closed."""
     warnings.filterwarnings("ignore", category=RecordWarning)  # the parent warns
+    hide_library_warnings()
     channel = PipeChannel(int(reading), int(writing))
     while channel.hear() is not None:
         function, arguments = channel.receive_object()

@@ -115,8 +115,11 @@ def _code(text: str, language: str = "text") -> str:
 
 def _text(value: object) -> str:
     """Return a docstring as Markdown, with its sections and examples as code."""
-    lines = (inspect.getdoc(value) or "").splitlines()
-    return docstring("\n".join(f"    {line}" if line.startswith((">>>", "...")) else line for line in lines))
+    lines, example = [], False  # an example ends with an empty line, after what it prints
+    for line in (inspect.getdoc(value) or "").splitlines():
+        example = bool(line) and (example or line.startswith(">>>"))
+        lines.append(f"    {line}" if example else line)
+    return docstring("\n".join(lines))
 
 
 def _summary(value: object) -> str:

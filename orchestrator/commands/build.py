@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 import typer
 
 from ..errors import ModelDescriptionError
-from ..fmu.opener import PackagedComponent
+from ..fmu.opener import Building, PackagedComponent
 from .options import RunOptions, plan_of_scenario, takes
 from .output import print_tables, say
 
@@ -219,7 +219,7 @@ def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, u
     print_tables([table])
 
 
-def _further_folders(*, build: bool) -> Sequence[Path]:
+def _further_folders(*, build: Building) -> Sequence[Path]:
     """Return the folders of FMUs that the environment names, and those of packages, whose FMUs are built."""
     from ..fmu.opener import Opener, further_folders, packaged, packaged_components
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeVar
@@ -19,8 +18,6 @@ from .options import CHANGES, RunOptions, ScenarioFile, plan_of_scenario, takes
 from .output import print_tables, say
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from ..plan import Instance, Plan, Value, Wire
 
 All = Annotated[bool, typer.Option("--all", help="Show every value, including the FMUs' defaults.")]
@@ -28,8 +25,6 @@ K = TypeVar("K")
 V = TypeVar("V")
 CAMBER = wheels("inclination_angle_*")
 """Inclination angles, which plants output from their roll camber."""
-PIPE_WIDTH = 140
-"""Line width of output to a pipe or a file."""
 
 
 @takes(*CHANGES, "fmus", "no_build", "no_validate")
@@ -82,84 +77,58 @@ def _data_of(plan: Plan) -> dict[str, object]:
 
 
 def show(plan: Plan, scenario: Path, *, defaults: bool = False) -> None:
-    """Print the plan of a scenario file, as wide as the terminal; in a pipe one line per row."""
-    from rich.console import Console
-
-    width = None if sys.stdout.isatty() else PIPE_WIDTH
-    console = Console(highlight=False, markup=False, emoji=False, width=width)
-    with console.capture() as capture:
-        _print(plan, scenario, console, defaults)
-    for line in capture.get().splitlines() if output.form() == "text" else ():
-        print(line.rstrip())
-
-
-def _print(plan: Plan, scenario: Path, console: Console, defaults: bool) -> None:
+    """Print the plan of a scenario file, for the width of the terminal."""
     from ..scenario.overrides import changed
     from ..wiring.order import evaluate
 
-    console.print(printable(f"{scenario}: {plan.title}" if plan.title else f"{scenario}"))
-    if plan.changes:
-        console.print(printable(f"changed: {changed(plan.changes)}"))
-    console.print(
-        f"{_number(plan.n_steps * plan.step)} s in {plan.n_steps} steps of {_number(1000 * plan.step)} ms, "
-        f"{plan.algorithm}; {len(plan.wires)} wires, {len(plan.record)} outputs recorded"
-    )
-    _show(console, "Instances in evaluation order", ("instance", "FMU", "step"), _unit_rows(plan))
-    values, hidden = _values(plan, defaults)
-    columns = ("name", "value", "origin", "instances", *(["source of the default"] if defaults else []))
-    _show(console, "Values", columns, values)
-    if hidden:
-        also = " or come from tyre files" if plan.scenario.get("tyre_files") else ""
-        console.print(f"  {hidden} more are left at the FMUs' defaults{also}: --all shows them", style="dim")
-    _show(console, "Derived from the vehicle file", ("name", "formula", "instances"), _derived(plan))
-    of_stiffness = ("name", "given", "tyres at static loads", "difference", "instances")
-    _show(console, "Given, although the tyres determine it", of_stiffness, _beside_tyres(plan))
-    if idle := _idle(plan):
-        console.print(f"  in the vehicle file, but used by no instance: {', '.join(idle)}", style="dim")
-    wires = list(_wire_rows(plan))
-    if any(kind for _, _, kind, _ in wires):
-        _show(console, "Wires", ("from", "to", "signal", "variables"), wires)
-    else:
-        _show(
-            console,
-            "Wires",
-            ("from", "to", "variables"),
-            [(source, to, names) for source, to, _, names in wires],
-        )
-    _show(console, "Delayed by one step", ("from", "to", "value at the start"), _delayed_rows(plan))
-    _show(console, "Faults", ("target", "fault", "signals"), _fault_rows(plan))
-    direct = evaluate({instance.name: instance.fmu for instance in plan.instances}, plan.wires).direct
-    headings = ("instance", "after", "direct feedthrough of")
-    _show(console, "Why this order", headings, _order_rows(plan, direct))
-    _show(
-        console, "Against the order", ("from", "to", "uses earlier values of"), _backward_rows(plan, direct)
-    )
     warned = sum(
         entry.severity == "warning" and entry.location.signal is not None for entry in plan.diagnostics
     )
     doubtful = f"No errors, but {counted(warned, 'suspicious value')}: see the notes."
-    console.print(f"\n{doubtful if warned else 'No errors.'}")
+    _tell(f"{scenario}: {plan.title}" if plan.title else f"{scenario}")
+    if plan.changes:
+        _tell(f"changed: {changed(plan.changes)}")
+    _tell(
+        f"{_number(plan.n_steps * plan.step)} s in {plan.n_steps} steps of {_number(1000 * plan.step)} ms, "
+        f"{plan.algorithm}; {len(plan.wires)} wires, {len(plan.record)} outputs recorded"
+    )
+    _show("Instances in evaluation order", ("instance", "FMU", "step"), _unit_rows(plan))
+    values, hidden = _values(plan, defaults)
+    columns = ("name", "value", "origin", "instances", *(["source of the default"] if defaults else []))
+    also = " or come from tyre files" if plan.scenario.get("tyre_files") else ""
+    _show(
+        "Values",
+        columns,
+        values,
+        f"{hidden} more are left at the FMUs' defaults{also}: --all shows them" if hidden else "",
+    )
+    _show("Derived from the vehicle file", ("name", "formula", "instances"), _derived(plan))
+    of_stiffness = ("name", "given", "tyres at static loads", "difference", "instances")
+    _show("Given, although the tyres determine it", of_stiffness, _beside_tyres(plan))
+    if idle := _idle(plan):
+        _tell(f"\nin the vehicle file, but used by no instance: {', '.join(idle)}")
+    wires = list(_wire_rows(plan))
+    seen = any(kind for _, _, kind, _ in wires)
+    headings = ("from", "to", "signal", "variables") if seen else ("from", "to", "variables")
+    _show("Wires", headings, wires if seen else [(source, to, names) for source, to, _, names in wires])
+    _show("Delayed by one step", ("from", "to", "value at the start"), _delayed_rows(plan))
+    _show("Faults", ("target", "fault", "signals"), _fault_rows(plan))
+    direct = evaluate({instance.name: instance.fmu for instance in plan.instances}, plan.wires).direct
+    _show("Why this order", ("instance", "after", "direct feedthrough of"), _order_rows(plan, direct))
+    _show("Against the order", ("from", "to", "uses earlier values of"), _backward_rows(plan, direct))
+    _tell(f"\n{doubtful if warned else 'No errors.'}")
 
 
-def _show(console: Console, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    if output.form() != "text":
-        from ..experiments.tables import Table
+def _tell(text: str) -> None:
+    if output.form() == "text":
+        print(printable(text))
 
-        table_of_rows = Table(title, columns, map(tuple, rows))
-        print_tables([table_of_rows] if table_of_rows.rows else [])
-        return
-    from rich.padding import Padding
-    from rich.table import Table as Grid
 
-    table = Grid(*columns, box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
-    for column in table.columns[:-1]:
-        column.no_wrap = True
-    table.columns[-1].overflow = "fold"  # names are never cut
-    for row in rows:
-        table.add_row(*map(printable, row))
-    if table.row_count:
-        console.print(f"\n{title}", style="bold")
-        console.print(Padding(table, (0, 0, 0, 2), expand=False))
+def _show(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], note: str = "") -> None:
+    from ..experiments.tables import Table
+
+    table = Table(title, columns, map(tuple, rows), [note] if note else [])
+    print_tables([table] if table.rows else [])
 
 
 def _number(value: object) -> str:
@@ -171,7 +140,7 @@ def _unit_rows(plan: Plan) -> Iterable[Sequence[str]]:
         yield instance.name, instance.fmu.name, f"{_number(1000 * instance.period * plan.step)} ms"
 
 
-def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
+def _values(plan: Plan, defaults: bool) -> tuple[Sequence[Sequence[str]], int]:
     """Return a row for every value with its origin, and the number of defaults not shown."""
     files = plan.scenario.get("tyre_files", {})
     of_tyres = {axle: ValueOrigin("file", Path(file["file"]).name) for axle, file in files.items()}
@@ -198,23 +167,23 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
                 takers.append(((name, text, origin), instance.name))
                 if defaults and origin == "default" and name in own:
                     sources.setdefault((name, text, origin), instance.fmu.variables[name].source)
-    rows = [*_run_rows(plan)]
+    rows: list[tuple[str, str, str, str]] = [*_run_rows(plan)]
     for axle, origin_of_file in of_tyres.items():
         takes = [instance.name for instance in plan.instances if origin_of_file in instance.origins.values()]
         what = f"{files[axle]['kind']}, {files[axle]['side']}"
         rows.append((f"tyres, {axle}", what, str(origin_of_file), ", ".join(takes)))
     for key, instances in _grouped(takers).items():
-        rows.append((*key, ", ".join(instances), *filter(None, [sources.get(key)])))
+        rows.append((*key, ", ".join(instances)))
     for instance in plan.instances:
         for name, series in instance.series.items():
             how = "held" if series.held else "linear"
             rows.append(
                 (name, f"{series.file}: {series.column}, {how}", str(instance.origins[name]), instance.name)
             )
-    return rows, hidden
+    return [(*row, sources.get(row[:3], "")) if defaults else row for row in rows], hidden
 
 
-def _run_rows(plan: Plan) -> Iterable[Sequence[str]]:
+def _run_rows(plan: Plan) -> Iterable[tuple[str, str, str, str]]:
     """Yield the rows of values that apply to the whole run."""
     origins = {str(change.target): change.origin for change in plan.changes}
     run = {

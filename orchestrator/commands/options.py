@@ -18,6 +18,7 @@ from ..results.file_formats import FORMATS
 if TYPE_CHECKING:
     from ..experiments.executor import Executor
     from ..experiments.experiment_result import Each
+    from ..fmu.opener import Building
     from ..plan import Override, Plan
 
 
@@ -145,7 +146,7 @@ class RunOptions:
         typer.Option(
             "--dry-run",
             help="Only tell how many runs would be made, how long they would take and how much disk space; "
-            "build, run and write nothing.",
+            "run and write nothing, and build FMUs only if there are none yet.",
         ),
     ] = False
     isolate: Annotated[
@@ -185,9 +186,9 @@ class RunOptions:
         _ = self.limit, self.changes  # raises now if they are invalid
 
     @property
-    def build(self) -> bool:
-        """Whether FMUs that are out of date are built."""
-        return not (self.no_build or self.no_run or self.dry_run)
+    def build(self) -> Building:
+        """Whether FMUs that are out of date are built; for a dry run, only those that do not exist."""
+        return not (self.no_build or self.no_run) and (not self.dry_run or "missing")
 
     @functools.cached_property
     def changes(self) -> tuple[Override, ...]:

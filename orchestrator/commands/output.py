@@ -13,6 +13,7 @@ import inspect
 import json
 import math
 import os
+import shutil
 import sys
 import threading
 import time
@@ -29,6 +30,7 @@ from ..messages import counted, printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from rich.console import Console
 
     from ..experiments.experiment import PlannedExperiment
     from ..experiments.jobs import Outcome
@@ -189,7 +191,9 @@ def _plain(value: Any) -> Any:
 
 
 WIDTH = 140
-"""Width of tables written to a file or a pipe."""
+"""Width of tables written to a file or a pipe, unless `COLUMNS` is set."""
+NARROWEST = 20
+"""Narrowest width of tables; a terminal that states less does not know its own."""
 SHOWN = 10
 """Failed runs named on the terminal; all are in the table."""
 SILENCE = 30.0
@@ -399,15 +403,22 @@ def save_figure(figure: Figure, wanted: Path | None, default: Path) -> None:
 
 
 def print_tables(tables: Iterable[Table]) -> None:
-    """Print tables to stdout, as wide as the terminal, or in the form that is asked for."""
+    """Print tables to stdout for the width of `console`, or in the form that is asked for."""
     if form() != "text":
         collect(tables)
         return
-    from rich.console import Console
-
     from ..experiments.tables import for_terminal
 
-    console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else WIDTH)
+    screen = console()
     for table in tables:
-        console.print()
-        console.print(for_terminal(table))
+        screen.print()
+        screen.print(for_terminal(table), crop=False)
+
+
+def console() -> Console:
+    """Return stdout as a console as wide as `COLUMNS` says, or the terminal, or `WIDTH`."""
+    from rich.console import Console
+
+    columns, lines = shutil.get_terminal_size((WIDTH, 50))
+    width = max(columns, NARROWEST)  # with a height, for rich to use it on every terminal
+    return Console(highlight=False, markup=False, emoji=False, width=width, height=lines)

@@ -299,6 +299,7 @@ class Validation:
 Validation.__module__ = "yawbench"  # where users import it from
 
 
+@np.errstate(all="ignore")
 def compare_run(results: Results, measurement: Measurement, bands: Bands) -> Validation:
     """Compare a run with all segments of a measurement.
 

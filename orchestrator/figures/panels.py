@@ -78,6 +78,7 @@ class Panel:
     rows: int = 1
 
 
+@np.errstate(all="ignore")
 def panels_of(runs: Sequence[LabelledRun], name: str, *, whole: bool = False) -> list[Panel]:
     """Return the panels that a name selects: none if no run has the signals, four for wheels.
 
@@ -188,6 +189,7 @@ def _draw_error(axes: Axes, runs: Sequence[LabelledRun], signal: str, whole: boo
         _limit(axes, max(SEEN_ERROR, min(peak for _, peak in peaks)), peaks, "%")
 
 
+@np.errstate(all="ignore")
 def _error(run: LabelledRun, signal: str) -> np.ndarray | None:
     columns = columns_of(run.results, signal)
     reference = reference_of(run.results, columns[0]) if columns else None

@@ -76,6 +76,8 @@ RC: Any = {
 }
 NO_LAYOUT = {"figure.autolayout": False, "figure.constrained_layout.use": False}
 """Settings with which a figure whose layout engine is None has none."""
+DRAWN = 1e100
+"""Largest number that is drawn. Chosen: more than any car does, and far less than matplotlib bears."""
 WIDTH, ROW = 10.0, 2.25
 """Width of a figure and height of a row of panels [inches]."""
 KINDS: dict[str, dict[str, None]] = {
@@ -173,13 +175,31 @@ def own_size() -> tuple[float, float] | None:
 def new_figure() -> Iterator[Figure]:
     """Context that yields an empty figure; drawing within it uses the common style."""
     import matplotlib
+    import numpy as np
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(_own()):
+    with matplotlib.rc_context(_own()), warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")  # of runs that are not finite, or have no range
         figure = Figure(layout="constrained")
         FigureCanvasAgg(figure)
         yield figure
+        _end_lines_that_grow(figure)
+
+
+def _end_lines_that_grow(figure: Figure) -> None:
+    """Draw nothing of values beyond `DRAWN`, for which matplotlib has no axis."""
+    import numpy as np
+
+    for axes in figure.axes:
+        for line in axes.lines:
+            points = np.array(line.get_xydata(), float)
+            beyond = (np.abs(points) > DRAWN).any(axis=1)
+            if beyond.any():
+                points[beyond] = np.nan
+                line.set_data(points.T)
+                axes.relim()
+                axes.autoscale_view()
 
 
 def save(figure: Figure, stem: Path, kinds: Sequence[str] = ("svg", "png")) -> list[Path]:
@@ -190,10 +210,11 @@ def save(figure: Figure, stem: Path, kinds: Sequence[str] = ("svg", "png")) -> l
     """
     paths = [stem.with_name(f"{stem.name}.{kind}") for kind in kinds]
     import matplotlib
+    import numpy as np
     from matplotlib.text import Text
 
-    with matplotlib.rc_context(_own() | NO_LAYOUT), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing from font")  # it is shown as a box
+    with matplotlib.rc_context(_own() | NO_LAYOUT), warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")  # such as of characters without a font, which are shown as boxes
         warnings.filterwarnings("error", "constrained_layout not applied")
         try:
             if (layout := figure.get_layout_engine()) is not None:
@@ -416,6 +437,10 @@ def digits_apart(pairs: Iterable[tuple[float, float]], unit: str, digits: int = 
     return digits
 
 
+READABLE = 1e15
+"""Size from which numbers have an exponent: beyond it, not all digits before the point are known."""
+
+
 def digits_of(value: float, digits: int = DIGITS) -> str:
     """Format a number with `digits` significant digits, all integer digits kept, no exponent if readable."""
     if math.isinf(value):
@@ -426,4 +451,8 @@ def digits_of(value: float, digits: int = DIGITS) -> str:
         return "0"
     rounded = float(f"{value:.{digits - 1}e}")
     decimals = digits - 1 - math.floor(math.log10(abs(rounded)))
-    return f"{value:.{digits - 1}e}" if decimals > 6 else f"{value:.{max(decimals, 0)}f}"
+    return (
+        f"{value:.{digits - 1}e}"
+        if decimals > 6 or abs(value) >= READABLE
+        else f"{value:.{max(decimals, 0)}f}"
+    )

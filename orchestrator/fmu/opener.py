@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import fmus
 from vocabulary.roles import role_in
@@ -43,6 +43,8 @@ if TYPE_CHECKING:
     from fmus.rebuild_stale import FmuUpdater
 
 
+Building = bool | Literal["missing"]
+"""Whether FMUs are built: those that are stale or missing, the missing alone, or none."""
 HOME = Path(fmus.__file__).resolve().parent
 """Folder of the FMUs of the project's own components."""
 FOLDERS = "YAWBENCH_FMUS"
@@ -60,8 +62,8 @@ class Opener:
     """Opens the FMUs of one or several plans.
 
     Args:
-        build: build FMUs that are stale, or missing but buildable. Only the process that starts runs does
-            so, once for all of them; FMUs found stale later are listed in the plan.
+        build: build FMUs that are stale, or missing but buildable; "missing": these alone. Only the process
+            that starts runs does so, once for all of them; FMUs found stale later are listed in the plan.
         report: called with a line for every FMU that is built.
         opened: FMUs already opened, by their paths.
     """
@@ -69,7 +71,7 @@ class Opener:
     def __init__(
         self,
         *,
-        build: bool = False,
+        build: Building = False,
         report: Callable[[str], None] = report_to_stderr,
         opened: Mapping[Path, Fmu] | None = None,
     ) -> None:
@@ -142,19 +144,27 @@ class Opener:
         """Return the names of the FMUs that can be used beside a folder, with those that can be built."""
         names = {path.stem for place in (folder, *further_folders()) for path in place.glob("*.fmu")}
         names |= packaged_components().keys()
-        names |= {path.stem for path in HOME.glob("*.fmu")}
-        if self.build:
-            from fmus.build import find_recipes
+        return sorted(names | (_own() if self.build else _built_own()))
 
-            names |= find_recipes().keys()
-        return sorted(names)
+
+def _own() -> set[str]:
+    """Return the names of the FMUs of the project's own components, built or not."""
+    from fmus.build import find_recipes  # slow to import
+
+    return {*find_recipes()}
+
+
+def _built_own() -> set[str]:
+    """Return the names of those that are built, in their folder or in the cache."""
+    from fmus.rebuild_stale import build_folder
+
+    return {path.stem for place in (HOME, build_folder(HOME)) for path in place.glob("*.fmu")}
 
 
 def find_folder(scenario: Path, *, opener: Opener) -> Path:
     """Return the nearest folder `fmus` with FMUs, upwards from the scenario, then from the working directory.
 
-    Raises:
-        ModelDescriptionError: there is none, and building is not allowed.
+    If there is none, the project's own; its FMUs may be in the cache.
     """
     above = scenario.absolute().parent
     here = Path.cwd()
@@ -163,13 +173,7 @@ def find_folder(scenario: Path, *, opener: Opener) -> Path:
     for folder in (above, *above.parents, here, *here.parents):
         if any((folder / "fmus").glob("*.fmu")):
             return opener.folders.setdefault((above, here), folder / "fmus")
-    if opener.build:
-        return HOME
-    raise ModelDescriptionError(
-        f"no folder fmus/ with FMUs in {above}, in {here} or above them; "
-        "make them with 'yawbench build' or name their folder with --fmus",
-        code="fmu-missing",
-    )
+    return HOME
 
 
 def find_fmu(fmu: str, *, scenario: Path, fmus: Path, opener: Opener, build: bool = True) -> Path:
@@ -199,11 +203,12 @@ def find_fmu(fmu: str, *, scenario: Path, fmus: Path, opener: Opener, build: boo
     own = opener.bring(HOME / archive.name, build=build)
     if os.path.isfile(own):
         return own
-    names = opener.names(fmus)
-    if not names:
+    if fmu in _own():
         raise ModelDescriptionError(
-            f"no FMU {short(fmu)}: the folder {fmus} contains no FMUs", code="fmu-missing"
+            f"{fmu} is not built, and building is off (--no-build, --no-run); 'yawbench build' builds it",
+            code="fmu-missing",
         )
+    names = opener.names(fmus)
     role = role_in(fmu)
     related = [name for name in names if role and role_in(name) == role] or names
     likely = closest(fmu, names)

@@ -259,6 +259,7 @@ def _column(results: Results, name: str) -> str | None:
     )
 
 
+@np.errstate(all="ignore")  # of runs that grow without bound; the number says so
 def evaluate(results: Results, chosen: Metric, window: TimeWindow | None = None) -> MetricValue | None:
     """Compute a metric over a window [s], by default its own or the whole run.
 

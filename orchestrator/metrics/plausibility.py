@@ -123,6 +123,7 @@ class PlausibilityWatch:
                 moving = {name: place(column) for name, column in motion if column in index}
                 self._states.append(_CheckState(check, columns, places, scale, moving))
 
+    @np.errstate(all="ignore")
     def look(self, rows: np.ndarray) -> None:
         """Check rows: shape (n, 1 + Real columns), time first."""
         for state in self._states:

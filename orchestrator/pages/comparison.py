@@ -66,6 +66,7 @@ class RunComparison:
         return not self.compared or not self.times
 
 
+@np.errstate(all="ignore")
 def divergence(first: Results, second: Results) -> RunComparison:
     """Compare all signals that both runs recorded, at their common times.
 

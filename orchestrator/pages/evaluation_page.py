@@ -43,8 +43,8 @@ from ..results.run_record import RunRecord
 from .page_parts import document
 from .viewer import LARGEST, MOST, Settings, View, assets, viewer
 
-PANELS = ("steering_wheel_angle", "yaw_rate", "sideslip", "acceleration_y")
-"""Signals shown first; chosen: what most tests judge."""
+PANELS = ("steering_wheel_angle", "yaw_rate", "sideslip", "acceleration_y", "cone_overrun")
+"""Signals shown first, where they are recorded; chosen: what most tests judge."""
 
 
 def criteria_table(judged: Sequence[Evaluation], series: TestSeries | None) -> tuple[Table, list[str]]:
@@ -107,7 +107,7 @@ def evaluation_page(
         views.append(View("all runs", PANELS))
     every = [runs_table(series.runs if series else judged, test, series)] if len(judged) > 1 else []
     runs = [LabelledRun(label, results_of(trace)) for label, trace in zip(labels, traces, strict=True)][:MOST]
-    settings = Settings(views, marks=marks, limits=limits, largest=LARGEST)
+    settings = Settings(views, marks=marks, limits=limits, dashed_of=deciding[0], largest=LARGEST)
     dashed = [*(f"{instant:.3f} s: {text}" for instant, text in marks), *map(_limit_words, limits)]
     return document(
         f"{test.name.replace('-', ' ').capitalize()}: {counted(len(judged), 'run')}",

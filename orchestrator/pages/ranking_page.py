@@ -234,7 +234,9 @@ def _write_side(key: str, label: str, results: Path | None, html: str, folder: P
         with suppress(ResultsError):
             run = load_results(results)
             limits = [("sideslip", side * SPUN, "20° of sideslip") for side in (1.0, -1.0)]
-            settings = Settings([View(panels=SHOWN)], marks=_instants(run), limits=limits, largest=1)
+            settings = Settings(
+                [View(panels=SHOWN)], marks=_instants(run), limits=limits, dashed_of=0, largest=1
+            )
             content = carried([LabelledRun(label, run)], settings)
     write_side(folder, key, content, html=html)
 

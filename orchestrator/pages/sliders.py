@@ -24,7 +24,7 @@ from vocabulary.vehicle import CAR
 from ..errors import Interrupted, ScenarioError, YawbenchError
 from ..experiments.jobs import LASTING, NEEDED, Job, execute, keyed, planned, recorded
 from ..figures.style import LabelledRun
-from ..fmu.opener import find_folder
+from ..fmu.opener import Building, find_folder
 from ..interrupts import StopFlag
 from ..messages import hint, short
 from ..plan import Instance, Plan, Variable
@@ -189,7 +189,7 @@ class Bench:
         build: as of the `Planner`.
     """
 
-    def __init__(self, *, build: bool = False) -> None:
+    def __init__(self, *, build: Building = False) -> None:
         self._planner = Planner(build=build)
         self._planning = threading.Lock()
         self._turn = threading.Lock()

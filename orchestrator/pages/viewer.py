@@ -94,6 +94,7 @@ class Settings:
         metrics: those in the table of runs.
         marks: instants [s] with a text, as vertical lines.
         limits: signal, bound in SI units and a text, as horizontal lines.
+        dashed_of: number of the run that marks and limits belong to, with which they are hidden; None: all.
         largest: size of the samples [bytes]; beyond it, the page carries the signals of the views and of the
             road alone, and still beyond it, of the road without the forces of the tyres. 0: no limit.
         ghosts: numbers of runs that are drawn faintly behind the others.
@@ -104,6 +105,7 @@ class Settings:
     metrics: Sequence[str] = METRICS
     marks: Sequence[tuple[float, str]] = ()
     limits: Sequence[tuple[str, float, str]] = ()
+    dashed_of: int | None = None
     largest: int = 0
     ghosts: Sequence[int] = ()
     bands: Sequence[int] = ()
@@ -175,6 +177,7 @@ def tidy_sides(folder: Path, keys: Collection[str]) -> None:
             file.unlink()
 
 
+@np.errstate(all="ignore")
 def carried(
     runs: Sequence[LabelledRun], settings: Settings = SETTINGS, packed: Sequence[PackedRun] | None = None
 ) -> Carried:
@@ -211,6 +214,7 @@ def carried(
             for column in _columns(results, signal)
         ],
         "marks": [list(mark) for mark in settings.marks],
+        "dashed_of": settings.dashed_of,
         "signals": {name: signal for name, signal in _signals(results).items() if name in carried},
         "dashes": [_dash(number) for number in range(len(LINES))],
         "metrics": [

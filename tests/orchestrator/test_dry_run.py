@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
+from fmus import rebuild_stale
+from fmus.build_stamp import BuildStamp
+from fmus.rebuild_stale import FmuUpdater
 from orchestrator.experiments import dry_run
 from orchestrator.experiments.dry_run import Forecast, Pace, Span, forecast_table
 from orchestrator.experiments.journal import records_in
+from orchestrator.fmu.opener import HOME
+from tests.checkout import ROOT
 
 from .test_batch_commands import SCENARIO, STUDY
 from .test_output import ALWAYS, SWEEP, documented
@@ -157,6 +166,56 @@ def test_a_ranking_is_counted_with_an_assumed_angle_until_it_is_measured(yawbenc
     assert (finished, left) == (0, [2 + 2 * 2, 2 + 2 * 2])  # both sides of A, two entries in two conditions
     assert "40.0 °" in note
     assert [path.name for path in tmp_path.iterdir()] == ["small.yaml"]
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory) -> Path:
+    """A copy of the program as a package has it: without a checkout, and without FMUs."""
+    site = tmp_path_factory.mktemp("site")
+    for name in ("orchestrator", "components", "vocabulary", "scenarios", "yawbench", "fmus"):
+        shutil.copytree(ROOT / name, site / name, ignore=shutil.ignore_patterns("__pycache__", "*.fmu"))
+    return site
+
+
+def test_outside_a_checkout_dry_runs_work_and_runs_take_the_fmus_of_the_cache(installed, tmp_path):
+    work = tmp_path / "work"
+    work.mkdir()
+    (work / "half.yaml").write_text(SCENARIO)
+    (work / "sweep.yaml").write_text(SWEEP)
+    environment = os.environ | {"PYTHONPATH": str(installed), "YAWBENCH_CACHE": str(tmp_path / "cache")}
+
+    def call(*arguments: str) -> tuple[int, str, str]:
+        command = (sys.executable, "-m", "yawbench", *arguments)
+        done = subprocess.run(command, cwd=work, env=environment, capture_output=True, text=True, check=False)
+        return done.returncode, done.stdout, done.stderr
+
+    status, _, said = call("run", "half.yaml", "--no-build")
+    assert (status, said.count("fmu")) == (2, 3)
+    assert all(f"{name} is not built" in said for name in ("driver_sine", "reference_steady_state"))
+    status, out, _ = call("sweep", "sweep.yaml", "--dry-run", "--json")
+    assert (status, json.loads(out)["forecasts"][0]["left"]) == (0, [2, 2])
+    assert sorted(path.name for path in work.iterdir()) == ["half.yaml", "sweep.yaml"]
+    assert not [*installed.rglob("*.fmu")]
+    for command in ("run", "check"):
+        assert call(command, "half.yaml", "--no-build")[0] == 0
+    assert call("sweep", "sweep.yaml")[0] == 0
+    status, out, _ = call("sweep", "sweep.yaml", "--dry-run", "--json", "--no-build")
+    assert (status, json.loads(out)["forecasts"][0]["finished"]) == (0, 2)
+    assert call("sweep", "sweep.yaml", "--no-run")[0] == 0
+    status, _, said = call("run", "half.yaml", "--no-build", "--swap", "controller=controller_fuzzy_sidesl")
+    assert status == 2
+    assert "did you mean 'controller_fuzzy_sideslip'" in said
+
+
+def test_a_dry_run_leaves_stale_fmus_as_they_are(monkeypatch):
+    updater = FmuUpdater(lambda _: None)
+    archive = HOME / "driver_sine.fmu"
+    monkeypatch.setattr(updater, "_build", lambda *_: pytest.fail("is built"))
+    monkeypatch.setattr(updater, "_key", lambda *_: "another key")
+    monkeypatch.setattr(rebuild_stale, "read_stamp", lambda _: BuildStamp("driver_sine", "", "old"))
+    monkeypatch.setattr(rebuild_stale.os.path, "exists", lambda _: True)
+    path, built = updater.bring(archive, build="missing")
+    assert (path, built and built.current) == (archive, False)
 
 
 def test_no_run_and_dry_run_exclude_each_other(yawbench, forecast):

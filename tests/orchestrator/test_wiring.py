@@ -11,12 +11,13 @@ from typing import Any
 import pytest
 
 from orchestrator.errors import Diagnostic, Location, ModelDescriptionError, WiringError, YawbenchError
+from orchestrator.fmu import opener
 from orchestrator.plan import Instance, Override, Plan, ValueOrigin, Wire
 from orchestrator.planner import Planner
 from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
-from tests.sentences import golden, golden_in, places_of, refused, texts_of
+from tests.sentences import golden, golden_in, places_of, texts_of
 from vocabulary.wheels import WHEELS
 
 from .fake_fmus import Var, make_fmu, out
@@ -207,12 +208,20 @@ def test_the_working_directory_has_the_fmus_of_a_scenario_elsewhere(
     assert unit(plan(path), "tyre").fmu.path == folder / "tyre_dugoff.fmu"
 
 
-def test_no_folder_of_fmus_is_said(folder: Path, tmp_path: Path) -> None:
+def test_fmus_that_are_not_built_anywhere_are_said(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder.rename(tmp_path / "elsewhere")
-    assert golden(problems(scenario(), ModelDescriptionError))
+    monkeypatch.setattr(opener, "HOME", tmp_path / "home")
+    found = problems(scenario(), ModelDescriptionError)
+    for name in ("driver_sine", "controller_fnn", "plant_seven_dof", "tyre_dugoff"):
+        (problem,) = (one for one in found if name in str(one))
+        assert problem.code == "fmu-missing"
+        assert "yawbench build" in str(problem)
     assert len(plan(fmus=tmp_path / "elsewhere").instances) == 4
-    with refused(ModelDescriptionError, "folder-missing"):
+    with pytest.raises(ModelDescriptionError, match="nowhere") as caught:
         plan(fmus=Path("nowhere"))
+    assert [one.code for one in caught.value.diagnostics] == ["folder-missing"]
 
 
 def test_an_fmu_can_be_a_path_relative_to_the_scenario(folder: Path, tmp_path: Path) -> None:
@@ -221,6 +230,14 @@ def test_an_fmu_can_be_a_path_relative_to_the_scenario(folder: Path, tmp_path: P
     (folder / "tyre_dugoff.fmu").rename(other)
     made = plan(scenario(UNITS.replace("tyre_dugoff", "Meine Räder/tyre ä.fmu")))
     assert unit(made, "tyre").fmu.path == other
+
+
+def test_without_a_folder_of_fmus_those_of_the_project_are_used(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    home = folder.rename(tmp_path / "home")
+    monkeypatch.setattr(opener, "HOME", home)
+    assert {instance.fmu.path.parent for instance in plan().instances} == {home}
 
 
 def test_every_missing_fmu_is_said_with_those_there_are(folder: Path) -> None:

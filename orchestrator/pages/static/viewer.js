@@ -3,6 +3,8 @@
 
 const ZOOM = [0.1, 8];
 const FEW = 40; // runs listed at once, besides those shown; chosen: more do not fit on a screen
+const NAMED = 4; // signals that a message names; chosen: a line
+const LONGEST_NAME = 150; // of a file, in characters; chosen: well below what file systems take
 const PAPER = 3; // dots per pixel in print
 const plotters = new Map(); // dots per pixel -> uPlot, which takes them once, when it is made
 
@@ -158,7 +160,7 @@ class Viewer extends InAddress {
     find('partial').hidden = !data.partial;
     find('key').textContent = data.key;
     const names = Object.entries(data.signals);
-    find('add').placeholder = `${names.length} recorded`;
+    find('add').placeholder = `${names.length} ${data.partial ? 'here' : 'recorded'}`;
     find('add').list.append(...names.map(([name, {label}]) => made('option', label, {value: name})));
     if (data.runs.some((run) => run.road)) return;
     find('main').classList.add('yv-alone');
@@ -246,7 +248,55 @@ class Viewer extends InAddress {
       + `stroke-width="${reference ? 5 : 2.2}"${dash && !reference ? ` stroke-dasharray="${dash}"` : ''}/></svg>`;
   }
 
+  // Whether instants and limits of a run are drawn, or those of all runs: only while it, or any, is shown.
+  tells(run = this.data.dashed_of) { return (run ?? null) === null ? this.state.shown.length > 0 : this.state.shown.includes(run); }
+
   faults() { return this.runs.filter((run) => this.shows(run)).flatMap((run) => run.faults); }
+
+  // The runs that are drawn; of differences, without the baseline.
+  drawnRuns() { return this.runs.filter((run) => this.shows(run) && !(this.state.difference && run === this.baseline)); }
+
+  drawnLabel(run) { return this.state.difference ? `${run.label} minus ${this.baseline.label}` : run.label; }
+
+  // What is drawn instead of the runs themselves: `B minus A`; '' if they are.
+  get drawnInstead() {
+    if (!this.state.difference) return '';
+    return `${this.drawnRuns().map((run) => run.label).join(', ') || 'nothing'} minus ${this.baseline.label}`;
+  }
+
+  fromBaseline(run, name) {
+    const from = resampled(this.baseline.column(name), this.baseline.shifted, run.shifted);
+    return run.column(name).map((value, i) => value - from[i]);
+  }
+
+  // See `Run.grain`.
+  grain(run, name) {
+    if (!this.state.difference || run === this.baseline) return run.grain(name);
+    return run.rounding(name) + this.baseline.rounding(name);
+  }
+
+  // The signals of a text of the reader, by name, by variable, by label or by a part of one, as a panel names them.
+  // Throw a sentence for the reader if there are none or several.
+  named(text) {
+    return text.split(',').map((spec) => spec.trim().split(' - ').map((part) => this.signalOf(part.trim())).join(' - ')).join(',');
+  }
+
+  signalOf(text) {
+    const {signals, partial} = this.data;
+    if (text in signals) return text;
+    const wanted = text.toLowerCase();
+    const words = (name) => {
+      const {label, unit} = signals[name];
+      return [name, name.slice(name.indexOf('.') + 1), label, unit ? `${label} in ${unit}` : label].map((one) => one.toLowerCase());
+    };
+    const every = Object.keys(signals);
+    const whole = every.filter((name) => words(name).includes(wanted));
+    const found = whole.length ? whole : every.filter((name) => words(name).some((one) => one.includes(wanted)));
+    if (found.length === 1) return found[0];
+    const more = found.length > NAMED ? ` and ${found.length - NAMED} more` : '';
+    if (found.length) throw new Error(`${text} may be ${found.slice(0, NAMED).join(', ')}${more}`);
+    throw new Error(partial ? `this page has no signal ${text}; yawbench plot --page shows all that was recorded` : `no signal ${text} was recorded`);
+  }
 
   known(spec) { return spec.split(',').every((name) => name.trim().split(' - ').every((part) => part in this.data.signals)); }
 
@@ -467,21 +517,21 @@ class Viewer extends InAddress {
     });
     const add = this.find('add');
     add.addEventListener('change', () => {
-      const spec = add.value.trim();
-      if (spec && this.known(spec)) {
+      this.taking(add, () => {
+        const spec = add.value.trim() && this.named(add.value);
+        if (!spec) return;
         if (!this.state.panels.includes(spec)) this.state.panels.push(spec);
         add.value = '';
-        add.setCustomValidity('');
         this.refresh();
-      } else {
-        add.setCustomValidity(spec ? 'not recorded' : '');
-        add.reportValidity();
-      }
+      });
     });
     this.find('x').addEventListener('change', (event) => {
-      const wanted = event.target.value.trim() || 'time';
-      if (this.axes().includes(wanted)) [this.state.x, this.state.span] = [wanted, null];
-      this.refresh();
+      this.taking(event.target, () => {
+        const wanted = event.target.value.trim() || 'time';
+        const axis = this.axes().includes(wanted) ? wanted : this.signalOf(wanted);
+        [this.state.x, this.state.span] = [axis, null];
+        this.refresh();
+      });
     });
     this.find('difference').addEventListener('change', (event) => this.setDifference(event.target.checked));
     this.find('tolerance').addEventListener('change', (event) => {
@@ -492,12 +542,20 @@ class Viewer extends InAddress {
     this.find('all').addEventListener('click', () => this.zoomTo(null));
     this.find('in').addEventListener('click', () => this.zoom(1.6));
     this.find('out').addEventListener('click', () => this.zoom(1 / 1.6));
-    this.find('csv').addEventListener('click', () => saveFile(new Blob([this.csv()], {type: 'text/csv'}), `${this.data.file}.csv`));
-    this.find('png').addEventListener('click', () => this.picture().toBlob((blob) => saveFile(blob, `${this.data.file}.png`)));
+    this.find('csv').addEventListener('click', () => saveFile(new Blob([this.csv()], {type: 'text/csv'}), this.fileName('csv')));
+    this.find('png').addEventListener('click', () => this.picture().toBlob((blob) => saveFile(blob, this.fileName('png'))));
     this.find('link').addEventListener('click', (event) => { this.remember(); copyAddress(event.target); });
     this.find('slider').addEventListener('input', (event) => this.seek(Number(event.target.value)));
     const keys = this.data.alone ? document : this.root; // several viewers of a page: the one with the focus
     keys.addEventListener('keydown', (event) => this.pressed(event), {signal: this.removal.signal});
+  }
+
+  // Take over what a field says, or tell the reader beside it why not.
+  taking(field, take) {
+    let problem = '';
+    try { take(); } catch (error) { problem = error.message; }
+    field.setCustomValidity(problem);
+    field.reportValidity();
   }
 
   setDifference(on) {
@@ -530,19 +588,30 @@ class Viewer extends InAddress {
     this.refresh();
   }
 
-  // The signals of all panels within the span, in SI units; a column per run and signal.
+  // Name of a file of what is drawn.
+  fileName(suffix) {
+    const words = [this.data.file, this.drawnInstead].filter(Boolean).join(' ').replace(/[^\p{L}\p{N}.,=+-]+/gu, '_');
+    return `${words.slice(0, LONGEST_NAME)}.${suffix}`;
+  }
+
+  // The signals of all panels within the span, or their differences from the baseline, in SI units; a column per run
+  // and signal.
   csv() {
     const [from, to] = this.span();
-    const names = [...new Set(this.panels.flatMap((panel) => panel.signals))];
-    const shown = this.runs.filter((run) => this.shows(run));
+    const {difference} = this.state;
+    const signals = this.panels.flatMap((panel) => (difference ? panel.signals.slice(0, 1) : panel.signals));
+    const names = [...new Set(signals)].filter((name) => !difference || this.baseline.has(name));
     const lines = [];
     lines.push(['run', 'time [s]', ...names.map((name) => `${name} [${this.meaning(name).si || '1'}]`)].map(quoted).join(','));
-    for (const run of shown) {
-      const columns = names.map((name) => (run.has(name) ? run.column(name) : null));
+    for (const run of this.drawnRuns()) {
+      const columns = names.map((name) => run.has(name) && (difference ? this.fromBaseline(run, name) : run.column(name)));
+      const grains = names.map((name) => run.has(name) && this.grain(run, name));
+      const cell = (value, grain) => (Number.isFinite(value) ? Number(knownDigits(value, 9, grain / 10)) : '');
       const xs = this.horizontal(run);
       for (let i = 0; i < run.rows; i++) {
         if (xs[i] < from || xs[i] > to) continue;
-        lines.push([quoted(run.label), run.shifted[i], ...columns.map((column) => (column ? Number(column[i].toPrecision(9)) : ''))].join(','));
+        const cells = columns.map((column, k) => (column ? cell(column[i], grains[k]) : ''));
+        lines.push([quoted(this.drawnLabel(run)), run.shifted[i], ...cells].join(','));
       }
     }
     return lines.join('\n') + '\n';
@@ -553,21 +622,30 @@ class Viewer extends InAddress {
     const sheet = made('canvas');
     const sizes = this.panels.map((panel) => panel.plot.ctx.canvas);
     const head = 22 * ratio;
-    const legend = 24 * ratio;
-    sheet.width = Math.max(...sizes.map((canvas) => canvas.width), 200);
-    sheet.height = sizes.reduce((sum, canvas) => sum + canvas.height + head, legend);
+    const line = 24 * ratio;
     const c = sheet.getContext('2d');
+    const title = this.drawnInstead;
+    sheet.width = Math.max(...sizes.map((canvas) => canvas.width), 200);
+    c.font = `${13 * ratio}px system-ui, sans-serif`;
+    let [x, y] = [8 * ratio, title ? line : 0];
+    const legend = this.drawnRuns().map((run) => {
+      const label = this.drawnLabel(run);
+      const wide = 56 * ratio + c.measureText(label).width;
+      if (x > 8 * ratio && x + wide > sheet.width) [x, y] = [8 * ratio, y + line];
+      x += wide;
+      return {run, label, x: x - wide, y: y + line / 2};
+    });
+    sheet.height = sizes.reduce((sum, canvas) => sum + canvas.height + head, y + line);
     c.fillStyle = this.theme.ground;
     c.fillRect(0, 0, sheet.width, sheet.height);
     const words = {colour: this.theme.ink, size: 13 * ratio, halo: false};
-    let x = 8 * ratio;
-    for (const run of this.runs.filter((one) => this.shows(one))) {
-      polyline(c, [x, x + 30 * ratio], [legend / 2, legend / 2]);
+    if (title) text(c, title, 8 * ratio, line / 2, {...words, size: 15 * ratio});
+    for (const {run, label, x: left, y: middle} of legend) {
+      polyline(c, [left, left + 30 * ratio], [middle, middle]);
       stroke(c, this.colour(run), 2.2, ratio, this.dash(run));
-      text(c, run.label, x + 36 * ratio, legend / 2, words);
-      x += 56 * ratio + c.measureText(run.label).width;
+      text(c, label, left + 36 * ratio, middle, words);
     }
-    let y = legend;
+    y += line;
     for (const [k, panel] of this.panels.entries()) {
       text(c, panel.root.querySelector('h4').textContent, 8 * ratio, y + head / 2, words);
       c.drawImage(sizes[k], 0, y + head);

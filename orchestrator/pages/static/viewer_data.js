@@ -92,6 +92,18 @@ class Run {
     return this.column(one).map((value, i) => value - from[i]);
   }
 
+  // Values of a signal that lie closer to each other than this mean the same: the step of its codes; 0: the page has
+  // all digits.
+  grain(name) { return name.includes(' - ') ? this.rounding(name) : this.columns[name][0] === 'q' ? this.columns[name][3] : 0; }
+
+  // The same of what is subtracted from another signal, whose rounding stays.
+  rounding(name) {
+    return name.split(' - ').map((part) => {
+      const [form, , , step] = this.columns[part];
+      return form === 'q' ? step : FLOAT * Math.max(...extremes(this.column(part)).map(Math.abs));
+    }).reduce((one, other) => one + other);
+  }
+
   // The recorded value at t, of the nearest row; NaN where the run has none.
   at(name, t) {
     if (!this.has(name) || t < this.start - 1e-9 || t > this.end + 1e-9) return NaN;
@@ -119,6 +131,8 @@ class Run {
   }
 }
 
+const FLOAT = 2 ** -23; // between two neighbouring 32-bit floats, relative to them
+
 // Values of a run at the times of another run, straight between rows, NaN outside.
 function resampled(values, time, wanted) {
   if (time.length === wanted.length && time[0] === wanted[0] && time[time.length - 1] === wanted[wanted.length - 1]) return values;
@@ -145,8 +159,17 @@ function digitsOf(value, digits) {
   if (value === 0) return '0';
   const rounded = Number(value.toExponential(digits - 1));
   const decimals = digits - 1 - Math.floor(Math.log10(Math.abs(rounded)));
-  if (decimals > 6) return value.toExponential(digits - 1).replace(/e([+-])(\d)$/, 'e$10$2');
+  if (decimals > 6 || Math.abs(value) >= 1e15) return value.toExponential(digits - 1).replace(/e([+-])(\d)$/, 'e$10$2');
   return value.toFixed(Math.max(decimals, 0));
+}
+
+// The same with no digits finer than a grain: 0.000 for what cannot be told from zero.
+function knownDigits(value, digits, grain) {
+  if (!(grain > 0 && grain < Infinity) || !Number.isFinite(value) || value === 0) return digitsOf(value, digits);
+  const power = Math.ceil(Math.log10(grain) - 1e-9); // of the last digit that is known
+  if (Math.min(Math.floor(Math.log10(Math.abs(value))) - digits + 1, 0) >= power) return digitsOf(value, digits);
+  const known = Math.round(value / 10 ** power) * 10 ** power;
+  return Object.is(known, -0) || known === 0 ? (0).toFixed(Math.max(-power, 0)) : known.toFixed(Math.max(-power, 0));
 }
 
 function decimal(value, decimals) {

@@ -82,18 +82,13 @@ class Panel {
         if (!run.has(name) || (k > 0 && run !== viewer.lead()) || (run.band && viewer.state.x === 'time')) continue;
         const difference = viewer.state.difference && run !== viewer.baseline;
         if (viewer.state.difference && (k > 0 || !viewer.baseline.has(name) || run === viewer.baseline)) continue;
-        const values = difference ? this.differenceOf(run, name) : run.column(name);
-        found.push({run, name, values, xs: viewer.horizontal(run), reference: k > 0});
+        const values = difference ? viewer.fromBaseline(run, name) : run.column(name);
+        const grain = viewer.grain(run, name);
+        found.push({run, name, values, grain, xs: viewer.horizontal(run), reference: k > 0});
       }
     }
     const rank = ({run, reference}) => (run.band ? 0 : reference ? 1 : 2);
     return found.sort((one, other) => rank(one) - rank(other));
-  }
-
-  differenceOf(run, name) {
-    const base = this.viewer.baseline;
-    const from = resampled(base.column(name), base.shifted, run.shifted);
-    return run.column(name).map((value, i) => value - from[i]);
   }
 
   get meaning() { return this.viewer.meaning(this.signals[0]); }
@@ -107,7 +102,8 @@ class Panel {
       + '<div class="yv-chart"></div><table><caption class="yv-hidden"></caption>'
       + '<thead class="yv-hidden"><tr><th scope="col">run</th><th scope="col">at the cursor</th>'
       + '<th scope="col">smallest</th><th scope="col">largest</th></tr></thead><tbody></tbody></table><p class="yv-hidden"></p>';
-    root.querySelector('h4').textContent = unit ? `${label} in ${unit}` : label;
+    const minus = viewer.state.difference ? `, minus ${viewer.baseline.label}` : '';
+    root.querySelector('h4').textContent = (unit ? `${label} in ${unit}` : label) + minus;
     root.querySelector('h4').setAttribute('aria-level', viewer.level);
     const names = root.querySelector('small');
     names.textContent = names.title = this.signals.join(', ');
@@ -125,7 +121,7 @@ class Panel {
     const {viewer} = this;
     if (this.plot) this.plot.destroy();
     this.drawn = this.lines();
-    const shown = this.drawn.filter(({run, reference}) => reference || viewer.shows(run));
+    const shown = this.drawn.filter(({run}) => viewer.shows(run));
     const theme = viewer.theme;
     const {factor} = this.meaning;
     const beside = Math.min(Math.max(PANEL_HEIGHT, ROW_HEIGHT * shown.length), PORTRAIT_HEIGHT);
@@ -196,12 +192,17 @@ class Panel {
         if (value > range[1]) range[1] = value;
       }
     }
-    for (const [name, bound] of this.viewer.data.limits) {
-      if (this.signals.includes(name) && !this.viewer.state.difference) range = extremes([bound * factor], range);
-    }
+    range = extremes(this.limits().map((bound) => bound * factor), range);
     if (!(range[0] <= range[1])) return [-1, 1];
     const room = 0.07 * (range[1] - range[0]) || Math.abs(range[0]) * 0.1 || 1;
     return [range[0] - room, range[1] + room];
+  }
+
+  // The limits of the panel's signals, of shown runs.
+  limits() {
+    const {data, state} = this.viewer;
+    const own = state.difference ? [] : data.limits.filter(([name, , , run]) => this.signals.includes(name) && this.viewer.tells(run));
+    return own.map(([, bound]) => bound);
   }
 
   behind(u) {
@@ -227,15 +228,15 @@ class Panel {
     ctx.setLineDash([4 * ratio, 3 * ratio]);
     ctx.beginPath();
     const tolerance = this.tolerance();
-    const limits = viewer.data.limits.filter(([name]) => this.signals.includes(name) && !viewer.state.difference);
-    for (const bound of [...limits.map(([, limit]) => limit), ...(tolerance > 0 ? [tolerance, -tolerance] : [])]) {
+    for (const bound of [...this.limits(), ...(tolerance > 0 ? [tolerance, -tolerance] : [])]) {
       const y = u.valToPos(bound * factor, 'y', true);
       if (y < bbox.top || y > bbox.top + bbox.height) continue;
       ctx.moveTo(bbox.left, y);
       ctx.lineTo(bbox.left + bbox.width, y);
     }
     if (viewer.state.x === 'time') {
-      for (const [time] of viewer.data.marks) {
+      for (const [time, , run] of viewer.data.marks) {
+        if (!viewer.tells(run)) continue;
         const x = u.valToPos(time, 'x', true);
         if (x < bbox.left || x > bbox.left + bbox.width) continue;
         ctx.moveTo(x, bbox.top);
@@ -292,7 +293,7 @@ class Panel {
       const seen = Number.isFinite(value) && x >= 0 && x <= wide && y >= -2 && y <= high + 2;
       this.dots[k].style.display = seen ? '' : 'none';
       if (seen) this.dots[k].style.transform = `translate(${x}px, ${y}px)`;
-      this.cells[k].textContent = Number.isFinite(value) ? this.text(value) : '–';
+      this.cells[k].textContent = Number.isFinite(value) ? this.text(value, line.grain * Math.abs(factor)) : '–';
     });
     const lead = viewer.lead();
     const [row, part] = place(lead.shifted, time);
@@ -301,14 +302,14 @@ class Panel {
     this.pointer.style.transform = `translateX(${x}px)`;
   }
 
-  text(value) { return digitsOf(value, CURSOR_DIGITS).replace('-', '−'); }
+  text(value, grain) { return knownDigits(value, CURSOR_DIGITS, grain).replace('-', '−'); }
 
   tabulate(factor) {
     const {viewer} = this;
     this.body.replaceChildren();
     this.cells = [];
     const words = [];
-    for (const {run, name, values, reference} of this.shown) {
+    for (const {run, name, values, grain, reference} of this.shown) {
       const row = this.body.insertRow();
       const title = reference ? `reference, ${name} of ${run.label}` : run.label;
       const head = made('th', '', {scope: 'row', title, innerHTML: viewer.swatch(run, reference)});
@@ -316,7 +317,7 @@ class Panel {
       row.append(head);
       this.cells.push(row.insertCell());
       const [low, high] = extremes(values);
-      const texts = low <= high ? [low, high].map((one) => digitsOf(one * factor, CURSOR_DIGITS)) : ['no number', 'no number'];
+      const texts = low <= high ? [low, high].map((one) => knownDigits(one * factor, CURSOR_DIGITS, grain * Math.abs(factor))) : ['no number', 'no number'];
       row.append(...texts.map((one) => made('td', one, {className: 'yv-hidden'})));
       words.push(`${title}: ${texts.join(' to ')}`);
     }

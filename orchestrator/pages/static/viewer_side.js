@@ -31,8 +31,9 @@ function together(parts) {
       if (!row) data.metrics.push(row = [title, data.runs.map(() => '')]);
       row[1].push(...values);
     }
+    const owner = part.dashed_of === null ? [] : [part.dashed_of + data.runs.length];
     for (const kind of ['marks', 'limits']) {
-      for (const one of part[kind]) {
+      for (const one of part[kind].map((dashed) => [...dashed, ...owner])) {
         if (!seen.has(JSON.stringify(one))) data[kind].push(one);
         seen.add(JSON.stringify(one));
       }

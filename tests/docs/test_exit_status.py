@@ -1,0 +1,131 @@
+"""One table tells the exit statuses; real commands end with them, and no other page contradicts it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import yawbench as yb
+from docs.generate import library
+from fmus.build import build_component
+from tests.checkout import ROOT
+from tests.commands import status_of
+from tests.orchestrator.test_batch_commands import SCENARIO, STUDY
+from tests.orchestrator.test_validation import line
+
+UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
+PAGE = ROOT / "docs/running.md"
+
+
+def statuses() -> dict[int, str]:
+    """Return status -> its meaning, as the page tells."""
+    section = PAGE.read_text("utf-8").partition("## Exit status\n")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| ([\d, ]+) \| (.*) \|$", section, re.MULTILINE)
+    return {int(number): meaning for numbers, meaning in rows for number in numbers.split(", ")}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch, fmus):
+    """A folder with scenarios, a study, recordings, and their results."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "half.yaml").write_text(SCENARIO)
+    (tmp_path / "study.yaml").write_text(STUDY)  # one of its claims does not reproduce
+    yb.measured(line(tmp_path, "turn"), segment=1).save(tmp_path / "turn")
+    line(tmp_path, "near", up=0.05)
+    line(tmp_path, "far", up=0.2)
+    rows = "".join(f"{k / 100},{9.0 if k == 50 else 0.001 * (k % 7)}\n" for k in range(200))
+    Path("spike.csv").write_text("time [s],r [rad/s]\n" + rows)
+    Path("spike.yaml").write_text("files: [spike.csv]\nsignals: {yaw_rate: r}\n")
+    values = [(t, 0.5 * (t > 1), 0.2 * (t > 1.2), 4.0 * (t > 1.3), 25) for t in np.arange(0, 5, 0.01)]
+    header = "time [s],d [rad],r [rad/s],a [m/s2],v [m/s]"
+    np.savetxt("step.csv", values, "%.9g", ",", header=header, comments="")
+    Path("step.yaml").write_text(
+        "files: [step.csv]\n"
+        "signals: {steering_wheel_angle: d, yaw_rate: r, acceleration_y: a, velocity_x: v}\n"
+    )
+    Path("still.csv").write_text(re.sub(r"(?m)^([\d.]+),.*$", r"\1,0,0,0,25", Path("step.csv").read_text()))
+    Path("still.yaml").write_text(Path("step.yaml").read_text().replace("step", "still"))
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("before", "command", "status", "words"),
+    [
+        ([], "run half.yaml", 0, "success"),
+        ([], "study study.yaml", 0, "a claim that does not reproduce"),
+        (["run half.yaml --out a", "run half.yaml --set step_size=0.02 --out b"], "diff a b", 0, "differ"),
+        ([], "validate turn --measured near.yaml --out v", 0, "success"),
+        ([], "validate turn --measured far.yaml --out v", 1, "a signal lies outside its band"),
+        ([], "measured show spike.yaml", 1, "a flaw"),
+        ([], "evaluate step-steer step.yaml --no-figures", 0, "success"),
+        ([], "evaluate step-steer still.yaml --no-figures", 1, "could judge nothing"),
+        ([], "study study.yaml --no-run", 1, "is not made"),
+        ([], "run half.yaml --set driver.amplitud=1", 2, "a name"),
+        ([], "run half.yaml --sett a=1", 2, "an option"),
+        ([], "run nowhere.yaml", 2, "a file"),
+        ([], "run half.yaml --swap controller=controller_nowhere", 2, "FMUs"),
+        ([], "plot nowhere", 2, "results"),
+        ([], "list metrics", 0, "success"),
+    ],
+)  # fmt: skip
+def test_commands_end_with_the_status_that_the_page_tells(
+    before, command, status, words, folder, fmus, capsys
+):
+    def ended(text: str) -> int:
+        takes = text.split()[0] in ("run", "study")
+        return status_of(*text.split(), *(["--fmus", fmus] if takes else []))
+
+    assert [ended(text) for text in before] == [0] * len(before), capsys.readouterr().err
+    assert ended(command) == status, capsys.readouterr().err
+    assert words in statuses()[status]
+
+
+def test_a_failed_run_ends_with_1_and_an_interrupted_one_with_130(folder, fmus, tmp_path, monkeypatch):
+    (tmp_path / "controller_law.py").write_text(
+        "from components.fmi.component import Component\n\n\n"
+        'class Law(Component):\n    """Fails."""\n\n    inputs = ("yaw_rate_ref",)\n'
+        '    outputs = ("yaw_moment",)\n\n    def output(self, t, u):\n        return (1.0 / (t < 0.2),)\n'
+    )
+    fmu = build_component(tmp_path / "controller_law.py", tmp_path)
+    assert status_of("run", "half.yaml", "--fmus", fmus, "--swap", f"controller={fmu}") == 1
+    assert "a run" in statuses()[1]
+    monkeypatch.setattr("orchestrator.commands.build.list", _interrupted)
+    assert status_of("list") == 130
+    assert set(statuses()) == {0, 1, 2, 130, 143}
+
+
+def _interrupted() -> None:
+    raise KeyboardInterrupt
+
+
+def test_other_pages_refer_to_the_table_and_none_lists_the_statuses_again():
+    for page in (*(ROOT / "docs").glob("*.md"), ROOT / "README.md"):
+        if page == PAGE:
+            continue
+        text = page.read_text("utf-8")
+        assert ("exit status" not in text.lower()) or "running.md#exit-status" in text, page
+        listed = [row for row in text.splitlines() if re.search(r"exit status.*\b0\b.*\b1\b.*\b2 if\b", row)]
+        assert not listed, page
+        assert "a test was not passed" not in text, page
+
+
+def test_what_the_help_says_of_exit_status_1_is_in_the_table(capsys):
+    said = {}
+    for command in ("measured", "evaluate", "validate", "second-opinion"):
+        assert status_of(command, "--help") == 0
+        said[command] = " ".join(capsys.readouterr().out.split())
+        assert "Exit status 1" in said[command]
+        assert f"`{command}" in statuses()[1]
+
+
+def test_the_results_of_examples_are_in_the_box_of_their_examples():
+    """A line of an example, or of what it prints, is indented up to the next empty line."""
+    inside, boxes = False, 0
+    for row in library.page().splitlines():
+        inside = bool(row.strip()) and (inside or row.strip().startswith(">>>"))
+        boxes += inside
+        assert not inside or row.startswith("    "), row
+    assert boxes > 50
