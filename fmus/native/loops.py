@@ -12,7 +12,7 @@ from .merge import items_of
 from .read import kinds_within, names_within
 from .shapes import Memo, Shape, Widening, build, numbers_of, shape_of, types_of
 from .statements import CONTINUE, EXIT, ON, OVER, RESULT, RETURN, Execution
-from .values import RESIZED, UNSET, Array, Box, Bytes, Each, List, Refused, Ring, Span, now, same
+from .values import RESIZED, UNSET, Array, Box, Bytes, Dict, Each, List, Refused, Ring, Span, now, same
 
 UNROLLED = 16
 """Number of passes up to which a loop over a range is unrolled; chosen: four wheels, seven sets."""
@@ -237,6 +237,8 @@ class Looping(Execution):
                     ends[box, key] = slots[key]
             if isinstance(slots, list) and len(slots) != len(box.slots) and not path.dead:
                 raise Refused("a list whose length changes in a loop")
+            if isinstance(box, Dict) and list(slots) != list(box.slots):
+                raise Refused("a dictionary whose keys change in a loop")
         for key in carried:
             box, name = key
             held = path.changed.get(box, box.slots)

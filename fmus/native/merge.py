@@ -19,6 +19,7 @@ from .values import (
     Bound,
     Box,
     Closure,
+    Dict,
     Frame,
     Instance,
     List,
@@ -77,6 +78,8 @@ def alike(a: Any, b: Any) -> bool:
             return len(a.slots) == len(b.slots)
         if isinstance(a, Instance) and isinstance(b, Instance) and a.cls is not b.cls:
             return False
+        if isinstance(a, Dict):
+            return list(a.slots) == list(b.slots)
         return not isinstance(a, (Ring, Array)) and set(a.slots) == set(b.slots)
     if isinstance(a, Closure) and isinstance(b, Closure):
         return a.node is b.node and same(a.defaults, b.defaults)
@@ -112,6 +115,8 @@ class Merging(Lowering):
         """Return the content of a box for modification."""
         if box.merged is not None:
             raise Refused("an object with two names is changed")
+        if box.alias or box.fixed:
+            raise Refused(f"{box.alias or 'the parameters'} is changed")
         box.changed = True
         if self.journals:
             since, journal = self.journals[-1]
@@ -177,6 +182,8 @@ class Merging(Lowering):
             slots_a, slots_b = a.slots(box), b.slots(box)
             if isinstance(slots_a, list) and len(slots_a) != len(slots_b):
                 raise Refused("the length of a list changes on one path only")
+            if isinstance(box, Dict) and list(slots_a) != list(slots_b):
+                raise Refused("the keys of a dictionary change on one path only")
             slots_a, slots_b = self.relevant(box, slots_a, slots_b)
             keys = range(len(slots_a)) if isinstance(slots_a, list) else dict.fromkeys((*slots_a, *slots_b))
             merged = {key: join.of(items_of(slots_a, key), items_of(slots_b, key)) for key in keys}

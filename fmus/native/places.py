@@ -80,4 +80,4 @@ class Places(Merging):
         """Return the item at a valid index."""
         types = list(types_of(ring.item))
         read = [self.let(type, "ring_item", ring.number, k, index) for k, type in enumerate(types)]
-        return build(ring.item, iter(read))
+        return build(ring.item, iter(read), alias="an item of a list whose length changes")

@@ -305,31 +305,38 @@ def _types(shape: Shape, seen: set[int]) -> Iterator[str]:
             yield from _types(item, seen)
 
 
-def build(shape: Shape, leaves: Iterator[Any], memo: dict[int, Any] | None = None) -> Any:
-    """Return the value of a shape with the given numbers at its leaves."""
+def build(shape: Shape, leaves: Iterator[Any], memo: dict[int, Any] | None = None, alias: str = "") -> Any:
+    """Return the value of a shape with the given numbers at its leaves.
+
+    Args:
+        shape, leaves: the shape and its numbers.
+        memo: filled with what was built, by the identity of its shape.
+        alias: what the objects are copies of, and cannot be changed therefore; "" if they are themselves.
+    """
     memo = {} if memo is None else memo
     if isinstance(shape, Leaf):
         return next(leaves)
     if isinstance(shape, Known):
         return shape.value
     if isinstance(shape, Items):
-        return like(shape.sample, [build(item, leaves, memo) for item in shape.items])
+        return like(shape.sample, [build(item, leaves, memo, alias) for item in shape.items])
     if isinstance(shape, Growing):
         return Ring(shape.number, shape.item)
     if isinstance(shape, Made):
-        return shape.make(build(shape.inner, leaves, memo))
+        return shape.make(build(shape.inner, leaves, memo, alias))
     if isinstance(shape, Forms):
-        tag = build(shape.tag, leaves, memo)
-        return Union(tag, tuple(build(item, leaves, memo) for item in shape.alternatives))
+        tag = build(shape.tag, leaves, memo, alias)
+        return Union(tag, tuple(build(item, leaves, memo, alias) for item in shape.alternatives))
     assert isinstance(shape, Held)
     if id(shape) not in memo:
         made = memo[id(shape)] = shape.blank()
-        held = {key: build(item, leaves, memo) for key, item in shape.items.items()}
+        made.alias = alias
+        held = {key: build(item, leaves, memo, alias) for key, item in shape.items.items()}
         made.slots = list(held.values()) if isinstance(made, List) else held
         if isinstance(made, List):
             made.path = shape.path
         if shape.parent is not None and isinstance(made, Frame):
-            made.parent = build(shape.parent, leaves, memo)
+            made.parent = build(shape.parent, leaves, memo, alias)
     return memo[id(shape)]
 
 

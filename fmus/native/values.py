@@ -8,9 +8,12 @@ can be undone before the other path is evaluated; a value with several forms is 
 from __future__ import annotations
 
 import ast
+import enum
 import itertools
+import types
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 from . import ir
@@ -55,14 +58,17 @@ class Box:
     Attributes:
         age: index in the order of creation.
         fixed: whether it never changes.
+        merged: the box into which it was merged where two paths joined.
+        alias: why it may be another object than it seems, and cannot be changed; "" if it is itself.
     """
 
     def __init__(self) -> None:
         self.age = next(_numbers)
         self.fixed = False
         self.slots: Any = {}
-        self.merged: Box | None = None  # the box into which this was merged where two paths joined
+        self.merged: Box | None = None
         self.changed = False
+        self.alias = ""
 
 
 class Frame(Box):
@@ -217,8 +223,8 @@ def now() -> int:
 
 
 def is_number(value: Any) -> bool:
-    """Return whether a value is a number, known at build time or not."""
-    return isinstance(value, (ir.Var, int, float))
+    """Return whether a value is a number, known at build time or not; those of own classes are not."""
+    return isinstance(value, ir.Var) or type(value) in (float, int, bool)
 
 
 def is_real(value: Any) -> bool:
@@ -233,11 +239,47 @@ def is_mixed(value: Any) -> bool:
     )
 
 
+_PLAIN = (int, float, bool, str, bytes, complex, type(None), range, frozenset)
+
+
 def is_plain(value: Any) -> bool:
-    """Return whether a value is known at build time and cannot change."""
+    """Return whether a value is known at build time, cannot change, and behaves as those of Python do."""
     if isinstance(value, tuple):
-        return all(map(is_plain, value))
-    return isinstance(value, (int, float, str, bytes, complex, type(None), range, frozenset))
+        return is_usual_tuple(value) and all(map(is_plain, value))
+    return type(value) in _PLAIN or is_usual_member(value)
+
+
+def is_usual_member(value: Any) -> bool:
+    """Return whether a value is a member of an enumeration without operators of its own."""
+    return isinstance(value, enum.Enum) and not _own_operators(type(value))
+
+
+def is_usual_tuple(value: tuple[Any, ...]) -> bool:
+    """Return whether a value is a tuple, or a named tuple without operators of its own."""
+    cls = type(value)
+    return cls is tuple or (hasattr(cls, "_fields") and not _own_operators(cls))
+
+
+_HARMLESS = {
+    "__new__", "__init__", "__init_subclass__", "__repr__", "__str__", "__format__", "__dir__", "__copy__",
+    "__deepcopy__", "__replace__", "__getnewargs__", "__reduce_ex__", "__signature__",
+}  # fmt: skip
+"""Special methods that do not change how a value is computed with."""
+
+
+@cache
+def _own_operators(cls: type) -> bool:
+    return any(
+        name.startswith("__") and name.endswith("__") and name not in _HARMLESS
+        for base in cls.__mro__
+        if base.__module__ not in ("enum", "builtins")
+        for name, member in vars(base).items()
+        if isinstance(member, types.FunctionType)
+    )
+
+
+_COMPARED = (bytes, range, types.MethodType, types.BuiltinMethodType)
+"""Types of values known at build time that are the same if they are equal; others are only themselves."""
 
 
 def same(first: Any, second: Any) -> bool:
@@ -246,14 +288,11 @@ def same(first: Any, second: Any) -> bool:
         return True
     if type(first) is not type(second) or isinstance(first, ir.Var | Box | Union | Closure | Bound):
         return False
-    if isinstance(first, (int, float, str)):
+    if type(first) in (int, float, str, complex):
         return repr(first) == repr(second)
     if isinstance(first, tuple):
         return len(first) == len(second) and all(map(same, first, second))
-    try:
-        return bool(first == second)
-    except Exception:
-        return False
+    return type(first) in _COMPARED and bool(first == second)
 
 
 def like(value: tuple[Any, ...], items: Sequence[Any]) -> tuple[Any, ...]:
