@@ -319,6 +319,8 @@ class Attributes(Places):
         if isinstance(value, Box) and not isinstance(value, Instance):
             return UNSET
         cls = value.cls if isinstance(value, Instance) else type(value)
+        if isinstance(value, type) and cls.__name__ in _METACLASSES:
+            return UNSET
         raw = member(cls, name)
         if isinstance(raw, types.FunctionType):
             return Bound(raw, value)

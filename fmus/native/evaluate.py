@@ -19,6 +19,7 @@ from .read import Source, Sources
 from .shapes import build, numbers_of, shape_of
 from .values import (
     EITHER,
+    OF_TABLE,
     RESIZED,
     UNSET,
     Array,
@@ -35,6 +36,7 @@ from .values import (
     Span,
     Text,
     Union,
+    boxes_in,
     is_number,
     is_plain,
     is_real,
@@ -420,7 +422,11 @@ class Evaluation(Attributes):
         pairs = zip(shapes, value.items, strict=True)
         columns = zip(*[numbers_of(s, x, self.read, self) for s, x in pairs], strict=True)
         leaves = iter([self._at(tuple(column), value.index) for column in columns])
-        return build(shapes[0], leaves, alias="an object of a table")
+        made = build(shapes[0], leaves, alias=OF_TABLE)
+        origins = tuple(boxes_in(value))
+        for box in boxes_in(made):
+            box.origins = origins
+        return made
 
     def _whole(self, value: Any) -> Any:
         return self.loaded(value) if isinstance(value, Picked) else value

@@ -22,6 +22,8 @@ INEXACT = f"an integer of 2^53 or more, which {ALONE} exactly: set YAWBENCH_UNIT
 """Error message of a native library for larger integers."""
 COMPLEX = f"a complex number, with which {ALONE}: set YAWBENCH_UNITS=python"
 """Error message of a native library for complex powers."""
+SAME_NAN = f"a NaN among items that are compared, with which {ALONE}: set YAWBENCH_UNITS=python"
+"""Error message of a native library for NaN in lists: Python takes one to be equal to itself."""
 
 
 class Refused(Exception):

@@ -14,6 +14,8 @@ from . import ir
 from .lower import Facts, Lowering
 from .values import (
     ANY,
+    OF_TABLE,
+    TWO_NAMES,
     UNSET,
     Array,
     Bound,
@@ -28,6 +30,7 @@ from .values import (
     Ring,
     Union,
     Unreachable,
+    boxes_in,
     is_number,
     keys_of,
     like,
@@ -104,7 +107,7 @@ class Merging(Lowering):
     def read(self, box: Box) -> Any:
         """Return the content of a box."""
         if box.merged is not None and box.merged.changed:
-            raise Refused("an object with two names is changed")
+            raise Refused(TWO_NAMES)
         return box.slots
 
     def write(self, box: Box, key: Any, value: Any) -> None:
@@ -113,8 +116,8 @@ class Merging(Lowering):
 
     def open(self, box: Box) -> Any:
         """Return the content of a box for modification."""
-        if box.merged is not None:
-            raise Refused("an object with two names is changed")
+        if box.merged is not None or box.pushed:
+            raise Refused(TWO_NAMES)
         if box.alias or box.fixed:
             raise Refused(f"{box.alias or 'the parameters'} is changed")
         box.changed = True
@@ -280,6 +283,8 @@ class _Join:
 
     def _loaded(self, value: Picked, path: Path) -> Any:
         outer, self.machine.out = self.machine.out, path.out
+        for box in boxes_in(value):
+            box.alias = OF_TABLE
         try:
             return self.machine.loaded(value)  # type: ignore[attr-defined]
         finally:
@@ -368,6 +373,7 @@ class _Join:
             made = Frame({}, parent)
         else:
             made = type(a)({})  # type: ignore[call-arg]
+        made.alias = a.alias or b.alias
         self.boxes[a, b] = made
         keys = keys_of(made) if isinstance(made, List) else dict.fromkeys((*slots_a, *slots_b))
         joined = {key: self.of(items_of(slots_a, key), items_of(slots_b, key)) for key in keys}

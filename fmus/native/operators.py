@@ -447,7 +447,13 @@ class Operating(Evaluation):
 
     def _same_item(self, a: Any, b: Any) -> ir.Operand:
         """Return whether items are equal, as `in` and lists compare them: NaN is the same as itself."""
-        return True if a is b else self.truth_of(self._equal(a, b))
+        if a is b:
+            return True
+        a, b = (self.real(x) if is_mixed(x) else x for x in (a, b))
+        if all(isinstance(x, ir.Var) and is_real(x) for x in (a, b)):
+            both = self.let(ir.BOOL, "both", self.function("isnan", a), self.function("isnan", b))
+            self.require(self.negation(both), "ValueError", ir.SAME_NAN)
+        return self.truth_of(self._equal(a, b))
 
     def _contained(self, a: Any, b: Any) -> Any:
         contains = self.special(b, "__contains__")

@@ -27,6 +27,14 @@ EITHER = "a number that is True or False on some paths, another integer on other
 """Message of `Refused` where the difference matters."""
 
 
+OF_TABLE = "an object of a table whose index is only known at run time"
+OF_RING = "an item of a list whose length changes"
+SHARED = "an object with two names"
+OF_LOOP = "an object that a loop passes on"
+TWO_NAMES = f"{SHARED} is changed"
+"""What is said of an object of which the translation has a copy for each name, when one is changed."""
+
+
 class Unreachable(Exception):
     """Signal that the current path has raised an exception."""
 
@@ -59,7 +67,9 @@ class Box:
         age: index in the order of creation.
         fixed: whether it never changes.
         merged: the box into which it was merged where two paths joined.
-        alias: why it may be another object than it seems, and cannot be changed; "" if it is itself.
+        alias: what it is a copy of, so that it cannot be changed; "" if it is the object itself.
+        pushed: whether it was copied into a list whose length changes.
+        origins: the objects of a table of which it is a copy.
     """
 
     def __init__(self) -> None:
@@ -69,6 +79,8 @@ class Box:
         self.merged: Box | None = None
         self.changed = False
         self.alias = ""
+        self.pushed = False
+        self.origins: tuple[Box, ...] = ()
 
 
 class Frame(Box):
@@ -311,6 +323,29 @@ def joined_text(parts: Sequence[ir.Part]) -> str | Text:
     if all(isinstance(part, str) for part in together):
         return "".join(part for part in together if isinstance(part, str))
     return Text(tuple(together))
+
+
+def boxes_in(value: Any) -> Iterator[Box]:
+    """Yield the objects in a value, each once."""
+    waiting, seen = [value], set()
+    while waiting:
+        x = waiting.pop()
+        if isinstance(x, tuple):
+            waiting += x
+        elif isinstance(x, Union):
+            waiting += x.alternatives
+        elif isinstance(x, Picked):
+            waiting += x.items
+        elif isinstance(x, Closure):
+            waiting.append(x.frame)
+        elif isinstance(x, Bound):
+            waiting.append(x.owner)
+        elif isinstance(x, Box) and not x.fixed and id(x) not in seen:
+            seen.add(id(x))
+            yield x
+            waiting += x.slots if isinstance(x.slots, list) else x.slots.values()
+            if isinstance(x, Frame):
+                waiting.append(x.parent)
 
 
 def keys_of(box: Box) -> Iterator[Any]:
