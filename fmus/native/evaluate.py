@@ -57,6 +57,7 @@ class Call:
     frame: Frame
     cls: type | None = None
     line: int = 0
+    column: int = 0
     base: Frame | None = None  # of an inner function
     own: frozenset[str] = frozenset()  # names that an inner function sets
 
@@ -74,6 +75,10 @@ class Evaluation(Attributes):
         named = next((call for call in reversed(self.calls) if call.source.file), None)
         return f"{named.source.file}:{named.line}" if named else ""
 
+    def branch_at(self) -> str:
+        named = next((call for call in reversed(self.calls) if call.source.file), None)
+        return f"{named.source.file}:{named.line}:{named.column}" if named else ""
+
     def raised_at(self) -> str:
         inner = next((call for call in reversed(self.calls) if call.source.of_package), None)
         return f"{inner.source.file}:{inner.line}" if inner else ""
@@ -81,6 +86,7 @@ class Evaluation(Attributes):
     def at(self, node: ast.AST) -> None:
         """Record the line that is being evaluated."""
         self.calls[-1].line = node.lineno  # type: ignore[attr-defined]
+        self.calls[-1].column = node.col_offset  # type: ignore[attr-defined]
 
     def evaluate(self, node: ast.expr) -> Any:
         """Return the value of an expression.

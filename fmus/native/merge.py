@@ -154,12 +154,20 @@ class Merging(Lowering):
 
     # ---- branches ---------------------------------------------------------------------------
 
-    def branch(self, test: ir.Operand, then: Callable[[], Any], orelse: Callable[[], Any]) -> Any:
-        """Return the value of `then` if a condition is true, else that of `orelse`."""
+    def branch(
+        self, test: ir.Operand, then: Callable[[], Any], orelse: Callable[[], Any], form: int | None = None
+    ) -> Any:
+        """Return the value of `then` if a condition is true, else that of `orelse`.
+
+        Args:
+            test, then, orelse: condition, and what is evaluated on the two paths.
+            form: the alternative of a value that the condition is about; None if it is of the component.
+        """
         known = self.facts.known(test)
         if known is not None:
             return then() if known else orelse()
         assert isinstance(test, ir.Var)
+        where = self.branch_at() + ("" if form is None else f":{form}")
         paths = []
         for holds, body in ((True, then), (False, orelse)):
             facts = self.facts.copy()
@@ -171,7 +179,7 @@ class Merging(Lowering):
             rest: list[ir.Statement] = []
             if not live.dead:
                 live.out, rest = [], live.out  # later statements need not be in the arm
-            self.out.append(ir.If(test, a.out, b.out))
+            self.out.append(ir.If(test, a.out, b.out, where))
             if live.dead:
                 raise Unreachable
             self.out += rest
@@ -193,7 +201,7 @@ class Merging(Lowering):
             changes.append((box, list(merged.values()) if isinstance(slots_a, list) else merged))
         join.finish()
         if a.out or b.out:
-            self.out.append(ir.If(test, a.out, b.out))
+            self.out.append(ir.If(test, a.out, b.out, where))
         for box, slots in changes:
             self.open(box)
             box.slots = slots if isinstance(slots, list) else {k: v for k, v in slots.items()}
@@ -214,7 +222,7 @@ class Merging(Lowering):
                 return self.by_form(value.alternatives[k], use)
             test = self.compare("==", value.tag, k)
             chosen = value.alternatives[k]
-            return self.branch(test, lambda: self.by_form(chosen, use), lambda: from_(possible[1:]))
+            return self.branch(test, lambda: self.by_form(chosen, use), lambda: from_(possible[1:]), k)
 
         return from_(self._possible(value, self.facts))
 
