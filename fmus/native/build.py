@@ -233,7 +233,7 @@ def _made(
     with tempfile.TemporaryDirectory(prefix="yawbench_") as folder:
         library = Path(folder, f"{name}.so")
         library.write_bytes(files[f"binaries/linux64/{NATIVE_LIBRARY}"])
-        compared = compare_with_python.differences(library, guid, component, resources, limit, thresholds)
+        compared = compare_with_python.differences(library, guid, component, resources, thresholds, limit)
     if compared.difference:
         return Native(why_not=f"the translation is not the same as Python: {compared.difference}", new=True)
     files = {path: _closed(data, compared.reached) for path, data in files.items()}

@@ -216,6 +216,9 @@ class Calling(BuiltIn):
             made_by = next(base for base in cls.__mro__ if "__new__" in vars(base))
             if "_fields" not in vars(made_by):
                 raise Refused(f"making a {cls.__name__}, which has a __new__")
+            for name in ("__iter__", "__len__", "__getitem__", "__hash__"):
+                if isinstance(member(cls, name), types.FunctionType):
+                    raise Refused(f"making a {cls.__name__}, a named tuple with a {name}")
             return cls(*args, **named)
         if issubclass(cls, (tuple, list, dict, int, float, str)):
             raise Refused(f"making a {cls.__name__}")

@@ -527,7 +527,9 @@ def _attempt(beside: _Beside, chance: random.Random, near: list[float], count: i
     ranges = [usual_range(variables[i].name) for i in beside.of["input"]]
     modes, now = [""] * len(ranges), [0.5 * (low + high) for low, high in ranges]
     h = chance.choice((*LENGTHS, *LENGTHS, 1e-4, 0.1, 1.0))
-    start = chance.choice((0.0, 0.0, *STARTS, *[x - 10.0 * h for x in near if 0.0 < x < 1e6]))
+    times = [*near, *(float(x) for kind, _, x in settings if kind in ("Real", "Integer"))]
+    start = chance.choice((0.0, 0.0, *STARTS, *[x - 10.3 * h for x in times if 0.0 < x < 1e6]))
+    short = [1e-9, 0.37 * h, *(x for x in near if 0.0 < x < 1.0)]  # as hosts make at events and at the end
     steps = []
     turn = chance.choice((0.02, 0.1, 0.5))
     for k in range(count):
@@ -546,7 +548,7 @@ def _attempt(beside: _Beside, chance: random.Random, near: list[float], count: i
                     now[i] = chance.choice(now)
             elif modes[i] == "walk":
                 now[i] += 0.05 * (high - low) * chance.uniform(-1.0, 1.0)
-        steps.append((list(now), h))
+        steps.append((list(now), chance.choice(short) if chance.random() < 0.03 else h))
     return _Try(settings, start, list(steps[0][0]), steps)
 
 
@@ -621,16 +623,16 @@ def differences(
     guid: str,
     component: type[Any],
     resources: Path,
-    limit: int = LIMIT,
     thresholds: Sequence[float] = (),
+    limit: int = LIMIT,
 ) -> Compared:
     """Compare a native library with its component, in another process.
 
     Args:
         library, guid: of the native library.
         component, resources: of the Python component.
-        limit: largest processor time [s].
         thresholds: numbers with which it compares others.
+        limit: largest processor time [s].
 
     Raises:
         TimeoutError: the comparison takes longer.

@@ -212,11 +212,11 @@ class Operating(Evaluation):
             return a + b
         if isinstance(a, tuple) and isinstance(b, int) and op == "*":
             return a * b
-        if (is_plain(a) and is_plain(b) and None not in (a, b) and op in OPERATORS) or (
+        if (is_plain(a) and is_plain(b) and a is not None and b is not None and op in OPERATORS) or (
             type(a) is frozenset and type(b) in (set, frozenset)
         ):
             return OPERATORS[op](a, b)
-        if None in (a, b) and (is_number(a) or is_number(b)):
+        if (a is None or b is None) and (is_number(a) or is_number(b)):
             types = f"'{_type_name(a)}' and '{_type_name(b)}'"
             self.end("TypeError", f"unsupported operand type(s) for {op}: {types}")
         raise Refused(f"{op} of a {type(a).__name__} and a {type(b).__name__}")
@@ -376,7 +376,7 @@ class Operating(Evaluation):
         a, b = self._basic(a), self._basic(b)
         if is_number(a) and is_number(b):
             return self.compare(COMPARED[type(op)], a, b)
-        if None in (a, b) and (is_number(a) or is_number(b)):
+        if (a is None or b is None) and (is_number(a) or is_number(b)):
             types = f"'{_type_name(a)}' and '{_type_name(b)}'"
             self.end("TypeError", f"'{COMPARED[type(op)]}' not supported between instances of {types}")
         if is_plain(a) and is_plain(b):

@@ -331,7 +331,7 @@ def boxes_in(value: Any) -> Iterator[Box]:
     while waiting:
         x = waiting.pop()
         if isinstance(x, tuple):
-            waiting += x
+            waiting.extend(x)
         elif isinstance(x, Union):
             waiting += x.alternatives
         elif isinstance(x, Picked):

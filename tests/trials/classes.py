@@ -11,7 +11,10 @@ from collections.abc import Sequence
 
 from .class_programs import program
 from .random_programs import OBJECT
-from .translated import REFUSED, TOGETHER, WRONG, Tally, Tried, shrunk, tried, tried_all
+from .translated import REFUSED, WRONG, Tally, Tried, shrunk, tried, tried_all
+
+TOGETHER = 50
+"""Programs that are compiled together."""
 
 
 def trial(seeds: Sequence[int]) -> Tally:
@@ -38,8 +41,8 @@ def main() -> None:
     args = parser.parse_args()
     began, total = sum(os.times()[:4]), Tally()
     seeds = range(args.seed * 1_000_000, args.seed * 1_000_000 + args.programs)
-    for first in range(0, len(seeds), 4 * TOGETHER):
-        some = trial(seeds[first : first + 4 * TOGETHER])
+    for first in range(0, len(seeds), 2 * TOGETHER):
+        some = trial(seeds[first : first + 2 * TOGETHER])
         total.counts += some.counts
         total.reasons += some.reasons
         for seed, why in some.bad:
@@ -48,7 +51,7 @@ def main() -> None:
                 text = shrunk(text, seed, OBJECT, why)
                 why = tried(text, seed, OBJECT)[1]
             print(f"==== {seed}\n{text}\n{why}\n", flush=True)
-        print(f"{min(first + 4 * TOGETHER, len(seeds))} programs: {dict(total.counts)}", flush=True)
+        print(f"{min(first + 2 * TOGETHER, len(seeds))} programs: {dict(total.counts)}", flush=True)
     print(f"in {sum(os.times()[:4]) - began:.0f} s of processor time")
     for reason, count in total.reasons.most_common(40):
         print(f"{count:6d} {reason}")
