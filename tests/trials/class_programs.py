@@ -1,7 +1,7 @@
 """Random laws made of classes, written as Python text: objects with operators, properties and descriptors.
 
-A program is built from a model of its classes: what their fields, properties, methods and operators are, so that
-most of what is written means something. Nothing is shared with the templates of `grammar.py`.
+A program is built from a model of its classes: what their fields, properties, methods and operators are, so
+that most of what is written means something. Nothing is shared with the templates of `grammar.py`.
 """
 
 from __future__ import annotations
@@ -130,7 +130,8 @@ class Writer:
             if self.odd:
                 ways += [f"{x} is {(self.thing(0, cls) or found)[0]}", f'hasattr({x}, "extra")']
             return self.chance.choice(ways)
-        return f"{self.number(depth)} {self.chance.choice(list(ORDER.values())[:4])} {self.chance.choice(LIMITS)}"
+        left, sign = self.number(depth), self.chance.choice(list(ORDER.values())[:4])
+        return f"{left} {sign} {self.chance.choice(LIMITS)}"
 
     # ---- classes ----------------------------------------------------------------------------
 
@@ -147,9 +148,10 @@ class Writer:
             f"        return getattr(owner, self.place) {self.chance.choice(('* 2.0', '+ 0.5', ''))}",
         ]
         if self.maybe(0.8):
+            value = self.chance.choice(("min(value, self.most)", "value - 1.0"))
             text += [
                 "    def __set__(self, owner, value):",
-                f"        setattr(owner, self.place, {self.chance.choice(('min(value, self.most)', 'value - 1.0'))})",
+                f"        setattr(owner, self.place, {value})",
             ]
         return name, text
 
@@ -237,7 +239,8 @@ class Writer:
             body.append(f"    def {name}(self{', x' * count}):")
             if fields and self.maybe(0.7):
                 body.append(
-                    f"        self.{self.chance.choice(fields)} {self.chance.choice(('=', '+=', '-='))} {self.number(1)}"
+                    f"        self.{self.chance.choice(fields)}"
+                    f" {self.chance.choice(('=', '+=', '-='))} {self.number(1)}"
                 )
             if cls.base is not None and (name, count) in cls.base.methods and self.maybe(0.6):
                 body.append(f"        return super().{name}({'x' * count}) + {self.number(1)}")
@@ -250,9 +253,10 @@ class Writer:
             cls.methods.append((name, 1))
         if self.maybe(0.3):
             name = self.name("k")
+            passed = ("x", "0.5", "2.0 * x")
             body += ["    @classmethod", f"    def {name}(cls, x):"]
             body.append(
-                f"        return cls({', '.join(self.chance.choice(('x', '0.5', '2.0 * x')) for _ in range(cls.arguments))})"
+                f"        return cls({', '.join(self.chance.choice(passed) for _ in range(cls.arguments))})"
             )
             cls.factories = [name]
         return body
@@ -306,21 +310,53 @@ class Writer:
         """Return what few programs have; much of it is refused."""
         take = self.chance.choice(fields or cls.fields)
         some = [
-            ["    def __getattr__(self, name):", '        if name == "extra":', f"            return self.{take} + 1.0",
-             "        raise AttributeError(name)"],
-            ["    def __setattr__(self, name, value):", "        super().__setattr__(name, value + 0.5)"],
-            ["    def __setattr__(self, name, value):", "        object.__setattr__(self, name, 2.0 * value)"],
-            ["    def __getattribute__(self, name):", "        return object.__getattribute__(self, name)"],
-            ["    @functools.cached_property", "    def kept(self):", f"        return self.{take} * 3.0"],
-            ["    def twice(self, by, x):", f"        self.{take} += by", "        return x * by",
-             "    double = functools.partialmethod(twice, 2.0)"],
-            ["    @functools.lru_cache", "    def cached(self, x):", f"        return self.{take} * x"],
-            ["    seen = [1.0]", "    def log(self, x):", "        self.seen += [x]", "        return self.seen[0]"],
-            ["    total = 0.0", "    def tell(self, x):", f"        {cls.name}.total += x", f"        return {cls.name}.total"],
-            ["    def __new__(cls, *a):", "        return super().__new__(cls)"],
-            ["    def __enter__(self):", "        return self", "    def __exit__(self, *a):", f"        self.{take} = 0.0"],
-        ]  # fmt: skip
-        chosen = self.chance.choice(some)
+            f"""
+    def __getattr__(self, name):
+        if name == "extra":
+            return self.{take} + 1.0
+        raise AttributeError(name)""",
+            """
+    def __setattr__(self, name, value):
+        super().__setattr__(name, value + 0.5)""",
+            """
+    def __setattr__(self, name, value):
+        object.__setattr__(self, name, 2.0 * value)""",
+            """
+    def __getattribute__(self, name):
+        return object.__getattribute__(self, name)""",
+            f"""
+    @functools.cached_property
+    def kept(self):
+        return self.{take} * 3.0""",
+            f"""
+    def twice(self, by, x):
+        self.{take} += by
+        return x * by
+    double = functools.partialmethod(twice, 2.0)""",
+            f"""
+    @functools.lru_cache
+    def cached(self, x):
+        return self.{take} * x""",
+            """
+    seen = [1.0]
+    def log(self, x):
+        self.seen += [x]
+        return self.seen[0]""",
+            f"""
+    total = 0.0
+    def tell(self, x):
+        {cls.name}.total += x
+        return {cls.name}.total""",
+            """
+    def __new__(cls, *a):
+        return super().__new__(cls)""",
+            f"""
+    def __enter__(self):
+        return self
+    def __exit__(self, *a):
+        self.{take} = 0.0""",
+        ]
+        chosen = self.chance.choice(some).splitlines()[1:]
         for line, name, count in (
             ("kept", "", 0),
             ("double", "double", 1),
@@ -364,7 +400,8 @@ class Writer:
                 rest = "".join(f", self.{x}" for x in cls.fields[1:])
                 text += ["    def __add__(self, o):"]
                 text += [
-                    f"        return {cls.name}(self.{take} + (o.{take} if isinstance(o, {cls.name}) else o){rest})"
+                    f"        more = o.{take} if isinstance(o, {cls.name}) else o",
+                    f"        return {cls.name}(self.{take} + more{rest})",
                 ]
                 cls.operators |= {"add"}
                 text += ["    def __radd__(self, o):", "        return self.__add__(o)"]
@@ -428,7 +465,8 @@ class Writer:
             if self.odd and self.maybe(0.05):
                 return [f"{pad}{cls.name}.{self.chance.choice(names)} = {self.number(1)}"]
             return [
-                f"{pad}{x}.{self.chance.choice(names)} {self.chance.choice(('=', '=', '+=', '*='))} {self.number(1)}"
+                f"{pad}{x}.{self.chance.choice(names)}"
+                f" {self.chance.choice(('=', '=', '+=', '*='))} {self.number(1)}"
             ]
         if pick < 0.8:
             names = [x for x in self.objects if x.startswith(("self.o", "self.t[", "self.l"))]
