@@ -52,6 +52,7 @@ class Report:
     current: list[str] = field(default_factory=list)
     removed: list[str] = field(default_factory=list)
     in_python: dict[str, str] = field(default_factory=dict)  # built without a native library -> why
+    notes: dict[str, str] = field(default_factory=dict)  # native -> what of it was never compared with Python
     warning: str = ""  # reason if the FMUs have no launcher
 
 
@@ -119,6 +120,8 @@ def build_all(
         how = runs_as(out / f"{name}.fmu")
         if how is not None and not how.native:
             report.in_python[name] = how.why
+        elif how is not None and how.note:
+            report.notes[name] = how.note
     if any(isinstance(known[name], PythonRecipe) for name in report.built):
         report.warning = compile_launcher()[1]
     if components is None and out.is_dir():

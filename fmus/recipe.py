@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import BuildError
-from orchestrator.fmu.archive import REASON
+from orchestrator.fmu.archive import REASON, UNTRIED
 from vocabulary.roles import ROLES
 
 from .compiler import compile_launcher, compiler_tools
@@ -110,6 +110,8 @@ class PythonRecipe:
             )
         packed |= library.files
         packed[REASON] = library.why_not.encode()
+        if library.untried:
+            packed[UNTRIED] = "".join(f"{place}\n" for place in library.untried).encode()
         return packed, (package, entry)
 
 

@@ -123,6 +123,18 @@ class RunsAs:
     """Execution of a component in Python: as native code or not, and the reason if it is not."""
 
     why: str = ""  # it runs in Python; "" if native
+    untried: tuple[str, ...] = ()  # files and lines of branches that were never compared with Python
+
+    @property
+    def note(self) -> str:
+        """A sentence on the branches that were never compared with Python, "" if there are none."""
+        lines: dict[str, list[str]] = {}
+        for place in self.untried:
+            file, _, line = place.rpartition(":")
+            lines.setdefault(file, []).append(line)
+        places = ", ".join(f"{file}:{', '.join(sorted(some, key=int))}" for file, some in lines.items())
+        text = "natively it ends with an error in branches that were never compared with Python"
+        return f"{text} ({places})" if places else ""
 
     @property
     def native(self) -> bool:

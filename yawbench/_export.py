@@ -7,6 +7,7 @@ import hashlib
 import inspect
 import struct
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -22,7 +23,8 @@ from fmus.presentation import presented
 from fmus.recipe import TOOL, PythonRecipe
 from fmus.source_files import Parts, Sources, UserModules
 from fmus.staging import staged
-from orchestrator.errors import BuildError, ScenarioError
+from orchestrator.errors import BuildError, ScenarioError, YawbenchWarning
+from orchestrator.fmu.archive import runs_as
 from orchestrator.messages import listed, short
 from vocabulary.roles import ROLES
 
@@ -47,6 +49,8 @@ def export_fmu(controller: ControllerLike, file: str | Path, *, role: str = "con
         >>> by_fmu, by_python = base.swap(controller=fmu).run(), base.swap(controller=follow).run()
         >>> bool((by_fmu["controller.yaw_moment"] == by_python["controller.yaw_moment"]).all())
         True
+
+    A `YawbenchWarning` names branches of its native library that were never compared with Python.
 
     The FMU is FMI 2.0 for co-simulation, with a native library where the program can be translated. It has
     the program's parameters, and contains the modules of the user's own package that it imports. Before it
@@ -90,6 +94,8 @@ def _write(controller: Any, path: Path, role: str, folder: str) -> None:
         key = hashlib.sha256(b"".join(files[name] for name in sorted(files))).hexdigest()[:32]
         stamp = BuildStamp(path.stem, key, source="Python", tool=TOOL, home=NOWHERE)
         put(path, to_bytes(files, stamp), *modules)
+        if (how := runs_as(path)) and how.note:
+            warnings.warn(f"{path.name}: {how.note}", YawbenchWarning, stacklevel=4)
     except BuildError as error:
         sentences = [diagnostic.message for diagnostic in error.diagnostics]
         raise BuildError([f"{path.stem}: {text}" for text in sentences], code=error.code) from None

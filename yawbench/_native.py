@@ -176,7 +176,7 @@ def in_native_code(
             unpacked = open_fmu(archive).directory
         except YawbenchError as error:
             return replace(fmu, runs_as=RunsAs(str(error)))
-    return replace(fmu, directory=unpacked, runs_as=RunsAs())
+    return replace(fmu, directory=unpacked, runs_as=RunsAs(untried=made.untried))
 
 
 def zipped(files: dict[str, bytes]) -> bytes:

@@ -23,7 +23,7 @@ from orchestrator.fault_kinds import FaultList, FaultName
 from orchestrator.master.process_state import Log
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.messages import hint, short
-from orchestrator.plan import Fmu, Instance, Override, Plan, Value
+from orchestrator.plan import Fmu, Instance, Override, Plan, RunsAs, Value
 from orchestrator.planner import Planner
 from orchestrator.scenario import loader
 from orchestrator.scenario.overrides import faults_at, setting, with_changes
@@ -241,7 +241,11 @@ class Scenario:
                 the instances cannot be connected.
         """
         plan = planner_of(self._programs).plan(self._loaded)
-        notes = tuple(
+        return replace(plan, diagnostics=plan.diagnostics + self._notes(plan))
+
+    def _notes(self, plan: Plan) -> tuple[Diagnostic, ...]:
+        """Return how the instances in plain Python run."""
+        return tuple(
             Diagnostic(
                 "instance-in-python",
                 f"{instance.name}: {instance.fmu.name} is plain Python of this process, not an FMU; "
@@ -251,7 +255,6 @@ class Scenario:
             for instance in plan.instances
             if instance.fmu.path in self._programs
         )
-        return replace(plan, diagnostics=plan.diagnostics + notes)
 
     def run(self, *, progress: Callable[[int, int], None] | bool | None = None) -> Run:
         """Run the scenario in this process and return its results; nothing is written.
@@ -280,11 +283,11 @@ class Scenario:
             try:
                 try:
                     run = Run(simulate_in_memory(plan, opener=opener, progress=report))
-                except SimulationError:
-                    if (again := self._in_python(plan)) == plan:
+                except SimulationError as error:
+                    if (again := self._in_python(plan, str(error))) == plan:
                         raise
                     opened.clear()
-                    run = Run(simulate_in_memory(again, opener=opener))  # fails again, now with the exception
+                    run = Run(simulate_in_memory(again, opener=opener))  # or fails again, with the exception
             except SimulationError as error:
                 warn(with_changes(plan.title, plan.changes), (*plan.diagnostics, *error.warnings))
                 ended = [instance for instance in opened if instance.name == error.instance]
@@ -292,15 +295,19 @@ class Scenario:
         warn(run._full_title, run.diagnostics)
         return run
 
-    def _in_python(self, plan: Plan) -> Plan:
-        """Return a plan in which plain Python runs as Python."""
-        instances = [
-            replace(instance, fmu=self._programs[instance.fmu.path].fmu)
-            if instance.fmu.path in self._programs
-            else instance
-            for instance in plan.instances
-        ]
-        return replace(plan, instances=tuple(instances))
+    def _in_python(self, plan: Plan, why: str) -> Plan:
+        """Return a plan in which plain Python runs as Python, because it failed natively."""
+        instances = []
+        for instance in plan.instances:
+            how = instance.fmu.runs_as
+            if instance.fmu.path in self._programs and how is not None and how.native:
+                fmu = replace(self._programs[instance.fmu.path].fmu, runs_as=RunsAs(f"natively, {why}"))
+                instances.append(replace(instance, fmu=fmu))
+            else:
+                instances.append(instance)
+        again = replace(plan, instances=tuple(instances))
+        others = tuple(note for note in plan.diagnostics if note not in self._notes(plan))
+        return replace(again, diagnostics=others + self._notes(again))
 
     @property
     def title(self) -> str:
@@ -319,7 +326,10 @@ class Scenario:
 
 
 def _how_it_runs(fmu: Fmu) -> str:
-    return f"runs in Python: {fmu.runs_as.why}" if fmu.runs_as and fmu.runs_as.why else "runs natively"
+    if fmu.runs_as is None or fmu.runs_as.native:
+        note = fmu.runs_as.note if fmu.runs_as else ""
+        return f"runs natively; {note}, and the run is repeated in Python" if note else "runs natively"
+    return f"runs in Python: {fmu.runs_as.why}"
 
 
 def warn(title: str, diagnostics: Iterable[Diagnostic]) -> None:

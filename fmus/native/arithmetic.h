@@ -310,6 +310,48 @@ MAYBE_UNUSED static void begin_problem(Problem *problem, const char *kind, const
     problem->length = 0, problem->text[0] = '\0';
 }
 
+/* ---- branches that were compared with Python ----
+ *
+ * The generated file has a table of its branches. In the comparison at the build, `closed` is 0 and each branch is
+ * noted when it is reached. The build then writes what was reached into the library, behind MARK, and closes the
+ * table: a branch that was never compared ends the call instead of computing what may be wrong. */
+
+#define MARK "branches that yawbench compared:"
+
+#define REACHED(k)                                                                                          \
+    if (!branches.reached[k] && !may_go_on(problem, branches.closed, &branches.reached[k], BRANCHES[k])) {  \
+        return 1;                                                                                           \
+    }
+
+#if defined __GNUC__ && !defined __clang__
+__attribute__((cold, noinline))
+#endif
+MAYBE_UNUSED static int may_go_on(Problem *problem, int closed, unsigned char *reached, const char *where)
+{
+    if (!closed) {
+        *reached = 1;
+        return 1;
+    }
+    begin_problem(problem, "RuntimeError", where);
+    say(problem, UNTRIED);
+    return 0;
+}
+
+/* Give the comparison the table, and the files and lines of its branches. */
+#define BRANCHES_OF_LIBRARY                                                                                 \
+    SHOWN unsigned char *yawbench_branches(int *count, const char *const **places);                         \
+    SHOWN unsigned char *yawbench_branches(int *count, const char *const **places)                          \
+    {                                                                                                       \
+        *count = N_BRANCHES;                                                                                \
+        *places = BRANCHES;                                                                                 \
+        return branches.reached;                                                                            \
+    }
+#if defined _WIN32
+#define SHOWN
+#else
+#define SHOWN __attribute__((visibility("default")))
+#endif
+
 /* Write a number with some digits: exponents from `widest` on, and below -4, use exponential notation; ".0" if
  * `real`. printf and strtod only process each other's text, so the locale's decimal point does not matter. */
 static void write_digits(char *out, double x, int digits, int widest, int real)

@@ -26,9 +26,9 @@ from orchestrator.errors import BuildError
 
 from .. import usual_ranges
 from ..compiler import compile_library, compiler_command, compiler_version
-from . import compare_with_python
+from . import compare_with_python, ir
 from .emit import emit
-from .specialise import specialise
+from .specialise import Program, specialise
 from .values import Refused
 
 HERE = Path(__file__).resolve().parent
@@ -53,6 +53,8 @@ LONGEST = 3.0
 MOST_TEXT, MOST_IN_HURRY = 2_000_000, 200_000
 """Largest number of characters in C of a component, and of one that a run waits for if it was never built;
 chosen: the longest of this project's has 0.9 million, those from 0.2 million on take more than `LONGEST`."""
+MARK = b"branches that yawbench compared:\0"
+"""Bytes before the table of branches in a library: MARK of `arithmetic.h`."""
 LATER = "its native library takes longer than a run should wait; 'yawbench build' makes it"
 
 
@@ -63,11 +65,13 @@ class Native:
     Attributes:
         files: path in the archive -> content.
         why_not: reason if there are none, else "".
+        untried: files and lines of branches that were never compared with Python: there, a call fails.
         new: whether they were compiled, and not in the cache.
     """
 
     files: dict[str, bytes] = field(default_factory=dict)
     why_not: str = ""
+    untried: tuple[str, ...] = ()
     new: bool = field(default=False, compare=False)
 
 
@@ -141,12 +145,14 @@ def native(
         for opened, where in read:
             raise Refused(f"{opened} is read at every import, and may change after the build", where)
         began = _processor_time()
-        text = emit(specialise(translated or component, home, *others, unnamed=unnamed), source, guid)
+        program = specialise(translated or component, home, *others, unnamed=unnamed)
+        text = emit(program, source, guid)
         if len(text) > MOST_TEXT:
             raise Refused(f"its translation to C is too long ({len(text) / 1e6:.1f} million characters)")
         if hurry and effort is None and len(text) > MOST_IN_HURRY:
             return Native(why_not=LATER)
-        made = _let_through(text, component, guid, resources, limit, hurry)
+        thresholds = _thresholds(program)
+        made = _let_through(text, component, guid, resources, limit, hurry, thresholds)
         if made.new:
             keep(EFFORTS, entry, str(_processor_time() - began).encode())
         return made
@@ -162,8 +168,21 @@ def _processor_time() -> float:
     return sum(os.times()[:4])  # of this process and its finished compilers
 
 
+def _thresholds(program: Program) -> list[float]:
+    """Return the numbers with which a component compares others: constants, and values of parameters."""
+    constants = {x for function in program.functions.values() for x in ir.thresholds(function.body)}
+    parameters = [v.start for v in program.variables if v.causality == "parameter" and v.type != "String"]
+    return sorted({*constants, *map(float, parameters)})
+
+
 def _let_through(
-    text: str, component: type[Any], guid: str, resources: Path, limit: int, hurry: bool
+    text: str,
+    component: type[Any],
+    guid: str,
+    resources: Path,
+    limit: int,
+    hurry: bool,
+    thresholds: Sequence[float],
 ) -> Native:
     """Return the cached result for a C text, or compile and compare it."""
     key = hashlib.sha256(f"{text}{_comparison()}{limit}".encode()).hexdigest()[:32]
@@ -174,20 +193,32 @@ def _let_through(
         files = {}
         for path, size in record["files"]:
             files[path], rest = rest[:size], rest[size:]
-        return Native(files, record["why_not"])
+        return Native(files, record["why_not"], tuple(record["untried"]))
     try:
-        made = _made(text, component, guid, resources, min(limit, int(LONGEST)) if hurry else limit)
+        most = min(limit, int(LONGEST)) if hurry else limit
+        made = _made(text, component, guid, resources, most, thresholds)
     except TimeoutError as error:
         if hurry:
             return Native(why_not=LATER, new=True)
         made = Native(why_not=str(error), new=True)
-    header = {"files": [[path, len(data)] for path, data in made.files.items()], "why_not": made.why_not}
+    header = {
+        "files": [[path, len(data)] for path, data in made.files.items()],
+        "why_not": made.why_not,
+        "untried": made.untried,
+    }
     head = json.dumps(header).encode()
     keep(STORE, key, len(head).to_bytes(8, "little") + head + b"".join(made.files.values()))
     return made
 
 
-def _made(text: str, component: type[Any], guid: str, resources: Path, limit: int) -> Native:
+def _made(
+    text: str,
+    component: type[Any],
+    guid: str,
+    resources: Path,
+    limit: int,
+    thresholds: Sequence[float],
+) -> Native:
     name = component.fmu_name
     sources = {f"{name}.c": text.encode()} | {n: file.read_bytes() for n, file in HEADERS.items()}
     compilers = {f"binaries/linux64/{NATIVE_LIBRARY}": (compiler_command(), LINUX)}
@@ -202,7 +233,18 @@ def _made(text: str, component: type[Any], guid: str, resources: Path, limit: in
     with tempfile.TemporaryDirectory(prefix="yawbench_") as folder:
         library = Path(folder, f"{name}.so")
         library.write_bytes(files[f"binaries/linux64/{NATIVE_LIBRARY}"])
-        difference = compare_with_python.differences(library, guid, component, resources, limit)
-    if difference:
-        return Native(why_not=f"the translation is not the same as Python: {difference}", new=True)
-    return Native(files, new=True)
+        compared = compare_with_python.differences(library, guid, component, resources, thresholds, limit)
+    if compared.difference:
+        return Native(why_not=f"the translation is not the same as Python: {compared.difference}", new=True)
+    files = {path: _closed(data, compared.reached) for path, data in files.items()}
+    return Native(files, untried=compared.untried, new=True)
+
+
+def _closed(library: bytes, reached: bytes) -> bytes:
+    """Return a library that ends with an error in branches that were not reached; see `arithmetic.h`."""
+    if not reached:
+        return library
+    before, mark, after = library.partition(MARK + bytes(1 + len(reached)))
+    if not mark or MARK in after:
+        raise BuildError(["the compiled library has no table of its branches"])
+    return before + MARK + b"\1" + reached + after

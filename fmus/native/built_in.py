@@ -7,10 +7,12 @@ import bisect
 import itertools
 import math
 import operator
+import types
 from collections.abc import Sequence
 from typing import Any
 
 from . import ir
+from .attributes import member
 from .loops import UNROLLED
 from .of_numbers import OfNumbers
 from .shapes import push
@@ -18,8 +20,9 @@ from .values import (
     EITHER,
     UNSET,
     Array,
-    Box,
+    Bound,
     Bytes,
+    Closure,
     Dict,
     Each,
     Failure,
@@ -48,6 +51,8 @@ _OPERATORS = {
 MOST_IN_ARRAY = 4096
 """Largest number of numbers in an array; chosen: it is on the stack."""
 
+_OF_FORMS = ("getattr", "hasattr", "isinstance", "bool", "zip")
+"""Functions that take values of several forms."""
 _PURE = (set, frozenset, str, repr, ord, chr, divmod, pow, format, float, int, bool, tuple, complex, range)
 
 
@@ -56,9 +61,9 @@ def _is_pure(function: Any) -> bool:
     if any(function is pure for pure in _PURE):
         return True
     owner = getattr(function, "__self__", None)
-    if isinstance(owner, dict):
+    if type(owner) is dict:
         return function.__name__ in ("get", "keys", "values", "items", "copy")
-    if isinstance(owner, (str, bytes, int, float, tuple, range, frozenset)):
+    if is_plain(owner) and owner is not None:
         return True
     return getattr(function, "__module__", "") in ("math", "_operator", "_bisect", "itertools")
 
@@ -148,12 +153,15 @@ class BuiltIn(OfNumbers):
             return self.operate("/", *[self._built_in(function, [x], {}) for x in args])
         if getattr(function, "__module__", "") == "math" and name not in ("floor", "ceil", "trunc"):
             args = [self.real(x) if is_mixed(x) else x for x in args]
-        if any(isinstance(x, Union) for x in args) and name not in ("getattr", "isinstance", "bool", "zip"):
+        if any(isinstance(x, Union) for x in args) and name not in _OF_FORMS:
             k = next(i for i, x in enumerate(args) if isinstance(x, Union))
             return self.by_form(
                 args[k], lambda x: self._built_in(function, [*args[:k], x, *args[k + 1 :]], named)
             )
-        if name == "get" and isinstance(function.__self__, dict):
+        if function is iter and len(args) == 1 and not named:
+            each = self.each(args[0])
+            return each if each.once else Each(each.count, each.item, each.end)
+        if name == "get" and type(getattr(function, "__self__", None)) is dict:
             return self._of_dict(Dict(function.__self__), name, args)
         own = getattr(self, f"_python_{name}", None)
         if own is not None and getattr(function, "__module__", "") in (
@@ -167,6 +175,8 @@ class BuiltIn(OfNumbers):
         for known, op in _OPERATORS.items():
             if function is known:
                 return self.operate(op, *args)
+        if getattr(function, "__module__", "") == "_operator" and name.startswith(("i", "set", "del")):
+            raise Refused(f"a call of operator.{name}")
         plain = [tuple(self.items(x)) if isinstance(x, List) else x for x in args]
         if _is_pure(function) and all(map(self._is_constant, (*plain, *named.values()))):
             try:
@@ -179,14 +189,36 @@ class BuiltIn(OfNumbers):
     def _python_setattr(self, owner: Any, name: str, value: Any) -> None:
         self.set_attribute(owner, name, value)
 
+    def _python_hasattr(self, owner: Any, name: str) -> Any:
+        return self.by_form(owner, lambda x: self.has(x, name))
+
     def _python_len(self, value: Any) -> Any:
+        method = self.special(value, "__len__")
+        if method is not UNSET:
+            return self.truth_or_length(method)
         if isinstance(value, Ring):
             return self.ring_length(value)
         if isinstance(value, Picked):
-            return len(value.items[0])
+            if all(isinstance(x, str) or type(x) is tuple for x in value.items):
+                return self.by_item(value, len)
+            return self.length_of_picked(value)
         if isinstance(value, Array):
             return value.memory.length
-        return len(self.read(value) if isinstance(value, Box) else value)
+        if isinstance(value, Each) and not value.once:
+            return value.count
+        if isinstance(value, (List, Dict)):
+            return len(self.read(value))
+        if isinstance(value, tuple) or type(value) in (str, bytes, range, list, dict, set, frozenset):
+            return len(value)
+        raise Refused(f"len of a {type(value).__name__}")
+
+    def truth_or_length(self, method: Any) -> Any:
+        """Return what a __len__ returns, which must be an integer that is not negative."""
+        count = self.narrowed(self.call(method, [], {}))
+        if not is_number(count) or ir.type_of(count) not in (ir.INT, ir.BOOL):
+            raise Refused("a __len__ that returns something other than an integer")
+        self.require(self.compare(">=", count, 0), "ValueError", "__len__() should return >= 0")
+        return self.binary("+", count, 0)
 
     def _python_array(self, kind: Any, values: Any = ()) -> Array:
         each = self.each(values)
@@ -221,7 +253,10 @@ class BuiltIn(OfNumbers):
         return tuple(self.items(value))
 
     def _python_dict(self, value: Any = (), **named: Any) -> Any:
+        if type(value) is dict:
+            value = Dict(value)
         held = self.read(value) if isinstance(value, Dict) else dict(map(self.items, self.items(value)))
+        held = {self._key(k): x for k, x in held.items()}
         return Dict({**held, **named})
 
     def _python_any(self, values: Any) -> Any:
@@ -256,6 +291,8 @@ class BuiltIn(OfNumbers):
         return Each(each.count, lambda k: (start + k, each.item(k)), each.end)
 
     def _python_reversed(self, values: Any) -> Any:
+        if self.special(values, "__reversed__") is not UNSET or isinstance(values, Instance):
+            raise Refused("reversed of an object")
         each = self.each(values)
         return Each(each.count, lambda k: each.item(each.count - 1 - k))
 
@@ -312,9 +349,8 @@ class BuiltIn(OfNumbers):
         return place
 
     def _python_getattr(self, owner: Any, name: str, *default: Any) -> Any:
-        if default and isinstance(owner, Instance) and owner.slots.get(name, UNSET) is UNSET:
-            return default[0] if not hasattr(owner.cls, name) else self.attribute(owner, name)
-        return self.by_form(owner, lambda x: self.attribute(x, name))
+        missing = (lambda: default[0]) if default else None
+        return self.by_form(owner, lambda x: self.attribute(x, name, missing))
 
     def _python_isinstance(self, value: Any, kinds: Any) -> Any:
         value = self.narrowed(value)
@@ -325,6 +361,20 @@ class BuiltIn(OfNumbers):
             if value.type == ir.EITHER and issubclass(bool, kinds) != issubclass(int, kinds):
                 raise Refused(EITHER)
             return issubclass(of, kinds)
+        for kind in kinds if isinstance(kinds, tuple) else (kinds,):
+            check = member(type(kind), "__instancecheck__")
+            if isinstance(check, types.FunctionType) and type(kind).__module__ not in (
+                "abc",
+                "typing",
+                "enum",
+            ):
+                raise Refused(f"isinstance of {kind.__name__}, whose class has a metaclass")
+        if isinstance(value, Picked):
+            value = self.loaded(value)
+        if isinstance(value, (Closure, Bound, Bytes, Span, Each, Failure)):
+            raise Refused(f"isinstance of a {type(value).__name__}")
+        if isinstance(value, Text):
+            return issubclass(str, kinds)
         if isinstance(value, Instance):
             return issubclass(value.cls, kinds)
         if isinstance(value, Array):

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import abc
 import ast
 import copy
 import dataclasses
+import enum
 import functools
 import inspect
 import operator
+import sys
 import types
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from typing import Any
 
 from . import ir
+from .attributes import is_generated, member
 from .built_in import BuiltIn
 from .evaluate import DEEPEST, Call
 from .read import names_set_by
 from .statements import EXIT, ON, RESULT, RETURN
 from .values import (
     ANY,
+    UNSET,
     Bound,
     Box,
     Closure,
@@ -38,46 +43,29 @@ from .values import (
 class Calling(BuiltIn):
     """Calls of functions, methods, classes and built-in functions."""
 
+    fixed: Container[ir.Var] = ()
+    """Variables that are the same in every call, such as parameters."""
+
     def _call(self, node: ast.Call) -> Any:
         if isinstance(node.func, ast.Name) and node.func.id == "super":
             raise Refused("super() outside a call of a method")
-        function = self._called(node.func)
+        function = self.evaluate(node.func)
         args = self.values(node.args)
         named: dict[str, Any] = {}
         for keyword in node.keywords:
             value = self.evaluate(keyword.value)
-            if keyword.arg is None:
-                named |= self.read(value) if isinstance(value, Dict) else value
-            else:
-                named[keyword.arg] = value
+            more = {keyword.arg: value} if keyword.arg is not None else self._named(value)
+            if named.keys() & more.keys():
+                raise Refused(f"two values for the argument {next(iter(named.keys() & more.keys()))}")
+            named |= more
         self.at(node)
         return self.by_form(function, lambda f: self.call(f, args, named))
 
-    def _called(self, node: ast.expr) -> Any:
-        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Call):
-            inner = node.value.func
-            if isinstance(inner, ast.Name) and inner.id == "super" and not node.value.args:
-                return self._of_base(node.attr)
-        return self.evaluate(node)
-
-    def _of_base(self, name: str) -> Any:
-        call = self.calls[-1]
-        cls, frame = call.source.cells.get("__class__"), call.frame
-        while frame.parent is not None:
-            frame = frame.parent
-        me = frame.slots[call.source.node.args.args[0].arg]
-        if not isinstance(me, Instance) or cls is None:
-            raise Refused("super() outside a method")
-        mro = me.cls.__mro__
-        for base in mro[mro.index(cls) + 1 :]:
-            if name in base.__dict__:
-                member = base.__dict__[name]
-                if isinstance(member, types.FunctionType):
-                    return Bound(member, me)
-                if name == "__init__":
-                    return lambda: None
-                raise Refused(f"super().{name}")
-        raise Refused(f"super().{name}")
+    def _named(self, value: Any) -> dict[str, Any]:
+        held = self.read(value) if isinstance(value, Dict) else value
+        if type(held) is not dict:
+            raise Refused(f"** of a {type(held).__name__}")
+        return held
 
     def call(self, function: Any, args: Sequence[Any], named: dict[str, Any]) -> Any:
         """Return the value of a call."""
@@ -95,37 +83,60 @@ class Calling(BuiltIn):
         if isinstance(function, Bound):
             if isinstance(function.function, str):
                 return self._method(function.owner, function.function, args, named)
-            if isinstance(function.owner, Instance) and function.function is function.owner.cls.__init__:  # type: ignore[misc]
-                return self._initialized(function.owner, args, named)
-            return self.call(function.function, [function.owner, *args], named)
+            of = function.function
+            if isinstance(of, functools.partialmethod):
+                return self.call(of.func, [function.owner, *of.args, *args], of.keywords | named)
+            return self.call(of, [function.owner, *args], named)
         if isinstance(function, Instance):
-            return self.call(self.attribute(function, "__call__"), args, named)
-        if isinstance(function, types.MethodType):
+            method = self.special(function, "__call__")
+            if method is UNSET:
+                raise Refused(f"a call of a {function.cls.__name__}")
+            return self.call(method, args, named)
+        if function is object.__setattr__ and not named:
+            return self.set_as_object(*args)
+        if is_generated(function) and args and dataclasses.is_dataclass(_class(args[0])):
+            return self._of_dataclass(function, args, named)
+        if isinstance(function, types.MethodType) and isinstance(function.__func__, types.FunctionType):
             return self.call(function.__func__, [function.__self__, *args], named)
         if isinstance(function, functools._lru_cache_wrapper):
+            if any(isinstance(x, ir.Var) and x.type != ir.INT and x not in self.fixed for x in args):
+                raise Refused(f"{function.__name__} remembers results: of -0.0 it may return that of 0.0")
             function = function.__wrapped__
         if function is copy.deepcopy:
             return self._copied(args[0], type(args[0]).__name__, {})
         if isinstance(function, types.FunctionType) and self.sources.contains(function):
             return self._inlined(function, args, named)
-        if isinstance(function, operator.itemgetter):
+        if type(function) is operator.itemgetter:
             keys = function.__reduce__()[1]
             picked = tuple(self.subscript(args[0], key) for key in keys)
             return picked if len(keys) > 1 else picked[0]
         if isinstance(function, functools.partial):
             return self.call(function.func, [*function.args, *args], function.keywords | named)
         if function is object.__new__ and isinstance(args[0], type):
+            self._makes_objects(args[0])
             return Instance(args[0])
         if isinstance(function, type) and not self._is_python(function):
             return self._made(function, args, named)
-        of_object = inspect.getattr_static(type(function), "__call__", None)
-        if isinstance(of_object, types.FunctionType) and self.sources.contains(of_object):
-            return self._inlined(of_object, [function, *args], named)
+        method = self.special(function, "__call__")
+        if method is not UNSET:
+            return self.call(method, args, named)
         return self._built_in(function, args, named)
 
     @staticmethod
     def _is_python(cls: type) -> bool:
         return cls.__module__ in ("array", "builtins", "itertools", "operator", "collections", "functools")
+
+    @staticmethod
+    def _makes_objects(cls: type) -> None:
+        """Refuse a class that makes objects in a way of its own."""
+        if type(cls) not in (type, abc.ABCMeta) and type(cls).__name__ != "_ProtocolMeta":
+            raise Refused(f"making a {cls.__name__}, whose class has a metaclass")
+        if member(cls, "__new__") is not vars(object)["__new__"]:
+            raise Refused(
+                f"making a {cls.__name__}, which has a __new__ or is derived from a class of Python"
+            )
+        if member(cls, "__del__") is not UNSET:
+            raise Refused(f"making a {cls.__name__}, which has a __del__")
 
     # ---- functions of the component ---------------------------------------------------------
 
@@ -167,6 +178,9 @@ class Calling(BuiltIn):
     ) -> dict[str, Any]:
         positional = [a.arg for a in (*to.posonlyargs, *to.args)]
         names = dict(zip(positional, args, strict=False))
+        twice = (names.keys() - {a.arg for a in to.posonlyargs}) & named.keys()
+        if twice or any(a.arg in named for a in to.posonlyargs):
+            raise Refused(f"two values for the argument {next(iter(twice or named))}")
         if to.vararg:
             names[to.vararg.arg] = tuple(args[len(positional) :])
         elif len(args) > len(positional):
@@ -188,23 +202,61 @@ class Calling(BuiltIn):
         return names
 
     def _made(self, cls: type, args: list[Any], named: dict[str, Any]) -> Any:
+        if isinstance(cls, enum.EnumMeta):
+            if len(args) != 1 or not is_plain(args[0]) or named:
+                raise Refused(f"a {cls.__name__} of a value that is only known at run time")
+            return cls(args[0])
         if issubclass(cls, BaseException):
+            if cls.__str__ is not BaseException.__str__ or any(
+                isinstance(member(cls, name), types.FunctionType) for name in ("__init__", "__new__")
+            ):
+                raise Refused(f"a {cls.__name__}, which makes its message itself")
             return Failure(cls, self._text(args))
         if issubclass(cls, tuple) and hasattr(cls, "_fields"):
+            made_by = next(base for base in cls.__mro__ if "__new__" in vars(base))
+            if "_fields" not in vars(made_by):
+                raise Refused(f"making a {cls.__name__}, which has a __new__")
+            for name in ("__iter__", "__len__", "__getitem__", "__hash__"):
+                if isinstance(member(cls, name), types.FunctionType):
+                    raise Refused(f"making a {cls.__name__}, a named tuple with a {name}")
             return cls(*args, **named)
         if issubclass(cls, (tuple, list, dict, int, float, str)):
             raise Refused(f"making a {cls.__name__}")
+        self._makes_objects(cls)
         made = Instance(cls)
         self._initialized(made, args, named)
         return made
 
     def _initialized(self, made: Instance, args: list[Any], named: dict[str, Any]) -> None:
-        init = made.cls.__init__  # type: ignore[misc]
-        own = isinstance(init, types.FunctionType) and self.sources.contains(init)
-        if dataclasses.is_dataclass(made.cls) and not own:
-            self._fill(made, made.cls, args, named)
-        elif isinstance(init, types.FunctionType):
+        init = member(made.cls, "__init__")
+        if init is object.__init__:
+            if args or named:
+                raise Refused(f"arguments of {made.cls.__name__}, which takes none")
+        elif not isinstance(init, types.FunctionType):
+            raise Refused(f"{made.cls.__name__}.__init__ is a {type(init).__name__}")
+        else:
             self.call(init, [made, *args], named)
+
+    def _of_dataclass(self, function: types.FunctionType, args: list[Any], named: dict[str, Any]) -> Any:
+        """Return the value of a call of a method that a dataclass has generated."""
+        name, me = function.__name__, args[0]
+        cls = next((x for x in _class(me).__mro__ if vars(x).get(name) is function), None)
+        if cls is not None and name == "__init__" and isinstance(me, Instance):
+            return self._fill(me, cls, function, args[1:], named)
+        if cls is not None and name == "__eq__" and len(args) == 2 and not named:
+            return self._equal_fields(me, args[1], cls)
+        raise Refused(f"{name} of a dataclass")
+
+    def _equal_fields(self, me: Any, other: Any, cls: type) -> Any:
+        if not (isinstance(me, Instance) and isinstance(other, Instance) and me.cls is other.cls):
+            if isinstance(me, Instance) and isinstance(other, Instance):
+                return NotImplemented
+            if self.is_own(me) and self.is_own(other):
+                raise Refused("comparing an object of the state with one of the module")
+            return NotImplemented
+        names = [f.name for f in dataclasses.fields(cls) if f.compare]
+        pairs = [(self.attribute(me, name), self.attribute(other, name)) for name in names]
+        return self._all_equal(pairs, as_items=sys.version_info < (3, 13))
 
     def _copied(self, value: Any, name: str, copies: dict[int, Any]) -> Any:
         """Return a copy of a Python object that the evaluation can change.
@@ -217,7 +269,13 @@ class Calling(BuiltIn):
         Raises:
             Refused: it contains other values than numbers, texts, functions, lists, objects of own classes.
         """
-        if is_plain(value) or isinstance(value, (type, types.FunctionType, types.BuiltinFunctionType)):
+        if isinstance(value, (Box, Union, ir.Var, Closure, Bound, Picked)):
+            if isinstance(value, ir.Var):
+                return value
+            raise Refused("a copy of what is computed at run time")
+        if is_plain(value) or isinstance(
+            value, (type, types.FunctionType, types.BuiltinFunctionType, enum.Enum)
+        ):
             return value
         if id(value) in copies:
             return copies[id(value)]
@@ -228,7 +286,7 @@ class Calling(BuiltIn):
             raise Refused(f"{name} of something that may change cannot be copied")
         if isinstance(value, types.MethodType):
             return Bound(value.__func__, self._copied(value.__self__, name, copies))
-        if isinstance(value, tuple):
+        if type(value) is tuple or hasattr(type(value), "_fields"):
             return like(value, [self._copied(x, f"{name}[{k}]", copies) for k, x in enumerate(value)])
         made: Box
         held: dict[Any, Any]
@@ -246,21 +304,53 @@ class Calling(BuiltIn):
             made.slots[key] = self._copied(x, f"{name}.{key}" if is_object else f"{name}[{key!r}]", copies)
         return made
 
-    def _fill(self, made: Instance, cls: type, args: list[Any], named: dict[str, Any]) -> None:
-        fields = [f for f in dataclasses.fields(cls) if f.init]
-        arguments = dict(zip([f.name for f in fields], args, strict=False)) | named
-        for f in fields:
-            if f.name in arguments:
-                value = arguments[f.name]
-            elif f.default is not dataclasses.MISSING:
-                value = f.default
+    def _fill(
+        self,
+        made: Instance,
+        cls: type,
+        init: types.FunctionType,
+        args: list[Any],
+        named: dict[str, Any],
+    ) -> None:
+        """Do what the __init__ that a dataclass has generated does."""
+        known = {f.name: f for f in dataclasses.fields(cls)}
+        parameters = list(inspect.signature(init).parameters.values())[1:]
+        positional = [p.name for p in parameters if p.kind is not p.KEYWORD_ONLY]
+        if len(args) > len(positional) or named.keys() & set(positional[: len(args)]):
+            raise Refused(f"arguments of {cls.__name__} that do not fit")
+        given = dict(zip(positional, args, strict=False)) | named
+        if given.keys() - {p.name for p in parameters}:
+            raise Refused(f"arguments of {cls.__name__} that do not fit")
+        frozen = is_generated(vars(cls).get("__setattr__"))
+        for p in parameters:
+            if p.name in known or p.name in given:
+                continue
+            if p.default is p.empty:
+                raise Refused(f"{cls.__name__} needs {p.name}")
+            given[p.name] = p.default
+        for f in known.values():
+            if f.name in given:
+                value = given[f.name]
             elif f.default_factory is not dataclasses.MISSING:
                 value = self.call(f.default_factory, [], {})
+            elif not f.init:
+                continue
+            elif f.default is not dataclasses.MISSING:
+                value = f.default
             else:
                 raise Refused(f"{cls.__name__} needs {f.name}")
-            made.slots[f.name] = value
-        if hasattr(cls, "__post_init__"):
-            self.call(cls.__post_init__, [made], {})
+            (self.set_as_object if frozen else self.set_attribute)(made, f.name, value)
+        if member(cls, "__post_init__") is not UNSET:
+            rest = [given[p.name] for p in parameters if p.name not in known]
+            self.call(self.attribute(made, "__post_init__"), rest, {})
+
+
+def _class(value: Any) -> type:
+    return value.cls if isinstance(value, Instance) else type(value)
+
+
+_SHARED = (type, types.FunctionType, types.BuiltinFunctionType, enum.Enum)
+"""Objects that `copy.deepcopy` returns as they are."""
 
 
 class _Empty:

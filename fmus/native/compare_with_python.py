@@ -1,5 +1,8 @@
 """Bitwise comparison of a native library with its Python component under the same sequence of calls.
 
+The library notes which of its branches are reached. Inputs for the others are searched in the library alone,
+which is fast, and what reaches more of them is compared as well (`_search`).
+
 Both run 2,000 steps at each of three step sizes, with inputs in their usual ranges, a hundredth and three
 times these ranges; with every choice of parameters and with changed parameters; with reset, a second start,
 saved, restored and serialized states; with outputs read, and parameters changed, before initialization ends;
@@ -11,6 +14,7 @@ integer of 2^53 or more. All NaNs are equal.
 from __future__ import annotations
 
 import ctypes
+import json
 import math
 import os
 import random
@@ -18,6 +22,7 @@ import signal
 import struct
 from collections.abc import Callable, Iterator, Sequence
 from ctypes import CFUNCTYPE, byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +41,11 @@ MANY = 60
 ALL_MOVED = "all parameters moved"
 LIMIT = 240
 """Largest processor time [s] of a comparison, since a wrongly translated loop may never end."""
+SEARCH, EPISODE, LONGEST_EPISODE = 120_000, 150, 50_000
+"""Steps of the search for branches that were not reached, of one try, and at most of one; chosen: the search
+takes half a second, as long as the comparison, and a controller is followed for 50,000 samples."""
+AFTER = 60
+"""Steps of a comparison after the last new branch was reached, in which what the branch did shows."""
 _LOGGER = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 
 
@@ -48,6 +58,21 @@ class _Callbacks(ctypes.Structure):
 
 class Difference(Exception):
     """Error: a difference between a native library and its Python component."""
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Outcome of a comparison.
+
+    Attributes:
+        difference: the first difference, "" if none.
+        reached: for each branch of the library, whether it was compared.
+        untried: files and lines of the branches that were not.
+    """
+
+    difference: str = ""
+    reached: bytes = b""
+    untried: tuple[str, ...] = ()
 
 
 Answer = tuple[bool, list[str], bytes]
@@ -121,6 +146,37 @@ class Native:
             status = self.library.fmi2SetFMUstate(self.instance, state)
             self.library.fmi2FreeFMUstate(self.instance, byref(state))
         return self._answer(status)
+
+
+class Branches:
+    """Branches of a native library, which notes those that are reached."""
+
+    def __init__(self, library: ctypes.CDLL) -> None:
+        self.count, self.places = 0, []
+        if hasattr(library, "yawbench_branches"):
+            count, places = c_int(), ctypes.POINTER(c_char_p)()
+            library.yawbench_branches.restype = c_void_p
+            self.place = library.yawbench_branches(byref(count), byref(places))
+            self.count = count.value
+            self.places = [(places[i] or b"").decode()[2:-1] for i in range(count.value)]
+        self.compared = bytes(self.count)
+
+    def now(self) -> bytes:
+        """Return those that were reached since the last `forget`."""
+        return ctypes.string_at(self.place, self.count) if self.count else b""
+
+    def forget(self) -> None:
+        if self.count:
+            ctypes.memset(self.place, 0, self.count)
+
+    def new(self) -> bool:
+        """Return whether some were reached that were not compared."""
+        return any(a > b for a, b in zip(self.now(), self.compared, strict=True))
+
+    def keep(self) -> None:
+        """Count those that were reached since the last `forget` as compared."""
+        self.compared = bytes(a | b for a, b in zip(self.now(), self.compared, strict=True))
+        self.forget()
 
 
 class Twin:
@@ -294,14 +350,37 @@ def random_inputs(variables: Sequence[Any], seed: str) -> Iterator[list[float]]:
         yield list(now)
 
 
-def compare(library: Path, guid: str, component: type[Any], resources: Path, steps: int = STEPS) -> None:
-    """Compare a native library with its Python component in all cases.
+def compare(
+    library: Path,
+    guid: str,
+    component: type[Any],
+    resources: Path,
+    thresholds: Sequence[float] = (),
+    steps: int = STEPS,
+) -> Branches:
+    """Compare a native library with its Python component in all cases, and return its branches.
+
+    Args:
+        library, guid: of the native library.
+        component, resources: of the Python component.
+        thresholds: numbers with which it compares others.
+        steps: number of steps at each step size.
 
     Raises:
         Difference: the first difference.
     """
-    variables = component.variables
-    beside = _Beside(Native(library, guid), Twin(component, resources), variables)
+    beside = _Beside(Native(library, guid), Twin(component, resources), component.variables)
+    branches = Branches(beside.native.library)
+    branches.forget()
+    _compare_usual(beside, component, steps)
+    branches.keep()
+    if 0 in branches.compared:
+        _search(beside, branches, component, thresholds)
+    return branches
+
+
+def _compare_usual(beside: _Beside, component: type[Any], steps: int) -> None:
+    variables = beside.variables
     inputs = random_inputs(variables, component.fmu_name)
     first = [0.0 if v.start is None else float(v.start) for v in variables if v.causality == "input"]
 
@@ -401,12 +480,158 @@ def _all_moved(beside: _Beside, variables: Sequence[Any]) -> Iterator[tuple[str,
         yield f"{ALL_MOVED}, {k}", choose
 
 
-def differences(library: Path, guid: str, component: type[Any], resources: Path, limit: int = LIMIT) -> str:
-    """Return the first difference between a native library and its component, "" if none; in another process.
+@dataclass(frozen=True)
+class _Try:
+    """Sequence of calls: parameters that are set, start time, inputs and step sizes, one per step."""
+
+    settings: list[tuple[str, int, Any]]
+    start: float
+    first: list[float]
+    steps: list[tuple[list[float], float]]
+
+
+def _search(beside: _Beside, branches: Branches, component: type[Any], thresholds: Sequence[float]) -> None:
+    """Search inputs that reach further branches of the native library, and compare them."""
+    left, number = SEARCH, 0
+    near = _near(thresholds)
+    counts = sorted({int(x) for x in thresholds if x == int(x) and EPISODE < x <= LONGEST_EPISODE})
+    while left > 0 and 0 in branches.compared:
+        chance = random.Random(f"{component.fmu_name} {number}")
+        long = counts[number // 2] if number % 2 == 0 and number // 2 < len(counts) else 0
+        attempt = _attempt(beside, chance, near, long + AFTER if long else EPISODE)
+        number += 1
+        taken, needed = _try_natively(beside, branches, attempt)
+        left -= taken + 20  # the calls before the first step take as long
+        if needed:
+            beside.label = f"found by searching, {number}: "
+            _compare_try(beside, attempt, needed + AFTER)
+            branches.keep()
+
+
+def _near(thresholds: Sequence[float]) -> list[float]:
+    """Return numbers at, before and beyond thresholds, of both signs."""
+    found = dict.fromkeys([0.0, 1.0])
+    for x in dict.fromkeys(thresholds):
+        for near in (x, math.nextafter(x, math.inf), math.nextafter(x, -math.inf), 1.01 * x, 0.99 * x):
+            found |= dict.fromkeys((near, -near))
+        found |= dict.fromkeys((x + 1.0, x - 1.0, 2.0 * x, 0.5 * x))
+    return list(found)
+
+
+def _attempt(beside: _Beside, chance: random.Random, near: list[float], count: int) -> _Try:
+    variables = beside.variables
+    moved = beside.of["parameter"] if chance.random() < 0.5 else ()
+    settings = [
+        (variables[i].type, i, _parameter(variables[i], chance, near)) for i in moved if chance.random() < 0.5
+    ]
+    ranges = [usual_range(variables[i].name) for i in beside.of["input"]]
+    modes, now = [""] * len(ranges), [0.5 * (low + high) for low, high in ranges]
+    h = chance.choice((*LENGTHS, *LENGTHS, 1e-4, 0.1, 1.0))
+    times = [*near, *(float(x) for kind, _, x in settings if kind in ("Real", "Integer"))]
+    start = chance.choice((0.0, 0.0, *STARTS, *[x - 10.3 * h for x in times if 0.0 < x < 1e6]))
+    short = [1e-9, 0.37 * h, *(x for x in near if 0.0 < x < 1.0)]  # as hosts make at events and at the end
+    steps = []
+    turn = chance.choice((0.02, 0.1, 0.5))
+    for k in range(count):
+        for i, (low, high) in enumerate(ranges):
+            if k == 0 or chance.random() < turn:
+                modes[i] = chance.choice(("near", "usual", "wide", "walk", "rest", "same"))
+                if modes[i] == "near":
+                    now[i] = chance.choice(near)
+                elif modes[i] == "usual":
+                    now[i] = chance.uniform(low, high)
+                elif modes[i] == "wide":
+                    now[i] = (high - low) * 10.0 ** chance.uniform(-3.0, 3.0) * chance.choice((-1.0, 1.0))
+                elif modes[i] == "rest":
+                    now[i] = 0.0
+                elif modes[i] == "same":
+                    now[i] = chance.choice(now)
+            elif modes[i] == "walk":
+                now[i] += 0.05 * (high - low) * chance.uniform(-1.0, 1.0)
+        steps.append((list(now), chance.choice(short) if chance.random() < 0.03 else h))
+    return _Try(settings, start, list(steps[0][0]), steps)
+
+
+def _parameter(v: Any, chance: random.Random, near: list[float]) -> Any:
+    if v.type == "String":
+        return chance.choice(v.choices)
+    if v.type == "Boolean":
+        return chance.random() < 0.5
+    low, high = v.minimum, v.maximum
+    values = [v.start, 0.0, 0.1 * v.start, 10.0 * v.start, *(x for x in (low, high) if x is not None)]
+    value = chance.choice((*values, chance.choice(near)))
+    if not (low is None or value >= low) or not (high is None or value <= high) or abs(value) > 1e9:
+        value = v.start
+    return int(value) if v.type == "Integer" else float(value)
+
+
+def _try_natively(beside: _Beside, branches: Branches, attempt: _Try) -> tuple[int, int]:
+    """Run a try in the native library; return its steps, and those until its last new branch, 0 if none."""
+    native, of = beside.native, beside.of
+    library, instance = native.library, native.instance
+    branches.forget()
+    native.reset()
+    for kind, i, value in attempt.settings:
+        native.set(kind, [i], [value])
+    n = len(of["input"])
+    refs, values, count = (c_uint * n)(*of["input"]), (c_double * n)(), c_size_t(n)
+    values[:] = attempt.first  # type: ignore[assignment]
+    library.fmi2SetReal(instance, refs, count, values)
+    begun = native.begin(attempt.start)[0] and native.end_initialization()[0]
+    before, needed, taken = branches.compared, 0, 0
+    now = branches.now()
+    if any(a > b for a, b in zip(now, before, strict=True)):
+        needed = 1
+    t, last = attempt.start, now
+    for taken, (inputs, h) in enumerate(attempt.steps if begun else (), start=1):
+        values[:] = inputs  # type: ignore[assignment]
+        library.fmi2SetReal(instance, refs, count, values)
+        failed = library.fmi2DoStep(instance, c_double(t), c_double(h), 1)
+        t += h
+        now = branches.now()
+        if now != last:
+            if any(a > b and not c for a, b, c in zip(now, before, last, strict=True)):
+                needed = taken
+            last = now
+        if failed:
+            break
+    native.messages.clear()
+    branches.forget()
+    return taken, needed
+
+
+def _compare_try(beside: _Beside, attempt: _Try, count: int) -> None:
+    def chosen() -> None:
+        for kind, i, value in attempt.settings:
+            beside.call("set", kind, [i], [value])
+
+    beside.extreme = True
+    if beside.start(chosen, attempt.start, attempt.first):
+        t = attempt.start
+        for inputs, h in attempt.steps[:count]:
+            if beside.of["input"]:
+                beside.call("set", "Real", beside.of["input"], inputs)
+            if not beside.call("step", t, h):
+                break
+            t += h
+            beside.outputs()
+    beside.extreme = False
+
+
+def differences(
+    library: Path,
+    guid: str,
+    component: type[Any],
+    resources: Path,
+    thresholds: Sequence[float] = (),
+    limit: int = LIMIT,
+) -> Compared:
+    """Compare a native library with its component, in another process.
 
     Args:
         library, guid: of the native library.
         component, resources: of the Python component.
+        thresholds: numbers with which it compares others.
         limit: largest processor time [s].
 
     Raises:
@@ -417,28 +642,34 @@ def differences(library: Path, guid: str, component: type[Any], resources: Path,
     reading, writing = os.pipe()
     child = os.fork()
     if child == 0:
-        text = "the comparison ends"
+        made: tuple[Any, ...] = ("the comparison ends",)
         try:
             os.close(reading)
             resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 1))
-            compare(library, guid, component, resources)
-            text = ""
+            branches = compare(library, guid, component, resources, thresholds)
+            made = "", branches.compared.hex(), branches.places
         except Difference as difference:
-            text = str(difference)
+            made = (str(difference)[:4000],)
         except BaseException as error:
-            text = f"{type(error).__name__}: {error}"
+            made = (f"{type(error).__name__}: {error}"[:4000],)
         finally:
-            os.write(writing, b"." + text.encode()[:4000])
+            with open(writing, "w", encoding="utf-8") as answers:
+                answers.write(json.dumps(made))
             os._exit(0)
     os.close(writing)
-    with open(reading, "rb") as answers:
+    with open(reading, encoding="utf-8") as answers:
         content = answers.read()
     _, status = os.waitpid(child, 0)
     if content:
-        return content[1:].decode("utf-8", "replace")
+        said, *rest = json.loads(content)
+        if said or not rest:
+            return Compared(said)
+        reached = bytes.fromhex(rest[0])
+        untried = [place for place, compared in zip(rest[1], reached, strict=True) if place and not compared]
+        return Compared("", reached, tuple(dict.fromkeys(untried)))
     if os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL):
         raise TimeoutError(f"the comparison with Python takes more than {limit} s of processor time")
-    return f"it dies of signal {os.WTERMSIG(status)}"
+    return Compared(f"it dies of signal {os.WTERMSIG(status)}")
 
 
-__all__ = ["Difference", "compare", "differences", "random_inputs"]
+__all__ = ["Compared", "Difference", "compare", "differences", "random_inputs"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from . import ir
@@ -36,7 +36,8 @@ _SIGNATURES = {
 
 def emit(program: Program, source: str, guid: str) -> str:
     """Return the text of a C file for a program, which includes `arithmetic.h` and `unit.h`."""
-    lines = [f"/* Made from {source} by yawbench build. */", '#include "arithmetic.h"', ""]
+    lines = [f"/* Made from {source} by yawbench build. */", f"#define UNTRIED {quoted(ir.UNTRIED)}"]
+    lines += ['#include "arithmetic.h"', ""]
     lines += _variables(program.variables, guid)
     for name, kind, types in (("Configured", "c", program.configured), ("State", "s", program.state)):
         members = [f"    {TYPES[type]} {kind}{i};" for i, type in enumerate(types)]
@@ -44,13 +45,33 @@ def emit(program: Program, source: str, guid: str) -> str:
     widths = ", ".join(map(str, program.rings)) or "0"
     lines += [f"enum {{ N_LISTS = {len(program.rings)} }};", f"static const int WIDTHS[] = {{{widths}}};", ""]
     made: dict[ir.Outlined, str] = {}
+    branches: dict[str, int] = {}
+    functions: list[str] = []
     for name, function in program.functions.items():
         for outlined in _outlined(function.body):
             if outlined not in made:
                 made[outlined] = f"{outlined.name}_{len(made)}"
-                lines += _Function(program, ir.Function(outlined.body, ()), made).of_its_own(outlined)
-        lines += _Function(program, function, made).lines(name)
-    return "\n".join([*lines, '#include "unit.h"', ""])
+                own = ir.Function(outlined.body, ())
+                functions += _Function(program, own, made, branches).of_its_own(outlined)
+        functions += _Function(program, function, made, branches).lines(name)
+    return "\n".join([*lines, *_table(branches), *functions, '#include "unit.h"', ""])
+
+
+def _table(branches: Iterable[str]) -> list[str]:
+    """Return the lines of the table of branches that were compared with Python (see `arithmetic.h`)."""
+    if not branches:
+        return []
+    places = [quoted(f" ({':'.join(x.split(':')[:2])})" if ":" in x else "") for x in branches]
+    return [
+        f"enum {{ N_BRANCHES = {len(places)} }};",
+        f"static const char *const BRANCHES[] = {{{', '.join(places)}}};",
+        "static struct {",
+        "    char mark[sizeof MARK];",
+        "    unsigned char closed, reached[N_BRANCHES];",
+        "} branches = {MARK, 0, {0}};",
+        "BRANCHES_OF_LIBRARY",
+        "",
+    ]
 
 
 def constant(value: bool | int | float) -> str:
@@ -112,8 +133,10 @@ def _variables(variables: Sequence[Any], guid: str) -> list[str]:
 class _Function:
     """Generator of the text of a function."""
 
-    def __init__(self, program: Program, function: ir.Function, names: dict[ir.Outlined, str]) -> None:
-        self.program, self.function, self.names = program, function, names
+    def __init__(
+        self, program: Program, function: ir.Function, names: dict[ir.Outlined, str], branches: dict[str, int]
+    ) -> None:
+        self.program, self.function, self.names, self.branches = program, function, names, branches
         self.tables: list[str] = []
 
     def lines(self, name: str) -> list[str]:
@@ -205,14 +228,16 @@ class _Function:
             if isinstance(s, ir.Let):
                 lines.append(f"{pad}{s.target.name} = {self._operation(s)};")
             elif isinstance(s, ir.If):
-                test, then, orelse = f"if ({s.test.name})", s.then, s.orelse
-                if not then:
-                    test, then, orelse = f"if (!{s.test.name})", orelse, []
-                lines.append(f"{pad}{test} {{")
-                self._statements(then, lines, depth + 1)
-                if orelse:
+                goes_on = not ir.raises(s.then) and not ir.raises(s.orelse)
+                lines.append(f"{pad}if ({'' if s.then or goes_on else '!'}{s.test.name}) {{")
+                if goes_on:
+                    lines += [self._reached(f"{s.where}:true", depth + 1)]
+                self._statements(s.then if s.then or goes_on else s.orelse, lines, depth + 1)
+                if goes_on or (s.then and s.orelse):
                     lines.append(f"{pad}}} else {{")
-                    self._statements(orelse, lines, depth + 1)
+                    if goes_on:
+                        lines += [self._reached(f"{s.where}:false", depth + 1)]
+                    self._statements(s.orelse, lines, depth + 1)
                 lines.append(f"{pad}}}")
             elif isinstance(s, ir.Loop):
                 lines.append(f"{pad}for (;;) {{")
@@ -252,6 +277,10 @@ class _Function:
             elif isinstance(s, ir.Digit):
                 text = f"text_{s.digits.name}[(int){self._real(s.index)}]"
                 lines.append(f"{pad}{s.target.name} = (unsigned char){text};")
+
+    def _reached(self, branch: str, depth: int) -> str:
+        """Return the line that notes a branch, or ends the call if it was never compared with Python."""
+        return f"{'    ' * depth}REACHED({self.branches.setdefault(branch, len(self.branches))})"
 
     def _item(self, numbers: Sequence[ir.Operand]) -> str:
         """Return the width of a list's items, and an item."""

@@ -4,27 +4,26 @@ from __future__ import annotations
 
 import ast
 import builtins
-import inspect
+import enum
+import itertools
 import re
 import types
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NoReturn
+from typing import Any
 
 from . import ir
+from .attributes import Attributes
 from .merge import alike
-from .places import Places
 from .read import Source, Sources
 from .shapes import build, numbers_of, shape_of
 from .values import (
     EITHER,
+    OF_TABLE,
     RESIZED,
     UNSET,
     Array,
-    Bound,
-    Box,
     Bytes,
-    Closure,
     Dict,
     Each,
     Failure,
@@ -37,7 +36,7 @@ from .values import (
     Span,
     Text,
     Union,
-    Unreachable,
+    boxes_in,
     is_number,
     is_plain,
     is_real,
@@ -58,11 +57,12 @@ class Call:
     frame: Frame
     cls: type | None = None
     line: int = 0
+    column: int = 0
     base: Frame | None = None  # of an inner function
     own: frozenset[str] = frozenset()  # names that an inner function sets
 
 
-class Evaluation(Places):
+class Evaluation(Attributes):
     """Evaluation of names, structures, attributes and items; other modules add the rest."""
 
     def __init__(self, sources: Sources) -> None:
@@ -75,6 +75,10 @@ class Evaluation(Places):
         named = next((call for call in reversed(self.calls) if call.source.file), None)
         return f"{named.source.file}:{named.line}" if named else ""
 
+    def branch_at(self) -> str:
+        named = next((call for call in reversed(self.calls) if call.source.file), None)
+        return f"{named.source.file}:{named.line}:{named.column}" if named else ""
+
     def raised_at(self) -> str:
         inner = next((call for call in reversed(self.calls) if call.source.of_package), None)
         return f"{inner.source.file}:{inner.line}" if inner else ""
@@ -82,6 +86,7 @@ class Evaluation(Places):
     def at(self, node: ast.AST) -> None:
         """Record the line that is being evaluated."""
         self.calls[-1].line = node.lineno  # type: ignore[attr-defined]
+        self.calls[-1].column = node.col_offset  # type: ignore[attr-defined]
 
     def evaluate(self, node: ast.expr) -> Any:
         """Return the value of an expression.
@@ -112,15 +117,6 @@ class Evaluation(Places):
         except (TypeError, AttributeError, LookupError, ValueError) as error:
             self.at(node)
             raise Refused(f"{kind} is not translated: {_first_line(node)}", self.where()) from error
-
-    def call(self, function: Any, args: Sequence[Any], named: dict[str, Any]) -> Any:
-        """Return the value of a call; implemented in `calls`."""
-        raise NotImplementedError
-
-    def end(self, kind: str, message: str) -> NoReturn:
-        """Emit an exception on the current path, and stop evaluating the path."""
-        self.fail(kind, message)
-        raise Unreachable
 
     # ---- names and constants ----------------------------------------------------------------
 
@@ -165,6 +161,8 @@ class Evaluation(Places):
                 continue
             assert isinstance(piece, ast.FormattedValue)
             spec = self.evaluate(piece.format_spec) if piece.format_spec else ""
+            if piece.conversion == ord("a"):
+                raise Refused("the conversion !a")
             parts += self._formatted(self.evaluate(piece.value), spec, piece.conversion == ord("r"))
         return joined_text(parts)
 
@@ -177,7 +175,7 @@ class Evaluation(Places):
             if spec != "" and not re.fullmatch(r"(\.\d)?g", spec):
                 raise Refused(f"the format {spec!r}")
             return [(value, spec or "r")]
-        if isinstance(value, (tuple, List)) and not is_plain(value):
+        if (type(value) is tuple or isinstance(value, List)) and not is_plain(value):
             items = self.read(value) if isinstance(value, List) else value
             opening, closing = "[]" if isinstance(value, List) else "()"
             parts: list[ir.Part] = [opening]
@@ -216,8 +214,8 @@ class Evaluation(Places):
                 made[self._key(self.evaluate(key))] = self.evaluate(value)
         return Dict(made)
 
-    @staticmethod
-    def _key(value: Any) -> Any:
+    def _key(self, value: Any) -> Any:
+        value = self.settled(value, self.facts) if isinstance(value, ir.Var) else value
         if not is_plain(value):
             raise Refused("a key that is only known at run time")
         return value
@@ -228,7 +226,7 @@ class Evaluation(Places):
         Raises:
             Refused: the number of items is only known at run time.
         """
-        value = self.narrowed(value)
+        value = self._iterated(self.narrowed(value))
         if isinstance(value, Each):
             if self.facts.known(self.read(value)["used"]) is True:
                 raise Refused("an iterator that is used twice")
@@ -250,32 +248,63 @@ class Evaluation(Places):
 
         return Each(count, lambda k: content()[k], content)
 
+    def _iterated(self, value: Any) -> Any:
+        """Return what the __iter__ of a value's class returns, if it is of a component."""
+        iterate = self.special(value, "__iter__")
+        if iterate is UNSET:
+            return value
+        iterator = self.narrowed(self.call(iterate, [], {}))
+        if not isinstance(iterator, Each) or not iterator.once:
+            raise Refused("an __iter__ that returns something other than an iterator of known length")
+        return iterator
+
     def items(self, value: Any) -> list[Any]:
         """Return the items of an iterable.
 
         Raises:
             Refused: the number of items is only known at run time.
         """
-        value = self.narrowed(value)
+        value = self._iterated(self.narrowed(value))
         if isinstance(value, (Each, Array)):
             each = self.each(value)
             return [each.item(k) for k in range(each.count)]
         if isinstance(value, (List, Dict)):
             return list(self.read(value))
         if isinstance(value, Picked):
-            return [self.subscript(value, k) for k in range(len(value.items[0]))]
+            return [self.subscript(value, k) for k in range(self.length_of_picked(value))]
         if isinstance(value, (ir.Var, Ring, Span, Union, Bytes, Text, Instance)):
             raise Refused("the number of items is only known at run time")
-        if isinstance(value, (tuple, list, str, bytes, range, dict, set, frozenset)):
-            return list(value)
-        if hasattr(value, "__iter__"):
-            return [self.imported(x) for x in value]
+        if isinstance(value, tuple) or type(value) in _ITERABLE:
+            return [*value]
+        if isinstance(value, enum.EnumMeta) and type(value) is enum.EnumMeta:
+            return [*value]
         if value is None:
             self.end("TypeError", "cannot unpack non-iterable NoneType object")
         raise Refused(f"iterating over {type(value).__name__}")
 
+    def length_of_picked(self, value: Picked) -> int:
+        """Return the length of an item of a table, if that of all is the same."""
+        rows = [self.read(x) if isinstance(x, List) else x for x in value.items]
+        lengths = {len(x) if isinstance(x, (tuple, list)) else None for x in rows}
+        if len(lengths) != 1 or None in lengths:
+            raise Refused("an item of a table whose items are of different length")
+        return lengths.pop()  # type: ignore[return-value]
+
+    def by_item(self, value: Picked, use: Callable[[Any], Any]) -> Any:
+        """Apply `use`, which computes nothing at run time, to the item of a table."""
+        return self._at(tuple(self.known_item(use(x)) for x in value.items), value.index)
+
+    def known_item(self, value: Any) -> Any:
+        """Return a value of a table that is known at build time."""
+        if isinstance(value, ir.Var):
+            raise Refused("an item of a table whose items are only known at run time")
+        return value
+
     def imported(self, value: Any) -> Any:
         """Convert the result of a Python function to a value of the evaluation."""
+        if isinstance(value, _FINITE):
+            items = [*value]
+            return Each(len(items), items.__getitem__)
         if isinstance(value, list):
             return List([self.imported(x) for x in value])
         if type(value) is tuple:
@@ -287,49 +316,26 @@ class Evaluation(Places):
     # ---- attributes and items ---------------------------------------------------------------
 
     def _attribute(self, node: ast.Attribute) -> Any:
-        owner = self.evaluate(node.value)
+        inner = node.value
+        if isinstance(inner, ast.Call) and isinstance(inner.func, ast.Name) and inner.func.id == "super":
+            return self.of_base(*self._super(inner), node.attr)
+        owner = self.evaluate(inner)
         self.at(node)
         return self.by_form(owner, lambda x: self.attribute(x, node.attr))
 
-    def attribute(self, owner: Any, name: str) -> Any:
-        """Return an attribute."""
-        if isinstance(owner, Picked):
-            owner = self.loaded(owner)
-        if isinstance(owner, Instance):
-            held = self.read(owner)
-            if name in held and held[name] is not UNSET:
-                text = f"'{owner.cls.__name__}' object has no attribute '{name}'"
-                return self.present(held[name], "AttributeError", text)
-            if name == "__class__":
-                return owner.cls
-            return self._of_class(owner, owner.cls, name)
-        if isinstance(owner, (List, Ring, Dict, Text)):
-            return Bound(name, owner)
-        if owner is None:
-            self.end("AttributeError", f"'NoneType' object has no attribute '{name}'")
-        if isinstance(owner, tuple) and hasattr(owner, "_fields") and name not in owner._fields:
-            return self._of_class(owner, type(owner), name)
-        if isinstance(owner, (ir.Var, Box, Closure, Bound, Span, Bytes)):
-            raise Refused(f"the attribute {name} of a {type(owner).__name__}")
-        if isinstance(owner, type):
-            raw = inspect.getattr_static(owner, name, UNSET)
-            if isinstance(raw, classmethod):
-                return Bound(raw.__func__, owner)
-        return getattr(owner, name)
-
-    def _of_class(self, owner: Any, cls: type, name: str) -> Any:
-        raw = inspect.getattr_static(cls, name, UNSET)
-        if raw is UNSET:
-            raise Refused(f"{cls.__name__} has no attribute {name}")
-        if isinstance(raw, staticmethod):
-            return raw.__func__
-        if isinstance(raw, classmethod):
-            return Bound(raw.__func__, cls)
-        if isinstance(raw, property):
-            return self.call(raw.fget, [owner], {})
-        if isinstance(raw, types.FunctionType):
-            return Bound(raw, owner)
-        return raw if isinstance(owner, Instance) else getattr(owner, name)
+    def _super(self, node: ast.Call) -> tuple[Any, type]:
+        """Return the object and the class of super(...)."""
+        call = self.calls[-1]
+        if node.args:
+            cls, me = self.values(node.args)
+        else:
+            cls, names = call.source.cells.get("__class__"), call.source.node.args.args
+            if cls is None or not names or call.frame.parent is not None:
+                raise Refused("super() outside a method, or within another function of it")
+            me = self.read(call.frame)[names[0].arg]
+        if not isinstance(cls, type):
+            raise Refused("super() of something other than a class")
+        return self.narrowed(me), cls
 
     def _subscript(self, node: ast.Subscript) -> Any:
         owner, index = self.evaluate(node.value), self.evaluate(node.slice)
@@ -354,6 +360,13 @@ class Evaluation(Places):
             return self.read(owner)[self._key(index)]
         if isinstance(owner, Picked) and not is_real(index):
             return self._of_picked(owner, index)
+        own = self.special(owner, "__getitem__")
+        if own is not UNSET:
+            return self.call(own, [index], {})
+        if isinstance(owner, enum.EnumMeta):
+            return owner.__members__[self._key(index)]
+        if not (isinstance(owner, (List, tuple)) or type(owner) in _SUBSCRIPTED):
+            raise Refused(f"an item of a {type(owner).__name__}")
         items = self.read(owner) if isinstance(owner, List) else owner
         if is_real(index):
             self.end("TypeError", f"{_kind_of(items)} indices must be integers or slices, not float")
@@ -363,6 +376,10 @@ class Evaluation(Places):
             if not isinstance(items, (tuple, list)) or not items:
                 raise Refused("an index that is only known at run time")
             return self._at(tuple(items), self.within(index, len(items), _beyond(items)))
+        if isinstance(items, (dict, types.MappingProxyType)):
+            return items[self._key(index)]
+        if not isinstance(index, slice) and type(index) not in (int, bool):
+            raise Refused(f"an index that is a {type(index).__name__}")
         known = isinstance(items, (tuple, list)) and isinstance(index, int)
         if known and not -len(items) <= index < len(items):
             self.end("IndexError", _beyond(items))
@@ -410,10 +427,28 @@ class Evaluation(Places):
         shapes = [shape_of(x, self.read) for x in value.items]
         pairs = zip(shapes, value.items, strict=True)
         columns = zip(*[numbers_of(s, x, self.read, self) for s, x in pairs], strict=True)
-        return build(shapes[0], iter([self._at(tuple(column), value.index) for column in columns]))
+        leaves = iter([self._at(tuple(column), value.index) for column in columns])
+        made = build(shapes[0], leaves, alias=OF_TABLE)
+        origins = tuple(boxes_in(value))
+        for box in boxes_in(made):
+            box.origins = origins
+        return made
 
     def _whole(self, value: Any) -> Any:
         return self.loaded(value) if isinstance(value, Picked) else value
+
+
+_ITERABLE: tuple[type, ...] = (
+    list, str, bytes, range, dict, set, frozenset, types.MappingProxyType,
+    type({}.keys()), type({}.values()), type({}.items()),
+)  # fmt: skip
+_SUBSCRIPTED = (list, str, bytes, range, dict, types.MappingProxyType)
+_FINITE = (
+    itertools.accumulate, itertools.chain, itertools.combinations, itertools.combinations_with_replacement,
+    itertools.compress, itertools.islice, itertools.pairwise, itertools.permutations, itertools.product,
+    itertools.zip_longest,
+)  # fmt: skip
+"""Iterators that end, if what they are made of is known."""
 
 
 def _unset(name: str, free: bool) -> tuple[str, str]:

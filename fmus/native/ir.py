@@ -22,6 +22,10 @@ INEXACT = f"an integer of 2^53 or more, which {ALONE} exactly: set YAWBENCH_UNIT
 """Error message of a native library for larger integers."""
 COMPLEX = f"a complex number, with which {ALONE}: set YAWBENCH_UNITS=python"
 """Error message of a native library for complex powers."""
+UNTRIED = f"no comparison with Python came here when this was built, and {ALONE}: set YAWBENCH_UNITS=python"
+"""Error message of a native library for branches that were never compared with Python."""
+SAME_NAN = f"a NaN among items that are compared, with which {ALONE}: set YAWBENCH_UNITS=python"
+"""Error message of a native library for NaN in lists: Python takes one to be equal to itself."""
 
 
 class Refused(Exception):
@@ -114,11 +118,12 @@ class Digit:
 
 @dataclass
 class If:
-    """Branch with two paths."""
+    """Branch with two paths; `where` is the same for all branches of the same place in the component."""
 
     test: Var
     then: list[Statement] = field(default_factory=list)
     orelse: list[Statement] = field(default_factory=list)
+    where: str = ""
 
 
 @dataclass
@@ -215,6 +220,21 @@ def every(body: Sequence[Statement]) -> Iterator[Statement]:
             yield from every(s.orelse)
         elif isinstance(s, Loop):
             yield from every(s.body)
+
+
+def raises(body: Sequence[Statement]) -> bool:
+    """Return whether statements always end with an exception."""
+    last = body[-1] if body else None
+    return isinstance(last, Raise) or (isinstance(last, If) and raises(last.then) and raises(last.orelse))
+
+
+def thresholds(body: Sequence[Statement]) -> Iterator[float]:
+    """Yield the constants with which statements, and the functions that they call, compare numbers."""
+    for s in every(body):
+        if isinstance(s, Let) and s.op in ("lt", "le", "gt", "ge", "eq", "ne"):
+            yield from (float(x) for x in s.operands if isinstance(x, (int, float)) and abs(x) < 1e12)
+        elif isinstance(s, Invoke):
+            yield from thresholds(s.function.body)
 
 
 def arrays_of(body: Sequence[Statement]) -> list[Array]:

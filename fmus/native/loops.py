@@ -12,7 +12,26 @@ from .merge import items_of
 from .read import kinds_within, names_within
 from .shapes import Memo, Shape, Widening, build, numbers_of, shape_of, types_of
 from .statements import CONTINUE, EXIT, ON, OVER, RESULT, RETURN, Execution
-from .values import RESIZED, UNSET, Array, Box, Bytes, Each, List, Refused, Ring, Span, now, same
+from .values import (
+    OF_LOOP,
+    RESIZED,
+    UNSET,
+    Array,
+    Bound,
+    Box,
+    Bytes,
+    Closure,
+    Dict,
+    Each,
+    Frame,
+    List,
+    Refused,
+    Ring,
+    Span,
+    boxes_in,
+    now,
+    same,
+)
 
 UNROLLED = 16
 """Number of passes up to which a loop over a range is unrolled; chosen: four wheels, seven sets."""
@@ -215,6 +234,7 @@ class Looping(Execution):
                     self.out.append(ir.Let(head, "copy", (kept,)))
                     leaves.append(head)
                 value = build(shape, iter(leaves))
+                _replace(items_of(box.slots, key) if _has(box, key) else UNSET, value)
                 starts[box, key] = value
                 self.write(box, key, value)
             self.branch(test(), body, lambda: self.leave(OVER))
@@ -237,6 +257,8 @@ class Looping(Execution):
                     ends[box, key] = slots[key]
             if isinstance(slots, list) and len(slots) != len(box.slots) and not path.dead:
                 raise Refused("a list whose length changes in a loop")
+            if isinstance(box, Dict) and list(slots) != list(box.slots):
+                raise Refused("a dictionary whose keys change in a loop")
         for key in carried:
             box, name = key
             held = path.changed.get(box, box.slots)
@@ -287,9 +309,36 @@ class Looping(Execution):
         self.out.append(ir.Loop(body))
         for (box, name), shape in carried.items():
             leaves = [self.let(leaf.type, "copy", leaf) for leaf in kept[box, name]]
-            self.write(box, name, build(shape, iter(leaves)))
+            value = build(shape, iter(leaves))
+            for before in (items_of(box.slots, name) if _has(box, name) else UNSET, made.ends[box, name]):
+                _replace(before, value)
+            self.write(box, name, value)
         self.leave(made.exit)
         self._after_loop(node)
+
+
+def _replace(before: Any, after: Any) -> None:
+    """Note that the objects in a value are replaced by copies, with which they are not to be confused."""
+    pairs = [(before, after)]
+    while pairs:
+        a, b = pairs.pop()
+        if isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b):
+            pairs += zip(a, b, strict=True)
+        elif isinstance(a, Closure) and isinstance(b, Closure):
+            pairs.append((a.frame, b.frame))
+        elif isinstance(a, Bound) and isinstance(b, Bound):
+            pairs.append((a.owner, b.owner))
+        elif isinstance(a, Box) and type(a) is type(b) and a is not b and a.merged is not b:
+            a.merged = b
+            keys = range(len(a.slots)) if isinstance(a.slots, list) else list(a.slots)
+            pairs += [(a.slots[k], items_of(b.slots, k)) for k in keys if _has(b, k)]
+            if isinstance(a, Frame) and isinstance(b, Frame):
+                pairs.append((a.parent, b.parent))
+        elif a is not b and not isinstance(a, Box) and not isinstance(b, Box):
+            for box in boxes_in(a):
+                box.alias = box.alias or OF_LOOP
+        elif isinstance(a, Box):
+            a.alias = a.alias or OF_LOOP
 
 
 def _has(box: Box, key: Any) -> bool:

@@ -136,6 +136,10 @@ class Lowering:
         """Return the file and line that are being evaluated."""
         raise NotImplementedError
 
+    def branch_at(self) -> str:
+        """Return the file, line and column of a branch."""
+        raise NotImplementedError
+
     def raised_at(self) -> str:
         """Return the file and line in the package for an exception's message."""
         return self.where()

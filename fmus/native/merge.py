@@ -14,11 +14,14 @@ from . import ir
 from .lower import Facts, Lowering
 from .values import (
     ANY,
+    OF_TABLE,
+    TWO_NAMES,
     UNSET,
     Array,
     Bound,
     Box,
     Closure,
+    Dict,
     Frame,
     Instance,
     List,
@@ -27,6 +30,7 @@ from .values import (
     Ring,
     Union,
     Unreachable,
+    boxes_in,
     is_number,
     keys_of,
     like,
@@ -77,6 +81,8 @@ def alike(a: Any, b: Any) -> bool:
             return len(a.slots) == len(b.slots)
         if isinstance(a, Instance) and isinstance(b, Instance) and a.cls is not b.cls:
             return False
+        if isinstance(a, Dict):
+            return list(a.slots) == list(b.slots)
         return not isinstance(a, (Ring, Array)) and set(a.slots) == set(b.slots)
     if isinstance(a, Closure) and isinstance(b, Closure):
         return a.node is b.node and same(a.defaults, b.defaults)
@@ -101,7 +107,7 @@ class Merging(Lowering):
     def read(self, box: Box) -> Any:
         """Return the content of a box."""
         if box.merged is not None and box.merged.changed:
-            raise Refused("an object with two names is changed")
+            raise Refused(TWO_NAMES)
         return box.slots
 
     def write(self, box: Box, key: Any, value: Any) -> None:
@@ -110,8 +116,10 @@ class Merging(Lowering):
 
     def open(self, box: Box) -> Any:
         """Return the content of a box for modification."""
-        if box.merged is not None:
-            raise Refused("an object with two names is changed")
+        if box.merged is not None or box.pushed:
+            raise Refused(TWO_NAMES)
+        if box.alias or box.fixed:
+            raise Refused(f"{box.alias or 'the parameters'} is changed")
         box.changed = True
         if self.journals:
             since, journal = self.journals[-1]
@@ -146,12 +154,20 @@ class Merging(Lowering):
 
     # ---- branches ---------------------------------------------------------------------------
 
-    def branch(self, test: ir.Operand, then: Callable[[], Any], orelse: Callable[[], Any]) -> Any:
-        """Return the value of `then` if a condition is true, else that of `orelse`."""
+    def branch(
+        self, test: ir.Operand, then: Callable[[], Any], orelse: Callable[[], Any], form: int | None = None
+    ) -> Any:
+        """Return the value of `then` if a condition is true, else that of `orelse`.
+
+        Args:
+            test, then, orelse: condition, and what is evaluated on the two paths.
+            form: the alternative of a value that the condition is about; None if it is of the component.
+        """
         known = self.facts.known(test)
         if known is not None:
             return then() if known else orelse()
         assert isinstance(test, ir.Var)
+        where = self.branch_at() + ("" if form is None else f":{form}")
         paths = []
         for holds, body in ((True, then), (False, orelse)):
             facts = self.facts.copy()
@@ -163,7 +179,7 @@ class Merging(Lowering):
             rest: list[ir.Statement] = []
             if not live.dead:
                 live.out, rest = [], live.out  # later statements need not be in the arm
-            self.out.append(ir.If(test, a.out, b.out))
+            self.out.append(ir.If(test, a.out, b.out, where))
             if live.dead:
                 raise Unreachable
             self.out += rest
@@ -177,13 +193,15 @@ class Merging(Lowering):
             slots_a, slots_b = a.slots(box), b.slots(box)
             if isinstance(slots_a, list) and len(slots_a) != len(slots_b):
                 raise Refused("the length of a list changes on one path only")
+            if isinstance(box, Dict) and list(slots_a) != list(slots_b):
+                raise Refused("the keys of a dictionary change on one path only")
             slots_a, slots_b = self.relevant(box, slots_a, slots_b)
             keys = range(len(slots_a)) if isinstance(slots_a, list) else dict.fromkeys((*slots_a, *slots_b))
             merged = {key: join.of(items_of(slots_a, key), items_of(slots_b, key)) for key in keys}
             changes.append((box, list(merged.values()) if isinstance(slots_a, list) else merged))
         join.finish()
         if a.out or b.out:
-            self.out.append(ir.If(test, a.out, b.out))
+            self.out.append(ir.If(test, a.out, b.out, where))
         for box, slots in changes:
             self.open(box)
             box.slots = slots if isinstance(slots, list) else {k: v for k, v in slots.items()}
@@ -204,7 +222,7 @@ class Merging(Lowering):
                 return self.by_form(value.alternatives[k], use)
             test = self.compare("==", value.tag, k)
             chosen = value.alternatives[k]
-            return self.branch(test, lambda: self.by_form(chosen, use), lambda: from_(possible[1:]))
+            return self.branch(test, lambda: self.by_form(chosen, use), lambda: from_(possible[1:]), k)
 
         return from_(self._possible(value, self.facts))
 
@@ -273,6 +291,8 @@ class _Join:
 
     def _loaded(self, value: Picked, path: Path) -> Any:
         outer, self.machine.out = self.machine.out, path.out
+        for box in boxes_in(value):
+            box.alias = OF_TABLE
         try:
             return self.machine.loaded(value)  # type: ignore[attr-defined]
         finally:
@@ -361,6 +381,7 @@ class _Join:
             made = Frame({}, parent)
         else:
             made = type(a)({})  # type: ignore[call-arg]
+        made.alias = a.alias or b.alias
         self.boxes[a, b] = made
         keys = keys_of(made) if isinstance(made, List) else dict.fromkeys((*slots_a, *slots_b))
         joined = {key: self.of(items_of(slots_a, key), items_of(slots_b, key)) for key in keys}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import types
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,18 +11,12 @@ from . import ir
 from .loops import Looping
 from .lower import COMPENSATED, complaint
 from .values import (
-    Bound,
-    Box,
-    Bytes,
-    Closure,
     List,
-    Picked,
     Refused,
-    Span,
-    Text,
     Union,
     is_mixed,
     is_number,
+    is_plain,
     is_real,
 )
 
@@ -35,20 +30,39 @@ class OfNumbers(Looping):
     """Calls of functions of numbers."""
 
     def _python_abs(self, value: Any) -> Any:
-        return self.size(value)
+        return self.by_form(value, lambda x: self.unary("__abs__", self.size, x))
 
     def _python_fabs(self, value: Any) -> Any:
         return self.function("fabs", value)
 
     def _python_float(self, value: Any) -> Any:
-        return self.as_real(value) if is_number(value) else float(value)
+        if type(value) is str:
+            return self._called(float, value)
+        return self._converted("__float__", (ir.REAL,), self.as_real, value)
 
     def _python_int(self, value: Any) -> Any:
-        return self.whole("trunc", value) if is_number(value) else int(value)
+        if type(value) is str:
+            return self._called(int, value)
+        return self._converted("__int__", (ir.INT,), lambda x: self.whole("trunc", x), value)
+
+    def _called(self, function: Any, text: str) -> Any:
+        try:
+            return function(text)
+        except ValueError as error:
+            self.end("ValueError", str(error))
+
+    def _converted(self, name: str, of: Sequence[str], usual: Any, value: Any) -> Any:
+        """Return a number, or that of an object whose class has a special method that returns one."""
+        result = self.narrowed(self.unary(name, usual, value))
+        if not is_number(result) or ir.type_of(result) not in of:
+            raise Refused(f"{name} that returns something other than Python wants")
+        return result
 
     def _python_round(self, value: Any, digits: Any = None) -> Any:
         if digits is None:
-            return self.whole("rint", value) if is_number(value) else round(value)
+            return self.unary("__round__", lambda x: self.whole("rint", x), value)
+        if not is_number(value):
+            raise Refused(f"round of a {type(value).__name__}")
         if not isinstance(value, ir.Var):
             return round(value, digits)
         if not isinstance(digits, int) or not 0 <= digits <= MOST_DIGITS:
@@ -152,7 +166,7 @@ class OfNumbers(Looping):
         items = self.items(values)
         if not isinstance(reverse, (bool, int)):
             raise Refused("an order that is only known at run time")
-        if key is None and not any(isinstance(x, (ir.Var, Union)) for x in items):
+        if key is None and all(map(self._is_constant, items)):
             return List(sorted(items, reverse=bool(reverse)))
         rows = self._keyed(items, key, "sorting values that are not numbers")
         if len(rows) > MOST_SORTED:
@@ -186,6 +200,12 @@ class OfNumbers(Looping):
         return self.compare(op, *(self.real(x) if is_mixed(x) else x for x in (a, b)))
 
     def _is_constant(self, value: Any) -> bool:
-        if isinstance(value, tuple):
+        """Return whether a value is known at build time, and none of its operators is of a component."""
+        if type(value) in (tuple, list, set, frozenset):
             return all(map(self._is_constant, value))
-        return not isinstance(value, (ir.Var, Box, Union, Picked, Closure, Bound, Text, Bytes, Span))
+        if type(value) is dict:
+            return all(map(self._is_constant, (*value, *value.values())))
+        return is_plain(value) or isinstance(value, (range, slice, *_FUNCTIONS))
+
+
+_FUNCTIONS = (type, types.BuiltinFunctionType)

@@ -7,7 +7,7 @@ from typing import Any
 from . import ir
 from .merge import Merging
 from .shapes import build, numbers_of_item, types_of
-from .values import Array, Refused, Ring, Unreachable, is_mixed, is_number, is_real
+from .values import OF_RING, Array, Refused, Ring, Unreachable, is_mixed, is_number, is_real
 
 
 class Places(Merging):
@@ -80,4 +80,4 @@ class Places(Merging):
         """Return the item at a valid index."""
         types = list(types_of(ring.item))
         read = [self.let(type, "ring_item", ring.number, k, index) for k, type in enumerate(types)]
-        return build(ring.item, iter(read))
+        return build(ring.item, iter(read), alias=OF_RING)

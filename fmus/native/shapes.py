@@ -9,12 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from types import BuiltinFunctionType, FunctionType
 from typing import Any
 
 from . import ir
 from .merge import Merging, items_of
 from .values import (
     ANY,
+    SHARED,
     UNSET,
     Array,
     Bound,
@@ -28,7 +30,9 @@ from .values import (
     Refused,
     Ring,
     Union,
+    boxes_in,
     is_number,
+    is_plain,
     keys_of,
     like,
     same,
@@ -71,6 +75,7 @@ class Held(Shape):
     items: dict[Any, Shape] = field(default_factory=dict)
     parent: Shape | None = None
     path: str = ""
+    alias: str = ""
 
 
 @dataclass(eq=False)
@@ -150,7 +155,7 @@ def shape_of(value: Any, slots: Place, path: str = "", memo: Memo | None = None)
         if path in memo.growing and isinstance(value, List):
             return memo.growing[path]
         kind, blank = _kind(value)
-        made = Held(kind, blank, path=path)
+        made = Held(kind, blank, path=path, alias=value.alias)
         memo[value] = made
         held = slots(value)
         for key in range(len(held)) if isinstance(held, list) else list(held):
@@ -160,6 +165,9 @@ def shape_of(value: Any, slots: Place, path: str = "", memo: Memo | None = None)
         return made
     if isinstance(value, Closure):
         of = value.source, value.defaults, value.named_defaults
+
+        if not all(map(_never_changes, (*value.defaults, *value.named_defaults.values()))):
+            raise Refused("a function whose default arguments are only known at run time")
 
         def closure(frame: Any, node: Any = value.node) -> Closure:
             return Closure(node, frame, *of)
@@ -171,6 +179,10 @@ def shape_of(value: Any, slots: Place, path: str = "", memo: Memo | None = None)
     if isinstance(value, Picked):
         raise Refused("an item of a table is kept")
     return Known(value)
+
+
+def _never_changes(value: Any) -> bool:
+    return is_plain(value) or isinstance(value, (type, FunctionType, BuiltinFunctionType))
 
 
 def _kind(box: Box) -> tuple[Any, Callable[[], Box]]:
@@ -188,6 +200,8 @@ class Widening:
 
     def __init__(self) -> None:
         self._pairs: dict[tuple[int, int], Shape] = {}
+        self._partners: dict[int, Shape] = {}
+        self._made: dict[int, list[Held]] = {}
         self._kept: list[Any] = []
         self.grew = False
 
@@ -215,7 +229,9 @@ class Widening:
             items = [self.of(x, y) for x, y in zip(a.items, b.items, strict=True)]
             return a if all(x is y for x, y in zip(items, a.items, strict=True)) else Items(a.sample, items)
         if isinstance(a, Held) and isinstance(b, Held) and _alike(a, b):
-            made = Held(a.kind, a.blank, path=a.path)
+            made = Held(a.kind, a.blank, path=a.path, alias=a.alias or b.alias)
+            self.grew = self.grew or made.alias != a.alias
+            self._note_names(a, b, made)
             self._pairs[key] = made
             nothing = Known(UNSET)
             for name in dict.fromkeys((*a.items, *b.items)):
@@ -228,6 +244,18 @@ class Widening:
         if isinstance(a, Growing) and isinstance(b, Growing) and a.number == b.number:
             return a
         return self._forms(a, b)
+
+    def _note_names(self, a: Held, b: Held, made: Held) -> None:
+        """Keep objects from being changed if two names are those of one object in only one of the shapes."""
+        shared = self._partners.setdefault(id(a), b) is not b
+        again = self._partners.setdefault(id(b), a) is not a
+        ours = [self._made.setdefault(id(x), []) for x in (a, b)]
+        for some in ours:
+            some.append(made)
+        if shared or again:
+            for x in (*ours[0], *ours[1]):
+                self.grew = self.grew or shared or not x.alias
+                x.alias = x.alias or SHARED
 
     def _forms(self, a: Shape, b: Shape) -> Shape:
         ours = list(a.alternatives) if isinstance(a, Forms) else [a]
@@ -305,31 +333,38 @@ def _types(shape: Shape, seen: set[int]) -> Iterator[str]:
             yield from _types(item, seen)
 
 
-def build(shape: Shape, leaves: Iterator[Any], memo: dict[int, Any] | None = None) -> Any:
-    """Return the value of a shape with the given numbers at its leaves."""
+def build(shape: Shape, leaves: Iterator[Any], memo: dict[int, Any] | None = None, alias: str = "") -> Any:
+    """Return the value of a shape with the given numbers at its leaves.
+
+    Args:
+        shape, leaves: the shape and its numbers.
+        memo: filled with what was built, by the identity of its shape.
+        alias: what the objects are copies of, and cannot be changed therefore; "" if they are themselves.
+    """
     memo = {} if memo is None else memo
     if isinstance(shape, Leaf):
         return next(leaves)
     if isinstance(shape, Known):
         return shape.value
     if isinstance(shape, Items):
-        return like(shape.sample, [build(item, leaves, memo) for item in shape.items])
+        return like(shape.sample, [build(item, leaves, memo, alias) for item in shape.items])
     if isinstance(shape, Growing):
         return Ring(shape.number, shape.item)
     if isinstance(shape, Made):
-        return shape.make(build(shape.inner, leaves, memo))
+        return shape.make(build(shape.inner, leaves, memo, alias))
     if isinstance(shape, Forms):
-        tag = build(shape.tag, leaves, memo)
-        return Union(tag, tuple(build(item, leaves, memo) for item in shape.alternatives))
+        tag = build(shape.tag, leaves, memo, alias)
+        return Union(tag, tuple(build(item, leaves, memo, alias) for item in shape.alternatives))
     assert isinstance(shape, Held)
     if id(shape) not in memo:
         made = memo[id(shape)] = shape.blank()
-        held = {key: build(item, leaves, memo) for key, item in shape.items.items()}
+        made.alias = alias or shape.alias
+        held = {key: build(item, leaves, memo, alias) for key, item in shape.items.items()}
         made.slots = list(held.values()) if isinstance(made, List) else held
         if isinstance(made, List):
             made.path = shape.path
         if shape.parent is not None and isinstance(made, Frame):
-            made.parent = build(shape.parent, leaves, memo)
+            made.parent = build(shape.parent, leaves, memo, alias)
     return memo[id(shape)]
 
 
@@ -357,6 +392,8 @@ def numbers_of_item(
     widening.of(ring.item, shape)
     if widening.grew:
         raise Promote(ring.number, shape)
+    for box in boxes_in(item):
+        box.pushed = True
     return tuple(numbers_of(ring.item, item, slots, machine))
 
 

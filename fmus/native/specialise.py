@@ -19,7 +19,19 @@ from . import ir
 from .outline import Library, Outlining
 from .read import Sources
 from .shapes import Growing, Memo, Promote, Shape, Widening, build, numbers_of, shape_of, types_of
-from .values import Instance, List, Refused, Union, Unreachable, is_mixed, is_number
+from .values import (
+    OF_RING,
+    OF_TABLE,
+    SHARED,
+    Instance,
+    List,
+    Refused,
+    Union,
+    Unreachable,
+    boxes_in,
+    is_mixed,
+    is_number,
+)
 
 WIDEST = 40
 """Largest number of evaluations of a step until the shape of the state converges."""
@@ -265,14 +277,36 @@ class _Specialising:
         return me, machine
 
     def _shape(self, me: Instance, fixed: set[ir.Var]) -> Shape:
-        memo = Memo(fixed, self.growing)
-        return shape_of(me, lambda box: box.slots, "self", memo)
+        self._keep_from_change(me)
+        return shape_of(me, lambda box: box.slots, "self", Memo(fixed, self.growing))
+
+    def _keep_from_change(self, me: Instance) -> None:
+        """Mark objects of the state that have a copy there, since only one of the two would be changed."""
+        held = set(boxes_in(me))
+        for box in held:
+            for copied in box.origins:
+                copied.alias = copied.alias or OF_TABLE
+            box.alias = box.alias or (OF_RING if box.pushed else "")
+            merged = box.merged
+            while merged is not None:
+                if merged in held:
+                    box.alias, merged.alias = box.alias or SHARED, merged.alias or SHARED
+                merged = merged.merged
 
     def _numbers(self, shape: Shape, me: Instance, machine: Outlining, method: str) -> list[ir.Operand]:
         try:
-            return numbers_of(shape, me, machine.read, machine)
+            numbers = numbers_of(shape, me, machine.read, machine)
+            if any(box.pushed and not box.alias for box in self._outside_lists(me)):
+                raise Refused(f"{OF_RING} has another name")
+            return numbers
         except Refused as refused:
             raise Refused(refused.text, refused.where or self._line_of(method)) from None
+
+    def _outside_lists(self, me: Instance) -> Memo:
+        """Return the objects of the state, without those in lists whose length changes."""
+        memo = Memo(growing=self.growing)
+        shape_of(me, lambda box: box.slots, "self", memo)
+        return memo
 
     def _attributes(self, shape: Shape, leaves: list[ir.Var]) -> dict[str, Any]:
         made = build(shape, iter(leaves))

@@ -22,7 +22,6 @@ from .values import (
     Dict,
     Failure,
     Frame,
-    Instance,
     List,
     Refused,
     Ring,
@@ -133,8 +132,10 @@ class Execution(Operating):
             self.set_item(owner, index, self._in_place(op, before, value))
 
     def _in_place(self, op: str, before: Any, value: Any) -> Any:
+        if isinstance(before, (Dict, Ring, Array)) or type(before) in (list, dict, set):
+            raise Refused(f"{op}= of a {type(before).__name__.lower()}")
         if not isinstance(before, List):
-            return self.operate(op, before, value)
+            return self.operate(op, before, value, in_place=True)
         if before.path is not None or not (op == "+" or (op == "*" and isinstance(value, int))):
             raise Refused(f"{op}= of a list")
         held = self.open(before)  # other references to the list see the change, too
@@ -159,7 +160,10 @@ class Execution(Operating):
             if d is not None
         }
         defaults = tuple(self.values(node.args.defaults))
-        made = Closure(node, self.frame, self.calls[-1].source, defaults, named)
+        decorators = [self.evaluate(x) for x in node.decorator_list]
+        made: Any = Closure(node, self.frame, self.calls[-1].source, defaults, named)
+        for decorator in reversed(decorators):
+            made = self.call(decorator, [made], {})
         self.write(self.frame, node.name, made)
 
     def _do_raise(self, node: ast.Raise) -> None:
@@ -190,8 +194,11 @@ class Execution(Operating):
             item = self.ring_item(owner, self.ring_index(owner, 0, text))
             self.out.append(ir.Drop(owner.number))
             return item
+        own = self.special(owner, "__delitem__")
+        if own is not UNSET:
+            return self.call(own, [index], {})
         if isinstance(owner, Dict) and not isinstance(index, ir.Var):
-            return self.open(owner).pop(index)
+            return self.open(owner).pop(self._key(index))
         if not isinstance(owner, List) or isinstance(index, ir.Var):
             raise Refused(f"removing an item from a {type(owner).__name__}")
         self.promote(owner)
@@ -244,20 +251,14 @@ class Execution(Operating):
         for inner, x in zip(target.elts, values, strict=True):
             self.assign(inner.value if isinstance(inner, ast.Starred) else inner, x)
 
-    def set_attribute(self, owner: Any, name: str, value: Any) -> None:
-        """Set an attribute of an instance."""
-
-        def use(x: Any) -> None:
-            if not isinstance(x, Instance):
-                raise Refused(f"setting an attribute of a {type(x).__name__}")
-            self.write(x, name, value)
-
-        self.by_form(owner, use)
-
     def set_item(self, owner: Any, index: Any, value: Any) -> None:
         """Set an item of a list, array or dictionary."""
         if isinstance(owner, Union):
             self.by_form(owner, lambda x: self.set_item(x, index, value))
+            return
+        own = self.special(owner, "__setitem__")
+        if own is not UNSET:
+            self.call(own, [index, value], {})
             return
         if isinstance(owner, Dict):
             self.write(owner, self._key(index), value)

@@ -8,9 +8,12 @@ can be undone before the other path is evaluated; a value with several forms is 
 from __future__ import annotations
 
 import ast
+import enum
 import itertools
+import types
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 from . import ir
@@ -22,6 +25,14 @@ RESIZED = "a list that changes its length during iteration"
 
 EITHER = "a number that is True or False on some paths, another integer on others"
 """Message of `Refused` where the difference matters."""
+
+
+OF_TABLE = "an object of a table whose index is only known at run time"
+OF_RING = "an item of a list whose length changes"
+SHARED = "an object with two names"
+OF_LOOP = "an object that a loop passes on"
+TWO_NAMES = f"{SHARED} is changed"
+"""What is said of an object of which the translation has a copy for each name, when one is changed."""
 
 
 class Unreachable(Exception):
@@ -55,14 +66,21 @@ class Box:
     Attributes:
         age: index in the order of creation.
         fixed: whether it never changes.
+        merged: the box into which it was merged where two paths joined.
+        alias: what it is a copy of, so that it cannot be changed; "" if it is the object itself.
+        pushed: whether it was copied into a list whose length changes.
+        origins: the objects of a table of which it is a copy.
     """
 
     def __init__(self) -> None:
         self.age = next(_numbers)
         self.fixed = False
         self.slots: Any = {}
-        self.merged: Box | None = None  # the box into which this was merged where two paths joined
+        self.merged: Box | None = None
         self.changed = False
+        self.alias = ""
+        self.pushed = False
+        self.origins: tuple[Box, ...] = ()
 
 
 class Frame(Box):
@@ -217,8 +235,8 @@ def now() -> int:
 
 
 def is_number(value: Any) -> bool:
-    """Return whether a value is a number, known at build time or not."""
-    return isinstance(value, (ir.Var, int, float))
+    """Return whether a value is a number, known at build time or not; those of own classes are not."""
+    return isinstance(value, ir.Var) or type(value) in (float, int, bool)
 
 
 def is_real(value: Any) -> bool:
@@ -233,11 +251,47 @@ def is_mixed(value: Any) -> bool:
     )
 
 
+_PLAIN = (int, float, bool, str, bytes, complex, type(None), range, frozenset)
+
+
 def is_plain(value: Any) -> bool:
-    """Return whether a value is known at build time and cannot change."""
+    """Return whether a value is known at build time, cannot change, and behaves as those of Python do."""
     if isinstance(value, tuple):
-        return all(map(is_plain, value))
-    return isinstance(value, (int, float, str, bytes, complex, type(None), range, frozenset))
+        return is_usual_tuple(value) and all(map(is_plain, value))
+    return type(value) in _PLAIN or is_usual_member(value)
+
+
+def is_usual_member(value: Any) -> bool:
+    """Return whether a value is a member of an enumeration without operators of its own."""
+    return isinstance(value, enum.Enum) and not _own_operators(type(value))
+
+
+def is_usual_tuple(value: tuple[Any, ...]) -> bool:
+    """Return whether a value is a tuple, or a named tuple without operators of its own."""
+    cls = type(value)
+    return cls is tuple or (hasattr(cls, "_fields") and not _own_operators(cls))
+
+
+_HARMLESS = {
+    "__new__", "__init__", "__init_subclass__", "__repr__", "__str__", "__format__", "__dir__", "__copy__",
+    "__deepcopy__", "__replace__", "__getnewargs__", "__reduce_ex__", "__signature__",
+}  # fmt: skip
+"""Special methods that do not change how a value is computed with."""
+
+
+@cache
+def _own_operators(cls: type) -> bool:
+    return any(
+        name.startswith("__") and name.endswith("__") and name not in _HARMLESS
+        for base in cls.__mro__
+        if base.__module__ not in ("enum", "builtins")
+        for name, member in vars(base).items()
+        if isinstance(member, types.FunctionType)
+    )
+
+
+_COMPARED = (bytes, range, types.MethodType, types.BuiltinMethodType)
+"""Types of values known at build time that are the same if they are equal; others are only themselves."""
 
 
 def same(first: Any, second: Any) -> bool:
@@ -246,14 +300,11 @@ def same(first: Any, second: Any) -> bool:
         return True
     if type(first) is not type(second) or isinstance(first, ir.Var | Box | Union | Closure | Bound):
         return False
-    if isinstance(first, (int, float, str)):
+    if type(first) in (int, float, str, complex):
         return repr(first) == repr(second)
     if isinstance(first, tuple):
         return len(first) == len(second) and all(map(same, first, second))
-    try:
-        return bool(first == second)
-    except Exception:
-        return False
+    return type(first) in _COMPARED and bool(first == second)
 
 
 def like(value: tuple[Any, ...], items: Sequence[Any]) -> tuple[Any, ...]:
@@ -272,6 +323,29 @@ def joined_text(parts: Sequence[ir.Part]) -> str | Text:
     if all(isinstance(part, str) for part in together):
         return "".join(part for part in together if isinstance(part, str))
     return Text(tuple(together))
+
+
+def boxes_in(value: Any) -> Iterator[Box]:
+    """Yield the objects in a value, each once."""
+    waiting, seen = [value], set()
+    while waiting:
+        x = waiting.pop()
+        if isinstance(x, tuple):
+            waiting.extend(x)
+        elif isinstance(x, Union):
+            waiting += x.alternatives
+        elif isinstance(x, Picked):
+            waiting += x.items
+        elif isinstance(x, Closure):
+            waiting.append(x.frame)
+        elif isinstance(x, Bound):
+            waiting.append(x.owner)
+        elif isinstance(x, Box) and not x.fixed and id(x) not in seen:
+            seen.add(id(x))
+            yield x
+            waiting += x.slots if isinstance(x.slots, list) else x.slots.values()
+            if isinstance(x, Frame):
+                waiting.append(x.parent)
 
 
 def keys_of(box: Box) -> Iterator[Any]:

@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 import typer
 
 from ..errors import ModelDescriptionError
+from ..fmu.archive import runs_as
 from ..fmu.opener import Building, PackagedComponent
 from .options import RunOptions, plan_of_scenario, takes
 from .output import print_tables, say
@@ -62,6 +63,8 @@ def build(components: Components = None, out: BuildFolder = None, force: Force =
             raise typer.BadParameter(f"{name}: there is no such file; name a component or its Python file")
         fmu = build_component(Path(name), target, force=force)
         say(f"{fmu.stem}: built from {name}")
+        if (how := runs_as(fmu)) and (how.why or how.note):
+            say(f"{fmu.stem} runs in Python: {how.why}" if how.why else f"{fmu.stem}: {how.note}")
     for warning in hidden(packaged_components(), target, packages=True):
         say(f"warning: {warning}")
     names = [name for name in named if name in known]
@@ -73,6 +76,8 @@ def build(components: Components = None, out: BuildFolder = None, force: Force =
         say(f"warning: {why}")
     for name, why in report.in_python.items():
         say(f"{name} runs in Python: {why}")
+    for name, note in report.notes.items():
+        say(f"{name}: {note}")
     for component in map(packaged, [] if named else packaged_components()):
         if component:
             _build_packaged(component, force=force)

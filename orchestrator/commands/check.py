@@ -11,6 +11,7 @@ import typer
 from vocabulary.wheels import WHEELS, wheels
 
 from ..errors import Diagnostic, YawbenchError
+from ..fmu.archive import runs_as
 from ..messages import counted, cut, fold, fold_wires, printable, star
 from ..plan import DEFAULT, ValueOrigin
 from . import output
@@ -42,6 +43,8 @@ def check(scenario: ScenarioFile, options: RunOptions, all_: All = False) -> Non
     for diagnostic in notes:
         say(f"note: {diagnostic}")
     for instance in plan.instances:
+        if (how := runs_as(instance.fmu.path)) and how.native and how.note:
+            say(f"note: {instance.name}: {how.note}")
         for violation in instance.fmu.violations:
             say(f"{violation.severity}: {instance.name}: {violation}")
 

@@ -558,7 +558,7 @@ def units_table(fmus: Sequence[Fmu]) -> Table:
     table = Table("", ["FMU", "runs as"])
     for fmu in fmus:
         how = runs_as(fmu.path)
-        table.rows.append([fmu.name, str(how) if how else None])
+        table.rows.append([fmu.name, f"{how}; {how.note}" if how and how.note else str(how) if how else None])
     return table
 
 

@@ -300,6 +300,8 @@ def _zip_is_whole(file: Path) -> bool:
 
 REASON = "extra/org.yawbench.native/native.txt"
 """Path in an archive of why it has no native library; empty if it has one."""
+UNTRIED = "extra/org.yawbench.native/untried.txt"
+"""Path in an archive of places in its native library that were never compared with Python, a line each."""
 WANTED = "YAWBENCH_UNITS"
 """Environment variable: `python` asks for Python in place of native code."""
 
@@ -315,16 +317,14 @@ def python_wanted() -> bool:
 def runs_as(archive: Path) -> RunsAs | None:
     """Return how an FMU that was built from Python here runs, None for any other."""
     try:
-        why = _why_python(str(archive), os.stat(archive).st_mtime_ns)
+        how = _how_built(str(archive), os.stat(archive).st_mtime_ns)
     except OSError:
         return None
-    if why is None:
-        return None
-    if why:
-        return RunsAs(why)
+    if how is None or not how.native:
+        return how
     if python_wanted():
         return PYTHON_WANTED
-    return RunsAs() if sys.platform == "linux" else RunsAs("the native library is for Linux")
+    return how if sys.platform == "linux" else RunsAs("the native library is for Linux")
 
 
 def is_native(directory: Path) -> bool:
@@ -338,9 +338,12 @@ def is_native(directory: Path) -> bool:
 
 
 @lru_cache(maxsize=1024)
-def _why_python(archive: str, changed: int) -> str | None:
+def _how_built(archive: str, changed: int) -> RunsAs | None:
     try:
         with zipfile.ZipFile(archive) as opened:
-            return opened.read(REASON).decode("utf-8", "replace")
+            why = opened.read(REASON).decode("utf-8", "replace")
+            listed = UNTRIED in opened.namelist()
+            places = opened.read(UNTRIED).decode("utf-8", "replace") if listed else ""
     except (KeyError, zipfile.BadZipFile):
         return None
+    return RunsAs(why, tuple(places.splitlines()))

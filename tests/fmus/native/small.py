@@ -82,5 +82,5 @@ def compiled(text: str, folder: Path, optimization: str = "-O0") -> Path:
 def fewer_steps() -> Iterator[None]:
     """Compare in fewer steps than a build does: small laws are soon known."""
     few = partial(compare_with_python.compare, steps=100)
-    with patch.multiple(compare_with_python, compare=few, FEW=12):
+    with patch.multiple(compare_with_python, compare=few, FEW=12, SEARCH=2000):
         yield

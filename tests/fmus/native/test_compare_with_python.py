@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+import struct
+
 import pytest
 
-from fmus.native import build
-from fmus.native.compare_with_python import differences
+from fmus.native import build, compare_with_python
+from fmus.native.compare_with_python import SEARCH, Native, differences
 from fmus.native.emit import emit
-from fmus.native.ir import INEXACT
+from fmus.native.ir import ALONE, INEXACT
 from fmus.native.specialise import specialise
 from tests.sentences import golden
 
@@ -55,7 +58,7 @@ def test_a_translation_that_is_wrong_is_found_out(what, tmp_path):
     with component_of(source(LAW), tmp_path) as (component, home):
         text = emit(specialise(component, home), "small.py", "{a}")
         library = compiled(broken(text, what), tmp_path)
-        found = differences(library, "{a}", component, home.parent)
+        found = differences(library, "{a}", component, home.parent).difference
     assert BROKEN[what][2] in found
 
 
@@ -89,8 +92,6 @@ LEFT = {
     "list": "def configure(self):\n    self.a = [0.0]\ndef start(self, t, u):\n    self.a[0] += 1\n"
     "    self.n = self.a[0]\n",
     "branch": "def start(self, t, u):\n    self.n = getattr(self, 'n', 0.0) + 1.0\n",
-    "later": "def start(self, t, u):\n    self.n = 0\n    if t < 3000.0:\n        self.m = 1\n"
-    "def advance(self, t, h, u):\n    self.n += getattr(self, 'm', 5)\n",
 }
 """Laws whose start leaves something to the next start."""
 
@@ -106,7 +107,7 @@ def compare(tmp_path_factory):
 
 @pytest.mark.parametrize("law", HUGE)
 def test_an_integer_of_2_to_53_is_an_error_and_no_wrong_number(law, compare):
-    assert INEXACT in compare(law, differences)
+    assert INEXACT in compare(law, differences).difference
 
 
 def test_a_translation_that_loops_for_ever_is_given_up(tmp_path):
@@ -120,7 +121,7 @@ def test_a_translation_that_loops_for_ever_is_given_up(tmp_path):
 def test_a_translation_that_is_right_gets_through(tmp_path):
     with component_of(source(LAW), tmp_path) as (component, home):
         library = compiled(emit(specialise(component, home), "small.py", "{a}"), tmp_path)
-        assert differences(library, "{a}", component, home.parent) == ""
+        assert differences(library, "{a}", component, home.parent).difference == ""
 
 
 def test_what_does_not_get_through_is_not_packed(tmp_path, monkeypatch):
@@ -135,8 +136,8 @@ def test_what_does_not_get_through_is_not_packed(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("law", LEFT)
 def test_what_a_start_leaves_to_the_next_start_is_found_out(law, compare):
-    found = compare(law, differences)
-    assert found.startswith("start at 3600 s: " if law == "later" else "outputs read before")
+    found = compare(law, differences).difference
+    assert found.startswith("outputs read before")
 
 
 @pytest.mark.parametrize("slow", ["by its length", "by its comparison"])
@@ -163,3 +164,70 @@ def test_a_run_waits_neither_for_a_long_translation_nor_for_a_long_comparison(sl
         assert made(hurry=True).why_not == build.LATER  # by now its effort is known, or still expected
         later = made(hurry=False)
     assert later.why_not == ("" if slow == "by its length" else "it takes long")
+
+
+LATE = """
+def start(self, t, u):
+    self.n = 0
+    self.x = 0.0
+def advance(self, t, h, u):
+    self.n += 1
+    if self.n == 2500:
+        self.x = 7.0
+    if u[0] > 5000.0 and h < 1e-6:
+        self.x = 3.0
+    if t > 90.0 and self.p.gain > 60.0:
+        self.x = 9.0
+def output(self, t, u):
+    if math.sin(u[0]) > 2.0:
+        return (5.0,)
+    return (self.x + u[1],)
+"""
+"""A law with branches that are reached late, by rare inputs, with other parameters, and never."""
+
+
+def test_branches_that_usual_inputs_miss_are_searched_and_compared(tmp_path, monkeypatch):
+    monkeypatch.setattr(compare_with_python, "SEARCH", SEARCH)
+    with component_of(source(LATE), tmp_path) as (component, home):
+        program = specialise(component, home)
+        text = emit(program, "small.py", "{a}")
+
+        def compared(text):
+            return differences(
+                compiled(text, tmp_path), "{a}", component, home.parent, build._thresholds(program)
+            )
+
+        found = compared(text)
+        for right, wrong in (("= 7.0;", "= 7.5;"), ("= 3.0;", "= 3.5;"), ("= 9.0;", "= 9.5;")):
+            assert "found by searching" in compared(text.replace(right, wrong)).difference
+    never = source(LATE).splitlines().index("        if math.sin(u[0]) > 2.0:") + 1
+    assert found.difference == "" and f"controllers/small.py:{never}" in found.untried
+    assert {int(place.rpartition(":")[2]) for place in found.untried} <= {never, never + 1}
+
+
+NARROW = """
+def advance(self, t, h, u):
+    pass
+def output(self, t, u):
+    if abs(math.sin(1234.5 * u[0]) - 0.77) < 1e-9:
+        return (5.0,)
+    return (u[1],)
+"""
+
+
+def test_a_branch_that_was_never_compared_ends_the_call_with_its_line(tmp_path, monkeypatch):
+    monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "cache"))
+    with component_of(source(NARROW), tmp_path) as (component, home):
+        given = {"source": "small.py", "guid": "{a}", "resources": home.parent}
+        made, again = (build.native(component, home, **given) for _ in range(2))
+    line = source(NARROW).splitlines().index("        if abs(math.sin(1234.5 * u[0]) - 0.77) < 1e-9:") + 1
+    assert made == again and f"controllers/small.py:{line}" in made.untried
+    library = tmp_path / "closed.so"
+    library.write_bytes(made.files["binaries/linux64/native.so"])
+    unit = Native(library, "{a}")
+    unit.set("Real", [0, 1], [0.5, 0.25])
+    assert unit.begin(0.0)[0] and unit.end_initialization()[0] and unit.step(0.0, 0.01)[0]
+    assert struct.unpack("d", unit.get([2])[2]) == (0.25,)
+    unit.set("Real", [0, 1], [math.asin(0.77) / 1234.5, 0.25])
+    done, (said,), _ = unit.step(0.01, 0.01)
+    assert not done and ALONE in said and f"(controllers/small.py:{line})" in said

@@ -43,7 +43,8 @@ def together(programs: Sequence[str]) -> str:
     lines = [heads[0]]
     counts = []
     for k, rest in enumerate(rests):
-        names = ["Configured", "State", "N_LISTS", "WIDTHS", *re.findall(r"(?m)^static int (\w+)\(", rest)]
+        names = ["Configured", "State", "N_LISTS", "WIDTHS", "N_BRANCHES", "BRANCHES", "branches"]
+        names += ["yawbench_branches", *re.findall(r"(?m)^static int (\w+)\(", rest)]
         lines += [f"#define {name} {name}_of_{k}" for name in names]
         lines += [rest, *(f"#undef {name}" for name in names)]
         counts.append([int(x) for x in re.findall(r"WIDTHS\[\] = \{(.*)\};", rest)[0].split(",")])
