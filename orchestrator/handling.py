@@ -30,9 +30,10 @@ from vocabulary.wheels import WHEELS
 from .errors import ModelDescriptionError, SimulationError, WiringError
 from .evaluation.steering_tests import gradients
 from .figures.style import QUIET, ROW, frame, line_style, new_figure
+from .fmu.fmu import Fmu
 from .fmu.opener import find_fmu, find_folder
 from .master.simulate import simulate_in_memory
-from .plan import Fmu, Plan
+from .plan import Plan
 from .planner import Planner
 from .results.reader import Results
 from .scenario import yaml_lines

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from .errors import ScenarioError
+from .fmu.fmu import Fmu
 from .fmu.opener import Opener, report_to_stderr
 from .messages import hint
-from .plan import Fmu, Instance, Override, Plan
+from .plan import Instance, Override, Plan
 from .scenario import yaml_lines
 from .scenario.loader import LoadedScenario, load_scenario
 from .scenario.yaml_lines import Document

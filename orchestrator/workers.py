@@ -21,8 +21,8 @@ from dataclasses import fields
 from typing import Any, NamedTuple, TypeVar
 
 from .errors import RecordWarning, YawbenchError
+from .fmu.fmu import Fmu
 from .fork_server import ServedChild, start
-from .plan import Fmu
 from .supervised_process import LOOK_EVERY, REPLY, REQUEST, PipeChannel, ProcessLost, SupervisedProcess
 
 T = TypeVar("T")

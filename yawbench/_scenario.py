@@ -20,10 +20,11 @@ from orchestrator.errors import (
     warnings_in,
 )
 from orchestrator.fault_kinds import FaultList, FaultName
+from orchestrator.fmu.fmu import Fmu, Value
 from orchestrator.master.process_state import Log
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.messages import hint, short
-from orchestrator.plan import Fmu, Instance, Override, Plan, Value
+from orchestrator.plan import Instance, Override, Plan
 from orchestrator.planner import Planner
 from orchestrator.scenario import loader
 from orchestrator.scenario.overrides import faults_at, setting

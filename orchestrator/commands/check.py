@@ -21,7 +21,8 @@ from .output import print_tables, say
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..plan import Instance, Plan, Value, Wire
+    from ..fmu.fmu import Value
+    from ..plan import Instance, Plan, Wire
 
 All = Annotated[bool, typer.Option("--all", help="Show every value, including the FMUs' defaults.")]
 K = TypeVar("K")

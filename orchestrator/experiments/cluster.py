@@ -32,9 +32,9 @@ import distributed
 from ..cache import OF_METRICS, sources_hash
 from ..errors import Diagnostic, ResultsError, ScenarioError
 from ..fmu.archive import open_fmu, read_archive
+from ..fmu.fmu import Fmu
 from ..interrupts import terminable
 from ..messages import listed
-from ..plan import Fmu
 from ..workers import Pool, pickled
 from .jobs import LASTING, NEEDED, Job, OnOutcome, Outcome, execute
 

@@ -35,12 +35,13 @@ from pydantic import Field
 from vocabulary.signals import SIGNALS
 
 from ..errors import ScenarioError, YawbenchError, code_of, text_of
+from ..fmu.fmu import Value, Variable
 from ..measured.least_squares import Simulated, Window
 from ..measured.measurement import Measurement, load_measurement
 from ..measured.segment import LowPass, Segment
 from ..measured.single_track import start_states
 from ..messages import hint
-from ..plan import InputSeries, Instance, Override, Value, Variable
+from ..plan import InputSeries, Instance, Override
 from ..planner import Planner
 from ..results.freshness import key_of
 from ..safe_files import reads

@@ -48,14 +48,7 @@ from ..scenario import overrides, yaml_lines
 from ..scenario.schema import Scalar
 from ..scenario.schema_validation import StrictModel, Time, validated
 from ..signal_names import Target
-from .axes import (
-    DesignAxisSpec,
-    Level,
-    OverrideSpec,
-    VariantSpec,
-    axis_of_levels,
-    changes_of_file,
-)
+from .axes import DesignAxisSpec, Level, OverrideSpec, VariantSpec, axis_of_levels, changes_of_file
 from .claim_schema import text_of
 from .executor import Executor
 from .experiment import LoadedExperiment, LoadedFile, NamedRun, experiment_of

@@ -30,10 +30,10 @@ from ..evaluation.standard_tests import Evaluation, SeriesRun, StandardTest
 from ..evaluation.steering_tests import slow_steer_amplitude
 from ..evaluation.trace import Trace, trace_of
 from ..figures.style import QUIET, frame, line_style, new_figure
+from ..fmu.fmu import Value as Plain
 from ..metrics.expressions import MetricValue, metric
 from ..metrics.measures import variable_of, words
 from ..plan import Override, Plan
-from ..plan import Value as Plain
 from ..results.reader import load_results
 from ..scenario.loader import LoadedScenario, load_scenario
 from ..scenario.overrides import changed, is_path, swap_of, with_changes

@@ -19,11 +19,12 @@ from vocabulary.wheels import WHEELS
 from ..errors import Diagnostic, ModelDescriptionError, ScenarioError, text_of
 from ..figures.style import shown
 from ..fmu.archive import open_fmu, runs_as
+from ..fmu.fmu import Fmu
 from ..messages import printable, star
 from ..metrics.expressions import STANDARD, MetricValue, columns_of, evaluate_all, metric
 from ..metrics.measures import catalogue as measures
 from ..metrics.measures import si, symbol
-from ..plan import Fmu, Plan
+from ..plan import Plan
 from ..results.reader import FoundRun, Results
 from ..results.run_record import RunRecord
 from ..scenario import loader

@@ -1,4 +1,4 @@
-"""Model descriptions: read by fmpy into `plan.Fmu`, and checked for what this master supports.
+"""Model descriptions: read by fmpy into `fmu.Fmu`, and checked for what this master supports.
 
 `scalars` gives the variables as scalars whichever version of FMI describes them, arrays element by element.
 """
@@ -19,7 +19,7 @@ from xml.etree import ElementTree
 
 from ..errors import Diagnostic, ModelDescriptionError
 from ..messages import short
-from ..plan import Fmu, UnitDefinition, Value, Variable
+from .fmu import Fmu, UnitDefinition, Value, Variable
 
 _ALWAYS = ("EnterInitializationMode", "ExitInitializationMode", "DoStep", "FreeInstance")
 CORE = {

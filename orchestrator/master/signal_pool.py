@@ -33,8 +33,9 @@ from ..coupling_algorithms import ALGORITHMS, WireTiming
 from ..errors import SimulationError
 from ..fault_kinds import KINDS, Disturbance, LinearDisturbance
 from ..fmu.description import integer_limits
+from ..fmu.fmu import Value, Variable
 from ..messages import listed
-from ..plan import Instance, Plan, Value, Variable, Wire
+from ..plan import Instance, Plan, Wire
 from .compiled_loop import Kind, OperationData
 from .instance import FmuInstance, Status, StepCalls
 from .process_state import OK

@@ -24,10 +24,11 @@ from vocabulary.vehicle import CAR
 from ..errors import Interrupted, ScenarioError, YawbenchError
 from ..experiments.jobs import LASTING, NEEDED, Job, execute, keyed, planned, recorded
 from ..figures.style import LabelledRun
+from ..fmu.fmu import Variable
 from ..fmu.opener import find_folder
 from ..interrupts import StopFlag
 from ..messages import hint, short
-from ..plan import Instance, Plan, Variable
+from ..plan import Instance, Plan
 from ..planner import Planner
 from ..results.reader import Results
 from ..scenario import loader

@@ -28,8 +28,9 @@ from typing import Any
 
 from ..errors import Diagnostic, Location, ScenarioError
 from ..fault_kinds import WORDS, FaultList
+from ..fmu.fmu import Value
 from ..messages import hint, listed
-from ..plan import Override, OverrideOrigin, Value
+from ..plan import Override, OverrideOrigin
 from ..signal_names import FACTS, FAULTS, INPUTS, OF_RUN, TYRES, VEHICLE, Target
 from . import yaml_lines
 from .fault_schema import location_of, parse_faults, read_line

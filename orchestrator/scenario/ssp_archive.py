@@ -23,8 +23,8 @@ from lxml import etree
 from lxml.etree import _Element
 
 from ..errors import Diagnostic, Location
+from ..fmu.fmu import Causality, UnitDefinition
 from ..messages import short
-from ..plan import Causality, UnitDefinition
 from ..safe_files import PACKED, TooLargeError, check_archive, read_bytes, reason
 from .quantities import BASE_UNITS, Unit, measure_of
 
