@@ -16,7 +16,6 @@ from .scenario import yaml_lines
 from .scenario.loader import LoadedScenario, load_scenario
 from .scenario.yaml_lines import Document
 from .signal_names import match
-from .tyre_stand import cornering_stiffness
 from .wiring.make_plan import Network, make_plan
 
 
@@ -101,6 +100,8 @@ class Planner:
         parts = tyres.parameters, tyres.constants, loads
         key = (tyres.fmu.sha256, *(tuple(sorted(part.items())) for part in parts))
         if key not in self._stiffnesses:
+            from .tyre_stand import cornering_stiffness
+
             self._stiffnesses[key] = cornering_stiffness(tyres, loads)
         return self._stiffnesses[key]
 

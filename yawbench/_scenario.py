@@ -24,6 +24,7 @@ from orchestrator.fmu.fmu import Fmu, Value
 from orchestrator.master.process_state import Log
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.messages import hint, short
+from orchestrator.metrics.plausibility import PlausibilityWatch
 from orchestrator.plan import Instance, Override, Plan
 from orchestrator.planner import Planner
 from orchestrator.scenario import loader
@@ -280,12 +281,17 @@ class Scenario:
             plan, report = self.plan(), called or shown.update
             try:
                 try:
-                    run = Run(simulate_in_memory(plan, opener=opener, progress=report))
+                    run = Run(
+                        simulate_in_memory(
+                            plan, opener=opener, watch=PlausibilityWatch(plan), progress=report
+                        )
+                    )
                 except SimulationError:
                     if (again := self._in_python(plan)) == plan:
                         raise
                     opened.clear()
-                    run = Run(simulate_in_memory(again, opener=opener))  # fails again, now with the exception
+                    # Fails again, now with the exception.
+                    run = Run(simulate_in_memory(again, opener=opener, watch=PlausibilityWatch(again)))
             except SimulationError as error:
                 warn(plan.title, (*plan.diagnostics, *error.warnings))
                 ended = [instance for instance in opened if instance.name == error.instance]

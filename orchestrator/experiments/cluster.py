@@ -90,7 +90,7 @@ class _Parcels:
 
     def pack(self, batch: Sequence[Job]) -> bytes:
         """Return a batch as bytes, which `_unpack` reads where the FMUs are known."""
-        return zlib.compress(pickled(batch, Fmu, lambda fmu: (_fmu, (self._keys[id(fmu)],))))
+        return zlib.compress(pickled(batch, lambda fmu: (_fmu, (self._keys[id(fmu)],))))
 
 
 def _unpack(parcel: bytes) -> list[Job]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 from ..errors import Diagnostic
+from ..sent_once import SentOnce
 
 Causality = Literal[
     "parameter", "input", "output", "local", "independent", "calculatedParameter", "structuralParameter"
@@ -106,7 +107,7 @@ class RunsAs:
 
 
 @dataclass(frozen=True)
-class Fmu:
+class Fmu(SentOnce):
     """An FMU unpacked in the cache."""
 
     name: str
@@ -158,3 +159,8 @@ class Fmu:
     def aliases(self) -> dict[str, str]:
         """Return other name -> name of the inputs that have several."""
         return {v.name: v.alias_of for v in self.variables.values() if v.alias_of is not None}
+
+
+def is_path(fmu: str) -> bool:
+    """Return whether `fmu` is the path of an archive rather than a name in the folder of FMUs."""
+    return fmu.lower().endswith(".fmu") or "/" in fmu or "\\" in fmu
