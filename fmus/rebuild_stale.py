@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Literal
 
 from orchestrator.cache import cache_folder, keep, recall
 from orchestrator.errors import BuildError
-from orchestrator.plan import BuildInfo
+from orchestrator.fmu.fmu import BuildInfo
 
 from .build_stamp import BuildStamp, read_stamp
 from .source_digests import SourceDigests, content_digest

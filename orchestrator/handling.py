@@ -30,13 +30,13 @@ from vocabulary.wheels import WHEELS
 from .errors import ModelDescriptionError, SimulationError, WiringError
 from .evaluation.steering_tests import FEWEST, gradients
 from .figures.style import QUIET, ROW, frame, line_style, new_figure
+from .fmu.fmu import Fmu, is_path
 from .fmu.opener import find_fmu, find_folder
 from .master.simulate import simulate_in_memory
-from .plan import Fmu, Plan
+from .plan import Plan
 from .planner import Planner
 from .results.reader import Results
 from .scenario import yaml_lines
-from .scenario.overrides import is_path
 from .tyre_stand import KNOWN_BY, open_role
 
 if TYPE_CHECKING:

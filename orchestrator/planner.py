@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from .errors import ScenarioError
+from .fmu.fmu import Fmu
 from .fmu.opener import Building, Opener, report_to_stderr
 from .messages import hint
-from .plan import Fmu, Instance, Override, Plan
+from .plan import Instance, Override, Plan
 from .scenario import yaml_lines
 from .scenario.loader import LoadedScenario, load_scenario
 from .scenario.yaml_lines import Document
 from .signal_names import match
-from .tyre_stand import cornering_stiffness
 from .wiring.make_plan import Network, make_plan
 
 
@@ -100,6 +100,8 @@ class Planner:
         parts = tyres.parameters, tyres.constants, loads
         key = (tyres.fmu.sha256, *(tuple(sorted(part.items())) for part in parts))
         if key not in self._stiffnesses:
+            from .tyre_stand import cornering_stiffness
+
             self._stiffnesses[key] = cornering_stiffness(tyres, loads)
         return self._stiffnesses[key]
 

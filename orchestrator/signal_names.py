@@ -7,7 +7,6 @@ characters and every other character matches itself.
 
 from __future__ import annotations
 
-import itertools
 import re
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -83,14 +82,6 @@ class SignalName(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.instance}.{self.variable}" if self.instance else self.variable
-
-
-def element_names(name: str, shape: tuple[int, ...]) -> list[str]:
-    """Return the names of an array's elements, row by row and counted from 1; for a scalar, its name."""
-    if not shape:
-        return [name]
-    indices = itertools.product(*(range(1, n + 1) for n in shape))
-    return [f"{name}[{','.join(map(str, index))}]" for index in indices]
 
 
 def alike(output: str, name: str) -> int:

@@ -16,12 +16,12 @@ import numpy as np
 
 from .errors import ScenarioError
 from .figures.style import QUIET, ROW, frame, line_style, new_figure
+from .fmu.fmu import Fmu, Value, is_path
 from .fmu.opener import Building, Opener, find_fmu, find_folder
 from .master.simulate import simulate_in_memory
 from .messages import listed
-from .plan import Fmu, InputSeries, Instance, Plan, Value
+from .plan import InputSeries, Instance, Plan
 from .scenario.loader import load_scenario
-from .scenario.overrides import is_path
 from .signal_names import SignalName
 from .wiring.make_plan import make_plan
 

@@ -18,14 +18,12 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import fields
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from .errors import RecordWarning, YawbenchError, hide_library_warnings
 from .fork_server import ServedChild, start
-from .plan import Fmu
+from .sent_once import SentOnce
 from .supervised_process import LOOK_EVERY, REPLY, REQUEST, PipeChannel, ProcessLost, SupervisedProcess
-
-T = TypeVar("T")
 
 FILES, FILES_EACH = 32, 4
 """Required limit of open files: a base, and more per process. Chosen: 32 suffice for two processes; each
@@ -72,7 +70,7 @@ class Worker(SupervisedProcess):
         self.calls = 0
         self.busy = False
         self.retires = False  # see `retire`
-        self._sent: dict[int, Fmu] = {}
+        self._sent: dict[int, SentOnce] = {}
 
     def give(self, number: int, function: Callable[..., Any], arguments: Sequence[Any]) -> None:
         """Have it call a function, importable by name."""
@@ -80,15 +78,16 @@ class Worker(SupervisedProcess):
         self.calls += 1
         self.busy = True
         with contextlib.suppress(BrokenPipeError):  # the cause is found when the answer is read
-            self._channel.send_pickle(REQUEST, pickled((function, arguments), Fmu, self._once))
+            self._channel.send_pickle(REQUEST, pickled((function, arguments), self._once))
 
-    def _once(self, fmu: Fmu) -> tuple[Any, ...]:
-        """Reduce an FMU, most of a plan and common to many, to a number after the first time."""
-        number = id(fmu)
+    def _once(self, item: SentOnce) -> tuple[Any, ...]:
+        """Reduce an object to a number after the first time."""
+        number = id(item)
         if number in self._sent:
             return _kept, (number,)
-        self._sent[number] = fmu  # refers to it, so that no other object gets its number
-        return _keep, (number, {of.name: getattr(fmu, of.name) for of in fields(fmu)})
+        self._sent[number] = item  # refers to it, so that no other object gets its number
+        of_item = {field.name: getattr(item, field.name) for field in fields(item)}  # type: ignore[arg-type]
+        return _keep, (number, type(item), of_item)
 
     def descriptors(self) -> tuple[int, int]:
         """Return the descriptors that can be read when it has answered or died."""
@@ -229,17 +228,17 @@ def _require_files(needed: int) -> None:
         )
 
 
-_fmus: dict[int, Fmu] = {}
-"""In a worker: number -> FMU that it was sent; see `Worker._once`."""
+_received: dict[int, SentOnce] = {}
+"""In a worker: number -> object that it was sent; see `Worker._once`."""
 
 
-def _keep(number: int, fields: dict[str, Any]) -> Fmu:
-    _fmus[number] = Fmu(**fields)
-    return _fmus[number]
+def _keep(number: int, kind: type[SentOnce], fields: dict[str, Any]) -> SentOnce:
+    _received[number] = kind(**fields)
+    return _received[number]
 
 
-def _kept(number: int) -> Fmu:
-    return _fmus[number]
+def _kept(number: int) -> SentOnce:
+    return _received[number]
 
 
 _retires = False
@@ -266,11 +265,11 @@ def main(reading: str, writing: str) -> None:
         channel.send_object(REPLY, (*answer, _retires))
 
 
-def pickled(content: Any, kind: type[T], reduce: Callable[[T], tuple[Any, ...]]) -> bytes:
-    """Return a pickle in which `reduce` says how objects of one type are restored, as `__reduce__` does."""
+def pickled(content: Any, reduce: Callable[[SentOnce], tuple[Any, ...]]) -> bytes:
+    """Return a pickle in which `reduce` says how what is sent once is restored, as `__reduce__` does."""
     buffer = io.BytesIO()
     pickler = pickle.Pickler(buffer)
-    pickler.dispatch_table = copyreg.dispatch_table | {kind: reduce}
+    pickler.dispatch_table = copyreg.dispatch_table | dict.fromkeys(SentOnce.__subclasses__(), reduce)
     pickler.dump(content)
     return buffer.getvalue()
 

@@ -2,7 +2,8 @@
 
 from collections.abc import Iterable
 
-from orchestrator.plan import Override, Value
+from orchestrator.fmu.fmu import Value
+from orchestrator.plan import Override
 from orchestrator.scenario.overrides import read_changes
 
 

@@ -28,10 +28,11 @@ from components.fmi.component import Component
 from components.fmi.variables import VariableSpec, output, parameter, signal
 from orchestrator.errors import ScenarioError
 from orchestrator.fmu.description import describe
+from orchestrator.fmu.fmu import Fmu, Value, ValueRef
 from orchestrator.master.instance import Buffers, ExperimentSetup, Status, StepCalls, nothing_to_do
 from orchestrator.master.process_state import ERROR, OK, Log
 from orchestrator.messages import counted, listed
-from orchestrator.plan import Fmu, Instance, Value, ValueRef
+from orchestrator.plan import Instance
 from vocabulary.roles import ROLES
 from vocabulary.wheels import wheels
 

@@ -18,11 +18,12 @@ from orchestrator.experiments.jobs import Job, Outcome, measured
 from orchestrator.experiments.result_files import columns_of, draw_over_axes
 from orchestrator.experiments.schema import ExperimentSpec, FigureSpec
 from orchestrator.experiments.tables import to_pandas
+from orchestrator.fmu.fmu import Value
 from orchestrator.master.fmi import open_instance
 from orchestrator.master.run_lifecycle import OpenInstance
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.messages import hint, listed, short
-from orchestrator.plan import Value
+from orchestrator.metrics.plausibility import PlausibilityWatch
 from orchestrator.results.reader import Results
 from orchestrator.scenario.quantities import number_and_unit
 from orchestrator.scenario.schema_validation import Model, validate
@@ -223,7 +224,7 @@ def executed(
 
 def _in_memory(job: Job, opener: OpenInstance = open_instance) -> Results:
     assert job.plan is not None
-    return simulate_in_memory(job.plan, opener=opener)
+    return simulate_in_memory(job.plan, opener=opener, watch=PlausibilityWatch(job.plan))
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from components.fmi.component import Component
 from orchestrator.errors import YawbenchError
 from orchestrator.fmu.archive import PYTHON_WANTED, REASON, open_fmu, python_wanted
 from orchestrator.fmu.description import binary_of
-from orchestrator.plan import Fmu, RunsAs
+from orchestrator.fmu.fmu import Fmu, RunsAs
 
 from ._parameters import ProgramParameters, functions_of, has_constructor
 

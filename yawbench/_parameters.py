@@ -25,7 +25,7 @@ import numpy as np
 
 from components.fmi.component import Component
 from components.fmi.variables import VariableSpec, parameter, parameter_class
-from orchestrator.plan import Value
+from orchestrator.fmu.fmu import Value
 from orchestrator.signal_names import SETTINGS
 
 from . import arguments

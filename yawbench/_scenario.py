@@ -20,10 +20,12 @@ from orchestrator.errors import (
     warnings_in,
 )
 from orchestrator.fault_kinds import FaultList, FaultName
+from orchestrator.fmu.fmu import Fmu, RunsAs, Value
 from orchestrator.master.process_state import Log
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.messages import hint, short
-from orchestrator.plan import Fmu, Instance, Override, Plan, RunsAs, Value
+from orchestrator.metrics.plausibility import PlausibilityWatch
+from orchestrator.plan import Instance, Override, Plan
 from orchestrator.planner import Planner
 from orchestrator.scenario import loader
 from orchestrator.scenario.overrides import faults_at, setting, with_changes
@@ -282,12 +284,14 @@ class Scenario:
             plan, report = self.plan(), called or shown.update
             try:
                 try:
-                    run = Run(simulate_in_memory(plan, opener=opener, progress=report))
+                    watch = PlausibilityWatch(plan)
+                    run = Run(simulate_in_memory(plan, opener=opener, watch=watch, progress=report))
                 except SimulationError as error:
                     if (again := self._in_python(plan, str(error))) == plan:
                         raise
                     opened.clear()
-                    run = Run(simulate_in_memory(again, opener=opener))  # or fails again, with the exception
+                    # It ends, or fails again, with the exception.
+                    run = Run(simulate_in_memory(again, opener=opener, watch=PlausibilityWatch(again)))
             except SimulationError as error:
                 warn(with_changes(plan.title, plan.changes), (*plan.diagnostics, *error.warnings))
                 ended = [instance for instance in opened if instance.name == error.instance]

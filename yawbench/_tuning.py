@@ -17,9 +17,9 @@ from orchestrator.experiments.experiment_result import ExperimentResult
 from orchestrator.experiments.schema import ExperimentSpec
 from orchestrator.experiments.tables import to_pandas
 from orchestrator.experiments.tuning import TunedLaw, columns_of, history_figure, search
+from orchestrator.fmu.fmu import Value
 from orchestrator.messages import counted, listed, short
 from orchestrator.metrics.expressions import metric
-from orchestrator.plan import Value
 
 from . import arguments
 from ._controller import PythonComponent

@@ -31,6 +31,7 @@ except ImportError:
 from orchestrator.errors import ScenarioError
 from orchestrator.evaluation.sine_with_dwell import SPUN, amplitudes
 from orchestrator.master.simulate import simulate_in_memory
+from orchestrator.metrics.plausibility import PlausibilityWatch
 from orchestrator.motion import LEAST_SPEED
 from orchestrator.plan import Plan
 from orchestrator.results.reader import Results
@@ -167,7 +168,8 @@ class SineWithDwell(gymnasium.Env[Observation, np.ndarray]):
     def _drive(self, plan: Plan) -> None:
         """Make a run in a separate thread, in which the controller waits for every action."""
         try:
-            self._hand.requests.put(simulate_in_memory(plan, opener=opener_of(self._scenario._programs)))
+            opener, watch = opener_of(self._scenario._programs), PlausibilityWatch(plan)
+            self._hand.requests.put(simulate_in_memory(plan, opener=opener, watch=watch))
         except BaseException as error:  # including `_Abandoned`
             self._hand.requests.put(error)
 

@@ -12,25 +12,27 @@ from orchestrator.errors import Messages, Severity
 from orchestrator.evaluation.standard_tests import TestName
 from orchestrator.evaluation.validation import ComparedTest, CrossPlot
 from orchestrator.fault_kinds import Fault, FaultList, FaultLocation, FaultName, FaultySignal
-from orchestrator.metrics.verdict import Relation, Status
-from orchestrator.plan import (
+from orchestrator.fmu.fmu import (
     BuildInfo,
     Causality,
     Fmu,
+    RunsAs,
+    UnitDefinition,
+    Value,
+    ValueRef,
+    Variability,
+    Variable,
+    VariableType,
+)
+from orchestrator.metrics.verdict import Relation, Status
+from orchestrator.plan import (
     InputSeries,
     Instance,
     OriginKind,
     OverrideOrigin,
-    RunsAs,
     SourceKind,
-    UnitDefinition,
-    Value,
     ValueOrigin,
-    ValueRef,
     ValueSource,
-    Variability,
-    Variable,
-    VariableType,
     Wire,
 )
 from orchestrator.results.reader import Results

@@ -10,15 +10,7 @@ from typing import Any
 from . import ir
 from .loops import Looping
 from .lower import COMPENSATED, complaint
-from .values import (
-    List,
-    Refused,
-    Union,
-    is_mixed,
-    is_number,
-    is_plain,
-    is_real,
-)
+from .values import List, Refused, Union, is_mixed, is_number, is_plain, is_real
 
 MOST_DIGITS = 15
 """Largest number of digits to which numbers are rounded."""

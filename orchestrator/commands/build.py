@@ -43,9 +43,8 @@ def build(components: Components = None, out: BuildFolder = None, force: Force =
     if out is None and target != HERE:
         say(f"FMUs go to {target}")
 
-    from orchestrator.messages import hint
-
     from ..fmu.opener import hidden, packaged, packaged_components
+    from ..messages import hint
 
     known = find_recipes()
     named = [*(components or ())]

@@ -19,7 +19,8 @@ from .options import CHANGES, RunOptions, ScenarioFile, plan_of_scenario, takes
 from .output import print_tables, say
 
 if TYPE_CHECKING:
-    from ..plan import Instance, Plan, Value, Wire
+    from ..fmu.fmu import Value
+    from ..plan import Instance, Plan, Wire
 
 All = Annotated[bool, typer.Option("--all", help="Show every value, including the FMUs' defaults.")]
 K = TypeVar("K")

@@ -359,12 +359,10 @@ def tune(context: typer.Context, file: TuningFile, options: RunOptions, seed: Tu
     """
     from ..experiments.load_experiment import load_experiment
     from ..experiments.tables import to_csv
+    from ..experiments.tuned_entries import write_entries
     from ..experiments.tuning import (
-        ENTRIES,
         best_of,
         columns_of,
-        entries_of,
-        entries_text,
         history_figure,
         search,
         tuning_of,
@@ -404,7 +402,7 @@ def tune(context: typer.Context, file: TuningFile, options: RunOptions, seed: Tu
     print_tables([table])
     command = command_of("tune", file, **options.changing, seed=None if seed is None else [seed])
     if tuning_of(experiment).entries:
-        write_whole(folder / ENTRIES, entries_text(entries_of(experiment, tuned), command))
+        write_entries(experiment, tuned, folder, command)
     save(history_figure(experiment, tuned, command), folder / "history")
     charts = [image_of(folder / "history.svg", experiment.spec.title)]
     facts: dict[str, Any] = {"results": [table], "charts": charts}

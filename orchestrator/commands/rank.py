@@ -89,7 +89,7 @@ def rank(
     _check("--only", "entry", only or (), ranking.entries)
     folder = options.out or default_folder(file)
     if options.dry_run:
-        from ..experiments.dry_run import of_ranking
+        from ..experiments.ranking_forecast import of_ranking
 
         execute = executor_of(folder, ranking.identity, options, format="parquet")
         print_forecasts(options, lambda pace: [of_ranking(ranking, execute, pace, only=only or ())])
@@ -140,7 +140,7 @@ def _rank_by_threats(
     _check("--condition", "condition", chosen, {**threats.spec.settings, **threats.spec.disciplines})
     folder = options.out or default_folder(file)
     if options.dry_run:
-        from ..experiments.dry_run import of_threats
+        from ..experiments.ranking_forecast import of_threats
 
         execute = executor_of(folder, threats.identity, options)
         print_forecasts(options, lambda pace: [of_threats(threats, execute, pace, only=only, chosen=chosen)])
@@ -164,7 +164,8 @@ def _entry(text: str) -> tuple[str, EntrySpec]:
     """Return the name and the entry of a controller given on the command line."""
     from ..experiments.ranking import CONTROLLER, EntrySpec
     from ..fault_kinds import FaultList
-    from ..scenario.overrides import is_path, swap_of
+    from ..fmu.fmu import is_path
+    from ..scenario.overrides import swap_of
 
     fmu, *settings = swap_of(CONTROLLER, text, "--controller")
     name = Path(str(fmu.value)).stem

@@ -58,6 +58,7 @@ def run(
     from ..master.isolation import opener_of
     from ..master.process_state import STATUS, WARNING
     from ..master.simulate import simulate
+    from ..metrics.plausibility import PlausibilityWatch
     from ..results.file_formats import size_note
     from ..results.run_folder import default_folder, refuse_below_others
     from ..scenario.overrides import changed, with_changes
@@ -84,7 +85,13 @@ def run(
     try:
         with _bar(title) as progress, opener_of(plan, options.limit) as opener:
             info = simulate(
-                plan, folder, progress=progress, opener=opener, format=options.format_, apart=True
+                plan,
+                folder,
+                progress=progress,
+                opener=opener,
+                watch=PlausibilityWatch(plan),
+                format=options.format_,
+                apart=True,
             )
     except SimulationError as error:
         _say_warnings(error.warnings)

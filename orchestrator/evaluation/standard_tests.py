@@ -18,7 +18,7 @@ from ..metrics.verdict import NotJudged, Verdict, WithUnit, worst
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..plan import Value
+    from ..fmu.fmu import Value
     from .trace import Trace
 
 P = ParamSpec("P")

@@ -17,8 +17,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, WithJsonSchema, model_validator
 
+from ..fmu.fmu import Value
 from ..messages import resolved, short
-from ..plan import Override, OverrideOrigin, Value
+from ..plan import Override, OverrideOrigin
 from ..scenario import overrides, yaml_lines
 from ..scenario.fault_schema import FaultSpec, by_location
 from ..scenario.quantities import parse_unit

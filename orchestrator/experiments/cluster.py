@@ -32,9 +32,9 @@ import distributed
 from ..cache import OF_METRICS, sources_hash
 from ..errors import Diagnostic, ResultsError, ScenarioError
 from ..fmu.archive import open_fmu, read_archive
+from ..fmu.fmu import Fmu
 from ..interrupts import terminable
 from ..messages import listed
-from ..plan import Fmu
 from ..workers import Pool, pickled
 from .jobs import LASTING, NEEDED, Job, OnOutcome, Outcome, execute
 
@@ -90,7 +90,7 @@ class _Parcels:
 
     def pack(self, batch: Sequence[Job]) -> bytes:
         """Return a batch as bytes, which `_unpack` reads where the FMUs are known."""
-        return zlib.compress(pickled(batch, Fmu, lambda fmu: (_fmu, (self._keys[id(fmu)],))))
+        return zlib.compress(pickled(batch, lambda fmu: (_fmu, (self._keys[id(fmu)],))))
 
 
 def _unpack(parcel: bytes) -> list[Job]:

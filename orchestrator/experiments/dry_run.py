@@ -8,16 +8,14 @@ its last look, searches for levels by the shortest and the longest path.
 from __future__ import annotations
 
 import json
-import math
 import tempfile
 import time
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import YawbenchError
-from ..figures.style import shown
 from ..master.simulate import simulate
 from ..messages import counted
 from ..plan import Plan
@@ -26,15 +24,10 @@ from ..results.run_folder import RUN_FILE
 from .axes import VariantSpec
 from .executor import Executor, left_to_do
 from .experiment import LoadedExperiment, PlannedExperiment
-from .experiment_result import judge_records
 from .jobs import Job
 from .journal import records_in
-from .on_demand import OnDemand
 from .open_value_regions import RegionCell, plan_region
-from .ranking import LoadedRanking, angle_experiment, angles_of, dwell_experiment
 from .tables import Table
-from .threat_runs import RESOLUTION, STEP
-from .threats import LoadedThreats
 from .tuning import middle_of, trials_of, tuning_of
 
 SHORT, LONG = 40, 400
@@ -43,8 +36,6 @@ MEASURED = 6
 """Largest number of FMU sets that are measured; others take the mean. Chosen: about three seconds."""
 LINE = 700
 """Bytes of a run in the journal; measured: 500 to 900 in the rankings and sweeps of scenarios/."""
-ASSUMED = math.radians(40.0)
-"""A [rad] where it has not been measured; chosen: the middle of the cars in scenarios/vehicles."""
 
 
 class Span(NamedTuple):
@@ -150,7 +141,7 @@ def of_experiment(
     experiment = experiment.short if quick and experiment.spec.repeats else experiment
     forecast = Forecast(experiment.spec.title)
     planned = execute.planned(experiment, keep=keep or experiment.spec.keep == "all")
-    _add_jobs(forecast, planned.jobs, execute, pace, journaled=bool(experiment.spec.axes))
+    add_jobs(forecast, planned.jobs, execute, pace, journaled=bool(experiment.spec.axes))
     if experiment.spec.region and not quick:
         _add_region(forecast, planned, execute, pace)
     if experiment.spec.axes and experiment.spec.keep == "limits" and forecast.left.most:
@@ -159,7 +150,7 @@ def of_experiment(
     return forecast
 
 
-def _add_jobs(
+def add_jobs(
     forecast: Forecast,
     jobs: Sequence[Job],
     execute: Executor,
@@ -167,6 +158,7 @@ def _add_jobs(
     *,
     journaled: bool,
 ) -> None:
+    """Add the runs of some jobs that are still to be made; `journaled`: finished ones are in the journal."""
     records = {} if execute.fresh or not journaled else records_in(execute.folder)
     left, finished = left_to_do(jobs, records, again=execute.fresh)
     forecast.finished += finished
@@ -217,72 +209,6 @@ def of_tuning(experiment: LoadedExperiment, execute: Executor, pace: Pace) -> Fo
         forecast.finished += finished
         seconds = sum(map(pace.of, jobs)) / len(jobs)
         forecast.add(Span(runs - finished, runs - finished), seconds, LINE)
-    return forecast
-
-
-def of_ranking(
-    ranking: LoadedRanking, execute: Executor, pace: Pace, *, only: Collection[str] = ()
-) -> Forecast:
-    """Return the cost of a ranking; where A is not measured yet, the amplitudes are those of `ASSUMED`.
-
-    Raises:
-        YawbenchError: a run cannot start.
-    """
-    forecast = Forecast(ranking.spec.title)
-    angles = _angles(forecast, ranking, execute, pace)
-    dwell = dwell_experiment(ranking, angles, execute)
-    planned = execute.planned(dwell, keep=False)
-    chosen = [case.number for case in planned.experiment.cases if not only or case.point[0].value in only]
-    jobs = OnDemand(chosen, planned.jobs.__getitem__)
-    _add_jobs(forecast, jobs, execute, pace, journaled=True)
-    return forecast
-
-
-def _angles(
-    forecast: Forecast,
-    ranking: LoadedRanking,
-    execute: Executor,
-    pace: Pace,
-    cars: Sequence[str] | None = None,
-) -> dict[str, float]:
-    """Add the runs that determine A, and return car -> A [rad], as measured or assumed."""
-    planned = execute.planned(angle_experiment(ranking, execute, cars), keep=False)
-    _add_jobs(forecast, planned.jobs, execute, pace, journaled=True)
-    records = {} if execute.fresh else records_in(execute.folder)
-    if all(key in records for key in planned.keys):
-        return angles_of(ranking, judge_records(planned, records), cars)
-    forecast.notes.append(f"A is assumed as {shown(ASSUMED, 'rad')}, which decides the number of amplitudes")
-    return dict.fromkeys(ranking.cars if cars is None else cars, ASSUMED)
-
-
-def of_threats(
-    threats: LoadedThreats,
-    execute: Executor,
-    pace: Pace,
-    *,
-    only: Collection[str] = (),
-    chosen: Collection[str] = (),
-) -> Forecast:
-    """Return the cost of a ranking by threats as bounds, since each search ends where the car is lost.
-
-    Raises:
-        YawbenchError: a run cannot start.
-    """
-    forecast = Forecast(threats.spec.title)
-    _angles(forecast, threats.ranking, execute, pace, threats.spec.cars)
-    runs = Span()
-    for place in threats.searches(only, chosen):
-        spec = threats.spec.threats[place.threat]
-        halvings = math.ceil(math.log2(STEP * abs(math.log(spec.hard / spec.easy)) / RESOLUTION))
-        levels = Span(1 + 0.0, 1 + round(1 / STEP) + max(0, halvings))
-        runs = runs.plus(levels.least, levels.most * len(threats.variants(spec)))
-    made = 0 if execute.fresh else len(records_in(execute.folder))
-    forecast.finished += made
-    plan = execute.planned(angle_experiment(threats.ranking, execute, threats.spec.cars)).jobs[0].plan
-    assert plan is not None
-    left = Span(max(0.0, runs.least - made), max(0.0, runs.most - made))
-    forecast.add(left, pace.of_plan(plan), LINE)
-    forecast.notes.append("a search ends where the car is lost; disciplines are not counted")
     return forecast
 
 

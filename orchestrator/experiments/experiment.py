@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import Diagnostic, Location, ScenarioError
+from ..fmu.fmu import Fmu
 from ..metrics.expressions import STANDARD, TimeWindow, metric, results_to_be, unit_in
-from ..plan import Fmu, Override, OverrideOrigin, Plan
+from ..plan import Override, OverrideOrigin, Plan
 from ..planner import Planner
 from ..results.reader import Results
 from ..scenario import quantities

@@ -36,6 +36,7 @@ from pydantic import Field
 from vocabulary.signals import SIGNALS
 
 from ..errors import ScenarioError, YawbenchError, code_of, text_of
+from ..fmu.fmu import Value, Variable
 from ..measured.gaps import by_signals
 from ..measured.least_squares import Simulated, Window
 from ..measured.measurement import Measurement, load_measurement
@@ -43,7 +44,7 @@ from ..measured.segment import LowPass, Segment
 from ..measured.single_track import start_states
 from ..messages import hint, span
 from ..motion import ANGLES, LEAST_SPEED, standing
-from ..plan import InputSeries, Instance, Override, Value, Variable
+from ..plan import InputSeries, Instance, Override
 from ..planner import Planner
 from ..results.freshness import key_of
 from ..safe_files import reads

@@ -250,6 +250,7 @@ def run_job(job: Job, opener: OpenInstance | None = None) -> MeasuredRun:
     from ..master.isolation import opener_of
     from ..master.run_lifecycle import StepClock, timing
     from ..master.simulate import simulate, simulate_in_memory
+    from ..metrics.plausibility import PlausibilityWatch
 
     plan, clock, run = job.plan or planned(job)[1], StepClock(), None
     with opener_of(plan, job.call_limit) as own:
@@ -257,12 +258,14 @@ def run_job(job: Job, opener: OpenInstance | None = None) -> MeasuredRun:
         timed = timing(opening, job.timed, clock) if job.timed and job.call_limit is None else opening
         if job.keep:
             apart = timed is own  # a step clock and instances in plain Python need this process
-            run = simulate(plan, job.out, opener=timed, format=job.format, apart=apart).id
+            run = simulate(
+                plan, job.out, opener=timed, watch=PlausibilityWatch(plan), format=job.format, apart=apart
+            ).id
             if not (job.metrics or job.test):
                 return MeasuredRun({}, id=run)
             results = load_results(job.out)
         else:
-            results = simulate_in_memory(plan, opener=timed)
+            results = simulate_in_memory(plan, opener=timed, watch=PlausibilityWatch(plan))
         record = measured(results, job.metrics, job.test)
     time = {STEP_TIME: (clock.mean, "s")} if clock.steps else {}
     return replace(record, values={**record.values, **time}, id=run)
@@ -275,8 +278,10 @@ def recorded(job: Job) -> Results:
         YawbenchError: the scenario is wrong or the run failed.
     """
     from ..master.simulate import simulate_in_memory
+    from ..metrics.plausibility import PlausibilityWatch
 
-    return simulate_in_memory(job.plan or planned(job)[1])
+    plan = job.plan or planned(job)[1]
+    return simulate_in_memory(plan, watch=PlausibilityWatch(plan))
 
 
 def measured(results: Results, metrics: MetricRequests, test: TestRequest | None = None) -> MeasuredRun:

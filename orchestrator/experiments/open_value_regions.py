@@ -13,23 +13,15 @@ from pathlib import Path
 from typing import Final
 
 from ..errors import Diagnostic, Location, ScenarioError
+from ..fmu.fmu import Value as Given
 from ..messages import hint, listed
 from ..metrics.expressions import MetricValue
 from ..metrics.verdict import Verdict
 from ..plan import Override
-from ..plan import Value as Given
 from ..planner import Planner
 from ..signal_names import Target
 from ..wiring.context import found_at
-from .axes import (
-    DesignPoint,
-    Level,
-    OpenValueSpec,
-    OpenVariantSpec,
-    changes_at,
-    latin_hypercube,
-    levels_of,
-)
+from .axes import DesignPoint, Level, OpenValueSpec, OpenVariantSpec, changes_at, latin_hypercube, levels_of
 from .claim_schema import Claim, MetricReference
 from .claims import ONE_IN, TIMES, ClaimResult, LevelVerdict, OpenValueScan, Region, judge, ranked
 from .confidence import Decision, SequentialTest

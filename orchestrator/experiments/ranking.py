@@ -39,23 +39,17 @@ from ..errors import ResultsError, ScenarioError
 from ..evaluation.sine_with_dwell import AMPLITUDE, SIDES, amplitudes
 from ..evaluation.standard_tests import Evaluation
 from ..evaluation.steering_tests import characteristic_angle, slow_steer_amplitude
+from ..fmu.fmu import is_path
 from ..messages import hint
 from ..metrics.expressions import TimeWindow
 from ..metrics.verdict import NotJudged
 from ..plan import Override, Plan
 from ..safe_files import reads
-from ..scenario import overrides, yaml_lines
+from ..scenario import yaml_lines
 from ..scenario.schema import Scalar
 from ..scenario.schema_validation import StrictModel, Time, validated
 from ..signal_names import Target
-from .axes import (
-    DesignAxisSpec,
-    Level,
-    OverrideSpec,
-    VariantSpec,
-    axis_of_levels,
-    changes_of_file,
-)
+from .axes import DesignAxisSpec, Level, OverrideSpec, VariantSpec, axis_of_levels, changes_of_file
 from .claim_schema import text_of
 from .executor import Executor
 from .experiment import LoadedExperiment, LoadedFile, NamedRun, experiment_of
@@ -223,7 +217,7 @@ class LoadedRanking(LoadedFile):
     def variant(self, name: str) -> VariantSpec:
         """Return an entry as a level of an axis: its controller is put into a scenario."""
         spec, folder = self.entries[name]
-        elsewhere = overrides.is_path(spec.fmu) and folder != self.path.parent
+        elsewhere = is_path(spec.fmu) and folder != self.path.parent
         fmu = str((folder / spec.fmu).absolute()) if elsewhere else spec.fmu
         settings = {f"{CONTROLLER}.{parameter}": value for parameter, value in spec.parameters.items()}
         return VariantSpec.model_validate({"swap": {CONTROLLER: fmu}, "set": settings})

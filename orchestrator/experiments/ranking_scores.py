@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..errors import ResultsError
 from ..evaluation.sine_with_dwell import FROM, RATIOS, SLIGHT, SPUN
 from ..figures.style import digits_apart
-from ..plan import Value
+from ..fmu.fmu import Value
 from .confidence import (
     Bounds,
     ConfidenceInterval,

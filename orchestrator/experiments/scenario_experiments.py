@@ -30,14 +30,15 @@ from ..evaluation.standard_tests import Evaluation, SeriesRun, StandardTest
 from ..evaluation.steering_tests import SLOW_STEER, slow_steer_amplitude
 from ..evaluation.trace import Trace, trace_of
 from ..figures.style import QUIET, frame, line_style, new_figure
+from ..fmu.fmu import Value as Plain
+from ..fmu.fmu import is_path
 from ..metrics.expressions import MetricValue, metric, while_moving
 from ..metrics.measures import variable_of, words
 from ..motion import largest
 from ..plan import Override, Plan
-from ..plan import Value as Plain
 from ..results.reader import load_results
 from ..scenario.loader import LoadedScenario, load_scenario
-from ..scenario.overrides import changed, is_path, swap_of, with_changes
+from ..scenario.overrides import changed, swap_of, with_changes
 from ..scenario.quantities import convert
 from ..signal_names import SignalName
 from .claim_schema import text_of

@@ -20,6 +20,7 @@ from vocabulary.wheels import WHEELS
 from ..errors import Diagnostic, ModelDescriptionError, ResultsError, ScenarioError, text_of
 from ..figures.style import shown
 from ..fmu.archive import open_fmu, runs_as
+from ..fmu.fmu import Fmu
 from ..messages import printable, star
 from ..metrics.expressions import (
     STANDARD,
@@ -35,7 +36,7 @@ from ..metrics.expressions import (
 from ..metrics.measures import catalogue as measures
 from ..metrics.measures import si_of, symbol
 from ..motion import LEAST_SPEED
-from ..plan import Fmu, Plan
+from ..plan import Plan
 from ..results.reader import FoundRun, Results, load_results
 from ..scenario import loader
 from ..scenario.overrides import changed, with_changes

@@ -14,12 +14,10 @@ from __future__ import annotations
 
 import itertools
 import math
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from ..cache import checksums_of
 from ..errors import ScenarioError
 from ..metrics.expressions import MetricValue
 from ..signal_names import Target
@@ -39,9 +37,6 @@ DIGITS = 3
 """Significant digits of tried values, so that files can state them; chosen: gains matter to a per cent."""
 TRIAL = "trial"
 """Name of the axis of trials."""
-ENTRIES = "entries.yaml"
-"""File in the results folder with the tuned laws as entries of a ranking."""
-
 JudgeExperiment = Callable[[LoadedExperiment], ExperimentResult]
 """Executes the missing runs of an experiment and returns its result."""
 
@@ -114,7 +109,7 @@ def search(experiment: LoadedExperiment, judged: JudgeExperiment) -> list[TunedL
 
         def costs(positions: Any, name: str = name, law: LawSpec = law, trials: list[Trial] = trials) -> Any:
             values = [_values(law, column) for column in np.asarray(positions).T]
-            tried = [_changes(law, point) for point in values]
+            tried = [changes_of(law, point) for point in values]
             findings = judged(
                 trials_of(experiment, {f"{name}, {k + 1}": changes for k, changes in enumerate(tried)})
             ).of_models()
@@ -138,7 +133,7 @@ def best_of(experiment: LoadedExperiment, tuned_laws: Sequence[TunedLaw]) -> Loa
     """Return the experiment with the best trial of every law."""
     laws = tuning_of(experiment).laws
     return trials_of(
-        experiment, {tuned.law: _changes(laws[tuned.law], tuned.best.values) for tuned in tuned_laws}
+        experiment, {tuned.law: changes_of(laws[tuned.law], tuned.best.values) for tuned in tuned_laws}
     )
 
 
@@ -181,7 +176,7 @@ def _values(law: LawSpec, positions: Sequence[float]) -> dict[Target, float]:
     return values
 
 
-def _changes(law: LawSpec, values: dict[Target, float]) -> VariantSpec:
+def changes_of(law: LawSpec, values: dict[Target, float]) -> VariantSpec:
     """Return a law's overrides together with tried values."""
     units = {target: axis.unit for axis in law.axes.values() for target in axis.vary}
     tried = {target: f"{x!r} {unit}" if (unit := units[target]) else x for target, x in values.items()}
@@ -191,7 +186,7 @@ def _changes(law: LawSpec, values: dict[Target, float]) -> VariantSpec:
 
 def middle_of(law: LawSpec) -> VariantSpec:
     """Return a law's overrides with the values in the middle of its ranges."""
-    return _changes(law, _values(law, [0.5] * len(law.axes)))
+    return changes_of(law, _values(law, [0.5] * len(law.axes)))
 
 
 def _objective(experiment: LoadedExperiment, values: MetricTable) -> float | None:
@@ -217,42 +212,6 @@ def tuning_table(experiment: LoadedExperiment, tuned_laws: Sequence[TunedLaw]) -
         ]
         table.rows.append([tuned.law, first, best, "\n".join(settings)])
     return table
-
-
-def entries_of(experiment: LoadedExperiment, tuned_laws: Sequence[TunedLaw]) -> dict[str, dict[str, Any]]:
-    """Return the best trials as entries of a ranking: name -> title, FMU, parameters, source."""
-    tuning = tuning_of(experiment)
-    entries = {}
-    for tuned in tuned_laws:
-        if tuned.best.objective is None:
-            continue  # all trials failed
-        law = tuning.laws[tuned.law]
-        settings = _changes(law, tuned.best.values).set
-        made = f"{experiment.identity}: {len(tuned.trials)} trials, seed {tuning.seed}"
-        comes_to = f"{tuning.objective} {tuned.best.cost:.4g}, {tuned.trials[0].cost:.4g} amid the ranges"
-        entries[re.sub(r"\W+", "_", f"{tuned.law.lower()}_tuned")] = {
-            "title": f"tuned {tuned.law}",
-            "fmu": law.swap[tuning.entries],
-            "gains": "tuned",
-            "parameters": {target.variable: value for target, value in settings.items()},
-            "source": f"{made}; {comes_to}",
-        }
-    return entries
-
-
-def entries_text(entries: dict[str, dict[str, Any]], command: str) -> str:
-    """Return tuned entries as the text of a YAML file with checksums."""
-    from io import StringIO
-
-    from ruamel.yaml import YAML
-
-    from .ranking import EntriesSpec
-
-    yaml: Any = YAML(typ="safe", pure=True)
-    yaml.default_flow_style, yaml.sort_base_mapping_type_on_output, yaml.width = False, False, 110
-    known = checksums_of(EntriesSpec.model_validate({"entries": entries}).content)
-    yaml.dump({"entries": entries, "checksums": known}, stream := StringIO())
-    return f"# Written by: {command}\n{stream.getvalue()}"
 
 
 def columns_of(tuned_laws: Sequence[TunedLaw]) -> Table:

@@ -37,10 +37,10 @@ from typing import Any
 from ..cache import STORES, cache_folders, content_of, delete_unused, hold
 from ..errors import ModelDescriptionError
 from ..messages import closest, listed, short
-from ..plan import Fmu, RunsAs
 from ..safe_files import PACKED, ArchiveError, TooLargeError, members, read_bytes, reason
 from . import description as fmu_description
 from .description import binary_of, platform
+from .fmu import Fmu, RunsAs
 
 FORMAT = 12
 """Format version of cache entries; part of their names, so versions of this program can share a cache."""

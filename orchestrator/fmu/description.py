@@ -1,4 +1,4 @@
-"""Model descriptions: read by fmpy into `plan.Fmu`, and checked for what this master supports.
+"""Model descriptions: read by fmpy into `fmu.Fmu`, and checked for what this master supports.
 
 `scalars` gives the variables as scalars whichever version of FMI describes them, arrays element by element.
 """
@@ -19,9 +19,8 @@ from xml.etree import ElementTree
 
 from ..errors import Diagnostic, ModelDescriptionError
 from ..messages import short
-from ..plan import Fmu, UnitDefinition, Value, Variable
 from ..safe_files import misplaced
-from ..signal_names import element_names
+from .fmu import Fmu, UnitDefinition, Value, Variable, element_names
 
 _ALWAYS = ("EnterInitializationMode", "ExitInitializationMode", "DoStep", "FreeInstance")
 CORE = {

@@ -34,10 +34,9 @@ from vocabulary.roles import role_in
 
 from ..errors import Diagnostic, ModelDescriptionError
 from ..messages import closest, listed, printable, short
-from ..plan import BuildInfo, Fmu
-from ..scenario.overrides import is_path
 from .archive import open_fmu
 from .description import hashes_of_modules
+from .fmu import BuildInfo, Fmu, is_path
 
 if TYPE_CHECKING:
     from fmus.rebuild_stale import FmuUpdater

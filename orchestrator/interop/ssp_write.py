@@ -35,8 +35,9 @@ from lxml.etree import SubElement, _Element
 
 from ..errors import ResultsError, WiringError
 from ..fmu.archive import read_archive
+from ..fmu.fmu import Fmu, Value, Variable
 from ..messages import fold, listed
-from ..plan import Fmu, Instance, Plan, Value, Variable, Wire
+from ..plan import Instance, Plan, Wire
 from ..safe_files import write_whole
 from ..scenario.overrides import with_changes
 from ..scenario.quantities import BASE_UNITS, Unit, conversion, measure_of

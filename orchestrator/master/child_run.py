@@ -35,10 +35,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import Interrupted, SimulationError, YawbenchError, error_record, rebuilt
+from ..fmu.fmu import Value
 from ..fork_server import ForkedChild, die_with_parent
 from ..interrupts import StopFlag, stop_requested_at
 from ..messages import listed
-from ..plan import Plan, Value
+from ..plan import Plan
 from ..results.recorder import BLOCK, RowBlock
 from ..supervised_process import LOG, REPLY, PipeChannel, ProcessLost, ProtocolError
 from .fmi import open_instance

@@ -17,8 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SimulationError
+from ..fmu.fmu import Value, Variable
 from ..messages import listed
-from ..plan import Value, Variable, Wire
+from ..plan import Wire
 from .instance import ExperimentSetup, Status
 from .process_state import FATAL, OK, STATUS, WARNING, Log, known
 from .signal_pool import InstanceSlot, SignalPool, by_type

@@ -27,8 +27,9 @@ import numpy as np
 from ..errors import ModelDescriptionError, SimulationError
 from ..fmu.archive import binary_problem
 from ..fmu.description import CORE, INTEGERS, binary_of
+from ..fmu.fmu import Value, ValueRef
 from ..messages import listed
-from ..plan import Instance, Value, ValueRef
+from ..plan import Instance
 from .compiled_loop import Kind, OperationData
 from .process_state import ERROR, FATAL, OK, STATUS, WARNING, Log, known, relisten, unlisten
 

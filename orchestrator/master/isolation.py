@@ -31,9 +31,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..errors import SimulationError, YawbenchError, error_record, rebuilt
+from ..fmu.fmu import Value, ValueRef
 from ..fork_server import start
 from ..interrupts import stop_requested_at
-from ..plan import Instance, Plan, Value, ValueRef
+from ..plan import Instance, Plan
 from ..supervised_process import ANSWER, FAILED, LOG, REPLY, REQUEST, PipeChannel, ProcessLost, stand_guard
 from .fmi import INSTANCE_TYPES, open_instance
 from .instance import (

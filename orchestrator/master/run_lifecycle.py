@@ -16,9 +16,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import ResultsError, SimulationError
+from ..fmu.fmu import Value
 from ..interrupts import StopFlag
 from ..messages import listed
-from ..plan import Instance, Plan, Value
+from ..plan import Instance, Plan
 from ..results.recorder import BLOCK
 from .instance import FmuInstance, Status, StepCalls
 from .process_state import MASTER, WARNING, Copies, Log, suspects

@@ -32,8 +32,9 @@ import numpy as np
 from ..coupling_algorithms import ALGORITHMS, WireTiming
 from ..errors import SimulationError
 from ..fault_kinds import KINDS, Disturbance, LinearDisturbance
+from ..fmu.fmu import Value, Variable, integer_limits
 from ..messages import listed
-from ..plan import Instance, Plan, Value, Variable, Wire, integer_limits
+from ..plan import Instance, Plan, Wire
 from .compiled_loop import Kind, OperationData
 from .instance import FmuInstance, Status, StepCalls
 from .process_state import OK

@@ -10,11 +10,13 @@ import uuid
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
+from typing import Protocol
+
+import numpy as np
 
 from ..errors import Diagnostic, Interrupted, ResultsError, ScenarioError, SimulationError, YawbenchError
 from ..interrupts import StopFlag, interrupts
 from ..messages import printable
-from ..metrics.plausibility import PlausibilityWatch
 from ..plan import Plan
 from ..results.freshness import key_of, recorded_variables, run_record, units_of
 from ..results.reader import Results
@@ -30,6 +32,16 @@ WRITTEN = 100
 """Warnings written into run.json; further ones are only counted."""
 IN_MEMORY = 16 * 10**9
 """Largest size of results kept in memory [B]; chosen: the memory of a desktop computer."""
+
+
+class Watch(Protocol):
+    """Observer of a run: looks at the rows as they are recorded, and warns of what it has seen."""
+
+    def look(self, rows: np.ndarray, /) -> None:
+        """Look at rows: shape (n, 1 + Real columns), time first."""
+
+    def warnings(self) -> tuple[Diagnostic, ...]:
+        """Return the warnings so far."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +65,7 @@ def simulate(
     *,
     progress: RunProgress | None = None,
     opener: OpenInstance = open_instance,
+    watch: Watch | None = None,
     format: str = "csv",
     apart: bool = False,
 ) -> RunInfo:
@@ -69,6 +82,7 @@ def simulate(
         out: folder of the results; made if it does not exist.
         progress: called with the number of communication points done and their total.
         opener: creates the instances; tests pass their own.
+        watch: looks at the recorded rows; its warnings stand in the record.
         format: of the results, one of `results.file_formats.FILES`.
         apart: step the instances in a child process where that is possible (see `child_run`): even if it
             crashes, the run ends with an error message and the results so far.
@@ -81,7 +95,7 @@ def simulate(
         ResultsError: `out` is not writable, or the format needs a package that is missing.
     """
     recorder = recorder_of(format)(Path(out), *_columns(plan))
-    run = Simulation(plan, recorder, progress, apart=apart and can_be_apart() and not keeps(plan))
+    run = Simulation(plan, recorder, progress, watch, apart=apart and can_be_apart() and not keeps(plan))
     run.make(opener)
     return RunInfo(
         Path(out),
@@ -92,12 +106,16 @@ def simulate(
         run.course.passes,
         list(run.log.warnings()),
         None if run.course.ended is None else str(run.course.ended),
-        run.watch.warnings(),
+        run.diagnostics,
     )
 
 
 def simulate_in_memory(
-    plan: Plan, *, progress: RunProgress | None = None, opener: OpenInstance = open_instance
+    plan: Plan,
+    *,
+    progress: RunProgress | None = None,
+    opener: OpenInstance = open_instance,
+    watch: Watch | None = None,
 ) -> Results:
     """Run a plan and return its results without writing anything to disk.
 
@@ -114,7 +132,7 @@ def simulate_in_memory(
             code="results-too-large",
         )
     recorder = MemoryRecorder(*_columns(plan), most=plan.n_steps + 1)
-    Simulation(plan, recorder, progress, apart=False).make(opener)
+    Simulation(plan, recorder, progress, watch, apart=False).make(opener)
     assert recorder.results is not None
     return recorder.results
 
@@ -133,12 +151,19 @@ class Simulation:
     """
 
     def __init__(
-        self, plan: Plan, recorder: Recorder | MemoryRecorder, progress: RunProgress | None, *, apart: bool
+        self,
+        plan: Plan,
+        recorder: Recorder | MemoryRecorder,
+        progress: RunProgress | None,
+        watch: Watch | None,
+        *,
+        apart: bool,
     ) -> None:
         self.plan = plan
         self.recorder = recorder
-        self.watch = PlausibilityWatch(plan)
-        recorder.looks.append(self.watch.look)
+        self._watch = watch
+        if watch:
+            recorder.looks.append(watch.look)
         self.log = Log()
         self.record = run_record(plan, status=RunStatus.RUNNING, started=datetime.now(timezone.utc))
         self.record.id, self.record.key = uuid.uuid4().hex[:12], key_of(plan)
@@ -150,6 +175,11 @@ class Simulation:
         self._ended_by: str | None = None  # instance
         self._began = time.perf_counter()
         self._saving = False
+
+    @property
+    def diagnostics(self) -> tuple[Diagnostic, ...]:
+        """Warnings about the course of the run, such as a car that spins."""
+        return self._watch.warnings() if self._watch else ()
 
     @property
     def wall_time(self) -> float:
@@ -204,7 +234,7 @@ class Simulation:
             self.course.flush()
         diagnostics = error.diagnostics if isinstance(error, (YawbenchError, Interrupted)) else []
         if isinstance(error, SimulationError):
-            error.warnings = self.watch.warnings()
+            error.warnings = self.diagnostics
         try:
             interrupted = isinstance(error, KeyboardInterrupt)
             self._save(RunStatus.INTERRUPTED if interrupted else RunStatus.FAILED, error)
@@ -242,7 +272,7 @@ class Simulation:
         record.wall_time, record.loop = self.wall_time, self.course.loop
         record.error = self._explained(error)
         record.units_freed = False
-        record.diagnostics = [*map(DiagnosticRecord.of, (*self.plan.diagnostics, *self.watch.warnings()))]
+        record.diagnostics = [*map(DiagnosticRecord.of, (*self.plan.diagnostics, *self.diagnostics))]
         if ended is not None:
             record.ended = EndRecord(instance=ended.instance, time=ended.time, message=str(ended))
         self._note_warnings()

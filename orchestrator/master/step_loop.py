@@ -23,9 +23,10 @@ from typing import cast
 import numpy as np
 
 from ..errors import Interrupted, SimulationError
+from ..fmu.fmu import Value
 from ..interrupts import StopFlag
 from ..messages import listed
-from ..plan import Plan, Value
+from ..plan import Plan
 from .compiled_loop import Answer, CompiledLoop, missing_loop
 from .initialization import initialize
 from .instance import Buffers, FmuInstance, PlainCall, Status

@@ -21,7 +21,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from ..coupling_algorithms import ALGORITHMS, CouplingWeights, WireTiming, delayed
-from ..plan import InputSeries, Plan, ValueRef, Variable
+from ..fmu.fmu import ValueRef, Variable
+from ..plan import InputSeries, Plan
 from .compiled_loop import Kind, OperationData
 from .instance import PlainCall, Status
 from .process_state import OK

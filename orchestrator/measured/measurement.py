@@ -56,14 +56,7 @@ from ..scenario.schema_validation import StrictModel, quantities_in, text_in_uni
 from ..scenario.yaml_lines import Document, KeyPath
 from .clocks import PACKED, UNIX, holds_times, seconds_of
 from .gaps import Samples, between_gaps, gaps_in, notes_on
-from .recording_formats import (
-    ColumnFile,
-    FileColumn,
-    numbers_in,
-    reading_series,
-    refuse_implausible,
-    unit_of,
-)
+from .recording_formats import ColumnFile, FileColumn, numbers_in, reading_series, refuse_implausible, unit_of
 from .segment import (
     MOVED,
     POLES,

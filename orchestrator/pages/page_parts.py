@@ -29,22 +29,10 @@ from vocabulary.wheels import WHEEL_NAMES, WHEELS
 
 from ..experiments.result_tables import FAILS, HOLDS, NOT_JUDGED, SENSITIVE, UNDECIDED
 from ..experiments.tables import Table
+from ..fmu.fmu import Value, Variable
 from ..messages import fold, printable
 from ..metrics.verdict import Status
-from ..plan import (
-    CHOSEN,
-    ERRATUM,
-    LITERATURE,
-    NEUTRAL,
-    PAPER,
-    VARIED,
-    Instance,
-    Override,
-    Plan,
-    Value,
-    ValueSource,
-    Variable,
-)
+from ..plan import CHOSEN, ERRATUM, LITERATURE, NEUTRAL, PAPER, VARIED, Instance, Override, Plan, ValueSource
 from ..results.freshness import versions
 from ..results.reader import Results
 from ..results.run_record import NOT_RECORDED, RunRecord

@@ -24,14 +24,15 @@ from vocabulary.vehicle import CAR
 from ..errors import Interrupted, ScenarioError, YawbenchError
 from ..experiments.jobs import LASTING, NEEDED, Job, execute, keyed, planned, recorded
 from ..figures.style import LabelledRun
+from ..fmu.fmu import Variable, is_path
 from ..fmu.opener import Building, find_folder
 from ..interrupts import StopFlag
 from ..messages import hint, short
-from ..plan import Instance, Plan, Variable
+from ..plan import Instance, Plan
 from ..planner import Planner
 from ..results.reader import Results
 from ..scenario import loader
-from ..scenario.overrides import is_path, read_changes
+from ..scenario.overrides import read_changes
 from ..scenario.quantities import convert
 from ..scenario.schema import LoadedScenario
 from ..signal_names import Target

@@ -21,7 +21,8 @@ from typing import Any, cast
 from ..cache import OF_RESULTS, checksum, sources_hash
 from ..errors import ResultsError
 from ..fmu.archive import runs_as
-from ..plan import DEFAULT, Fmu, InputSeries, Instance, Plan, ValueSource, Variable, Wire
+from ..fmu.fmu import Fmu, Variable
+from ..plan import DEFAULT, InputSeries, Instance, Plan, ValueSource, Wire
 from ..signal_names import SignalName
 from .reader import load_results
 from .run_folder import RUN_FILE, RunStatus, is_dead

@@ -22,7 +22,7 @@ import numpy as np
 
 from ..cache import checksum, shown
 from ..errors import ResultsError
-from ..plan import Value
+from ..fmu.fmu import Value
 from ..safe_files import reason, write_whole
 from .file_formats import FORMATS, RESULTS_FILE, check_format, load_class, plain, rows_text
 from .reader import Results

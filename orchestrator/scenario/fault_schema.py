@@ -13,8 +13,8 @@ from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, WithJso
 
 from ..errors import Location, ScenarioError
 from ..fault_kinds import KINDS, NO_FAULTS, WORDS, Fault, FaultList, FaultLocation
+from ..fmu.fmu import Value
 from ..messages import listed, short
-from ..plan import Value
 from . import quantities, yaml_lines
 from .schema_validation import Instant, OneOf, StrictModel, Time, in_unit, validate
 

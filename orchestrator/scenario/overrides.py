@@ -28,17 +28,13 @@ from typing import Any
 
 from ..errors import Diagnostic, Location, ScenarioError
 from ..fault_kinds import WORDS, FaultList
+from ..fmu.fmu import Value, is_path
 from ..messages import hint, listed
-from ..plan import Override, OverrideOrigin, Value
+from ..plan import Override, OverrideOrigin
 from ..signal_names import FACTS, FAULTS, INPUTS, OF_RUN, TYRES, VEHICLE, Target
 from . import yaml_lines
 from .fault_schema import location_of, parse_faults, read_line
 from .yaml_lines import Document, KeyPath
-
-
-def is_path(fmu: str) -> bool:
-    """Return whether `fmu` is the path of an archive rather than a name in the folder of FMUs."""
-    return fmu.lower().endswith(".fmu") or "/" in fmu or "\\" in fmu
 
 
 def read_changes(

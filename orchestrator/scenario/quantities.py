@@ -24,8 +24,8 @@ from fractions import Fraction
 from functools import cache, lru_cache
 
 from ..errors import InvalidValueError
+from ..fmu.fmu import UnitDefinition, Variable
 from ..messages import closest, listed, short
-from ..plan import UnitDefinition, Variable
 
 BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 Powers = tuple[int, int, int, int, int, int, int, int]  # of BASE_UNITS

@@ -38,8 +38,9 @@ from pydantic import (
 from vocabulary.vehicle import CAR
 
 from ..coupling_algorithms import ALGORITHMS
+from ..fmu.fmu import Value
 from ..messages import listed, short
-from ..plan import Override, Value
+from ..plan import Override
 from ..signal_names import RESERVED, SignalName
 from .fault_schema import FaultSpec
 from .schema_validation import Instant, OneOf, StrictModel, Time, in_unit

@@ -29,10 +29,9 @@ from lxml import etree
 from lxml.etree import _Element
 
 from ..errors import Diagnostic, Location
+from ..fmu.fmu import Causality, UnitDefinition, element_names
 from ..messages import listed, short
-from ..plan import Causality, UnitDefinition
 from ..safe_files import PACKED, ArchiveError, TooLargeError, members, misplaced, read_bytes, reason
-from ..signal_names import element_names
 from .quantities import BASE_UNITS, Unit, measure_of
 
 DESCRIPTION_FILE = "SystemStructure.ssd"

@@ -32,8 +32,8 @@ from lxml import etree
 from lxml.etree import _Element
 
 from ..errors import Diagnostic, Location
+from ..fmu.fmu import UnitDefinition, Value, integer_limits
 from ..messages import fold, listed
-from ..plan import UnitDefinition, Value, integer_limits
 from ..signal_names import RESERVED
 from .quantities import Unit, conversion, converted, measure_of
 from .ssp_archive import (

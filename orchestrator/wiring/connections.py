@@ -15,8 +15,9 @@ from dataclasses import replace
 from graphlib import CycleError
 from itertools import pairwise
 
+from ..fmu.fmu import Variable
 from ..messages import fold, hint, listed
-from ..plan import Variable, Wire
+from ..plan import Wire
 from ..scenario.loader import Connection
 from ..scenario.quantities import conversion, measure_of, parse_unit, unit_of
 from ..scenario.yaml_lines import KeyPath, dotted

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InvalidValueError, ScenarioError, code_of, text_of
+from ..fmu.fmu import Value, Variable
 from ..messages import fold, hint, resolved, span
-from ..plan import InputSeries, Value, ValueOrigin, Variable
+from ..plan import InputSeries, ValueOrigin
 from ..scenario.loader import LoadedScenario
 from ..scenario.quantities import unit_of
 from ..scenario.schema import SeriesSpec

@@ -21,8 +21,9 @@ from functools import cached_property
 from vocabulary.wheels import WHEELS, wheels
 
 from ..errors import Diagnostic, Severity, WiringError
+from ..fmu.fmu import Fmu, Value, Variable
 from ..messages import fold_sentences
-from ..plan import DEFAULT, Fmu, Instance, Plan, Value, ValueOrigin, Variable
+from ..plan import DEFAULT, Instance, Plan, ValueOrigin
 from ..scenario.loader import LoadedScenario
 from ..scenario.yaml_lines import MOST_ERRORS, Document, KeyPath
 from ..signal_names import FACTS as NAMES

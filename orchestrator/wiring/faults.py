@@ -8,8 +8,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from ..fault_kinds import KINDS, Fault, FaultLocation, FaultySignal
+from ..fmu.fmu import Variable
 from ..messages import fold, hint, listed
-from ..plan import Variable, Wire
+from ..plan import Wire
 from ..scenario.loader import LoadedScenario
 from ..scenario.quantities import convert
 from ..scenario.yaml_lines import KeyPath, dotted

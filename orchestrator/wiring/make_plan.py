@@ -25,11 +25,11 @@ from vocabulary.wheels import WHEELS
 
 from ..errors import BuildError, Diagnostic, Location, ModelDescriptionError, WiringError, YawbenchError
 from ..fmu.description import CORE
+from ..fmu.fmu import Fmu, Value, Variable, is_path
 from ..fmu.opener import Opener, find_fmu, find_folder, hidden, host_needs, shadowed_modules, stale_fmus
 from ..messages import closest, fold, hint, listed
-from ..plan import DEFAULT, Fmu, InputSeries, Instance, Plan, Value, ValueOrigin, Variable, Wire
+from ..plan import DEFAULT, InputSeries, Instance, Plan, ValueOrigin, Wire
 from ..scenario.loader import LoadedScenario
-from ..scenario.overrides import is_path
 from ..signal_names import SignalName, match
 from .connections import Connector
 from .constants import Constant, Input, constants

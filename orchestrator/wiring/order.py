@@ -27,8 +27,9 @@ from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from itertools import chain
 
+from ..fmu.fmu import Fmu
 from ..messages import star
-from ..plan import Fmu, Wire
+from ..plan import Wire
 
 Node = tuple[str, str]  # instance, variable
 Edge = tuple[str, str]  # source instance, target instance

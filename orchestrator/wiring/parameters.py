@@ -20,19 +20,9 @@ from vocabulary.patches import patches_of
 from vocabulary.vehicle import CAR
 
 from ..errors import code_of
+from ..fmu.fmu import Fmu, Value, Variable, integer_limits
 from ..messages import closest, fold, hint, listed, short
-from ..plan import (
-    DEFAULT,
-    LITERATURE,
-    VARIED,
-    Fmu,
-    OriginKind,
-    Value,
-    ValueOrigin,
-    ValueSource,
-    Variable,
-    integer_limits,
-)
+from ..plan import DEFAULT, LITERATURE, VARIED, OriginKind, ValueOrigin, ValueSource
 from ..safe_files import TEXT, read_bytes
 from ..scenario import quantities
 from ..scenario.loader import LoadedScenario

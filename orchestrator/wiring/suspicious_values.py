@@ -23,8 +23,9 @@ from vocabulary.roles import without_role
 from vocabulary.vehicle import CAR, DYNAMIC_INDEX
 
 from ..errors import Diagnostic, Location
+from ..fmu.fmu import Value, Variable
 from ..messages import fold, listed
-from ..plan import DEFAULT, SENSING, Instance, OriginKind, Value, Variable, Wire
+from ..plan import DEFAULT, SENSING, Instance, OriginKind, Wire
 from ..scenario.loader import LoadedScenario
 from ..scenario.quantities import exact_text, meant_unit, number_and_unit
 from .context import FACTS

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.fault_kinds import FaultySignal
+from orchestrator.fmu.fmu import Fmu, ValueRef, Variable
 from orchestrator.master.instance import ExperimentSetup, FmuInstance, StepCalls
 from orchestrator.master.process_state import ERROR, OK, Log
-from orchestrator.plan import Fmu, Instance, Plan, ValueRef, Variable, Wire
+from orchestrator.plan import Instance, Plan, Wire
 from orchestrator.signal_names import SignalName
 
 

@@ -10,10 +10,11 @@ import fmpy
 import pytest
 
 from orchestrator.errors import ModelDescriptionError, SimulationError
+from orchestrator.fmu.fmu import Fmu, Variable
 from orchestrator.master.fmi import open_instance
 from orchestrator.master.isolation import Isolation
 from orchestrator.master.simulate import simulate
-from orchestrator.plan import Fmu, Instance, Plan, Variable, Wire
+from orchestrator.plan import Instance, Plan, Wire
 from orchestrator.results.reader import load_results
 from orchestrator.signal_names import SignalName
 from tests.sentences import golden, golden_in, refused

@@ -12,7 +12,7 @@ import pytest
 
 from orchestrator.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
 from orchestrator.experiments.jobs import Job, execute, read_back, ready
-from orchestrator.plan import Fmu, Variable
+from orchestrator.fmu.fmu import Fmu, Variable
 from orchestrator.results.reader import load_results
 from orchestrator.supervised_process import PipeChannel
 from orchestrator.workers import Pool

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.plan import Fmu, Variable, Wire
+from orchestrator.fmu.fmu import Fmu, Variable
+from orchestrator.plan import Wire
 from orchestrator.wiring.order import EvaluationOrder, evaluate
 from tests.sentences import golden
 

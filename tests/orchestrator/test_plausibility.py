@@ -12,8 +12,9 @@ import pytest
 
 from orchestrator.errors import Diagnostic, Location, warnings_in
 from orchestrator.experiments.tables import MARK, marked, remarks
+from orchestrator.fmu.fmu import Fmu, Variable
 from orchestrator.metrics.plausibility import CHECKS, PlausibilityWatch
-from orchestrator.plan import Fmu, Instance, Plan, Variable, Wire
+from orchestrator.plan import Instance, Plan, Wire
 from orchestrator.results.run_record import RunRecord
 from orchestrator.signal_names import SignalName
 from tests.sentences import golden

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import pytest
 
-from orchestrator.plan import UnitDefinition
+from orchestrator.fmu.fmu import UnitDefinition
 from orchestrator.scenario import quantities
 from orchestrator.scenario.quantities import conversion, convert, measure_of, parse_unit, seconds
 from tests.sentences import refused

@@ -12,8 +12,9 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.errors import YawbenchError
 from orchestrator.fmu.archive import open_fmu
+from orchestrator.fmu.fmu import Variable
 from orchestrator.interop.ssp_write import for_omsimulator, write_ssp
-from orchestrator.plan import Plan, Variable
+from orchestrator.plan import Plan
 from orchestrator.results.reader import load_results
 from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan

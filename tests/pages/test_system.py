@@ -7,8 +7,9 @@ from pathlib import Path
 
 from lxml import etree
 
+from orchestrator.fmu.fmu import Fmu
 from orchestrator.pages.diagram import diagram, system_of, systems_of
-from orchestrator.plan import Fmu, Instance, Plan, Wire
+from orchestrator.plan import Instance, Plan, Wire
 from tests.sentences import golden
 from vocabulary.wheels import WHEELS
 

@@ -8,7 +8,7 @@ import yawbench as yb
 from fmus.build import HERE as FMUS
 from fmus.build import build_all, find_components
 from orchestrator.fmu.archive import runs_as
-from orchestrator.plan import RunsAs
+from orchestrator.fmu.fmu import RunsAs
 from orchestrator.scenario.loader import names
 
 pytestmark = pytest.mark.filterwarnings("ignore::yawbench.YawbenchWarning")

@@ -14,7 +14,7 @@ from fmus.build import build_component
 from fmus.compiler import compiler_command
 from orchestrator.commands.new import begin
 from orchestrator.fmu.archive import REASON, runs_as
-from orchestrator.plan import RunsAs
+from orchestrator.fmu.fmu import RunsAs
 from tests.checkout import ROOT
 from tests.sentences import golden
 

@@ -13,7 +13,7 @@ import pytest
 from fmus.build import HERE as FMUS
 from fmus.build import find_components
 from orchestrator.fmu.archive import runs_as
-from orchestrator.plan import RunsAs
+from orchestrator.fmu.fmu import RunsAs
 from tests.fmus.bare import Fmu
 from tests.fmus.programs import (
     expected_outputs,
