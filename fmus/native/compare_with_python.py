@@ -44,6 +44,10 @@ LIMIT = 240
 SEARCH, EPISODE, LONGEST_EPISODE = 120_000, 150, 50_000
 """Steps of the search for branches that were not reached, of one try, and at most of one; chosen: the search
 takes half a second, as long as the comparison, and a controller is followed for 50,000 samples."""
+PATIENCE = 200
+"""Tries in a row that reach nothing new, after which the search ends; chosen: a search of a fifth of a second."""
+MOST_FOUND = 25
+"""Largest number of tries that are compared; chosen: a start of the slowest component takes half a second."""
 AFTER = 60
 """Steps of a comparison after the last new branch was reached, in which what the branch did shows."""
 _LOGGER = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
@@ -492,10 +496,11 @@ class _Try:
 
 def _search(beside: _Beside, branches: Branches, component: type[Any], thresholds: Sequence[float]) -> None:
     """Search inputs that reach further branches of the native library, and compare them."""
-    left, number = SEARCH, 0
+    left, number, last, found = SEARCH, 0, 0, 0
     near = _near(thresholds)
     counts = sorted({int(x) for x in thresholds if x == int(x) and EPISODE < x <= LONGEST_EPISODE})
-    while left > 0 and 0 in branches.compared:
+    patience = max(PATIENCE, 2 * len(counts))
+    while left > 0 and found < MOST_FOUND and 0 in branches.compared and number - last < patience:
         chance = random.Random(f"{component.fmu_name} {number}")
         long = counts[number // 2] if number % 2 == 0 and number // 2 < len(counts) else 0
         attempt = _attempt(beside, chance, near, long + AFTER if long else EPISODE)
@@ -503,6 +508,7 @@ def _search(beside: _Beside, branches: Branches, component: type[Any], threshold
         taken, needed = _try_natively(beside, branches, attempt)
         left -= taken + 20  # the calls before the first step take as long
         if needed:
+            last, found = number, found + 1
             beside.label = f"found by searching, {number}: "
             _compare_try(beside, attempt, needed + AFTER)
             branches.keep()

@@ -16,7 +16,7 @@ from . import ir
 from .attributes import Attributes
 from .merge import alike
 from .read import Source, Sources
-from .shapes import build, numbers_of, shape_of
+from .shapes import Widening, build, numbers_of, shape_of
 from .values import (
     EITHER,
     OF_TABLE,
@@ -424,11 +424,12 @@ class Evaluation(Attributes):
             raise Refused("an item of a table whose items are not alike")
         if isinstance(first, tuple):
             return like(first, [self._whole(self._of_picked(value, k)) for k in range(len(first))])
-        shapes = [shape_of(x, self.read) for x in value.items]
-        pairs = zip(shapes, value.items, strict=True)
-        columns = zip(*[numbers_of(s, x, self.read, self) for s, x in pairs], strict=True)
-        leaves = iter([self._at(tuple(column), value.index) for column in columns])
-        made = build(shapes[0], leaves, alias=OF_TABLE)
+        shape = shape_of(first, self.read)
+        for x in value.items[1:]:
+            shape = Widening().of(shape, shape_of(x, self.read))
+        rows = [numbers_of(shape, x, self.read, self) for x in value.items]
+        leaves = iter([self._at(column, value.index) for column in zip(*rows, strict=True)])
+        made = build(shape, leaves, alias=OF_TABLE)
         origins = tuple(boxes_in(value))
         for box in boxes_in(made):
             box.origins = origins
