@@ -18,7 +18,7 @@ from orchestrator.commands.new import begin
 from orchestrator.errors import BuildError
 from tests.fmus.bare import ERROR, OK, Fmu, Refused, Unit
 from tests.fmus.programs import in_windows, in_wine, run, ten_steps
-from tests.sentences import golden, golden_in, refused
+from tests.refusals import each_mentions, mentions, refused
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 
@@ -91,7 +91,7 @@ def test_an_fmu_whose_sources_are_broken_stays_and_one_whose_sources_are_gone_is
     target = tmp_path / "out" / "controller_idea.fmu"
     build_all(tmp_path / "out", root=root)
     edited(folder / "idea.c", "s->x = 0.0;", "s->x = nothing;")
-    with refused(BuildError, "compiler-failed"):
+    with refused(BuildError, "compiler-failed", names=("controller_idea", "idea.c:26:12")):
         build_all(tmp_path / "out", root=root)
     assert target.exists()
     edited(folder / "idea.c", "nothing", "0.0")
@@ -103,38 +103,38 @@ def test_an_fmu_whose_sources_are_broken_stays_and_one_whose_sources_are_gone_is
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "sentence"),
+    ("old", "new", "names"),
     [
-        ("</fmiModelDescription>", "", "is not well-formed XML"),
-        ('modelIdentifier="controller_idea"', 'modelIdentifier="x"', 'modelIdentifier="controller_idea"'),
-        ('valueReference="5"', 'valueReference="7"', "moment_limit must have the value reference 5"),
-        ('name="yaw_moment"', 'name="moment"', "a controller must declare the output yaw_moment"),
-        ('name="yaw_rate"', 'name="yaw rate"', "'yaw rate' is not a valid name in C"),
-        ('causality="input"', 'causality="local"', "yaw_rate must be an input, an output or a parameter"),
-        ('<Real unit="N.m" start', "<Integer start", "moment_limit is not Real"),
-        ('min="0"', 'min="none"', "min must be a number (got 'none')"),
-        ('unit="N.m/rad" start', 'unit="N/rad" start', 'unit "N/rad"'),
+        ("</fmiModelDescription>", "", ("well-formed",)),
+        ('modelIdentifier="controller_idea"', 'modelIdentifier="x"', ('modelIdentifier="controller_idea"',)),
+        ('valueReference="5"', 'valueReference="7"', ("moment_limit", "reference 5")),
+        ('name="yaw_moment"', 'name="moment"', ("yaw_moment", "controller", "declare")),
+        ('name="yaw_rate"', 'name="yaw rate"', ("'yaw rate'", "valid")),
+        ('causality="input"', 'causality="local"', ("yaw_rate", "output", "parameter")),
+        ('<Real unit="N.m" start', "<Integer start", ("moment_limit", "Real")),
+        ('min="0"', 'min="none"', ("'none'", "min")),
+        ('unit="N.m/rad" start', 'unit="N/rad" start', ('unit "N/rad"',)),
     ],
 )
-def test_a_wrong_model_description_is_told_in_one_sentence(folder, old, new, sentence):
+def test_a_wrong_model_description_is_told_in_one_sentence(folder, old, new, names):
     edited(folder / "modelDescription.xml", old, new)
-    assert sentence in problems(folder)
+    assert mentions(problems(folder), *names)
 
 
 def test_what_is_missing_is_named(folder, root, monkeypatch):
     edited(folder / "idea.c", "fabs(law(s, v))", "strange(law(s, v))")
     assert "strange" in problems(folder)
     (folder / "idea.c").unlink()
-    assert golden(problems(folder))
+    assert mentions(problems(folder), "controller_idea", "idea")
     (root / "controllers" / "idea.py").touch()
-    assert golden_in(problems(folder))
+    assert mentions(problems(folder), "idea.py")
     monkeypatch.setenv("CC", "no-such-compiler")
     (root / "controllers" / "idea.py").unlink()
-    assert golden_in(problems(folder))
+    assert mentions(problems(folder), "controller_idea", "no-such-compiler", "CC")
 
 
 def test_a_folder_without_a_role_or_a_model_description_is_refused(folder, tmp_path):
-    with refused(BuildError, "component-invalid"):
+    with refused(BuildError, "component-invalid", names=("modelDescription.xml", "component")):
         build_component(tmp_path, tmp_path / "out")
     moved = shutil.copytree(folder, tmp_path / "idea")
     with pytest.raises(BuildError, match="which role"):
@@ -153,7 +153,7 @@ def test_a_parameter_out_of_its_range_is_refused_in_one_sentence(unit):
     unit.set(proportional_gain=-1.0)
     with pytest.raises(Refused):
         unit.start()
-    assert golden(unit.messages)
+    assert each_mentions(unit.messages, ("proportional_gain", "0", "-1"))
 
 
 def test_a_parameter_cannot_be_set_later_and_an_output_never(unit):
@@ -162,7 +162,7 @@ def test_a_parameter_cannot_be_set_later_and_an_output_never(unit):
     unit.start()
     with pytest.raises(Refused):
         unit.set(integral_gain=1.0)
-    assert golden(unit.messages[-1])
+    assert mentions(unit.messages[-1], "integral_gain", "set", "initialization")
 
 
 def test_a_restored_state_goes_on_as_the_first_time(unit):
@@ -181,7 +181,7 @@ def test_a_restored_state_goes_on_as_the_first_time(unit):
 
 def test_what_it_cannot_do_is_an_error_with_a_message_not_a_crash(unit):
     assert unit.call("fmi2CancelStep") == ERROR
-    assert golden(unit.messages[-1])
+    assert mentions(unit.messages[-1], "fmi2CancelStep", "supported")
     assert unit.call("fmi2GetInteger", None, 0, None) == OK
 
 

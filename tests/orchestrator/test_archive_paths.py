@@ -19,7 +19,7 @@ from orchestrator.results.reader import load_results
 from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
-from tests.sentences import texts_of
+from tests.refusals import texts_of
 
 from .fake_fmus import Var, make_fmu
 from .test_foreign import write_fmu

@@ -21,7 +21,7 @@ from orchestrator.scenario.loader import files, load_scenario
 from orchestrator.scenario.ssp_archive import DESCRIPTION_FILE, SSC, SSD, SSM, SSV
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
-from tests.sentences import golden, golden_in, texts_of
+from tests.refusals import mentions, texts_of
 
 from .fake_fmus import make_fmu
 
@@ -207,7 +207,7 @@ def test_a_text_that_xml_cannot_hold_is_refused(fmus, tmp_path):
     plan = replace(plan_of(SCENARIOS / PAPERS[3], fmus), title="bell \a")
     with pytest.raises(ResultsError) as caught:
         write_ssp(plan, tmp_path / "system.ssp")
-    assert golden_in(caught.value)
+    assert mentions(caught.value, "system.ssp", "NULL")
     assert not (tmp_path / "system.ssp").exists()
 
 
@@ -356,7 +356,7 @@ def test_a_value_for_what_nothing_has_is_passed_over_with_a_note(feedback, fmus,
     path = rewritten(feedback, tmp_path / "typo.ssp", ('name="initial_speed"', 'name="speed"'))
     plan = make_plan(load_scenario(path), fmus=fmus)
     assert "initial_speed" not in unit_of(plan, "plant").parameters
-    assert golden_in(texts_of(plan))
+    assert mentions(texts_of(plan), "plant.speed", "values")
 
 
 def test_a_start_value_of_a_connected_input_counts_for_nothing(feedback, fmus, tmp_path):
@@ -366,54 +366,54 @@ def test_a_start_value_of_a_connected_input_counts_for_nothing(feedback, fmus, t
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "says"),
+    ("before", "after", "names"),
     [
-        ("resources/plant_two_dof.fmu", "../plant_two_dof.fmu", "is not in the archive"),
-        ("resources/plant_two_dof.fmu", "http://host/plant.fmu", "is not in the archive"),
-        ("resources/plant_two_dof.fmu", "resources/nothing.fmu", "there is no resources/nothing.fmu"),
-        ("resources/plant_two_dof.fmu", "plant.ssd", "only FMUs are supported"),
-        ('implementation="CoSimulation"', 'implementation="ModelExchange"', "only CoSimulation is supported"),
-        ("<ssd:Elements>", '<ssd:Elements><ssd:Other name="x"/>', "an element of kind Other (x)"),
-        ('name="tyre"', 'name="plant"', "two elements are called 'plant'"),
+        ("resources/plant_two_dof.fmu", "../plant_two_dof.fmu", ("archive",)),
+        ("resources/plant_two_dof.fmu", "http://host/plant.fmu", ("archive",)),
+        ("resources/plant_two_dof.fmu", "resources/nothing.fmu", ("resources/nothing.fmu",)),
+        ("resources/plant_two_dof.fmu", "plant.ssd", ("supported",)),
+        ('implementation="CoSimulation"', 'implementation="ModelExchange"', ("CoSimulation", "supported")),
+        ("<ssd:Elements>", '<ssd:Elements><ssd:Other name="x"/>', ("Other", "element", "kind")),
+        ('name="tyre"', 'name="plant"', ("'plant'", "elements")),
         (
             'startConnector="steer_angle" endElement="plant"',
             'startConnector="steer" endElement="plant"',
-            "driver has no output 'steer'",
+            ("'steer'", "driver"),
         ),
         (
             'startConnector="steer_angle" endElement="plant" endConnector="steer_angle"',
             'startConnector="velocity_x" endElement="plant" endConnector="steer_angle"',
-            "cannot connect driver.velocity_x and plant.steer_angle: each takes a value",
+            ("driver.velocity_x", "plant.steer_angle"),
         ),
         (
             'endElement="plant" endConnector="tyre_force_x_fr"',
             'endElement="plant" endConnector="tyre_force_x_fl"',
-            "plant.tyre_force_x_fl has more than one source: tyre.tyre_force_x_fl and tyre.tyre_force_x_fr",
+            ("plant.tyre_force_x_fl", "tyre.tyre_force_x_fl", "tyre.tyre_force_x_fr"),
         ),
         (
             "<ssd:Elements>",
             '<ssd:Elements><ssd:SignalDictionaryReference name="bus" dictionary="d"/>',
-            "a signal dictionary (bus)",
+            ("signal", "dictionary", "bus"),
         ),
-        ('startElement="driver"', 'startElement="nobody"', "'nobody': there is no such component"),
-        ('startElement="driver"', "", "the connector 'steer_angle': the system has none of this name"),
+        ('startElement="driver"', 'startElement="nobody"', ("'nobody'", "component")),
+        ('startElement="driver"', "", ("'steer_angle'", "connector", "system")),
         (
             'source="resources/plant_two_dof.fmu"',
             'source="a.fmu" sourceBase="component"',
-            "is in a component",
+            ("component",),
         ),
-        ('startTime="0.0"', 'startTime="1.0"', "must be after start_time, 1 s"),
-        ('value="25.0"', 'value="fast"', "'fast' is not of type Real"),
-        ("</ssd:System>", "", "not well-formed"),
+        ('startTime="0.0"', 'startTime="1.0"', ("start_time", "1 s")),
+        ('value="25.0"', 'value="fast"', ("'fast'", "Real")),
+        ("</ssd:System>", "", ("not well-formed",)),
     ],
 )
 def test_what_an_archive_cannot_mean_here_is_said_in_one_sentence(
-    feedback, fmus, tmp_path, before, after, says
+    feedback, fmus, tmp_path, before, after, names
 ):
     archive = rewritten(feedback, tmp_path / "changed.ssp", (before, after))
     sentence = problem(archive, fmus)
     assert sentence.startswith(str(archive))
-    assert says in sentence
+    assert mentions(sentence, *names)
 
 
 def test_an_archive_without_a_step_asks_for_one_and_takes_it(feedback, fmus, tmp_path):
@@ -443,7 +443,7 @@ def test_the_step_of_an_archive_of_omsimulator_is_taken(feedback, fmus, tmp_path
 
 def test_an_archive_without_a_stop_time_asks_for_one(feedback, fmus, tmp_path):
     path = rewritten(feedback, tmp_path / "endless.ssp", ('stopTime="0.6"', ""))
-    assert golden_in(problem(path, fmus))
+    assert mentions(problem(path, fmus), "archive", "stop", "time")
     assert make_plan(load_scenario(path, changes=changed(stop_time=0.2)), fmus=fmus).n_steps == 200
 
 
@@ -474,7 +474,7 @@ def test_entities_are_not_expanded_and_no_file_is_read_for_them(feedback, fmus, 
         ("<ssd:SystemStructureDescription ", declared),
         ('<ssv:Real value="25.0" unit="m/s"/>', "&e;"),
     )
-    assert golden_in(problem(path, fmus))
+    assert mentions(problem(path, fmus), "has no value")
 
 
 @pytest.mark.parametrize("content", [b"", b"no zip", b"PK\x03\x04 cut off"])
@@ -482,9 +482,9 @@ def test_what_is_no_archive_is_said_in_one_sentence(tmp_path, fmus, content):
     archive = tmp_path / "broken.ssp"
     archive.write_bytes(content)
     assert problem(archive, fmus).startswith(f"{archive}: ")
-    assert golden(problem(tmp_path / "missing.ssp", fmus))
+    assert mentions(problem(tmp_path / "missing.ssp", fmus), "missing.ssp", "archive")
 
 
 def test_an_archive_that_lacks_its_description_is_refused(feedback, fmus, tmp_path):
     archive = rewritten(feedback, tmp_path / "empty.ssp", without=(DESCRIPTION_FILE,))
-    assert golden_in(problem(archive, fmus))
+    assert mentions(problem(archive, fmus), "SystemStructure.ssd")

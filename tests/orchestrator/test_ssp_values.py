@@ -19,7 +19,7 @@ from orchestrator.scenario.loader import load_scenario
 from orchestrator.scenario.ssp_archive import SSC, SSD, SSM, SSV
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
-from tests.sentences import texts_of
+from tests.refusals import texts_of
 
 from . import models3
 from .conftest import compiled

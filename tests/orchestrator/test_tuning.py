@@ -13,7 +13,7 @@ from orchestrator.cli import main
 from orchestrator.experiments.ranking import EntriesSpec
 from orchestrator.scenario import yaml_lines
 from orchestrator.scenario.schema_validation import validate
-from tests.sentences import golden, golden_in
+from tests.refusals import mentions
 
 SCENARIO = """
 title: A steering wheel
@@ -81,7 +81,7 @@ def test_the_least_of_all_trials_is_found_written_down_and_not_sought_twice(yawb
         assert float(row["objective"]) == pytest.approx(wanted, rel=1e-6, abs=1e-15)
     best = min(trials, key=lambda row: float(row["objective"]))
     assert float(best["driver.amplitude"]) == pytest.approx(1.719, abs=0.5)
-    assert golden_in(out)
+    assert mentions(out, "driver.amplitude", "1.74 deg")
     written = yaml_lines.read(tmp_path / "out/entries.yaml", what="file of entries")
     assert validate(EntriesSpec, written).edited == ""
     (entry,) = YAML(typ="safe").load((tmp_path / "out/entries.yaml").read_text())["entries"].items()
@@ -89,11 +89,11 @@ def test_the_least_of_all_trials_is_found_written_down_and_not_sought_twice(yawb
     wanted = {"title": "tuned big wheel", "fmu": "driver_sine", "gains": "tuned", "parameters": made}
     source = entry[1].pop("source")
     assert entry == ("big_wheel_tuned", wanted)
-    assert golden(source)
+    assert mentions(source, "tuning.yaml", "10 trials", "seed 2", "1.36e-07", "0.0003239")
     found = json.loads((tmp_path / "out/experiment.json").read_text())
     assert [*found["runs"]] == ["turned"]
     page = html.fromstring((tmp_path / "out/report.html").read_text())
-    assert golden_in(page.text_content())
+    assert mentions(page.text_content(), "5", "2 trials", "seed 2")
     before = (tmp_path / "out/trials.csv").read_bytes()
     runs = (tmp_path / "out/runs.jsonl").read_bytes()
     status, out, told = yawbench()
@@ -102,22 +102,22 @@ def test_the_least_of_all_trials_is_found_written_down_and_not_sought_twice(yawb
 
 
 @pytest.mark.parametrize(
-    ("wrong", "sentence"),
+    ("wrong", "names"),
     [
-        ({"objective: miss": "objective: mist"}, "there is no derived number 'mist'; did you mean 'miss'"),
-        ({"runs: [turned]": "runs: [burned]"}, "no run is named 'burned'; did you mean 'turned'"),
-        ({"from: 0.5, to: 5": "values: [1, 2]"}, "axes.angle: needs from and to, and no count"),
-        ({"entries: driver": "entries: wheel"}, "'big wheel' also changes driver"),
-        ({"swap: {driver: driver_sine}": "stop_time: 1"}, "'big wheel' also changes stop_time"),
-        ({"      swap: {driver: driver_sine}\n": ""}, "'big wheel' names no FMU for it"),
-        ({"population: 5": "population: 3"}, "tuning.population"),
-        ({"tuning:": "axes: {a: {vary: driver.amplitude, values: [1]}}\ntuning:"}, "has axes of its own"),
+        ({"objective: miss": "objective: mist"}, ("'mist'", "'miss'")),
+        ({"runs: [turned]": "runs: [burned]"}, ("'burned'", "'turned'")),
+        ({"from: 0.5, to: 5": "values: [1, 2]"}, ("axes.angle", "count")),
+        ({"entries: driver": "entries: wheel"}, ("'big wheel'", "changes", "driver")),
+        ({"swap: {driver: driver_sine}": "stop_time: 1"}, ("'big wheel'", "stop_time")),
+        ({"      swap: {driver: driver_sine}\n": ""}, ("'big wheel'",)),
+        ({"population: 5": "population: 3"}, ("tuning.population",)),
+        ({"tuning:": "axes: {a: {vary: driver.amplitude, values: [1]}}\ntuning:"}, ("axes",)),
     ],
 )
-def test_what_is_wrong_with_a_tuning_file_is_said_before_anything_runs(yawbench, wrong, sentence):
+def test_what_is_wrong_with_a_tuning_file_is_said_before_anything_runs(yawbench, wrong, names):
     status, out, told = yawbench(**wrong)
     assert (status, out) == (2, "")
-    assert sentence in told
+    assert mentions(told, *names)
 
 
 def test_other_commands_say_what_a_tuning_file_is_for_and_tune_what_it_is_not(yawbench):
@@ -128,4 +128,4 @@ def test_other_commands_say_what_a_tuning_file_is_for_and_tune_what_it_is_not(ya
         assert "`yawbench tune`" in told
     status, _, told = yawbench(**{TUNING.partition("tuning:")[2]: "", "tuning:": ""})
     assert (status, told.count("\n")) == (2, 1)
-    assert golden_in(told)
+    assert mentions(told, "'tuning'")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import yawbench as yb
-from tests.sentences import golden_in, refused
+from tests.refusals import mentions, refused
 
 
 class Proportional:
@@ -56,9 +56,9 @@ def test_every_row_is_what_the_run_alone_comes_to(base, runs):
 def test_a_metric_is_drawn_over_an_axis_with_a_line_per_level(runs):
     (axes,) = runs.plot("peak(sideslip)", x="plant.initial_speed", lines="controller").axes
     assert [line.get_xdata().tolist() for line in axes.get_lines()] == [[54.0, 90.0], [54.0, 90.0]]
-    with refused(yb.ScenarioError, "argument-invalid"):
+    with refused(yb.ScenarioError, "argument-invalid", names=("'controller'", "axis", "figure")):
         runs.plot("peak(sideslip)", x="plant.initial_speed")
-    with refused(yb.ScenarioError, "metric-unknown"):
+    with refused(yb.ScenarioError, "metric-unknown", names=("'peak(sideslp)'", "'peak(sideslip)'")):
         runs.plot("peak(sideslp)", x="plant.initial_speed", lines="controller")
 
 
@@ -82,40 +82,40 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_others_are_made(base)
 
     made = yb.experiment(base, {"controller": [careless, "controller_off"]}).run(workers=1, keep=False)
     assert made.table["status"].tolist() == ["failed", "completed"]
-    assert golden_in(made.table["reason"][0])
+    assert mentions(made.table["reason"][0], "float", "division", "zero")
     assert made.runs is None
 
 
 @pytest.mark.parametrize(
-    ("axes", "said"),
+    ("axes", "names"),
     [
-        ({"controlller": ["a"]}, "the scenario has no instance 'controlller'; did you mean 'controller'"),
-        ({"driver.amplitude": []}, "axes.driver.amplitude.values: has no values"),
+        ({"controlller": ["a"]}, ("'controlller'", "'controller'")),
+        ({"driver.amplitude": []}, ("axes.driver.amplitude.values", "values")),
         (
             {"driver.amplitude": ["1 deg", 2]},
-            "driver.amplitude: give all levels in the same unit, or all without",
+            ("driver.amplitude", "levels", "unit"),
         ),
-        ({"driver.amplitude": ["1.2.3 deg"]}, "'1.2.3 deg': give plain numbers, and their unit"),
-        ({"driver.amplitde": [1, 2]}, "has no parameter 'amplitde'; did you mean 'amplitude'"),
-        ({"driver.amplitude": 1}, r"driver.amplitude: must be a list of levels \(got 1\)"),
-        ({"controller": "controller_off"}, "controller: must be a list of levels"),
-        ({"driver.amplitude": ["0.01", "0.02"]}, "driver.amplitude: give numbers, .* as such, not as text"),
-        ({"driver.amplitude": np.ones((2, 2))}, r"driver.amplitude\[0\]: must be a number"),
+        ({"driver.amplitude": ["1.2.3 deg"]}, ("'1.2.3 deg'", "plain", "numbers")),
+        ({"driver.amplitde": [1, 2]}, ("'amplitde'", "'amplitude'")),
+        ({"driver.amplitude": 1}, ("driver.amplitude", "1")),
+        ({"controller": "controller_off"}, ("controller", "list", "levels")),
+        ({"driver.amplitude": ["0.01", "0.02"]}, ("driver.amplitude", "numbers", "text")),
+        ({"driver.amplitude": np.ones((2, 2))}, ("driver.amplitude", "0")),
         (
             {"controller": [Proportional(), Proportional()]},
-            "controller: two levels have the name 'Proportional'",
+            ("controller", "'Proportional'"),
         ),
     ],
 )
-def test_what_is_wrong_is_said_before_any_run_is_made(base, axes, said):
-    with pytest.raises(yb.ScenarioError, match=said):
+def test_what_is_wrong_is_said_before_any_run_is_made(base, axes, names):
+    with refused(yb.ScenarioError, names=names):
         yb.experiment(base, axes).run()
 
 
 def test_levels_without_end_and_workers_that_are_no_number_are_refused(base):
-    with refused(yb.ScenarioError, "argument-invalid"):
+    with refused(yb.ScenarioError, "argument-invalid", names=("driver.amplitude", "100,000")):
         yb.experiment(base, {"driver.amplitude": itertools.count(0.01, 0.01)})
-    with refused(TypeError):
+    with refused(TypeError, names=("workers", "'x'")):
         yb.experiment(base, {"driver.amplitude": [0.02]}).run(workers="x")
 
 
