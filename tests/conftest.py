@@ -18,8 +18,6 @@ from orchestrator.workers import default_workers
 from tests.commands import status_of
 from tests.fmu_copies import put_fmus
 
-pytest_plugins = ["tests.sentences"]
-
 TESTS = Path(__file__).parent
 LONGEST_FIRST = (
     *("scenarios", "trials", "pages", "docs", "orchestrator", "yawbench", "fmus"),

@@ -15,7 +15,7 @@ from orchestrator.commands.build import build
 from orchestrator.errors import BuildError
 from orchestrator.safe_files import claim
 from orchestrator.workers import Pool
-from tests.sentences import golden, golden_in
+from tests.refusals import each_mentions, mentions
 
 APP = typer.Typer()
 APP.command()(build)
@@ -28,7 +28,7 @@ def run(*arguments):
 def test_it_builds_what_is_named_and_says_so_on_stderr(tmp_path):
     done = run("controller_off", "driver_sine", "--out", tmp_path)
     assert (done.exit_code, done.stdout) == (0, "")
-    assert golden(done.stderr)
+    assert each_mentions(done.stderr, ("controller_off", "built"), ("driver_sine", "built"))
     assert {file.name for file in tmp_path.iterdir()} == {"controller_off.fmu", "driver_sine.fmu"}
 
 
@@ -42,13 +42,13 @@ class Backwards(Pool):
 def test_it_names_what_is_built_in_the_order_asked_for_whichever_takes_longer(tmp_path, monkeypatch):
     monkeypatch.setattr("fmus.build.Pool", Backwards)
     done = run("controller_off", "driver_sine", "--out", tmp_path)
-    assert golden(done.stderr)
+    assert each_mentions(done.stderr, ("controller_off", "built"), ("driver_sine", "built"))
 
 
 def test_it_builds_nothing_twice_unless_forced(tmp_path):
     run("controller_off", "driver_sine", "--out", tmp_path)
-    assert golden(run("controller_off", "driver_sine", "--out", tmp_path).stderr)
-    assert golden(run("driver_sine", "--out", tmp_path, "--force").stderr)
+    assert each_mentions(run("controller_off", "driver_sine", "--out", tmp_path).stderr, ("2", "date"))
+    assert each_mentions(run("driver_sine", "--out", tmp_path, "--force").stderr, ("driver_sine", "built"))
 
 
 @pytest.mark.exhaustive
@@ -61,7 +61,7 @@ def test_it_builds_everything_by_default(tmp_path):
 def test_a_name_that_is_no_component_is_wrong_input(tmp_path):
     done = run("driver_sin", "--out", tmp_path)
     assert done.exit_code == 2
-    assert golden_in(" ".join(done.stderr.replace("│", " ").split()))
+    assert mentions(" ".join(done.stderr.replace("│", " ").split()), "'driver_sin'", "component")
 
 
 def test_a_python_file_from_anywhere_can_be_named(tmp_path):
@@ -73,7 +73,7 @@ def test_a_python_file_from_anywhere_can_be_named(tmp_path):
     )
     done = run(file, "--out", tmp_path / "out")
     assert done.exit_code == 0
-    assert golden(done.stderr)
+    assert each_mentions(done.stderr, ("controller_zero", "controller_zero.py"))
     assert (tmp_path / "out" / "controller_zero.fmu").exists()
 
 
@@ -87,7 +87,7 @@ def test_a_component_that_cannot_be_built_ends_with_status_1_and_one_sentence(tm
     command = [sys.executable, "-m", "orchestrator.cli", "build", str(file), "--out", str(tmp_path / "out")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 1
-    assert golden_in(done.stderr)
+    assert mentions(done.stderr, "standard", "library")
     assert done.stderr.count("\n") == 1
     assert "Traceback" not in done.stderr
 
@@ -97,7 +97,7 @@ def test_without_a_compiler_it_warns(tmp_path, monkeypatch):
     done = run("controller_off", "--out", tmp_path)
     assert done.exit_code == 0
     assert "warning: " in done.stderr
-    assert golden_in(done.stderr)
+    assert mentions(done.stderr, "no-such-compiler", "compiler")
 
 
 @pytest.mark.parametrize("what", ["orchestrator.commands.build", "orchestrator.cli"])

@@ -16,7 +16,7 @@ from fmus.build import build_component, find_components
 from orchestrator.commands.new import begin
 from tests.fmus.bare import ERROR, OK, Fmu, Refused, Unit
 from tests.fmus.plausible import plausible
-from tests.sentences import golden
+from tests.refusals import each_mentions, mentions
 
 IN_C = "a unit in C"
 H = 0.002
@@ -26,7 +26,6 @@ pytestmark = [
     pytest.mark.parametrize("runs_as", ["native", "python"]),
     pytest.mark.parametrize("name", [IN_C, *find_components()]),
     pytest.mark.sampled(12),
-    pytest.mark.same_sentences("name", "runs_as"),
 ]
 
 
@@ -107,7 +106,7 @@ def test_another_guid_is_refused_with_a_sentence(fmu_of, name, runs_as):
         for fmu.guid in ("", "{00000000-0000-0000-0000-000000000000}", right[:-1], right + " "):
             with pytest.raises(Refused) as caught:
                 Unit(fmu)
-            assert golden(caught.value)
+            assert mentions(caught.value, "fmi2Instantiate", "status 3", "GUID")
     finally:
         fmu.guid = right
     Unit(fmu).free()
@@ -124,7 +123,17 @@ def test_calls_out_of_order_are_refused_and_change_nothing(unit):
     unit.step(0.0, H)
     unit.do("fmi2Terminate")
     said += [step_refused(unit, H), refusal(unit, "fmi2Terminate")]
-    assert golden(said)
+    assert each_mentions(
+        said,
+        ("fmi2DoStep", "initialization"),
+        ("fmi2ExitInitializationMode", "initialization"),
+        ("fmi2DoStep", "initialization"),
+        ("fmi2EnterInitializationMode", "initialization"),
+        ("fmi2SetupExperiment", "initialization"),
+        ("fmi2SetupExperiment", "initialization"),
+        ("fmi2DoStep", "fmi2Terminate"),
+        ("fmi2Terminate",),
+    )
     unit.outputs()
     unit.do("fmi2Reset")
     started(unit)
@@ -136,16 +145,23 @@ def test_a_step_that_is_not_positive_or_longer_than_a_day_is_refused(unit, h):
     started(unit)
     unit.step(0.0, H)
     before = unit.outputs()
-    assert golden(step_refused(unit, H, h))
+    assert mentions(step_refused(unit, H, h), "fmi2DoStep", "86400 s", f"{h:g} s")
     assert (reached(unit), unit.outputs()) == (H, before)
     unit.step(H, H)
 
 
 def test_a_step_from_another_time_than_the_one_reached_is_refused(unit):
     started(unit, 0.5)
-    assert golden([step_refused(unit, t) for t in (0.0, 0.5 - H, 0.5 + H, math.nan, math.inf)])
+    assert each_mentions(
+        [step_refused(unit, t) for t in (0.0, 0.5 - H, 0.5 + H, math.nan, math.inf)],
+        ("fmi2DoStep", "0 s", "0.5 s"),
+        ("fmi2DoStep", "0.498 s", "0.5 s"),
+        ("fmi2DoStep", "0.502 s", "0.5 s"),
+        ("fmi2DoStep", "0.5 s"),
+        ("fmi2DoStep", "0.5 s"),
+    )
     unit.step(0.5, H)
-    assert golden(step_refused(unit, 0.5))
+    assert mentions(step_refused(unit, 0.5), "fmi2DoStep", "0.5 s", "0.502 s")
     unit.step(0.5 + H, H)
 
 
@@ -166,7 +182,7 @@ def test_no_step_leads_beyond_the_stop_time(unit):
     started(unit, 0.0, 3 * H)
     for k in range(3):
         unit.step(k * H, H)
-    assert golden(step_refused(unit, 3 * H))
+    assert mentions(step_refused(unit, 3 * H), "fmi2DoStep", "0.008 s", "0.006 s")
     assert reached(unit) == 3 * H
 
 
@@ -185,7 +201,7 @@ def test_the_time_reached_is_saved_and_restored_with_the_state(unit):
     unit.do("fmi2Reset")
     unit.restore(saved)
     unit.step(H, H)
-    assert golden(step_refused(unit, 2 * H, 4 * H))
+    assert mentions(step_refused(unit, 2 * H, 4 * H), "fmi2DoStep", "0.012 s", "0.01 s")
 
 
 UNSUPPORTED = {
@@ -203,7 +219,18 @@ UNSUPPORTED = {
 def test_functions_that_are_not_supported_are_answered_alike_and_change_nothing(unit):
     said = [refusal(unit, name, *arguments) for name, arguments in UNSUPPORTED.items()]
     said.append(step_refused(unit, 0.0))  # still, as no call so far counts as a failure of the instance
-    assert golden(said)
+    assert each_mentions(
+        said,
+        ("fmi2GetDirectionalDerivative", "supported"),
+        ("fmi2SetRealInputDerivatives", "supported"),
+        ("fmi2GetRealOutputDerivatives", "supported"),
+        ("fmi2CancelStep", "supported"),
+        ("fmi2GetStatus", "supported"),
+        ("fmi2GetIntegerStatus", "supported"),
+        ("fmi2GetBooleanStatus", "supported"),
+        ("fmi2GetStringStatus", "supported"),
+        ("fmi2DoStep", "initialization"),
+    )
     started(unit)
     refusal(unit, "fmi2CancelStep")
     said = step_refused(unit, 0.5)
@@ -217,7 +244,13 @@ def test_a_start_time_that_is_not_finite_or_far_from_zero_is_refused(unit):
         refusal(unit, "fmi2SetupExperiment", 0, ctypes.c_double(0), ctypes.c_double(t), *no_stop)
         for t in (math.nan, math.inf, -math.inf, 1e300)
     ]
-    assert golden(said)
+    assert each_mentions(
+        said,
+        ("fmi2SetupExperiment", "1e+12 s", "nan s"),
+        ("fmi2SetupExperiment", "1e+12 s", "inf s"),
+        ("fmi2SetupExperiment", "1e+12 s", "-inf s"),
+        ("fmi2SetupExperiment", "1e+12 s", "1e+300 s"),
+    )
     started(unit)
 
 
@@ -262,7 +295,7 @@ def test_only_whole_states_of_the_same_fmu_are_deserialized(unit, fmu_of, name, 
         size = ctypes.c_size_t(len(wrong))
         said.append(refusal(unit, "fmi2DeSerializeFMUstate", wrong, size, ctypes.byref(place)))
         assert not place
-    assert golden(sorted(set(said)))
+    assert each_mentions(sorted(set(said)), ("fmi2DeSerializeFMUstate", "state"))
     unit.restore(unit.from_bytes(content))
     unit.step(0.0, H)
 
@@ -287,7 +320,24 @@ def test_pointers_that_are_null_are_refused_with_a_sentence(unit):
         ("fmi2GetRealStatus", LAST_SUCCESSFUL_TIME, None),
         ("fmi2SetDebugLogging", 1, n, None),
     ]
-    assert golden([refusal(unit, *call) for call in calls])
+    assert each_mentions(
+        [refusal(unit, *call) for call in calls],
+        ("fmi2GetReal", "references", "values"),
+        ("fmi2GetReal", "references", "values"),
+        ("fmi2SetReal", "references", "values"),
+        ("fmi2SetReal", "references", "values"),
+        ("fmi2GetFMUstate", "place", "state"),
+        ("fmi2SetFMUstate", "state"),
+        ("fmi2SerializedFMUstateSize", "state", "place"),
+        ("fmi2SerializedFMUstateSize", "state", "place"),
+        ("fmi2SerializeFMUstate", "place", "bytes"),
+        ("fmi2SerializedFMUstateSize", "state", "place"),
+        ("fmi2SerializeFMUstate", "place", "bytes"),
+        ("fmi2DeSerializeFMUstate", "bytes", "place"),
+        ("fmi2DeSerializeFMUstate", "bytes", "place"),
+        ("fmi2GetRealStatus", "place", "value"),
+        ("fmi2SetDebugLogging", "categories"),
+    )
     assert unit.call("fmi2FreeFMUstate", None) == OK
     unit.forget(state)
     started(unit)

@@ -10,7 +10,7 @@ import pytest
 from orchestrator.errors import ResultsError
 from orchestrator.evaluation.braking_and_wind import evaluate_braking, evaluate_side_wind
 from orchestrator.evaluation.trace import Trace
-from tests.sentences import golden, golden_in
+from tests.refusals import each_mentions, mentions
 
 from .test_sine_with_dwell import as_sampled
 
@@ -69,11 +69,11 @@ def test_without_a_pedal_the_deceleration_tells_the_beginning_and_a_moving_car_h
     assert evaluate_braking(made)["begin"] == pytest.approx(BEGIN, abs=0.0011)
     early = evaluate_braking(braked(even, last=4.0))
     assert early["distance"] is None
-    assert golden(list(map(str, early.diagnostics)))
+    assert each_mentions(list(map(str, early.diagnostics)), ("4.00 s", "18 km/h", "car"))
     del made.signals["acceleration_x"]
-    assert golden_in(str(evaluate_braking(made).diagnostics[0]))
+    assert mentions(str(evaluate_braking(made).diagnostics[0]), "drive_force", "acceleration_x")
     free = braked(even, drive_force=np.zeros(7000))
-    assert golden(list(map(str, evaluate_braking(free).diagnostics)))
+    assert each_mentions(list(map(str, evaluate_braking(free).diagnostics)), ("car",))
     del made.signals["yaw_rate"]
     with pytest.raises(ResultsError, match="yaw_rate"):
         evaluate_braking(made)
@@ -138,6 +138,8 @@ def test_a_gust_gives_deviation_and_peaks_of_its_closed_forms(sampling):
     assert judged["acceleration_y"] == pytest.approx(-1.5, rel=1e-3)
     assert judged["sideslip"] is None
     signals["steering_wheel_angle"] += 0.1 * s
-    assert golden_in(str(evaluate_side_wind(Trace("gust", t, signals)).diagnostics[0]))
+    assert mentions(
+        str(evaluate_side_wind(Trace("gust", t, signals)).diagnostics[0]), "hand", "wheel", "held"
+    )
     calm = Trace("calm", t, signals | {"wind_force_y": np.zeros_like(t)})
-    assert golden(list(map(str, evaluate_side_wind(calm).diagnostics)))
+    assert each_mentions(list(map(str, evaluate_side_wind(calm).diagnostics)), ("side", "wind"))

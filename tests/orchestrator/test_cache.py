@@ -13,7 +13,7 @@ from orchestrator.cache import STORES, cache_folder, keep, recall
 from orchestrator.cli import main
 from orchestrator.fmu.archive import open_fmu
 from orchestrator.safe_files import write_whole
-from tests.sentences import golden, golden_in, refused
+from tests.refusals import each_mentions, mentions, refused
 
 from .fake_fmus import make_fmu
 
@@ -72,7 +72,7 @@ def test_a_file_that_cannot_be_put_in_place_leaves_what_stood_there(tmp_path, mo
         raise OSError(5, "Input/output error")
 
     monkeypatch.setattr(os, "fsync", refuse)
-    with refused(OSError):
+    with refused(OSError, names=("[Errno 5]", "Input/output", "a")):
         write_whole(file, b"new")
     assert file.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [file]
@@ -81,22 +81,24 @@ def test_a_file_that_cannot_be_put_in_place_leaves_what_stood_there(tmp_path, mo
 def test_show_tells_what_there_is_and_touches_nothing(full, capsys):
     before = sorted(full.rglob("*"))
     out, _ = told(capsys)
-    assert golden(out.splitlines()[:4])  # fmt: skip
+    assert each_mentions(
+        out.splitlines()[:4], ("cache",), ("0.0 MB", "unpacked"), ("1", "0.0 MB"), ("0.0 MB", "left")
+    )
     assert sorted(full.rglob("*")) == before
 
 
 def test_verify_deletes_what_is_damaged_and_nothing_else(full, capsys):
-    assert golden(told(capsys, "verify")[1])
+    assert each_mentions(told(capsys, "verify")[1], ("entry",))
     (launcher,) = full.glob("launcher/*")
     launcher.write_bytes(b"a laun")
     (table,) = full.glob("*/fmu/resources/table.txt")
     table.write_bytes(b"9 2 3")
     out, err = told(capsys, "verify")
-    assert golden_in(out)
+    assert mentions(out, "0.0 MB", "1 deleted", "unpacked", "deleted")
     assert err == "damaged: 2\n"
     assert not launcher.exists()
     assert not table.exists()
-    assert golden(told(capsys, "verify")[1])
+    assert each_mentions(told(capsys, "verify")[1], ("entry",))
 
 
 def test_clear_deletes_what_is_ours(full, capsys):
@@ -148,7 +150,7 @@ def test_nothing_is_deleted_while_another_command_uses_the_cache(full, tmp_path,
         with pytest.raises(SystemExit) as ended:
             main(["cache", "clear"])
         assert ended.value.code == 1
-        assert golden_in(capsys.readouterr().err)
+        assert mentions(capsys.readouterr().err, "cache", "command")
         assert sorted(full.rglob("*")) == before
         told(capsys, "show")
         user.communicate()

@@ -13,7 +13,7 @@ import pytest
 import yawbench as yb
 from orchestrator.errors import ScenarioError
 from orchestrator.scenario import loader
-from tests.sentences import golden, refused
+from tests.refusals import mentions, refused
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 NAME = "fuzzy_feedback/single_sine"
@@ -35,7 +35,7 @@ def test_a_scenario_that_comes_along_is_run_by_its_name_from_any_folder(yawbench
 def test_every_command_that_takes_a_scenario_takes_a_name(yawbench):
     status, text, _ = yawbench("check", NAME)
     assert status == 0
-    assert golden(text.splitlines()[-1])
+    assert mentions(text.splitlines()[-1], "No errors")
     assert yawbench("export-ssp", NAME)[0] == 0
     assert yawbench("list", "signals", NAME)[0] == 0
     assert yawbench("plot", NAME, "--panel", "yaw_rate", "--set", "stop_time=0.01")[0] == 0
@@ -57,7 +57,11 @@ def test_the_nearest_folder_of_scenarios_comes_before_the_one_that_comes_along(t
 def test_the_library_knows_the_names_that_the_commands_know(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert yb.load(NAME).path == SCENARIOS / f"{NAME}.yaml"
-    with refused(ScenarioError, "scenario-unknown"):
+    with refused(
+        ScenarioError,
+        "scenario-unknown",
+        names=("'fuzy_feedback/single_sine'", "'fuzzy_feedback/single_sine'"),
+    ):
         yb.load("fuzy_feedback/single_sine")
 
 
@@ -87,9 +91,9 @@ def test_a_vehicle_file_goes_by_its_name_with_or_without_its_folder():
     van = loader.find("van", "a vehicle file")
     assert van == loader.find("vehicles/van", "a vehicle file")
     assert van.samefile(SCENARIOS / "vehicles" / "van.yaml")
-    with refused(ScenarioError, "scenario-unknown"):
+    with refused(ScenarioError, "scenario-unknown", names=("'large_salon'", "'large_saloon'")):
         loader.find("large_salon", "a vehicle file")
-    with refused(ScenarioError, "scenario-unknown"):
+    with refused(ScenarioError, "scenario-unknown", names=("'25mps'", "fnn_sideslip/25mps")):
         loader.find("25mps", "a scenario")
 
 

@@ -18,7 +18,7 @@ from orchestrator import cli
 from orchestrator.cli import COMMANDS, _application, main
 from orchestrator.errors import Interrupted, ScenarioError
 from orchestrator.messages import printable
-from tests.sentences import golden
+from tests.refusals import each_mentions, mentions
 
 
 def say(capsys, *arguments):
@@ -55,11 +55,20 @@ def test_an_error_of_the_program_itself_is_a_sentence_that_says_so(
         cli.main([])
     said = capsys.readouterr().err
     assert ended.value.code == 1
-    assert golden(said)
+    assert each_mentions(said, ("ZeroDivisionError", "test_cli.py:51", "YAWBENCH_TRACEBACK", "1 shows"))
     monkeypatch.setenv(cli.TRACEBACK, "1")
     with pytest.raises(SystemExit):
         cli.main([])
-    assert golden(re.sub(r"line \d+", "line *", capsys.readouterr().err))
+    assert each_mentions(
+        re.sub(r"line \d+", "line *", capsys.readouterr().err),
+        ("recent", "call", "Traceback"),
+        ("cli.py", "_status"),
+        ("_application", "arguments"),
+        ("test_cli.py", "line", "broken"),
+        ("ZeroDivisionError", '"\\x1b[31mof all things"'),
+        ("ZeroDivisionError",),
+        ("ZeroDivisionError", "test_cli.py:51"),
+    )
 
 
 PROGRAM = Path(sys.executable).with_name("yawbench")
@@ -72,7 +81,7 @@ def test_a_full_disk_behind_the_output_is_a_sentence_and_no_success():
             [PROGRAM, "list", "metrics"], stdout=full, stderr=subprocess.PIPE, text=True, env=BUFFERED
         )
     assert done.returncode == 1
-    assert golden(done.stderr)
+    assert each_mentions(done.stderr, ("space", "left", "device"))
 
 
 def test_a_reader_who_has_seen_enough_is_told_nothing():
@@ -176,4 +185,14 @@ def test_a_choice_that_does_not_exist_is_told_with_those_that_do(capsys):
     with pytest.raises(SystemExit) as end:
         main(["list", "foo"])
     assert end.value.code == 2
-    assert golden(capsys.readouterr().err.splitlines()[-1])
+    assert mentions(
+        capsys.readouterr().err.splitlines()[-1],
+        "'WHAT'",
+        "'foo'",
+        "'runs'",
+        "'scenarios'",
+        "'fmus'",
+        "'vehicles'",
+        "'signals'",
+        "'metrics'",
+    )

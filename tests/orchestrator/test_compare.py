@@ -26,7 +26,7 @@ from orchestrator.figures.style import save
 from orchestrator.metrics.expressions import MetricValue
 from orchestrator.pages.comparison import BEST, comparison_facts, metric_table
 from tests.changed import changed
-from tests.sentences import golden, refused
+from tests.refusals import each_mentions, refused
 
 from .recorded import car, write
 
@@ -100,7 +100,7 @@ def test_a_file_whose_name_holds_a_comma_is_one_fmu(scenario, tmp_path):
 def test_an_fmu_may_bring_parameters_and_so_be_compared_with_itself(scenario):
     heavier = changed(settings=["plant.mass=2"])
     jobs = variants(scenario, ["controller=a,a:law=sign:gain=2,b"], heavier)
-    assert golden([job.label for job in jobs])
+    assert [job.label for job in jobs] == ["a", "a law=sign gain=2", "b"]
     assert [given(job) for job in jobs] == [
         {"controller": "a"},
         {"controller": "a", "controller.law": "sign", "controller.gain": 2},
@@ -127,17 +127,23 @@ def test_parameters_alone_set_the_scenarios_own_fmu_against_itself(scenario):
 
 
 def test_a_comparison_with_itself_is_an_error(scenario):
-    with refused(ScenarioError, "option-invalid"):
+    with refused(ScenarioError, "option-invalid", names=("--swap controller=a", "compare", "controller")):
         labels(scenario, "controller=controller_fnn")
 
 
 def test_a_unit_that_does_not_exist_is_named_with_the_likely_one(scenario):
-    with refused(ScenarioError, "instance-unknown"):
+    with refused(
+        ScenarioError,
+        "instance-unknown",
+        names=("--swap controler=controller_off", "'controler'", "'controller'"),
+    ):
         labels(scenario, "controler=controller_off")
 
 
 def test_an_option_without_an_fmu_is_an_error(scenario):
-    with refused(ScenarioError, "option-invalid"):
+    with refused(
+        ScenarioError, "option-invalid", names=("--swap controller", "--swap INSTANCE=FMU", "controller")
+    ):
         labels(scenario, "controller")
 
 
@@ -165,7 +171,14 @@ def findings(tmp_path):
 def test_the_table_has_a_row_per_metric_and_a_column_per_run(findings):
     table = comparison_table(findings)
     assert table.headings == ["metric", "", "off", "fnn", "broken"]
-    assert golden(table.text()[0])  # fmt: skip
+    assert each_mentions(
+        table.text()[0],
+        ("Sideslip", "angle", "relative"),
+        ("β_ref", "max"),
+        ("140 %",),
+        ("2.00 %",),
+        ("failed",),
+    )
 
 
 def test_a_run_that_failed_is_named_and_the_others_are_drawn(findings, tmp_path, monkeypatch):

@@ -15,7 +15,7 @@ from orchestrator.experiments.executor import Executor, highest_passing, runner_
 from orchestrator.experiments.experiment import NamedRun, experiment_of
 from orchestrator.experiments.jobs import MeasuredRun, Outcome, run_job
 from orchestrator.plan import Override
-from tests.sentences import golden
+from tests.refusals import mentions
 
 from .test_repeats import SCENARIO
 
@@ -168,7 +168,7 @@ def test_plans_that_cannot_be_stored_are_one_sentence(executor, tmp_path, monkey
     execute, _ = executor()
     with execute, pytest.raises(ResultsError) as error:
         execute.plans(named_runs(tmp_path))
-    assert golden(str(error.value).replace(str(tmp_path), "FOLDER"))
+    assert mentions(error.value, tmp_path / "missing", "TMPDIR")
 
 
 def found_by(passing, **bounds):

@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.results.reader import load_results
-from tests.sentences import golden, golden_in
+from tests.refusals import mentions
 
 from . import models3
 from .conftest import compiled
@@ -125,7 +125,7 @@ def test_a_value_on_a_wire_that_a_type_cannot_hold_ends_the_run(run, isolate):
     units = {"a": ("Every", {}), "b": ("Every", {})}
     status, said, _ = run(units, *isolate, inputs=constants, connections=wires)
     assert status == 1
-    assert golden_in(said)
+    assert mentions(said, "b:", "0 s", "1000")
 
 
 REST = EVERY | {"String": "", "mode": "dry"}
@@ -185,15 +185,27 @@ def test_an_integer_that_feeds_a_real_is_coupled_alike_by_both_loops(run, tmp_pa
 
 @mostly_together
 @pytest.mark.parametrize(
-    ("wire", "constants", "unit", "time"),
+    ("wire", "constants", "unit", "time", "names"),
     [
-        ({"from": "a.counter", "to": "b.mode_in"}, {}, "b", 1.0),
-        ({"from": "c.Int64_out", "to": "b.Float64_in"}, {"c.Int64_in": 2**53 + 1}, "c", 0.0),
-        ({"from": "c.UInt32_out", "to": "old.Integer_in"}, {}, "old", 0.0),
+        ({"from": "a.counter", "to": "b.mode_in"}, {}, "b", 1.0, ("b:", "mode_in")),
+        (
+            {"from": "c.Int64_out", "to": "b.Float64_in"},
+            {"c.Int64_in": 2**53 + 1},
+            "c",
+            0.0,
+            ("b:", "mode_in"),
+        ),
+        (
+            {"from": "c.UInt32_out", "to": "old.Integer_in"},
+            {},
+            "old",
+            0.0,
+            ("c:", "Int64_out", "9007199254740993", "Real"),
+        ),
     ],
 )
 def test_a_number_that_its_input_cannot_be_ends_the_run(
-    run, tmp_path, library, isolate, wire, constants, unit, time
+    run, tmp_path, library, isolate, wire, constants, unit, time, names
 ):
     old = write_fmu(tmp_path / "foreign.fmu", library, "Integer")
     units = {"a": ("Stair", {}), "b": ("Every", {}), "c": ("Every", {}), "old": (old, {})}
@@ -202,7 +214,7 @@ def test_a_number_that_its_input_cannot_be_ends_the_run(
         inputs["old.Integer_in"] = 0
     status, _, results = run(units, *isolate, inputs=inputs, connections=[wire], stop_time=3)
     assert status == 1
-    assert golden(results.record.error.message)
+    assert mentions(results.record.error.message, unit, *names)
     assert results.record.error.instance == unit
     assert results.record.error.time == pytest.approx(time, abs=0.11)
 
@@ -255,7 +267,7 @@ def test_an_input_with_two_names_has_one_source(run):
     wires = [{"from": "s.x", "to": "m.u[1]"}, {"from": "s.x", "to": "m.force[1]"}]
     status, said, _ = run(units, inputs={"m.u[2]": 0.0}, connections=wires)
     assert status == 2
-    assert golden_in(said)
+    assert mentions(said, "s.yaml:1", "connections[1]", "m.u[1]", "s.x", "connections[0]")
 
 
 @mostly_together
@@ -273,7 +285,7 @@ def test_units_of_both_versions_share_a_scenario(run, tmp_path, library, isolate
 def test_an_fmu_that_wants_to_end_ends_the_run_after_its_last_step(run, isolate):
     status, said, results = run({"a": ("Stair", {})}, *isolate, stop_time=20, step_size=0.5)
     assert status == 0, said
-    assert golden_in(said)
+    assert mentions(said, "9 s", "ended")
     assert (results.time[-1], results["a.counter"][-1]) == (9.0, 10)
     assert results.record.ended.time == 9.0
 
@@ -289,14 +301,14 @@ def test_a_step_from_which_an_fmu_returns_early_is_gone_to_its_end(run, isolate)
 def test_an_fmu_that_returns_early_and_stays_is_an_error(run, isolate):
     status, said, _ = run({"a": ("Stuck", {})}, *isolate)
     assert status == 1
-    assert golden_in(said)
+    assert mentions(said, "a:", "0 s")
 
 
 @mostly_together
 def test_a_parameter_that_does_not_take_ends_the_run(run, isolate):
     status, said, _ = run({"a": ("Deaf", {"parameters": {"k": 2.0}})}, *isolate)
     assert status == 1
-    assert golden_in(said)
+    assert mentions(said, "a:", "k")
 
 
 @together_and_apart
@@ -304,7 +316,7 @@ def test_an_fmu_that_refuses_to_be_instantiated_says_why(run, isolate):
     status, said, _ = run({"a": ("Refusing", {})}, *isolate)
     assert status == 1
     assert "a: " in said
-    assert golden_in(said)
+    assert mentions(said, "Refusing.fmu", "100")
 
 
 @pytest.mark.parametrize(
@@ -332,7 +344,7 @@ def test_other_interfaces_are_refused(run, tmp_path, models, interface, words):
     path = make_fmu(tmp_path, "Dahlquist", models, interface=interface)
     status, said, _ = run({"a": (path, {})})
     assert status == 2
-    assert golden_in(said)
+    assert mentions(said, "FMI", "2.0", "3.0")
 
 
 @mostly_together
@@ -355,7 +367,7 @@ def test_check_shows_arrays_and_their_constants(run):
     shown = [line.split() for line in said.splitlines()]
     assert ["u[1]", "2.5", "scenario", "m"] in shown
     assert ["u[2]", "2.5", "scenario", "m"] in shown
-    assert golden_in(said)
+    assert mentions(said, "No errors")
 
 
 LOOP = [{"from": "m.y[1]", "to": "n.u[1]"}, {"from": "n.y[1]", "to": "m.u[1]", "gain": 0.5}]
@@ -406,15 +418,15 @@ def test_a_delayed_wire_brings_the_value_of_one_communication_step_before(run, a
 
 
 @pytest.mark.parametrize(
-    ("source", "target", "delay", "command"),
+    ("source", "target", "delay", "command", "names"),
     [
-        ("d.x", "m.u[1]", "2 steps", "check"),
-        ("e.Int8_out", "f.Int8_in", "1 step", "check"),
-        (["d", "e"], "m.u[*]", "1 step", "check"),
-        ("d.x", "m.u[1]", "1 step", "export-ssp"),
+        ("d.x", "m.u[1]", "2 steps", "check", ("s.yaml:1", "connections[0].delay", "'1 step'", "'2 steps'")),
+        ("e.Int8_out", "f.Int8_in", "1 step", "check", ("s.yaml:1", "connections[0]", "Real", "f.Int8_in")),
+        (["d", "e"], "m.u[*]", "1 step", "check", ("s.yaml:1", "connections[0]", "instance.variable")),
+        ("d.x", "m.u[1]", "1 step", "export-ssp", ("s.ssp", "m.u[1]")),
     ],
 )
-def test_a_delay_that_cannot_be_is_refused(run, tmp_path, source, target, delay, command):
+def test_a_delay_that_cannot_be_is_refused(run, tmp_path, source, target, delay, command, names):
     units = {"d": ("Dahlquist", {}), "m": ("Matrix", {}), "e": ("Every", {}), "f": ("Every", {})}
     inputs = rest("f.Int8_in" if "f" in target else "", "e.Float64_in", "f.Float64_in", units="ef")
     inputs |= {name: 0.0 for name in ("m.u[1]", "m.u[2]") if name != target}
@@ -422,7 +434,7 @@ def test_a_delay_that_cannot_be_is_refused(run, tmp_path, source, target, delay,
     where = ["--out", str(tmp_path / "s.ssp")] if command == "export-ssp" else []
     status, said, _ = run(units, *where, command=command, inputs=inputs, connections=wires)
     assert status == 2
-    assert golden_in(said.splitlines()[-1])
+    assert mentions(said.splitlines()[-1], *names)
 
 
 def test_check_lists_delays(run):
@@ -431,4 +443,4 @@ def test_check_lists_delays(run):
     status, said, _ = run(FEEDBACK, command="check", inputs=inputs, connections=wires)
     assert status == 0, said
     rows = [line.split() for line in said.splitlines()]
-    assert golden_in(said.splitlines()[rows.index(["n.y[1]", "m.u[1]", "0"]) - 2])
+    assert mentions(said.splitlines()[rows.index(["n.y[1]", "m.u[1]", "0"]) - 2], "step")

@@ -16,7 +16,7 @@ from orchestrator.master.simulate import simulate
 from orchestrator.plan import Fmu, Instance, Plan, Variable, Wire
 from orchestrator.results.reader import load_results
 from orchestrator.signal_names import SignalName
-from tests.sentences import golden, golden_in, refused
+from tests.refusals import each_mentions, mentions, refused
 
 HERE = Path(__file__).parent
 TYPES = ("Real", "Integer", "Boolean", "String")
@@ -92,7 +92,7 @@ def test_a_failed_instance_is_ended_as_the_standard_allows(fmu, held, answer, en
     with pytest.raises(SimulationError) as caught:
         simulate(chain(fmu, answer), tmp_path / "out")
     assert caught.value.code == "fmu-call-failed"
-    assert golden(str(caught.value))
+    assert mentions(str(caught.value), "b:", "0.25 s", "99.5%")
     assert counters(fmu) == ended
     results = load_results(tmp_path / "out")
     assert results.time[-1] == 0.25
@@ -103,7 +103,9 @@ def test_a_failed_instance_is_ended_as_the_standard_allows(fmu, held, answer, en
 
 def test_a_warning_with_printf_arguments_is_readable(fmu, held, tmp_path):
     info = simulate(chain(fmu, 1), tmp_path / "out")
-    assert golden([(m.instance, m.time, m.text) for m in info.warnings])
+    assert each_mentions(
+        [(m.instance, m.time, m.text) for m in info.warnings], ("0.25 valve", "99.5%", "valve", "gedacht")
+    )
     assert counters(fmu) == [2, 2, 2]
 
 
@@ -114,7 +116,7 @@ def test_an_invalid_status_ends_the_run(fmu, answer, isolated, tmp_path):
     with Isolation(plan.instances) as isolation, pytest.raises(SimulationError) as caught:
         simulate(plan, tmp_path / "out", opener=isolation if isolated else open_instance)
     assert caught.value.code == "fmu-call-failed"
-    assert golden_in(str(caught.value))
+    assert mentions(str(caught.value), "b:", "0.25 s")
     assert load_results(tmp_path / "out").time[-1] == 0.25
 
 
@@ -123,7 +125,7 @@ def test_an_invalid_status_ends_the_run(fmu, answer, isolated, tmp_path):
 )
 def test_an_instance_that_cannot_be_ended_is_reported(fmu, held, answer, word, ended, tmp_path):
     info = simulate(chain(fmu, AT_THE_END + answer), tmp_path / "out")
-    assert golden([(m.instance, m.text) for m in info.warnings])
+    assert each_mentions([(m.instance, m.text) for m in info.warnings], ("fmi2Terminate", word))
     assert counters(fmu) == ended  # after Fatal no function of any instance may be called
     assert load_results(tmp_path / "out").record.status == "completed"
 
@@ -131,7 +133,7 @@ def test_an_instance_that_cannot_be_ended_is_reported(fmu, held, answer, word, e
 def test_an_fmu_that_refuses_to_be_instantiated_says_why(fmu, held, tmp_path):
     plan = chain(fmu)
     refusing = replace(plan.instances[1], fmu=replace(fmu, guid="{refuse}"))
-    with refused(SimulationError, "fmu-not-loadable"):
+    with refused(SimulationError, "fmu-not-loadable", names=("b:", "foreign.fmu")):
         simulate(replace(plan, instances=(plan.instances[0], refusing)), tmp_path / "out")
     assert counters(fmu) == [1, 0, 1]
 
@@ -139,14 +141,16 @@ def test_an_fmu_that_refuses_to_be_instantiated_says_why(fmu, held, tmp_path):
 def test_an_fmu_for_other_platforms_only_is_refused(fmu, tmp_path):
     binaries = fmu.directory / "binaries"
     (binaries / fmpy.platform).rename(binaries / "win16")
-    with refused(ModelDescriptionError, "fmu-not-loadable"):
+    with refused(
+        ModelDescriptionError, "fmu-not-loadable", names=("a:", "foreign.fmu", "binaries/linux64/foreign.so")
+    ):
         simulate(chain(fmu), tmp_path / "out")
 
 
 def test_a_file_other_than_a_library_is_refused(fmu, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (fmu.directory / "binaries" / fmpy.platform / "foreign.so").write_bytes(b"no library")
-    with refused(ModelDescriptionError, "fmu-not-loadable"):
+    with refused(ModelDescriptionError, "fmu-not-loadable", names=("a:", "foreign.fmu", "foreign.so")):
         simulate(chain(fmu), "out")
     assert Path.cwd() == tmp_path
     assert load_results("out").record.status == "failed"

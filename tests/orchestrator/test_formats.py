@@ -19,7 +19,7 @@ from orchestrator.results.reader import load_results
 from orchestrator.results.recorder import BLOCK, MemoryRecorder, recorder_of
 from orchestrator.results.run_record import RunRecord
 from tests.fmu_copies import put_fmus
-from tests.sentences import golden, golden_in, refused
+from tests.refusals import mentions, refused
 
 from .fakes import Clock, Function, Stage, make_plan
 from .recorded import car, record_text, write
@@ -148,14 +148,14 @@ def test_a_run_that_fails_keeps_what_it_has_recorded(name, tmp_path):
     with pytest.raises(SimulationError) as error:
         simulate(plan(), tmp_path, opener=Stage(units(fail_at=0.9)), format=name)
     assert error.value.code == "value-not-finite"
-    assert golden(str(error.value.diagnostics[1]))
+    assert mentions(str(error.value.diagnostics[1]), "recorded")
     found = load_results(tmp_path)
     assert found.record.status == "failed"
     assert found.time[-1] == 0.899
 
 
 def test_a_run_in_memory_that_fails_says_nothing_of_files():
-    with refused(SimulationError):
+    with refused(SimulationError, names=("a:", "0.9 s", "a.y", "b.y", "y")):
         simulate_in_memory(plan(), opener=Stage(units(fail_at=0.9)))
 
 
@@ -174,7 +174,7 @@ def test_a_disk_without_room_is_one_sentence_and_keeps_the_earlier_results(name,
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert caught.value.code == "results-unwritable"
-    assert golden_in(str(caught.value.diagnostics[0]))
+    assert mentions(str(caught.value.diagnostics[0]), "File", "large")
     assert "rows that fit" not in str(caught.value)
     assert "recorded until" not in str(caught.value)
     assert len(load_results(tmp_path).time) == 51
@@ -182,13 +182,13 @@ def test_a_disk_without_room_is_one_sentence_and_keeps_the_earlier_results(name,
 
 
 def test_an_unknown_format_names_those_there_are():
-    with refused(ScenarioError, "format-unknown"):
+    with refused(ScenarioError, "format-unknown", names=("--format hdf5", "csv", "parquet", "mf4")):
         recorder_of("hdf5")
 
 
 def test_mdf_without_its_package_says_how_to_get_it(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "asammdf", None)  # importing it is an ImportError
-    with refused(ResultsError, "package-missing"):
+    with refused(ResultsError, "package-missing", names=("ASAM", "MDF", "'yawbench[mdf]'", "asammdf")):
         recorder_of("mf4")
 
 
@@ -196,11 +196,11 @@ def test_mdf_without_its_package_says_how_to_get_it(tmp_path, monkeypatch):
 def test_damaged_files_are_one_sentence(name, tmp_path):
     record(tmp_path, 20, name)
     (tmp_path / FILES[name]).write_bytes(b"neither one nor the other")
-    with refused(ResultsError, "results-unreadable") as error:
+    with refused(ResultsError, "results-unreadable", names=(tmp_path / FILES[name],)) as error:
         load_results(tmp_path)
     assert "\n" not in str(error.value)
     (tmp_path / FILES[name]).unlink()
-    with refused(ResultsError, "results-missing"):
+    with refused(ResultsError, "results-missing", names=("run.json", f"results.{name}")):
         load_results(tmp_path)
 
 
@@ -208,7 +208,11 @@ def test_a_record_that_names_another_file_is_refused(tmp_path):
     folder = write(car(n=5), tmp_path / "run")
     run = json.loads((folder / "run.json").read_text())
     (folder / "run.json").write_text(record_text({**run, "results": "../secret.csv"}))
-    with refused(ResultsError, "results-unreadable"):
+    with refused(
+        ResultsError,
+        "results-unreadable",
+        names=("run.json", "'../secret.csv'", "results.csv", "results.parquet", "results.mf4"),
+    ):
         load_results(folder)
 
 
@@ -260,7 +264,7 @@ def test_run_writes_the_format_it_is_told_and_prints_metrics(driver, tmp_path, c
     common = [str(tmp_path / "alone.yaml"), "--fmus", str(driver), "--format", "parquet"]
     main_ok(["run", *common, "--out", str(tmp_path / "run"), "--metric", "peak(steer_angle)"])
     told = capsys.readouterr().out
-    assert golden_in(told)
+    assert mentions(told, "Steer", "angle", "peak")
     assert "5.73 °" in told
     assert load_results(tmp_path / "run").file.name == "results.parquet"
 

@@ -20,7 +20,7 @@ from orchestrator.master.isolation import InstanceProcess
 from orchestrator.master.process_state import Log
 from orchestrator.results.reader import load_results
 from orchestrator.supervised_process import FAILED, LOG, REPLY, PipeChannel, ProcessLost, ProtocolError
-from tests.sentences import golden_in
+from tests.refusals import mentions
 
 from ..trials.hostile_fmus import VALUES_OF, Case, attack, make_files
 
@@ -146,7 +146,7 @@ def test_what_comes_through_the_pipe_and_is_no_answer_is_a_sentence(said, stays,
 def test_nothing_that_comes_from_a_unit_is_unpickled(pretend):
     data = pickle.dumps(_Malicious())
     for kind in (REPLY, LOG, FAILED):
-        assert golden_in(pretend(bytes([kind]) + len(data).to_bytes(4, "little") + data))
+        assert mentions(pretend(bytes([kind]) + len(data).to_bytes(4, "little") + data), "wrote", "pipe")
 
 
 def test_random_bytes_in_the_pipe_never_pass_for_an_answer(pretend):
@@ -178,7 +178,7 @@ def test_a_unit_that_copies_the_process_of_its_run_ends_it_before_there_are_many
         cwd=tmp_path, env=os.environ | {"HOSTILE": does}, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 1
-    assert golden_in(done.stderr)
+    assert mentions(done.stderr, "good", "bad", "process")
     assert "Traceback" not in done.stderr
     results = load_results(tmp_path / "out")
     assert results.record.status == "failed"

@@ -26,7 +26,7 @@ from orchestrator.scenario import yaml_lines
 from orchestrator.scenario.loader import load_scenario
 from orchestrator.scenario.overrides import read_changes
 from orchestrator.wiring.make_plan import make_plan
-from tests.sentences import golden, golden_in, places_of, refused, texts_of
+from tests.refusals import each_mentions, mentions, places_of, refused, texts_of
 
 from .fake_fmus import Var, make_fmu
 
@@ -54,17 +54,23 @@ def problems(text: str | bytes, **options: list[str]) -> list[Diagnostic]:
 
 
 @pytest.mark.parametrize(
-    ("text", "expected"),
+    ("text", "expected", "name"),
     [
         (
             "units: !own {a: {fmu: plant}}",
             [("value-invalid", "a.yaml:3: units"), ("value-wrong-type", "a.yaml:3: units")],
+            "'!own'",
         ),
         (
             "units: !!seq {a: b}",
             [("value-invalid", "a.yaml:3: units"), ("value-wrong-type", "a.yaml:3: units")],
+            "'tag:yaml.org,2002:seq'",
         ),
-        ("units: !!map [a]", [("value-invalid", "a.yaml:3: units"), ("value-wrong-type", "a.yaml:3: units")]),
+        (
+            "units: !!map [a]",
+            [("value-invalid", "a.yaml:3: units"), ("value-wrong-type", "a.yaml:3: units")],
+            "'tag:yaml.org,2002:map'",
+        ),
         (
             "title: !!binary aGk=",
             [
@@ -72,13 +78,18 @@ def problems(text: str | bytes, **options: list[str]) -> list[Diagnostic]:
                 ("value-invalid", "a.yaml:3: title"),
                 ("value-wrong-type", "a.yaml:3: title"),
             ],
+            "'tag:yaml.org,2002:binary'",
         ),
-        ('title: "\\U00FFFFFF"', [("file-not-yaml", "a.yaml:3")]),
-        ("title: !<%ff> b", [("file-not-yaml", "a.yaml:3")]),
-        ("title: !%zz b", [("file-not-yaml", "a.yaml:3")]),
-        ('title: "\\e[31mred"', [("key-missing", "a.yaml:1"), ("value-invalid", "a.yaml:3: title")]),
-        ('title: "a \\u202e b"', [("key-missing", "a.yaml:1"), ("value-invalid", "a.yaml:3: title")]),
-        ('title: "\\ud800"', [("key-missing", "a.yaml:1"), ("value-invalid", "a.yaml:3: title")]),
+        ('title: "\\U00FFFFFF"', [("file-not-yaml", "a.yaml:3")], "0x110000"),
+        ("title: !<%ff> b", [("file-not-yaml", "a.yaml:3")], "0xff"),
+        ("title: !%zz b", [("file-not-yaml", "a.yaml:3")], "'z'"),
+        ('title: "\\e[31mred"', [("key-missing", "a.yaml:1"), ("value-invalid", "a.yaml:3: title")], "\\x1b"),
+        (
+            'title: "a \\u202e b"',
+            [("key-missing", "a.yaml:1"), ("value-invalid", "a.yaml:3: title")],
+            "\\u202e",
+        ),
+        ('title: "\\ud800"', [("key-missing", "a.yaml:1"), ("value-invalid", "a.yaml:3: title")], "\\ud800"),
         (
             '"\\e[2J": 1',
             [
@@ -86,12 +97,14 @@ def problems(text: str | bytes, **options: list[str]) -> list[Diagnostic]:
                 ("value-invalid", "a.yaml:3: \x1b[2J"),
                 ("key-unknown", "a.yaml:3: \x1b[2J"),
             ],
+            "\\x1b",
         ),
-        ("title: " + "[" * 45 + "]" * 45, [("file-not-yaml", "a.yaml:3")]),
-        ("title: " + "[" * 5000, [("file-not-yaml", "a.yaml:3")]),
+        ("title: " + "[" * 45 + "]" * 45, [("file-not-yaml", "a.yaml:3")], "40 brackets"),
+        ("title: " + "[" * 5000, [("file-not-yaml", "a.yaml:3")], "40 brackets"),
         (
             "title:\n" + "".join(f"{' ' * n}-\n" for n in range(1, 50)),
             [("file-too-large", "a.yaml:3: title")],
+            "40 collections",
         ),
         (
             "inputs: {a: " + "1" * 400 + "}",
@@ -100,6 +113,7 @@ def problems(text: str | bytes, **options: list[str]) -> list[Diagnostic]:
                 ("value-invalid", "a.yaml:3: inputs.a"),
                 ("value-invalid", "a.yaml:3: inputs.a"),
             ],
+            "11111111111111111111111111111111111111111111111111111111",
         ),
         (
             "inputs: {a: " + "1" * 5000 + "}",
@@ -108,37 +122,41 @@ def problems(text: str | bytes, **options: list[str]) -> list[Diagnostic]:
                 ("value-wrong-type", "a.yaml:3: inputs.a"),
                 ("value-invalid", "a.yaml:3: inputs.a"),
             ],
+            "11111111111111111111111111111111111111111111111111111111",
         ),
     ],
 )
 def test_yaml_beyond_what_scenarios_use_is_refused_in_a_sentence(
-    text: str, expected: list[tuple[str, str]]
+    text: str, expected: list[tuple[str, str]], name: str
 ) -> None:
     found = problems(f"{HEAD}{text}\n")
     assert places_of(found) == expected
-    assert golden([one for one in found if one.location.line == 3])
+    assert mentions([one for one in found if one.location.line == 3], name)
 
 
 @pytest.mark.parametrize(
-    ("value", "code"),
+    ("value", "code", "names"),
     [
-        ("1" * 400, "value-invalid"),
-        ("[" * 3000, "value-invalid"),
-        ("5 " + "(" * 3000, "value-invalid"),
-        ("5 " + "(" * 50 + "kg" + ")" * 40, "unit-unknown"),
-        ("1e999 kg", "value-invalid"),
-        ("1e999", "value-invalid"),
-        ("nan", "value-invalid"),
-        (".nan", "value-invalid"),
-        ("5,5", "value-invalid"),
-        ("5 kgg", "unit-unknown"),
+        ("1" * 400, "value-invalid", ("1" * 56, "kg")),
+        ("[" * 3000, "value-invalid", ("[" * 56, "kg")),
+        ("5 " + "(" * 3000, "value-invalid", ("5 " + "(" * 54, "kg")),
+        ("5 " + "(" * 50 + "kg" + ")" * 40, "unit-unknown", ("(" * 50 + "kg", "'kg'")),
+        ("1e999 kg", "value-invalid", ("'1e999 kg'", "finite")),
+        ("1e999", "value-invalid", ("inf", "finite")),
+        ("nan", "value-invalid", ("'nan'", "kg")),
+        (".nan", "value-invalid", ("nan", "finite")),
+        ("5,5", "value-invalid", ("'5,5'", "5.5")),
+        ("5 kgg", "unit-unknown", ("'kgg'", "'kg'")),
     ],
 )
-def test_a_setting_that_is_no_quantity_is_refused_in_a_sentence(value: str, code: str) -> None:
+def test_a_setting_that_is_no_quantity_is_refused_in_a_sentence(
+    value: str, code: str, names: tuple[str, ...]
+) -> None:
     (found,) = problems(f"{HEAD}units: {{a: {{fmu: plant}}}}\n", settings=[f"a.mass={value}"])
     assert str(found).startswith("--set a.mass=")
     assert found.code == code
-    assert golden(found.message)
+    assert len(str(found)) < 3200 and len(found.message) < 200
+    assert mentions(found.message, *names)
 
 
 @pytest.mark.parametrize("name", ["n" * 4000, "n" * 300 + ".yaml", "a\0b"])
@@ -152,7 +170,7 @@ def test_names_that_cannot_be_those_of_files_are_refused(name: str) -> None:
 
 def test_a_name_with_a_line_feed_can_be_swapped_in_and_is_not_found() -> None:
     (said,) = problems(f"{HEAD}units: {{a: {{fmu: plant}}}}\n", swaps=["a=pl\nant"])
-    assert golden_in(said)
+    assert mentions(said, "'pl\\nant'")
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
@@ -160,29 +178,29 @@ def test_pipes_devices_and_loops_of_links_are_not_read() -> None:
     os.mkfifo("pipe.yaml")
     os.symlink("loop.yaml", "loop.yaml")
     for path in ("pipe.yaml", "/dev/zero", "loop.yaml"):
-        with refused(ScenarioError, "file-unreadable"):
+        with refused(ScenarioError, "file-unreadable", names=(path,)):
             load_scenario(Path(path))
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/zero"), reason="no such device here")
 def test_a_device_in_place_of_an_fmu_or_a_vehicle_file_is_not_read() -> None:
     (said,) = problems(f"{HEAD}units: {{a: {{fmu: /dev/zero}}}}\n")
-    assert golden(said)
+    assert mentions(said, "a.yaml:3", "units.a.fmu")
     (said,) = problems(f"{HEAD}vehicle: /dev/zero\nunits: {{a: {{fmu: plant}}}}\n")
-    assert golden(said)
+    assert mentions(said, "vehicle", "file", "socket")
 
 
 def test_a_file_that_is_too_large_is_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(yaml_lines, "TEXT", 1000)
     (said,) = problems("a" * 1001)
-    assert golden(said)
+    assert mentions(said, "a.yaml", "0.001 MB")
 
 
 def test_of_very_many_problems_the_first_ones_are_told() -> None:
     units = "".join(f"  u{i}: {{fmi: plant}}\n" for i in range(1000))
     said = problems(f"{HEAD}units:\n{units}")
     assert len(said) == yaml_lines.MOST_ERRORS + 1
-    assert golden(said[-1])
+    assert mentions(said[-1], "a.yaml", "200 problems")
 
 
 def said_of(load: object, text: str) -> list[str]:
@@ -194,7 +212,7 @@ def said_of(load: object, text: str) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("text", "expected"),
+    ("text", "expected", "name"),
     [
         (
             f"{SWEEP}axes: {{a: {{vary: plant.mass, from: 1, to: 2, count: 1000000000}}}}\n",
@@ -220,12 +238,12 @@ def test_a_study_of_too_many_runs_is_refused_before_they_are_listed() -> None:
     hundred = list(range(100))
     for_each = f"{{a: {hundred}, b: {hundred}, c: {hundred}}}"
     text = f'{STUDY}  - {{name: "{{a}}{{b}}{{c}}", scenario: a.yaml, for: {for_each}}}\n'
-    assert golden(said_of(load_experiment, text))
+    assert each_mentions(said_of(load_experiment, text), ("b.yaml:4", "runs[0].for", "1000000", "10000"))
     text = STUDY + "".join(
         f'  - {{name: "{i}/{{a}}/{{b}}", scenario: a.yaml, for: {{a: {hundred}, b: {hundred}}}}}\n'
         for i in range(2)
     )
-    assert golden(said_of(load_experiment, text))
+    assert each_mentions(said_of(load_experiment, text), ("b.yaml:3", "10000"))
 
 
 def test_a_grid_of_too_many_cells_is_refused() -> None:
@@ -235,7 +253,7 @@ def test_a_grid_of_too_many_cells_is_refused() -> None:
         f'grids: {{g: {{title: t, metric: m, run: "{{a}}{{b}}", rows: {{a: {many}}}, '
         f"columns: {{b: {many}}}}}}}\n"
     )
-    assert golden(said_of(load_experiment, text))
+    assert each_mentions(said_of(load_experiment, text), ("b.yaml:5", "grids.g", "40000", "10000"))
 
 
 @pytest.mark.parametrize("text", ["a + " * 5000 + "a", "(" * 300 + "a" + ")" * 300, "-" * 390 + "a", "a\0"])
@@ -255,7 +273,7 @@ def test_a_bad_address_in_an_ssp_archive_is_refused_with_its_line() -> None:
     )
     with zipfile.ZipFile("a.ssp", "w") as archive:
         archive.writestr("SystemStructure.ssd", ssd)
-    with refused(ScenarioError) as caught:
+    with refused(ScenarioError, names=("a.ssp/SystemStructure.ssd:3", "'http://[bad.fmu'")) as caught:
         load_scenario(Path("a.ssp"))
     assert [str(one.location) for one in caught.value.diagnostics] == ["a.ssp/SystemStructure.ssd:3"]
 
@@ -264,13 +282,13 @@ def test_an_ssp_archive_that_unpacks_without_limit_is_refused(monkeypatch: pytes
     monkeypatch.setattr(safe_files, "UNPACKED", 1_000_000)
     with zipfile.ZipFile("a.ssp", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("SystemStructure.ssd", bytes(3_000_000))
-    with refused(ScenarioError, "file-unreadable"):
+    with refused(ScenarioError, "file-unreadable", names=("a.ssp", "3 MB", "1 MB")):
         load_scenario(Path("a.ssp"))
 
 
 def test_what_nobody_foresaw_becomes_a_sentence_that_keeps_its_cause() -> None:
     with (
-        refused(ScenarioError, "value-invalid") as caught,
+        refused(ScenarioError, "value-invalid", names=("a.yaml", "KeyError", "'secret'")) as caught,
         reading("scenario file", "a.yaml", ScenarioError),
     ):
         raise KeyError("secret")

@@ -11,7 +11,7 @@ from orchestrator.results.run_folder import RunStatus
 from orchestrator.results.run_record import FmuRecord, RunRecord
 from orchestrator.scenario.loader import title_of
 from tests.fmu_copies import put_fmus
-from tests.sentences import golden, golden_in
+from tests.refusals import each_mentions, mentions
 
 from .recorded import car, write
 
@@ -76,7 +76,7 @@ def test_runs_that_are_the_same_say_so(yawbench, tmp_path):
     write(car(), tmp_path / "other")
     status, out, said = yawbench("diff", tmp_path / "one", tmp_path / "other")
     assert (status, out) == (0, "")
-    assert golden(said)
+    assert each_mentions(said, ("identical", "inputs", "numbers"))
 
 
 @pytest.mark.parametrize(
@@ -165,7 +165,7 @@ def test_a_run_whose_record_was_changed_is_listed_and_left_out_of_an_evaluation_
     assert (status, out) == (2, "")
     assert said.startswith(sentence)
     _, _, said = yawbench("evaluate", "step-steer", tmp_path, "--no-figures")
-    assert golden_in(said)
+    assert mentions(said, "note", "run.json", "'units'")
     for command in (("plot", tmp_path / "one"), ("diff", tmp_path / "one", tmp_path / "other")):
         status, out, said = yawbench(*command)
         assert (status, out) == (2, "")

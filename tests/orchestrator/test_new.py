@@ -13,7 +13,7 @@ from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.results.reader import load_results
 from tests.checkout import copy_checkout, run_in
-from tests.sentences import golden, golden_in
+from tests.refusals import each_mentions, mentions
 
 UNITS = (
     "driver_sine", "reference_steady_state", "controller_off", "controller_fnn", "controller_fuzzy_sideslip",
@@ -125,7 +125,7 @@ def test_a_new_study_judges_its_claim_and_a_new_sweep_finds_its_limits(beginning
 def test_only_controllers_begin_in_c(new):
     status, _, said = new("idea", "--language", "c", kind="tyre")
     assert status == 2
-    assert golden(said)
+    assert each_mentions(said, ("--language c", "available"))
 
 
 def test_it_writes_a_source_a_test_and_a_scenario(tmp_path, new):
@@ -145,10 +145,12 @@ def test_in_c_the_source_is_a_folder_with_the_model_description(tmp_path, new):
 def test_it_prints_how_to_build_test_run_and_compare(project):
     _, printed = project
     build, test, run, compare = (" ".join(command[1:]) for command in printed["follow_c"][1:])
-    assert golden(build)
-    assert golden(test)
-    assert golden(run)
-    assert golden(compare)
+    assert mentions(build, "controllers/follow_c", "--out")
+    assert mentions(test, "tests/test_follow_c.py", "pytest")
+    assert mentions(run, "scenarios/follow_c/25mps.yaml")
+    assert mentions(
+        compare, "scenarios/follow_c/25mps.yaml", "--swap controller=controller_off", "controller_follow_c"
+    )
 
 
 @pytest.mark.exhaustive
@@ -172,15 +174,15 @@ def test_in_a_checkout_the_files_stand_among_its_own_and_build_finds_them(tmp_pa
     assert (checkout / "components/controllers/idea.py").is_file()
     assert (checkout / "components/controllers/idea_c/idea_c.c").is_file()
     said = run_in(checkout, "yawbench", "build").stderr
-    assert golden_in(said)
-    assert golden_in(said)
+    assert mentions(said, "controller_idea", "built")
+    assert mentions(said, "controller_idea_c", "built")
     for name in ("idea", "idea_c"):
         done = run_in(checkout, "yawbench", "check", f"scenarios/{name}/25mps.yaml")
         assert done.returncode == 0, done.stderr
     tests = [f"tests/components/test_{name}.py" for name in ("idea", "idea_c")]
     assert "10 passed" in run_in(checkout, "python", "-m", "pytest", "-q", *tests).stdout
     shutil.rmtree(checkout / "components/controllers/idea_c")
-    assert golden_in(run_in(checkout, "yawbench", "build").stderr)
+    assert mentions(run_in(checkout, "yawbench", "build").stderr, "controller_idea_c", "removed")
 
 
 def test_nothing_is_overwritten_and_nothing_is_written_beside_what_exists(tmp_path, new):
@@ -189,7 +191,7 @@ def test_nothing_is_overwritten_and_nothing_is_written_beside_what_exists(tmp_pa
     scenario.write_text("mine")
     status, _, said = new("idea")
     assert status == 2
-    assert golden(said)
+    assert each_mentions(said, ("scenarios/idea/25mps.yaml", "exists"))
     assert files(tmp_path) == {"scenarios/idea/25mps.yaml"}
     assert scenario.read_text() == "mine"
 

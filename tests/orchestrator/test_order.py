@@ -9,7 +9,7 @@ import pytest
 
 from orchestrator.plan import Fmu, Variable, Wire
 from orchestrator.wiring.order import EvaluationOrder, evaluate
-from tests.sentences import golden
+from tests.refusals import each_mentions
 
 
 def fmu(inputs: str = "", **outputs: str | None) -> Fmu:
@@ -140,7 +140,17 @@ def test_a_real_loop_is_reported_with_its_shortest_path() -> None:
         loads=fmu("acceleration_y", vertical_load="acceleration_y"),
         tyre=fmu("vertical_load slip", force="vertical_load slip"),
     )
-    assert golden(found.loops)
+    assert each_mentions(
+        found.loops,
+        (
+            "tyre.force",
+            "plant.force",
+            "plant.acceleration_y",
+            "loads.acceleration_y",
+            "loads.vertical_load",
+            "tyre.vertical_load",
+        ),
+    )
 
 
 def test_loops_alike_on_four_wheels_are_reported_once() -> None:
@@ -150,7 +160,7 @@ def test_loops_alike_on_four_wheels_are_reported_once() -> None:
         plant=fmu(" ".join(forces), **dict(zip(loads, forces, strict=True))),
         tyre=fmu(" ".join(loads), **dict(zip(forces, loads, strict=True))),
     )
-    assert golden(found.loops)
+    assert each_mentions(found.loops, ("tyre.force_fl", "plant.force_fl", "plant.load_fl", "tyre.load_fl"))
 
 
 def test_separate_loops_are_reported_each() -> None:
@@ -166,7 +176,7 @@ def test_separate_loops_are_reported_each() -> None:
 def test_a_loop_through_an_output_that_says_nothing_is_only_possible() -> None:
     found = evaluated(plant=fmu("force", slip=None), tyre=fmu("slip", force="slip"))
     assert found.loops == ()
-    assert golden(found.possible_loops)
+    assert each_mentions(found.possible_loops, ("tyre.force", "plant.force", "plant.slip", "tyre.slip"))
     assert sorted(found.order) == ["plant", "tyre"]
 
 

@@ -16,7 +16,7 @@ from orchestrator.metrics.plausibility import CHECKS, PlausibilityWatch
 from orchestrator.plan import Fmu, Instance, Plan, Variable, Wire
 from orchestrator.results.run_record import RunRecord
 from orchestrator.signal_names import SignalName
-from tests.sentences import golden
+from tests.refusals import mentions
 from vocabulary.wheels import WHEELS
 
 from .recorded import car, noted
@@ -50,7 +50,7 @@ def test_a_car_that_spins_is_named_with_the_time_and_the_angle():
     one = found(plan(sideslip={"unit": "rad"}), sideslip)["car-spins"]
     assert (one.location.signal, one.location.time) == ("plant.sideslip", pytest.approx(0.51))
     assert one.value == pytest.approx(90.0)
-    assert golden(one.message)
+    assert mentions(one.message, "45 degrees", "0.51 s", "90 degrees", "car")
 
 
 def test_a_calm_run_has_no_findings():
@@ -64,7 +64,7 @@ def test_the_first_wheel_that_lifts_is_named():
     values = [np.where(time < at, 3000.0, 0.0) for at in (2.0, 0.9, 0.4, 2.0)]
     one = found(plan(**loads), *values)["wheel-lifts"]
     assert (one.location.signal, one.location.time) == ("plant.vertical_load_rl", pytest.approx(0.4))
-    assert golden(one.message)
+    assert mentions(one.message, "0.4 s", "wheel")
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ def test_a_value_outside_what_its_model_states_is_named():
     made = plan(pressure={"lowest": 0.0, "highest": 2.0})
     assert found(made, np.linspace(0.0, 2.0, 10)) == {}
     one = found(made, np.linspace(0.0, 3.0, 101))["range-left"]
-    assert golden(one.message)
+    assert mentions(one.message, "plant.pressure", "0.67 s")
     assert found(made, np.linspace(0.0, -1.0, 101))["range-left"].value == pytest.approx(-1.0)
 
 
@@ -118,7 +118,7 @@ def test_a_run_with_findings_is_marked_in_tables():
     noted(results, diagnostics=[spin.record()])
     assert results.record.all_diagnostics == (spin,)
     assert marked("a", results) == f"a {MARK}"
-    assert golden(remarks([("a", results)]))
+    assert remarks([("a", results)]) == ["† a: the car spins"]
 
 
 def test_records_of_earlier_versions_give_diagnostics():
@@ -127,7 +127,7 @@ def test_records_of_earlier_versions_give_diagnostics():
     record = RunRecord.model_validate({"findings": [spin], "notes": notes})
     note, warning = record.all_diagnostics
     assert note.severity == "info"
-    assert golden(note.message)
+    assert mentions(note.message, "stiffnesses", "tyres")
     where = Location(signal="plant.sideslip", time=1.0)
     assert warning == Diagnostic("car-spins", "the car spins", "warning", where, math.inf)
     assert record.course_warnings == (warning,)

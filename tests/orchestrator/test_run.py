@@ -20,7 +20,7 @@ from orchestrator.results.reader import load_results
 from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.fmu_copies import put_fmus
-from tests.sentences import golden, golden_in
+from tests.refusals import each_mentions, mentions
 
 UNITS = (
     "driver_sine", "reference_steady_state", "controller_fnn", "controller_off",
@@ -127,7 +127,7 @@ def test_the_record_tells_everything_needed_to_repeat_the_run(yawbench, fmus, tm
     run = json.loads((tmp_path / "out" / "run.json").read_text())
     assert run["status"] == "completed"
     assert run["error"] is None
-    assert golden(run["title"])
+    assert mentions(run["title"], "car", "slalom")
     assert (run["algorithm"], run["step_size"], run["stop_time"], run["rows"]) == (
         "extrapolated",
         0.001,
@@ -173,7 +173,7 @@ def test_runs_of_other_settings_and_one_that_fails_leave_all_results_readable(
     status, said = yawbench(scenario, "--name", "good")
     assert status == 1
     (results,) = Path("results").iterdir()
-    assert golden_in(said)
+    assert mentions(said, "good/failed", "recorded")
     assert {folder.name: load_results(folder).record.status for folder in results.iterdir()} == {
         "good": "completed",
         f"{scenario.stem},controller=controller_off,driver.amplitude=0.03": "completed",
@@ -232,7 +232,11 @@ def test_an_exception_in_a_component_is_one_sentence_with_file_and_line(yawbench
     scenario = faulty('raise ValueError("velocity must exceed 1 m/s, 100 % größer {u}".format(u=int(t > 0)))')
     status, said = yawbench(scenario, "--out", tmp_path / "out")
     assert status == 1
-    assert golden(said.splitlines())
+    assert each_mentions(
+        said.splitlines(),
+        ("controller", "0.05 s", "ValueError", "1 m/s", "100 %", "controllers/faulty.py:17", "velocity"),
+        ("out", "recorded"),
+    )
     results = load_results(tmp_path / "out")
     assert results.time.tolist() == [0.0, 0.01, 0.02, 0.03, 0.04, 0.05]
     error = results.record.error
@@ -248,7 +252,7 @@ def test_an_exception_at_the_start_is_one_sentence(yawbench, faulty, tmp_path):
     status, said = yawbench(faulty(value="1.0 / u[0]"), "--out", tmp_path / "out")
     assert status == 1
     assert said.startswith("controller: ")
-    assert golden_in(said.splitlines()[0])
+    assert mentions(said.splitlines()[0], "ZeroDivisionError", "controllers/faulty.py:20")
     assert "Traceback" not in said
     assert len(load_results(tmp_path / "out").time) == 0
 
@@ -265,7 +269,7 @@ def test_a_wrong_value_of_a_parameter_names_the_allowed_ones(yawbench, tmp_path)
 def test_friction_below_zero_is_a_mistake(yawbench, tmp_path):
     status, said = yawbench(car(tmp_path), "--out", tmp_path / "out", "--set", "inputs.friction*=-0.65")
     assert status == 2
-    assert golden_in(said)
+    assert mentions(said, "--set inputs.friction*=-0.65", "tyre.friction_*")
 
 
 @pytest.mark.parametrize(("value", "word"), [("float('nan')", "not a number"), ("1e999", "infinite")])
@@ -277,22 +281,36 @@ def test_a_value_that_is_not_finite_stops_the_run_and_names_its_wire(
     fmu = tmp_path / "controller_faulty.fmu"
     status, said = yawbench(scenario, "--out", tmp_path / "out", "--swap", f"controller={fmu}")
     assert status == 1
-    assert golden_in(said.splitlines())
+    assert mentions(
+        said.splitlines(),
+        "controller",
+        "yaw_moment",
+        "0.016 s",
+        "controller.yaw_moment",
+        "allocator.yaw_moment",
+    )
     assert load_results(tmp_path / "out").time[-1] == 0.015
 
 
 def test_a_warning_of_a_component_is_shown_and_recorded(yawbench, faulty, tmp_path):
     status, said = yawbench(faulty('self.warn("tyres are 90 % warm")'), "--out", tmp_path / "out")
     assert status == 0
-    assert golden(said.splitlines()[0])
+    assert mentions(said.splitlines()[0], "warning", "0.05 s", "90 %")
     run = load_results(tmp_path / "out").record
-    assert golden([w.text for w in run.warnings])
+    assert each_mentions(
+        [w.text for w in run.warnings],
+        ("90 %", "tyres", "warm"),
+        ("90 %", "tyres", "warm"),
+        ("90 %", "tyres", "warm"),
+        ("90 %", "tyres", "warm"),
+        ("90 %", "tyres", "warm"),
+    )
 
 
 def test_ctrl_c_inside_a_component_ends_the_run_after_the_step(yawbench, faulty, tmp_path):
     status, said = yawbench(faulty("os.kill(os.getpid(), signal.SIGINT)"), "--out", tmp_path / "out")
     assert status == 130
-    assert golden(said.splitlines())
+    assert each_mentions(said.splitlines(), ("0.06 s", "interrupted"), ("out", "recorded"))
     results = load_results(tmp_path / "out")
     assert results.record.status == "interrupted"
     assert results.time[-1] == 0.06
@@ -311,7 +329,7 @@ def test_ctrl_c_ends_a_component_that_never_comes_back(loop, faulty, fmus, tmp_p
     scenario = faulty("os.kill(os.getppid(), signal.SIGINT)\n            while True: signal.pause()")
     done = run_process("run", scenario, "--fmus", fmus, "--out", tmp_path / "out")
     assert done.returncode == 130
-    assert golden(done.stderr)
+    assert each_mentions(done.stderr, ("0.05 s", "interrupted", "controller"), ("out", "recorded"))
     results = load_results(tmp_path / "out")
     assert results.record.status == "interrupted"
     assert results.time[-1] == 0.05
@@ -435,5 +453,5 @@ def test_what_was_remarkable_in_a_run_that_failed_is_said_before_why_it_failed(f
     status, said = yawbench(scenario, "--out", tmp_path / "o", "--set", "driver.amplitude=3")
     lines = [line for line in said.splitlines() if not line.startswith(("changed:", "note: driver"))]
     assert status == 1
-    assert golden(lines[0])
-    assert golden(lines[1])
+    assert mentions(lines[0], "note", "101 degrees", "60", "0.03 s")
+    assert mentions(lines[1], "controller", "0.05 s", "ValueError", "controllers/faulty.py:17")

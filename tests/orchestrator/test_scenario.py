@@ -13,7 +13,7 @@ from orchestrator.errors import Diagnostic, ScenarioError
 from orchestrator.scenario.loader import ScenarioSpec, load_scenario
 from orchestrator.signal_names import SignalName
 from tests.changed import changed
-from tests.sentences import golden, golden_in, places_of
+from tests.refusals import each_mentions, mentions, places_of
 
 GOOD = """\
 title: Single sine
@@ -93,95 +93,137 @@ def test_the_schema_can_be_printed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "expected"),
+    ("old", "new", "expected", "names"),
     [
         (
             "stop_time: 8.0",
             "stop_tim: 8.0",
             [("key-missing", "a.yaml:1"), ("key-unknown", "a.yaml:2: stop_tim")],
+            (("a.yaml:1", "'stop_time'"), ("a.yaml:2", "stop_tim", "'stop_time'", "title", "faults")),
         ),
         (
             "fmu: driver_sine, parameters",
             "fmu: driver_sine, parametres",
             [("key-unknown", "a.yaml:6: units.driver.parametres")],
+            (("a.yaml:6", "units.driver.parametres", "'parameters'", "fmu", "validate"),),
         ),
         (
             "{from: controller.torque_request_*, to:",
             "{from: controller.torque_request_*, too:",
             [("key-missing", "a.yaml:11: connections[0]"), ("key-unknown", "a.yaml:11: connections[0].too")],
+            (
+                ("a.yaml:11", "connections[0]", "'to'"),
+                ("a.yaml:11", "connections[0].too", "'to'", "gain", "offset", "delay"),
+            ),
         ),
         (
             "step_size: 1 ms",
             "step_size: 1 ms\nalgorithm: jakobi",
             [("value-invalid", "a.yaml:4: algorithm")],
+            (("a.yaml:4", "'jacobi'", "'gauss_seidel'", "'extrapolated'", "'jakobi'"),),
         ),
-        ("title: Single sine", "title: 5", [("value-wrong-type", "a.yaml:1: title")]),
-        ("fmu: driver_sine", "fmu: 5", [("value-wrong-type", "a.yaml:6: units.driver.fmu")]),
-        ("fmu: driver_sine", "fmu: ''", [("value-wrong-type", "a.yaml:6: units.driver.fmu")]),
-        ("8.0", "soon", [("value-invalid", "a.yaml:2: stop_time")]),
-        ("8.0", "0", [("value-invalid", "a.yaml:2: stop_time")]),
-        ("8.0", "", [("value-invalid", "a.yaml:2: stop_time")]),
+        ("title: Single sine", "title: 5", [("value-wrong-type", "a.yaml:1: title")], (("a.yaml:1", "5"),)),
+        (
+            "fmu: driver_sine",
+            "fmu: 5",
+            [("value-wrong-type", "a.yaml:6: units.driver.fmu")],
+            (("a.yaml:6", "units.driver.fmu", "5"),),
+        ),
+        (
+            "fmu: driver_sine",
+            "fmu: ''",
+            [("value-wrong-type", "a.yaml:6: units.driver.fmu")],
+            (("a.yaml:6", "units.driver.fmu", "''"),),
+        ),
+        ("8.0", "soon", [("value-invalid", "a.yaml:2: stop_time")], (("a.yaml:2", "stop_time", "'soon'"),)),
+        ("8.0", "0", [("value-invalid", "a.yaml:2: stop_time")], (("a.yaml:2", "stop_time", "0 s"),)),
+        ("8.0", "", [("value-invalid", "a.yaml:2: stop_time")], (("a.yaml:2", "stop_time"),)),
         (
             "8.0",
             "8.0005",
             [("time-grid-invalid", "a.yaml:2: stop_time")],
+            (("a.yaml:2", "stop_time", "8.0005 s", "0.001 s", "8 s", "8.001 s"),),
         ),
         (
             "step_size: 0.002",
             "step_size: 0.5 ms",
             [("time-grid-invalid", "a.yaml:7: units.controller.step_size")],
+            (("a.yaml:7", "units.controller.step_size", "0.0005 s", "0.001 s"),),
         ),
-        ("0.65", ".nan", [("value-invalid", "a.yaml:4: inputs.friction*")]),
-        ("5 deg", "[1, 2]", [("value-invalid", "a.yaml:6: units.driver.parameters.amplitude")]),
-        ("5 deg", "", [("value-invalid", "a.yaml:6: units.driver.parameters.amplitude")]),
+        (
+            "0.65",
+            ".nan",
+            [("value-invalid", "a.yaml:4: inputs.friction*")],
+            (("a.yaml:4", "inputs.friction*", "nan"),),
+        ),
+        (
+            "5 deg",
+            "[1, 2]",
+            [("value-invalid", "a.yaml:6: units.driver.parameters.amplitude")],
+            (("a.yaml:6", "units.driver.parameters.amplitude", "[1, 2]"),),
+        ),
+        (
+            "5 deg",
+            "",
+            [("value-invalid", "a.yaml:6: units.driver.parameters.amplitude")],
+            (("a.yaml:6", "units.driver.parameters.amplitude"),),
+        ),
         (
             "  driver: {",
             "  my driver: {",
             [("value-invalid", "a.yaml:6: units.my driver")],
+            (("a.yaml:6", "units.my", "'my driver'", "letters", "digits", "_"),),
         ),
         (
             "  driver: {",
             "  vehicle: {",
             [("value-invalid", "a.yaml:6: units.vehicle")],
+            (("a.yaml:6", "units.vehicle", "'vehicle'", "--set", "vehicle.NAME"),),
         ),
         (
             "from: controller.",
             "from: contoller.",
             [("instance-unknown", "a.yaml:11: connections[0].from")],
+            (("a.yaml:11", "connections[0].from", "'contoller'", "'controller'"),),
         ),
         (
             "to: plant.wheel_torque_*",
             "to: tyre.wheel_torque_*",
             [("instance-unknown", "a.yaml:11: connections[0].to")],
+            (("a.yaml:11", "connections[0].to", "'tyre'", "driver", "controller", "plant"),),
         ),
         (
             "to: plant.wheel_torque_*",
             "to: plant",
             [("value-invalid", "a.yaml:11: connections[0].to")],
+            (("a.yaml:11", "connections[0].to", "instance.variable", "'plant'"),),
         ),
         (
             "connections:",
             "record: [plnt.yaw_rate]\nconnections:",
             [("instance-unknown", "a.yaml:10: record[0]")],
+            (("a.yaml:10", "record[0]", "'plnt'", "'plant'"),),
         ),
         (
             "connections:\n  - {from",
             "connections:\n  {from",
             [("value-wrong-type", "a.yaml:10: connections")],
+            (("a.yaml:10", "'from'", "'controller.torque_request_*'", "'to'", "plant.whee"),),
         ),
         (
             "  plant:\n    fmu: plant_seven_dof",
             "  plant: {fmu: a}\n  plant: {fmu: b}",
             [("key-duplicate", "a.yaml:9")],
+            (("a.yaml:9", "units.plant", "line 8"),),
         ),
     ],
 )
 def test_a_mistake_is_said_with_its_line(
-    file: Path, old: str, new: str, expected: list[tuple[str, str]]
+    file: Path, old: str, new: str, expected: list[tuple[str, str]], names
 ) -> None:
     found = problems(edited((old, new)))
     assert places_of(found) == expected
-    assert golden(found)
+    assert each_mentions(found, *names)
 
 
 def test_all_mistakes_are_said_at_once_from_top_to_bottom(file: Path) -> None:
@@ -197,14 +239,14 @@ def test_all_mistakes_are_said_at_once_from_top_to_bottom(file: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "expected"),
+    ("text", "expected", "names"),
     [
-        ("", [("file-empty", "a.yaml")]),
-        ("null\n", [("file-empty", "a.yaml")]),
-        ("a: " + 5000 * "[", [("file-not-yaml", "a.yaml:1")]),
-        ("- 1\n", [("value-wrong-type", "a.yaml:1")]),
-        ("a: [1, 2\nb: 3\n", [("file-not-yaml", "a.yaml:2")]),
-        ("a:\n\t- b\n", [("file-not-yaml", "a.yaml:2")]),
+        ("", [("file-empty", "a.yaml")], ("scenario", "empty")),
+        ("null\n", [("file-empty", "a.yaml")], ("scenario", "empty")),
+        ("a: " + 5000 * "[", [("file-not-yaml", "a.yaml:1")], ("a.yaml:1", "40 brackets")),
+        ("- 1\n", [("value-wrong-type", "a.yaml:1")], ("a.yaml:1", "[1]")),
+        ("a: [1, 2\nb: 3\n", [("file-not-yaml", "a.yaml:2")], ("a.yaml:2", "','", "']'", "':'")),
+        ("a:\n\t- b\n", [("file-not-yaml", "a.yaml:2")], ("a.yaml:2", "'\\t'")),
         (
             "a: &x [*x]\n",
             [
@@ -214,25 +256,28 @@ def test_all_mistakes_are_said_at_once_from_top_to_bottom(file: Path) -> None:
                 ("key-missing", "a.yaml:1"),
                 ("key-unknown", "a.yaml:1: a"),
             ],
+            ("a.yaml:1", "a[0]"),
         ),
     ],
 )
-def test_what_is_no_scenario_at_all_is_said(file: Path, text: str, expected: list[tuple[str, str]]) -> None:
+def test_what_is_no_scenario_at_all_is_said(
+    file: Path, text: str, expected: list[tuple[str, str]], names
+) -> None:
     found = problems(write(text))
     assert places_of(found) == expected
-    assert golden(found[0])
+    assert mentions(found[0], "a.yaml", *names)
 
 
 def test_a_missing_file_is_said_with_a_guess(file: Path) -> None:
-    assert golden(problems(Path("aa.yaml")))
-    assert golden(problems(Path("25mps.yaml")))
+    assert each_mentions(problems(Path("aa.yaml")), ("aa.yaml", "'a.yaml'"))
+    assert each_mentions(problems(Path("25mps.yaml")), ("25mps.yaml", "a.yaml"))
 
 
 def test_a_folder_and_a_binary_file_are_no_scenarios(file: Path) -> None:
     Path("d.yaml").mkdir()
     Path("e.yaml").write_bytes(b"\xff\xfe\x00")
-    assert golden(problems(Path("d.yaml")))
-    assert golden(problems(Path("e.yaml")))
+    assert each_mentions(problems(Path("d.yaml")), ("d.yaml", "scenario", "file"))
+    assert each_mentions(problems(Path("e.yaml")), ("e.yaml",))
 
 
 def test_a_path_with_spaces_and_umlauts_is_read(file: Path) -> None:
@@ -253,18 +298,25 @@ def test_mistakes_in_the_vehicle_file_name_that_file(file: Path) -> None:
     Path("cars").mkdir()
     Path("cars/car.yaml").write_text("mass: 1100\nparameters: {mass: .inf}\n")
     found = problems(edited(("title:", "vehicle: cars/car.yaml\ntitle:"), ("0.65", ".nan")))
-    assert golden(found)
+    assert each_mentions(
+        found,
+        ("a.yaml:5", "inputs.friction*", "nan"),
+        ("cars/car.yaml:1", "title", "source", "tyres", "parameters"),
+        ("cars/car.yaml:2", "parameters.mass", "inf"),
+    )
 
 
 def test_a_missing_vehicle_file_is_said_where_it_is_named(file: Path) -> None:
     Path("car.yaml").write_text("parameters: {}\n")
-    assert golden(problems(edited(("title:", "vehicle: cra.yaml\ntitle:"))))
+    assert each_mentions(
+        problems(edited(("title:", "vehicle: cra.yaml\ntitle:"))), ("a.yaml:1", "cra.yaml", "'car.yaml'")
+    )
 
 
 def test_a_vehicle_path_that_cannot_be_one_is_said(file: Path) -> None:
     said = problems(edited(("title:", 'vehicle: "a\\0"\ntitle:')))
-    assert golden(said[0])
-    assert golden_in(said[1])
+    assert mentions(said[0], "a.yaml:1", "control", "character")
+    assert mentions(said[1], "vehicle", "file", "null")
 
 
 def test_swap_replaces_the_fmu_and_remembers_the_old_one(file: Path) -> None:
@@ -313,21 +365,35 @@ def test_settings_change_times_and_algorithm_of_the_run_and_steps_of_units(file:
 
 
 @pytest.mark.parametrize(
-    ("options", "expected"),
+    ("options", "expected", "names"),
     [
         (
             {"swaps": ["contoller=x"]},
             [("instance-unknown", "--swap contoller=x")],
+            ("--swap contoller=x", "'contoller'", "'controller'"),
         ),
-        ({"swaps": ["controller"]}, [("option-invalid", "")]),
-        ({"swaps": ["controller="]}, [("option-invalid", "")]),
+        (
+            {"swaps": ["controller"]},
+            [("option-invalid", "")],
+            ("--swap controller", "--swap INSTANCE=FMU", "controller"),
+        ),
+        ({"swaps": ["controller="]}, [("option-invalid", "")], ("--swap INSTANCE=FMU", "controller")),
         (
             {"settings": ["tyre.mu=1"]},
             [("instance-unknown", "--set tyre.mu=1")],
+            ("--set tyre.mu=1", "'tyre'", "driver", "inputs"),
         ),
         (
             {"settings": ["stop=3"]},
             [("option-invalid", "")],
+            (
+                "--set stop=3",
+                "--set INSTANCE.PARAMETER=VALUE",
+                "start_time",
+                "stop_time",
+                "step_size",
+                "speed=VALUE",
+            ),
         ),
         (
             {"settings": ["step_size=0.0015"]},
@@ -335,11 +401,13 @@ def test_settings_change_times_and_algorithm_of_the_run_and_steps_of_units(file:
                 ("time-grid-invalid", "a.yaml:2: stop_time"),
                 ("time-grid-invalid", "a.yaml:7: units.controller.step_size"),
             ],
+            ("a.yaml:2", "stop_time", "8 s", "0.0015 s", "--set step_size=0.0015", "7.9995 s", "8.001 s"),
         ),
-        ({"settings": ["driver.amplitude="]}, None),
+        ({"settings": ["driver.amplitude="]}, None, ()),
         (
             {"settings": ["driver.amplitude=.inf"]},
             [("value-invalid", "--set driver.amplitude=inf")],
+            ("--set driver.amplitude=inf", "inf", "finite"),
         ),
         (
             {"step_size": 0.0015},
@@ -347,23 +415,25 @@ def test_settings_change_times_and_algorithm_of_the_run_and_steps_of_units(file:
                 ("time-grid-invalid", "a.yaml:2: stop_time"),
                 ("time-grid-invalid", "a.yaml:7: units.controller.step_size"),
             ],
+            ("a.yaml:2", "stop_time", "8 s", "0.0015 s", "step_size=0.0015", "7.9995 s", "8.001 s"),
         ),
-        ({"step_size": -1.0}, [("value-invalid", "test step_size=-1.0")]),
+        ({"step_size": -1.0}, [("value-invalid", "test step_size=-1.0")], ("step_size=-1.0", "0 s")),
         (
             {"algorithm": "euler"},
             [("value-invalid", "test algorithm=euler")],
+            ("algorithm=euler", "'jacobi'", "'gauss_seidel'", "'extrapolated'", "'euler'"),
         ),
     ],
 )
 def test_a_wrong_option_is_named(
-    file: Path, options: dict[str, Any], expected: list[tuple[str, str]] | None
+    file: Path, options: dict[str, Any], expected: list[tuple[str, str]] | None, names
 ) -> None:
     if expected is None:
         assert load_scenario(file, changes=changed(**options)).units["driver"].parameters["amplitude"] == ""
     else:
         found = problems(file, **options)
         assert places_of(found) == expected
-        assert golden(found[0])
+        assert mentions(found[0], *names)
 
 
 def test_times_can_be_overridden_exactly(file: Path) -> None:
@@ -372,13 +442,20 @@ def test_times_can_be_overridden_exactly(file: Path) -> None:
     assert scenario.algorithm == "jacobi"
 
 
-@pytest.mark.parametrize("text", ["runs: [{scenario: b.yaml}]", "axes: {}\nruns: 3", "parameters: {mass: 3}"])
-def test_a_file_of_another_kind_is_one_sentence(tmp_path: Path, text: str) -> None:
+@pytest.mark.parametrize(
+    "text, names",
+    [
+        ("runs: [{scenario: b.yaml}]", ("`yawbench study`", "`report`")),
+        ("axes: {}\nruns: 3", ("`yawbench sweep`",)),
+        ("parameters: {mass: 3}", ("'vehicle'",)),
+    ],
+)
+def test_a_file_of_another_kind_is_one_sentence(tmp_path: Path, text: str, names) -> None:
     path = tmp_path / "other.yaml"
     path.write_text(text, encoding="utf-8")
     (found,) = problems(path)
     assert places_of([found]) == [("file-wrong-kind", f"{path}:1")]
-    assert golden(found)
+    assert mentions(found, "other.yaml:1", *names)
     scenario = tmp_path / "a.yaml"
     scenario.write_text(GOOD.replace("stop_time", "vehicle: other.yaml\nstop_time"), encoding="utf-8")
     if "vehicle" not in found.message:

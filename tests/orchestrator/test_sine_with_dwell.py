@@ -19,7 +19,7 @@ from orchestrator.figures.style import save
 from orchestrator.metrics.verdict import NotJudged, Status, Verdict, apart, not_judged
 from orchestrator.results.measurement_results import load_run
 from tests.commands import status_of
-from tests.sentences import golden, golden_in
+from tests.refusals import mentions
 from vocabulary.units import UNITS
 
 A, LARGE = radians(36.0), radians(270.0)
@@ -156,7 +156,7 @@ def test_a_yaw_rate_that_never_falls_has_no_second_peak_and_is_unstable():
     judged = evaluate_dwell(trace(yaw_rate=lambda t: -PEAK * 0.5 * (1 + np.tanh(t - PEAK_AT))), A)
     assert judged["peak"] is None
     assert judged.criteria["stability"].status is Status.FAILED
-    assert golden_in(judged.criteria["stability"].why)
+    assert mentions(judged.criteria["stability"].why, "no second peak")
 
 
 def test_a_ratio_is_signed_and_a_spin_that_passes_is_flagged():
@@ -166,14 +166,14 @@ def test_a_ratio_is_signed_and_a_spin_that_passes_is_flagged():
     assert judged["ratio_1000"] < 0.0
     assert judged.criteria["stability"].status is Status.PASSED
     assert judged["sideslip"] == radians(60.0)
-    assert golden_in(judged.diagnostics)
+    assert mentions(judged.diagnostics, "60 degrees", "sideslip")
 
 
 def test_below_26_8_degrees_the_zeroing_range_ends_at_the_first_instant_above_75_degrees_per_second():
     """A 2 pi 0.7 Hz cos(2 pi 0.7 Hz 0.2 s) = 75 deg/s at 26.8 degrees."""
     low = evaluate_dwell(trace(radians(26.0)), radians(17.0))
     high = evaluate_dwell(trace(radians(30.0)), radians(17.0))
-    assert golden_in(low.diagnostics)
+    assert mentions(low.diagnostics, "200 ms", "stay")
     assert high.diagnostics == []
     assert low["end"] == pytest.approx(END + 0.0143, abs=0.001)  # the zero holds the first degrees, too
 
@@ -254,7 +254,7 @@ def test_a_second_peak_that_comes_later_than_the_first_ratio_is_none():
 def test_a_slow_steer_whose_acceleration_opposes_it_has_no_angle():
     judged = evaluate_slow_steer(turned(slow_steer(), "acceleration_y"))
     assert judged["angle"] is None
-    assert golden(str(judged.diagnostics[0]))
+    assert mentions(str(judged.diagnostics[0]), "'sign: -1'", "lateral", "acceleration")
 
 
 def test_responsiveness_is_asked_from_5_a_on_a_dry_road_at_80_km_h():
@@ -314,10 +314,10 @@ def test_a_series_passes_only_if_no_run_is_missing_fails_or_is_not_judged():
     assert "has passed, with" in passed.summary
     missing = judge_series(runs(without=3), A)
     assert missing.data["verdict"] is Status.FAILED
-    assert golden(missing.criteria["stability"].why)
+    assert mentions(missing.criteria["stability"].why, "1 runs", "+108.0 degrees")
     assert "has not passed (stability and responsiveness not judged)" in missing.summary
     failed = judge_series(runs(spoil=Verdict(Status.FAILED)), A)
-    assert golden(failed.criteria["stability"].why)
+    assert mentions(failed.criteria["stability"].why, "26 runs", "144.0 degrees", "fail", "smallest")
     assert "has failed (stability)" in failed.summary
     assert judge_series(runs(spoil=not_judged("too short")), A).data["verdict"] is Status.FAILED
 
@@ -364,7 +364,7 @@ def test_a_run_that_ends_before_0_375_g_has_no_angle():
     assert judged["angle"] is None
     with pytest.raises(NotJudged) as caught:
         characteristic_angle([judged])
-    assert golden_in(caught.value)
+    assert mentions(caught.value, "0.354 g", "0.375 g", "slowly", "steer")
 
 
 MAPPING = """
@@ -403,7 +403,7 @@ def test_measured_columns_under_other_names_units_and_signs_give_the_same(tmp_pa
     assert found["verdict"] == "passed"
     for key, one in found["quantities"].items():
         assert one["value"] == pytest.approx(exact[key], rel=1e-8), key
-    assert golden_in([why["message"] for why in found["diagnostics"]])
+    assert mentions([why["message"] for why in found["diagnostics"]], "sideslip", "spin", "ratios")
 
 
 UNITS_GIVEN = {
@@ -460,8 +460,8 @@ def test_an_evaluation_that_judges_nothing_says_so_and_ends_with_1(tmp_path, mon
     command = ("evaluate", "sine-with-dwell", "map.yaml", *options)
     assert status_of(*command) == 1
     said = capsys.readouterr()
-    assert golden_in(said.out)
-    assert golden_in(said.err)
+    assert mentions(said.out, "yaw", "rate")
+    assert mentions(said.err, "judged")
     (tmp_path / "map.yaml").write_text(mapping.replace("a, yaw", "{column: a, sign: -1}, yaw"))
     assert status_of(*command) == 0
 
@@ -521,7 +521,7 @@ def test_a_series_is_driven_from_a_and_goes_on_where_it_was(tmp_path, capsys):
     assert (series / "sine_with_dwell_series.png").is_file()
     assert status_of("drive", "sine-with-dwell", *settings) == 0
     again = capsys.readouterr()
-    assert golden_in(again.err)
+    assert mentions(again.err, "4 runs", "sine", "dwell")
     assert again.out == first.out
 
 
@@ -578,7 +578,7 @@ def test_a_series_of_lane_changes_finds_the_highest_clean_speed_and_goes_on_wher
     assert status_of("drive", "iso-3888-2", *settings) == 0
     again = capsys.readouterr()
     assert again.out == first.out
-    assert golden_in(again.err)
+    assert mentions(again.err, "km/h", "1 run")
 
 
 def test_equal_runs_have_equal_figures_wherever_their_results_are(tmp_path):

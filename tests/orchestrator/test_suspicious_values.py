@@ -11,7 +11,7 @@ from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from orchestrator.wiring.suspicious_values import seen_as
 from tests.changed import changed
-from tests.sentences import golden, refused
+from tests.refusals import each_mentions, mentions, refused
 from vocabulary.wheels import WHEELS
 
 from .fake_fmus import Var, make_fmu, out
@@ -83,7 +83,9 @@ def test_a_change_of_what_the_reference_is_told_alone_names_the_tyres_that_keep_
     made = plan("inputs.friction=0.3")
     (one,) = warnings_in(made.diagnostics)
     assert (one.code, one.location.signal, one.value) == ("values-differ", "reference.friction", 0.3)
-    assert golden(one.message)
+    assert mentions(
+        one.message, "reference.friction", "0.3", "tyre.friction_*", "0.65", "--set friction=VALUE"
+    )
 
 
 @pytest.mark.parametrize(
@@ -130,7 +132,10 @@ def test_friction_that_a_road_gives_is_left_to_it_and_is_that_of_the_road():
 
 def test_a_reference_that_is_told_another_friction_than_the_roads_is_named_unless_it_is_meant():
     road = "  road: {fmu: road_x}\n"
-    assert golden(remarks("inputs.reference.friction=0.3", facts="friction: 0.5", more=road))
+    assert each_mentions(
+        remarks("inputs.reference.friction=0.3", facts="friction: 0.5", more=road),
+        ("road.base_friction", "0.5", "reference.friction", "0.3", "--set friction=VALUE"),
+    )
     meant = plan(facts='friction: 0.5\ninputs: {"reference.friction": 0.3}', more=road)
     assert values(meant, "reference")["friction"] == 0.3
     assert warnings_in(meant.diagnostics) == ()
@@ -141,20 +146,28 @@ def test_a_reference_that_is_told_another_friction_than_the_roads_is_named_unles
 
 
 def test_a_fact_in_the_wrong_unit_is_refused():
-    with refused(WiringError, "unit-mismatch"):
+    with refused(WiringError, "unit-mismatch", names=("--set speed=3", "'3 kg'", "m/s", "km/h")):
         plan("speed=3 kg")
 
 
 def test_a_speed_held_by_the_driver_that_is_not_the_cars_is_named():
     held = {"driver": "speed_gain: 100"}
-    assert golden(remarks("plant.initial_speed=80 km/h", **held))
+    assert each_mentions(
+        remarks("plant.initial_speed=80 km/h", **held),
+        ("driver.target_speed", "25 m/s", "plant.initial_speed", "22.2222 m/s", "--set speed=VALUE"),
+    )
     assert remarks("plant.initial_speed=80 km/h") == []  # the driver holds no speed
     (both,) = remarks(plant="initial_speed: 20", driver="speed_gain: 100, target_speed: 30")
-    assert golden(both)
+    assert mentions(
+        both, "driver.target_speed", "30 m/s", "plant.initial_speed", "20 m/s", "--set speed=VALUE"
+    )
 
 
 def test_one_mass_for_the_reference_and_another_for_the_plant_is_named():
-    assert golden(remarks("plant.mass=1500"))
+    assert each_mentions(
+        remarks("plant.mass=1500"),
+        ("reference.mass", "1200 kg", "plant.mass", "1500 kg", "--set vehicle.mass=VALUE", "mass"),
+    )
 
 
 def test_two_values_that_the_scenario_gives_are_meant():
@@ -167,7 +180,7 @@ def test_the_fmus_own_values_of_what_is_no_property_of_the_car_are_meant():
 
 
 def test_another_cars_steering_ratio_is_named():
-    assert golden(remarks(car="mass: 1200"))
+    assert each_mentions(remarks(car="mass: 1200"), ("driver.steering_ratio", "17"))
 
 
 @pytest.mark.parametrize(

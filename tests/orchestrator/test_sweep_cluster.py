@@ -18,7 +18,7 @@ from orchestrator.experiments.executor import left_to_do
 from orchestrator.experiments.experiment import plan_experiment
 from orchestrator.experiments.jobs import Job, Outcome
 from orchestrator.experiments.load_experiment import load_experiment
-from tests.sentences import golden, golden_in
+from tests.refusals import mentions
 
 from .test_sweep import UNITS, moods, rows, yawbench  # noqa: F401
 
@@ -73,7 +73,9 @@ def table_of(file, yawbench, cluster, tmp_path):  # noqa: F811
 
 
 def test_a_cluster_gives_the_table_of_this_machine_to_the_byte(moods, yawbench, cluster_of_threads, tmp_path):  # noqa: F811
-    assert golden_in(table_of(moods(5, 20, 60, count=2), yawbench, cluster_of_threads, tmp_path))
+    assert mentions(
+        table_of(moods(5, 20, 60, count=2), yawbench, cluster_of_threads, tmp_path), "all finished already"
+    )
 
 
 @pytest.mark.exhaustive
@@ -230,7 +232,7 @@ def test_a_scheduler_that_does_not_answer_is_one_sentence(address, moods, yawben
     monkeypatch.setattr("orchestrator.experiments.cluster.TIMEOUT", 0.5)
     status, _, err = yawbench(moods(10), "out", "--scheduler", address)
     assert status == 2
-    assert golden_in(err.splitlines()[-1])
+    assert mentions(err.splitlines()[-1], "--scheduler", "Dask", "0.5 s", f"--scheduler {address}")
     assert "Traceback" not in err
 
 
@@ -241,7 +243,7 @@ def test_a_scheduler_without_workers_is_one_sentence(moods, yawbench, tmp_path):
     with LocalCluster(n_workers=0, dashboard_address=":0", silence_logs=50) as empty:
         status, _, err = yawbench(moods(10), "out", "--scheduler", empty.scheduler_address)
     assert status == 2
-    assert golden_in(err.splitlines()[-1])
+    assert mentions(err.splitlines()[-1], "scheduler", "workers")
 
 
 def test_workers_of_another_version_are_refused(moods, yawbench, cluster_of_threads, monkeypatch):  # noqa: F811
@@ -254,7 +256,7 @@ def test_workers_of_another_version_are_refused(moods, yawbench, cluster_of_thre
     assert status == 2
     assert f"yawbench {theirs['yawbench']}" in err.splitlines()[-1]
     assert "99.0" in err.splitlines()[-1]
-    assert golden_in(err.splitlines()[-1])
+    assert mentions(err.splitlines()[-1], "fit", "yawbench")
 
 
 class _Restarting:
@@ -283,4 +285,6 @@ def test_without_its_package_the_option_says_how_to_get_it(moods, fmus, capsys, 
     with pytest.raises(SystemExit) as end:
         main(["sweep", str(moods(10)), *arguments])
     assert end.value.code == 2
-    assert golden(capsys.readouterr().err.splitlines()[-1])
+    assert mentions(
+        capsys.readouterr().err.splitlines()[-1], "--scheduler", "'yawbench[cluster]'", "distributed"
+    )

@@ -12,7 +12,7 @@ import pytest
 from components.tyre_models.pacejka_2012_set import COMMON, LONGITUDINAL, REST
 from orchestrator.errors import ScenarioError
 from orchestrator.scenario.tir import read_tir
-from tests.sentences import golden_in, refused, texts_of
+from tests.refusals import mentions, refused, texts_of
 
 from .tir_files import UNITS, text_of, write
 
@@ -148,7 +148,7 @@ def test_without_fzmax_loads_go_to_three_times_the_nominal_or_to_where_a_stiffne
     assert read(tmp_path, without=["FZMAX"]).values["fzmax"] == 12000.0
     assert read(tmp_path, {"FZMAX": "0", "LFZO": "0.5"}).values["fzmax"] == 6000.0
     assert read(tmp_path, {"PKY4": "3.2"}, without=["FZMAX"]).values["fzmax"] < 4000 * 3
-    assert golden_in([str(w) for w in read(tmp_path, {"PKX2": "-20.5"}).warnings])
+    assert mentions([str(w) for w in read(tmp_path, {"PKX2": "-20.5"}).warnings], "sign")
 
 
 @pytest.mark.parametrize(
@@ -216,7 +216,7 @@ def test_the_unloaded_radius_can_come_from_rim_and_width(tmp_path):
     given = {"RIM_RADIUS": "0.19", "WIDTH": "0.2", "ASPECT_RATIO": "0.6"}
     file = read(tmp_path, given, without=["UNLOADED_RADIUS"])
     assert file.values["unloaded_radius"] == pytest.approx(0.31)
-    assert golden_in(str(file.warnings[0]))
+    assert mentions(str(file.warnings[0]), "RIM_RADIUS", "WIDTH", "ASPECT_RATIO")
 
 
 @pytest.mark.parametrize(
@@ -225,17 +225,17 @@ def test_the_unloaded_radius_can_come_from_rim_and_width(tmp_path):
 def test_what_is_no_such_file_is_refused_in_one_sentence(tmp_path, content):
     path = tmp_path / "b.tir"
     path.write_bytes(content)
-    with refused(ScenarioError, "tyre-file-invalid"):
+    with refused(ScenarioError, "tyre-file-invalid", names=("b.tir", "tyre", "property")):
         read_tir(path)
 
 
 def test_a_missing_file_a_folder_and_a_very_large_one_are_refused(tmp_path):
-    with refused(ScenarioError, "file-missing"):
+    with refused(ScenarioError, "file-missing", names=("no.tir", "tyre", "property")):
         read_tir(tmp_path / "no.tir")
     with refused(ScenarioError, "file-unreadable"):
         read_tir(tmp_path)
     (tmp_path / "large.tir").write_bytes(b"$" * 1_000_001)
-    with refused(ScenarioError, "file-unreadable"):
+    with refused(ScenarioError, "file-unreadable", names=("large.tir", "1 MB")):
         read_tir(tmp_path / "large.tir")
 
 

@@ -16,7 +16,7 @@ from orchestrator.planner import Planner
 from orchestrator.scenario.loader import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
-from tests.sentences import golden, golden_in, places_of, refused, texts_of
+from tests.refusals import each_mentions, mentions, places_of, refused, texts_of
 from vocabulary.wheels import WHEELS
 
 from .fake_fmus import Var, make_fmu, out
@@ -209,9 +209,9 @@ def test_the_working_directory_has_the_fmus_of_a_scenario_elsewhere(
 
 def test_no_folder_of_fmus_is_said(folder: Path, tmp_path: Path) -> None:
     folder.rename(tmp_path / "elsewhere")
-    assert golden(problems(scenario(), ModelDescriptionError))
+    assert each_mentions(problems(scenario(), ModelDescriptionError), ("'yawbench build'", "--fmus"))
     assert len(plan(fmus=tmp_path / "elsewhere").instances) == 4
-    with refused(ModelDescriptionError, "folder-missing"):
+    with refused(ModelDescriptionError, "folder-missing", names=("--fmus nowhere", "nowhere", "folder")):
         plan(fmus=Path("nowhere"))
 
 
@@ -225,19 +225,36 @@ def test_an_fmu_can_be_a_path_relative_to_the_scenario(folder: Path, tmp_path: P
 
 def test_every_missing_fmu_is_said_with_those_there_are(folder: Path) -> None:
     path = scenario(UNITS.replace("controller_fnn", "controller_fn").replace("tyre_dugoff", "x/tyre.fmu"))
-    assert golden(problems(path, ModelDescriptionError))
-    assert golden(problems(scenario(), ModelDescriptionError, swaps=["tyre=tyre_x"]))
+    assert each_mentions(
+        problems(path, ModelDescriptionError),
+        (
+            "a.yaml:5",
+            "units.controller.fmu",
+            "'controller_fn'",
+            "fmus",
+            "'controller_fnn'",
+            "controller_dead_band",
+            "controller_sliding_mode",
+        ),
+        ("a.yaml:7", "units.tyre.fmu", "tyre.fmu"),
+    )
+    assert each_mentions(
+        problems(scenario(), ModelDescriptionError, swaps=["tyre=tyre_x"]),
+        ("--swap tyre=tyre_x", "'tyre_x'", "fmus", "tyre_dugoff", "tyre_magic_formula_62_transient"),
+    )
 
 
 def test_a_corrupt_fmu_is_said_where_it_is_used(folder: Path) -> None:
     (folder / "tyre_dugoff.fmu").write_bytes(b"PK nonsense")
-    assert golden(problems(scenario(), ModelDescriptionError))
+    assert each_mentions(
+        problems(scenario(), ModelDescriptionError), ("a.yaml:7", "units.tyre.fmu", "tyre_dugoff.fmu", "File")
+    )
 
 
 def test_an_fmu_for_one_instance_is_not_used_twice(folder: Path) -> None:
     make_fmu(folder / "lonely.fmu", once=True)
     path = scenario(UNITS + "  one: {fmu: lonely}\n  two: {fmu: lonely}\n")
-    assert golden(problems(path))
+    assert each_mentions(problems(path), ("a.yaml:9", "units.two.fmu", "--isolate"))
     assert len(make_plan(load_scenario(path), isolated=True).instances) == 6
 
 
@@ -248,7 +265,7 @@ def test_units_that_would_run_each_others_code_are_refused(folder: Path) -> None
     make_fmu(folder / "four.fmu", files={"resources/slavemodule.txt": b"json", "resources/json.py": b""})
     assert len(plan(scenario(UNITS + "  a: {fmu: two}\n  b: {fmu: three}\n")).instances) == 6
     path = scenario(UNITS + "  a: {fmu: one}\n  b: {fmu: two}\n  c: {fmu: four}\n")
-    assert golden(problems(path))
+    assert each_mentions(problems(path), ("a.yaml", "'model_of_mine'", "--isolate"), ("a.yaml", "'json'"))
 
 
 def test_a_unit_whose_module_is_loaded_already_is_refused(
@@ -263,7 +280,7 @@ def test_a_unit_whose_module_is_loaded_already_is_refused(
     path = scenario(UNITS + "  a: {fmu: one}\n")
     assert len(plan(path).instances) == 5  # the same code: no harm
     loaded.write_text("x = 2")
-    assert golden(problems(path))
+    assert each_mentions(problems(path), ("a.yaml", "'fakes_xyz'"))
 
 
 def test_a_unit_whose_folder_of_modules_is_loaded_from_another_archive_is_refused(
@@ -283,7 +300,7 @@ def test_a_unit_whose_folder_of_modules_is_loaded_from_another_archive_is_refuse
     path = scenario(UNITS + "  a: {fmu: one}\n")
     assert len(plan(path).instances) == 5
     loaded.write_text("x = 2")
-    assert golden_in(problems(path)[0])
+    assert mentions(problems(path)[0], "'fakes_ns'", "module", "process")
 
 
 # Parameters
@@ -316,55 +333,84 @@ def test_every_type_of_parameter_is_taken() -> None:
 
 
 @pytest.mark.parametrize(
-    ("setting", "code"),
+    ("setting", "code", "names"),
     [
         (
             "driver.amplitud=1",
             "parameter-unknown",
+            (("--set driver.amplitud=1", "driver_sine", "'amplitud'", "'amplitude'"),),
         ),
         (
             "controller.k=1",
             "parameter-unknown",
+            (("--set controller.k=1", "controller_fnn", "'k'", "wheel_radius", "rule_base", "gain"),),
         ),
-        ("tyre.k=1", "parameter-unknown"),
+        ("tyre.k=1", "parameter-unknown", (("--set tyre.k=1", "tyre_dugoff", "'k'"),)),
         (
             "tyre.friction_fl=1",
             "parameter-unknown",
+            (("--set tyre.friction_fl=1", "'friction_fl'", "'inputs'"),),
         ),
-        ("driver.amplitude=5 kg", "unit-mismatch"),
-        ("driver.amplitude=big", "value-invalid"),
-        ("driver.amplitude=true", "value-invalid"),
-        ("driver.amplitude=1e999 deg", "value-invalid"),
-        ("driver.frequency=-1", "value-invalid"),
-        ("plant.wheel_radius=110 cm", "value-invalid"),
-        ("driver.periods=1.5", "value-invalid"),
-        ("driver.periods=0", "value-invalid"),
-        ("driver.smooth=1", "value-invalid"),
-        ("driver.shape=5", "value-invalid"),
-        ("driver.shape=sin", "value-invalid"),
-        ("driver.road=icy", "value-invalid"),
-        ("driver.road=3", "value-invalid"),
-        ("vehicle.mas=1", "parameter-unknown"),
-        ("vehicle.xyz=1", "parameter-unknown"),
-        ("vehicle.wheel_radius=5 kg", "unit-mismatch"),
-        ("inputs.frction*=1", "variable-unknown"),
-        ("inputs.friction_fl=5 m", "unit-mismatch"),
+        (
+            "driver.amplitude=5 kg",
+            "unit-mismatch",
+            (("--set driver.amplitude=5", "'5 kg'", "rad", "deg", "mrad"),),
+        ),
+        ("driver.amplitude=big", "value-invalid", (("--set driver.amplitude=big", "'big'"),)),
+        ("driver.amplitude=true", "value-invalid", (("--set driver.amplitude=true", "true", "number"),)),
+        ("driver.amplitude=1e999 deg", "value-invalid", (("--set driver.amplitude=1e999", "'1e999 deg'"),)),
+        ("driver.frequency=-1", "value-invalid", (("--set driver.frequency=-1", "0 Hz"),)),
+        (
+            "plant.wheel_radius=110 cm",
+            "value-invalid",
+            (("--set plant.wheel_radius=110", "1 m", "'110 cm'"),),
+        ),
+        ("driver.periods=1.5", "value-invalid", (("--set driver.periods=1.5", "whole", "number"),)),
+        ("driver.periods=0", "value-invalid", (("--set driver.periods=0", "1"),)),
+        ("driver.smooth=1", "value-invalid", (("--set driver.smooth=1", "true", "false"),)),
+        ("driver.shape=5", "value-invalid", (("--set driver.shape=5", "text"),)),
+        ("driver.shape=sin", "value-invalid", (("--set driver.shape=sin", "'sin'", "'sine'", "square"),)),
+        ("driver.road=icy", "value-invalid", (("--set driver.road=icy", "'icy'", "dry", "wet"),)),
+        ("driver.road=3", "value-invalid", (("--set driver.road=3", "dry", "wet"),)),
+        ("vehicle.mas=1", "parameter-unknown", (("--set vehicle.mas=1", "'mas'", "'mass'"),)),
+        ("vehicle.xyz=1", "parameter-unknown", (("--set vehicle.xyz=1", "'xyz'"),)),
+        (
+            "vehicle.wheel_radius=5 kg",
+            "unit-mismatch",
+            (("--set vehicle.wheel_radius=5", "'5 kg'", "m", "mm", "cm", "km"),),
+        ),
+        ("inputs.frction*=1", "variable-unknown", (("--set inputs.frction*=1", "'friction_*'"),)),
+        (
+            "inputs.friction_fl=5 m",
+            "unit-mismatch",
+            (("--set inputs.friction_fl=5", "'5 m'", "tyre.friction_fl"),),
+        ),
         (
             "inputs.steer_angle=0",
             "constant-overruled",
+            (
+                ("--set inputs.steer_angle=0", "controller.steer_angle", "driver.steer_angle"),
+                ("--set inputs.steer_angle=0", "plant.steer_angle", "driver.steer_angle"),
+            ),
         ),
     ],
 )
-def test_a_wrong_value_is_said_in_one_sentence(setting: str, code: str) -> None:
+def test_a_wrong_value_is_said_in_one_sentence(setting: str, code: str, names) -> None:
     found = problems(scenario(), settings=[setting])
     assert {*places_of(found)} == {(code, f"--set {setting}")}
-    assert golden(found)
+    assert each_mentions(found, *names)
 
 
 def test_all_wrong_values_are_said_at_once_with_their_lines() -> None:
     Path("car.yaml").write_text("parameters:\n  wheel_radius: 5 kg\n  mass: 0\n")
     units = UNITS.replace("driver_sine", "driver_sine, parameters: {amplitude: x, frequency: -1}")
-    assert golden(problems(scenario(units, head="vehicle: car.yaml\n")))
+    assert each_mentions(
+        problems(scenario(units, head="vehicle: car.yaml\n")),
+        ("a.yaml:5", "units.driver.parameters.amplitude", "'x'"),
+        ("a.yaml:5", "units.driver.parameters.frequency", "0 Hz", "-1"),
+        ("car.yaml:2", "parameters.wheel_radius", "'5 kg'", "m", "mm", "cm", "km"),
+        ("car.yaml:3", "parameters.mass", "1 kg", "0"),
+    )
 
 
 # Swapping
@@ -377,14 +423,24 @@ def test_what_was_meant_for_the_replaced_fmu_is_left_out_with_a_note() -> None:
     made = plan(path, swaps=["controller=controller_off"])
     assert unit(made, "controller").parameters == {"gain": 2.0}
     assert unit(made, "tyre").constants == {f"friction_{w}": 0.65 for w in WHEELS}
-    assert golden(texts_of(made)[:2])
+    assert each_mentions(
+        texts_of(made)[:2],
+        ("vehicle.rule_base", "left", "instance"),
+        ("controller.wheel_radius", "controller_off"),
+    )
 
 
 def test_a_mistake_stays_a_mistake_after_a_swap() -> None:
     units = UNITS.replace("step_size: 2 ms", "parameters: {gian: 2}")
     swap = ["controller=controller_off"]
-    assert golden(problems(scenario(units), swaps=swap))
-    assert golden(problems(scenario(), swaps=swap, settings=["controller.rule_base=2"]))
+    assert each_mentions(
+        problems(scenario(units), swaps=swap),
+        ("a.yaml:5", "units.controller.parameters.gian", "controller_off", "'gian'", "'gain'"),
+    )
+    assert each_mentions(
+        problems(scenario(), swaps=swap, settings=["controller.rule_base=2"]),
+        ("--set controller.rule_base=2", "controller_off", "'rule_base'"),
+    )
 
 
 def test_a_constant_and_a_connection_of_the_replaced_fmu_are_left_out_with_a_note(folder: Path) -> None:
@@ -392,7 +448,12 @@ def test_a_constant_and_a_connection_of_the_replaced_fmu_are_left_out_with_a_not
     units = "\n".join(line for line in UNITS.splitlines() if "tyre" not in line) + "\n"
     rest = 'inputs: {friction: 1, "tyre_force*": 0}\n' + TORQUES + "record: [plant.acceleration_y]\n"
     made = plan(scenario(units, rest), swaps=["plant=plant_two_dof"])
-    assert golden(texts_of(made))
+    assert each_mentions(
+        texts_of(made),
+        ("inputs.tyre_force*", "left", "instance"),
+        ("connections[0]", "'wheel_torque_*'", "plant"),
+        ("record[0]", "'acceleration_y'", "plant"),
+    )
     assert made.record == ()
 
 
@@ -402,10 +463,10 @@ def test_a_friction_too_low_for_all_who_are_told_it_is_said_once_and_else_of_who
     make_fmu(folder / "plant_one.fmu", inputs=inputs, outputs=["x"], parameters=base)
     make_fmu(folder / "reference_one.fmu", inputs=[Var("friction", "1", minimum=0.1)], outputs=["y"])
     one, two = "  plant: {fmu: plant_one}\n", "  reference: {fmu: reference_one}\n"
-    for units, value in ((one, -1), (one + two, 0.05)):
+    for units, value, names in ((one, -1, ("0",)), (one + two, 0.05, ("0.1", "reference.friction"))):
         found = problems(scenario(units, "", head=f"friction: {value}\n"))
         assert places_of(found) == [("value-invalid", "a.yaml:1: friction")]
-        assert golden(found)
+        assert each_mentions(found, (value, *names))
 
 
 def test_friction_and_speed_that_nobody_takes_after_a_swap_are_left_out_with_a_note(folder: Path) -> None:
@@ -414,24 +475,34 @@ def test_friction_and_speed_that_nobody_takes_after_a_swap_are_left_out_with_a_n
     make_fmu(folder / "plant_two.fmu", outputs=["x"])
     units = "  plant: {fmu: plant_one}\n"
     path = scenario(units, "", head="friction: 0.4\nspeed: 20\n")
-    assert golden(texts_of(plan(path, swaps=["plant=plant_two"]))[:2])
+    assert each_mentions(
+        texts_of(plan(path, swaps=["plant=plant_two"]))[:2],
+        ("speed", "left", "instance"),
+        ("friction", "left", "instance"),
+    )
     for setting in ("friction=0.3", "speed=30"):
         assert len(problems(path, swaps=["plant=plant_two"], settings=[setting])) == 1
     alone = scenario(units.replace("one", "two"), "", head="friction: 0.4\nspeed: 20\n")
-    assert golden(problems(alone))
+    assert each_mentions(
+        problems(alone), ("a.yaml:1", "instance", "friction"), ("a.yaml:2", "initial_speed", "target_speed")
+    )
 
 
 def test_a_swap_works_though_the_replaced_fmu_is_not_there(folder: Path) -> None:
     units = UNITS.replace("controller_fnn, step_size: 2 ms", "gone, parameters: {secret: 1}")
     made = plan(scenario(units), swaps=["controller=controller_off"])
-    assert golden(texts_of(made))
+    assert each_mentions(texts_of(made), ("controller.secret", "controller_off"))
 
 
 # Wires
 
 
 def test_an_input_without_a_source_is_said_with_what_fits() -> None:
-    assert golden(problems(scenario(rest="inputs: {friction: 0.65}\n")))
+    assert each_mentions(
+        problems(scenario(rest="inputs: {friction: 0.65}\n")),
+        ("a.yaml:6", "units.plant", "plant.wheel_torque_*", "N.m", "controller.torque_request_*", "'inputs'"),
+        ("a.yaml:7", "units.tyre", "tyre.friction_*", "'inputs'"),
+    )
 
 
 def test_an_optional_input_keeps_its_start_value_where_nothing_drives_it(folder: Path) -> None:
@@ -447,12 +518,32 @@ def test_an_optional_input_keeps_its_start_value_where_nothing_drives_it(folder:
 
 def test_an_input_of_one_wheel_without_a_source_is_said_alone() -> None:
     rest = "inputs: {friction: 1, friction_fl: 1, friction_rl: 1, friction_rr: 1}\n" + TORQUES
-    assert golden(problems(scenario(rest=rest)))
+    assert each_mentions(
+        problems(scenario(rest=rest)), ("a.yaml:7", "units.tyre", "tyre.friction_fr", "'inputs'")
+    )
 
 
 def test_more_than_one_output_of_a_name_is_said_and_a_connection_settles_it() -> None:
     units = UNITS + "  second: {fmu: driver_sine}\n"
-    assert golden(problems(scenario(units)))
+    assert each_mentions(
+        problems(scenario(units)),
+        (
+            "a.yaml:5",
+            "units.controller",
+            "controller.steer_angle",
+            "driver.steer_angle",
+            "second.steer_angle",
+            "'connections'",
+        ),
+        (
+            "a.yaml:6",
+            "units.plant",
+            "plant.steer_angle",
+            "driver.steer_angle",
+            "second.steer_angle",
+            "'connections'",
+        ),
+    )
     more = "  - {from: second.steer_angle, to: plant.steer_angle}\n"
     more += "  - {from: driver.steer_angle, to: controller.steer_angle}\n"
     made = plan(scenario(units, CONSTANTS + TORQUES + more))
@@ -461,11 +552,12 @@ def test_more_than_one_output_of_a_name_is_said_and_a_connection_settles_it() ->
 
 
 @pytest.mark.parametrize(
-    ("connection", "expected"),
+    ("connection", "expected", "names"),
     [
         (
             "{from: controler.torque_request_*, to: plant.x}",
-            None,  # said when the file is read
+            None,
+            (),  # said when the file is read
         ),
         (
             "{from: controller.torque_requst_*, to: plant.wheel_torque_*}",
@@ -473,6 +565,7 @@ def test_more_than_one_output_of_a_name_is_said_and_a_connection_settles_it() ->
                 ("input-undriven", "a.yaml:6: units.plant"),
                 ("variable-unknown", "a.yaml:10: connections[0].from"),
             ],
+            ("connections[0].from", "'torque_requst_*'", "'torque_request_*'", "controller"),
         ),
         (
             "{from: controller.torque_request_*, to: plant.torque}",
@@ -480,6 +573,15 @@ def test_more_than_one_output_of_a_name_is_said_and_a_connection_settles_it() ->
                 ("input-undriven", "a.yaml:6: units.plant"),
                 ("variable-unknown", "a.yaml:10: connections[0].to"),
             ],
+            (
+                "connections[0].to",
+                "'torque'",
+                "steer_angle",
+                "tyre_force_x_*",
+                "tyre_force_y_*",
+                "wheel_torque_*",
+                "plant",
+            ),
         ),
         (
             "{from: controller.yaw_rate, to: plant.wheel_torque_*}",
@@ -487,6 +589,7 @@ def test_more_than_one_output_of_a_name_is_said_and_a_connection_settles_it() ->
                 ("input-undriven", "a.yaml:6: units.plant"),
                 ("variable-wrong-kind", "a.yaml:10: connections[0].from"),
             ],
+            ("connections[0].from", "controller.yaw_rate"),
         ),
         (
             "{from: controller.torque_request_*, to: plant.wheel_torque_fl}",
@@ -494,6 +597,7 @@ def test_more_than_one_output_of_a_name_is_said_and_a_connection_settles_it() ->
                 ("input-undriven", "a.yaml:6: units.plant"),
                 ("connection-invalid", "a.yaml:10: connections[0]"),
             ],
+            ("connections[0]", "'from'", "controller.torque_request_*", "'to'", "plant.wheel_torque_fl"),
         ),
         (
             "{from: controller.torque_*, to: plant.wheel_torque_*}",
@@ -501,6 +605,7 @@ def test_more_than_one_output_of_a_name_is_said_and_a_connection_settles_it() ->
                 ("input-undriven", "a.yaml:6: units.plant"),
                 ("connection-matches-nothing", "a.yaml:10: connections[0]"),
             ],
+            ("connections[0]", "'from'", "request_fl", "request_fr", "request_rl", "request_rr", "'to'"),
         ),
         (
             "{from: plant.yaw_rate, to: plant.steer_angle}",
@@ -508,23 +613,26 @@ def test_more_than_one_output_of_a_name_is_said_and_a_connection_settles_it() ->
                 ("input-undriven", "a.yaml:6: units.plant"),
                 ("connection-invalid", "a.yaml:10: connections[0]"),
             ],
+            ("connections[0]",),
         ),
         (
             "{from: driver.steer_angle, to: plant.wheel_torque_*}",
             [("wiring-unit-mismatch", "a.yaml:10: connections[0]")],
+            ("connections[0]", "driver.steer_angle", "plant.wheel_torque_*", "N.m"),
         ),
-        ("{from: plant.yaw_rate, to: controller.yaw_rate, gain: much}", None),
+        ("{from: plant.yaw_rate, to: controller.yaw_rate, gain: much}", None, ()),
         (
             "{from: plant.status, to: controller.yaw_rate}",
             [
                 ("input-undriven", "a.yaml:6: units.plant"),
                 ("wiring-type-mismatch", "a.yaml:10: connections[0]"),
             ],
+            ("connections[0]", "plant.status", "controller.yaw_rate"),
         ),
     ],
 )
 def test_a_wrong_connection_is_said_in_one_sentence(
-    connection: str, expected: list[tuple[str, str]] | None
+    connection: str, expected: list[tuple[str, str]] | None, names
 ) -> None:
     path = scenario(rest=f"{CONSTANTS}connections:\n  - {connection}\n")
     if expected is None:
@@ -533,12 +641,21 @@ def test_a_wrong_connection_is_said_in_one_sentence(
     else:
         found = problems(path)
         assert places_of(found) == expected
-        assert golden(found[-1])
+        assert mentions(found[-1], "a.yaml:10", *names)
 
 
 def test_two_connections_to_one_input_are_said() -> None:
     more = "  - {from: controller.torque_request_rr, to: plant.wheel_torque_fl}\n"
-    assert golden(problems(scenario(rest=CONSTANTS + TORQUES + more)))
+    assert each_mentions(
+        problems(scenario(rest=CONSTANTS + TORQUES + more)),
+        (
+            "a.yaml:11",
+            "connections[1]",
+            "plant.wheel_torque_fl",
+            "controller.torque_request_fl",
+            "connections[0]",
+        ),
+    )
 
 
 def test_one_output_can_feed_four_wheels() -> None:
@@ -554,7 +671,11 @@ def wire_to(made: Plan, target: str, name: str) -> Wire:
 
 def test_units_that_differ_over_equal_names_are_said_with_the_target(folder: Path) -> None:
     make_fmu(folder / "driver_m.fmu", outputs=[out("steer_angle", unit="m")])
-    assert golden(problems(scenario(), swaps=["driver=driver_m"]))
+    assert each_mentions(
+        problems(scenario(), swaps=["driver=driver_m"]),
+        ("a.yaml:5", "units.controller", "driver.steer_angle", "controller.steer_angle"),
+        ("a.yaml:6", "units.plant", "driver.steer_angle", "plant.steer_angle"),
+    )
 
 
 def test_a_wire_converts_between_units_of_one_dimension(folder: Path) -> None:
@@ -584,7 +705,7 @@ def test_units_are_known_by_what_the_fmu_defines(folder, unit, base, gain, offse
 
 def test_units_that_are_neither_known_nor_defined_fit_by_name_alone(folder: Path) -> None:
     make_fmu(folder / "other.fmu", outputs=[out("steer_angle", unit="radian")])
-    assert golden_in(problems(scenario(), swaps=["driver=other"])[1])
+    assert mentions(problems(scenario(), swaps=["driver=other"])[1], "plant.steer_angle", "units", "radian")
     make_fmu(folder / "taker.fmu", inputs=[Var("steer_angle", "radian")], outputs=["y"])
     path = scenario("  other: {fmu: other}\n  taker: {fmu: taker}\n", "")
     assert not wire_to(plan(path), "taker", "steer_angle").converts
@@ -594,7 +715,7 @@ def test_a_unit_that_contradicts_its_name_counts_as_defined_and_is_noted(folder:
     make_fmu(folder / "other.fmu", outputs=[out("steer_angle", unit="deg")], definitions={"deg": 'rad="1"'})
     made = plan(swaps=["driver=other"])
     assert not wire_to(made, "plant", "steer_angle").converts
-    assert golden(texts_of(made))
+    assert each_mentions(texts_of(made), ("deg", "otherwise", "usual"))
 
 
 def test_a_parameter_is_converted_into_a_unit_that_only_the_fmu_defines(folder: Path) -> None:
@@ -629,7 +750,10 @@ def test_gain_and_offset_take_plain_numbers_whatever_the_units_are(folder, given
 def test_a_gain_in_place_of_a_conversion_is_noted(folder: Path) -> None:
     make_fmu(folder / "driver_deg.fmu", outputs=[out("steer_angle", unit="deg")])
     rest = CONSTANTS + TORQUES + "  - {from: driver.steer_angle, to: plant.steer_angle, gain: 0.0625}\n"
-    assert golden(texts_of(plan(scenario(rest=rest), swaps=["driver=driver_deg"])))
+    assert each_mentions(
+        texts_of(plan(scenario(rest=rest), swaps=["driver=driver_deg"])),
+        ("connections[1]", "replace", "conversion"),
+    )
 
 
 def test_text_has_no_gain_and_a_whole_number_a_whole_one(folder: Path) -> None:
@@ -638,9 +762,11 @@ def test_text_has_no_gain_and_a_whole_number_a_whole_one(folder: Path) -> None:
     make_fmu(folder / "reader.fmu", inputs=[Var("word", type="String", start="")], outputs=["y"])
     units = "  a: {fmu: count}\n  b: {fmu: taker}\n  c: {fmu: reader}\n"
     rest = "connections:\n  - {from: a.n, to: b.n, gain: 2}\n  - {from: a.word, to: c.word, gain: 2}\n"
-    assert golden(problems(scenario(units, rest)))
+    assert each_mentions(
+        problems(scenario(units, rest)), ("a.yaml:9", "connections[1]", "Real", "Integer", "String")
+    )
     rest = "connections:\n  - {from: a.n, to: b.n, gain: 0.5}\n"
-    assert golden(problems(scenario(units, rest)))
+    assert each_mentions(problems(scenario(units, rest)), ("a.yaml:8", "connections[0]", "Real", "Integer"))
 
 
 def test_units_that_mean_the_same_fit(folder: Path) -> None:
@@ -650,12 +776,20 @@ def test_units_that_mean_the_same_fit(folder: Path) -> None:
 
 def test_an_fmu_without_units_is_connected_with_a_note(folder: Path) -> None:
     make_fmu(folder / "controller_bare.fmu", outputs=[out("torque_request_*", unit=None)])
-    assert golden(texts_of(plan(swaps=["controller=controller_bare"])))
+    assert each_mentions(
+        texts_of(plan(swaps=["controller=controller_bare"])), ("controller_bare", "torque_request_*")
+    )
 
 
 def test_types_that_differ_over_equal_names_are_said(folder: Path) -> None:
     make_fmu(folder / "driver_text.fmu", outputs=[out("steer_angle", unit=None, type="String", start="")])
-    assert golden(problems(scenario(), swaps=["driver=driver_text"])[1])
+    assert mentions(
+        problems(scenario(), swaps=["driver=driver_text"])[1],
+        "a.yaml:6",
+        "units.plant",
+        "driver.steer_angle",
+        "plant.steer_angle",
+    )
 
 
 @pytest.mark.parametrize("kind", ["Integer", "Boolean"])
@@ -674,7 +808,7 @@ def test_a_constant_integer_feeds_an_enumeration_that_has_its_number(folder: Pat
         return scenario("  sensor: {fmu: sensor}\n  taker: {fmu: taker}\n", "")
 
     assert len(plan(feed(2)).wires) == 1
-    assert golden(problems(feed(3)))
+    assert each_mentions(problems(feed(3)), ("a.yaml:5", "units.taker", "sensor.road", "taker.road"))
 
 
 def test_enumerations_fit_if_the_input_knows_every_item_by_the_same_number(folder: Path) -> None:
@@ -687,7 +821,9 @@ def test_enumerations_fit_if_the_input_knows_every_item_by_the_same_number(folde
         return scenario("  sensor: {fmu: sensor}\n  taker: {fmu: taker}\n", "")
 
     assert len(plan(feed("dry", "wet")).wires) == 1
-    assert golden(problems(feed("dry", "ice")))
+    assert each_mentions(
+        problems(feed("dry", "ice")), ("a.yaml:5", "units.taker", "sensor.road", "taker.road")
+    )
 
 
 def test_a_real_algebraic_loop_is_said_with_its_path(folder: Path) -> None:
@@ -701,7 +837,17 @@ def test_a_real_algebraic_loop_is_said_with_its_path(folder: Path) -> None:
         ],
     )
     path = scenario(UNITS.replace("plant_seven_dof", "plant_loop"), CONSTANTS)
-    assert golden(problems(path))
+    assert each_mentions(
+        problems(path),
+        (
+            "a.yaml",
+            "tyre.tyre_force_y_fl",
+            "plant.tyre_force_y_fl",
+            "plant.slip_angle_fl",
+            "tyre.slip_angle_fl",
+            "'delay: 1 step'",
+        ),
+    )
 
 
 def test_a_loop_through_an_fmu_that_says_nothing_is_a_note(folder: Path) -> None:
@@ -715,7 +861,9 @@ def test_a_loop_through_an_fmu_that_says_nothing_is_a_note(folder: Path) -> None
         ],
     )
     (note,) = texts_of(plan(scenario(UNITS.replace("plant_seven_dof", "plant_silent"), CONSTANTS)))
-    assert golden(note)
+    assert mentions(
+        note, "tyre.tyre_force_x_fl", "plant.tyre_force_x_fl", "plant.slip_ratio_fl", "tyre.slip_ratio_fl"
+    )
 
 
 # Constants
@@ -734,12 +882,18 @@ def test_a_constant_by_name_goes_before_one_by_pattern() -> None:
 
 def test_two_constants_for_one_input_are_said() -> None:
     rest = 'inputs: {"friction*": 0.8, "friction_*": 0.3}\n' + TORQUES
-    assert golden(problems(scenario(rest=rest)))
+    assert each_mentions(
+        problems(scenario(rest=rest)),
+        ("a.yaml:8", "inputs.friction_*", "tyre.friction_*", "inputs.friction*"),
+    )
 
 
 def test_a_constant_for_driven_inputs_is_said_once_for_four_wheels() -> None:
     rest = 'inputs: {"friction*": 1, "slip_ratio*": 0}\n' + TORQUES
-    assert golden(problems(scenario(rest=rest)))
+    assert each_mentions(
+        problems(scenario(rest=rest)),
+        ("a.yaml:8", "inputs.slip_ratio*", "tyre.slip_ratio_*", "plant.slip_ratio_*"),
+    )
 
 
 def test_a_constant_that_names_the_unit_goes_before_equal_names_with_a_note() -> None:
@@ -749,12 +903,19 @@ def test_a_constant_that_names_the_unit_goes_before_equal_names_with_a_note() ->
     assert unit(made, "plant").constants == {"steer_angle": math.pi / 180}
     assert [w.target for w in made.wires if w.output == "steer_angle"] == ["controller"]
     assert not [w for w in made.wires if w.input.startswith("slip_ratio")]
-    assert golden(texts_of(made))
+    assert each_mentions(
+        texts_of(made),
+        ("plant.steer_angle", "driver.steer_angle"),
+        ("tyre.slip_ratio_*", "plant.slip_ratio_*"),
+    )
 
 
 def test_a_constant_never_goes_before_a_connection() -> None:
     rest = 'inputs: {"friction*": 1, "plant.wheel_torque_*": 0}\n' + TORQUES
-    assert golden(problems(scenario(rest=rest)))
+    assert each_mentions(
+        problems(scenario(rest=rest)),
+        ("a.yaml:8", "inputs.plant.wheel_torque_*", "plant.wheel_torque_*", "controller.torque_request_*"),
+    )
 
 
 # Which of several sources
@@ -820,7 +981,7 @@ def test_several_lists_of_units_count_in_the_order_that_all_of_them_allow(folder
 def test_what_a_swap_leaves_without_equal_names_is_no_error_but_a_note() -> None:
     path = scenario(rest=CONSTANTS + TORQUES + "  - {from: [driver], to: [controller]}\n")
     made = plan(path, swaps=["controller=controller_off"])
-    assert golden_in(texts_of(made))
+    assert mentions(texts_of(made), "connections[1]", "left", "equal")
 
 
 def test_lists_that_prefer_in_a_circle_are_an_error_that_names_it(folder: Path) -> None:
@@ -829,14 +990,26 @@ def test_lists_that_prefer_in_a_circle_are_an_error_that_names_it(folder: Path) 
     rest += "  - {from: [driver, estimator], to: [controller]}\n"
     found = problems(scenario(estimators(folder), rest))
     assert places_of(found) == [("connection-circular", "a.yaml:14: connections[3]")]
-    assert golden(found)
+    assert each_mentions(
+        found, ("a.yaml:14", "connections[3]", "connections[1]", "connections[2]", "controller")
+    )
 
 
 def test_null_leaves_an_input_without_a_source(folder: Path) -> None:
     units = estimators(folder).replace("  road: {fmu: road}\n", "")
     refused = TORQUES + "  - {from: null, to: tyre.friction_*}\n"
     refused += "  - {from: [plant], to: [controller]}\n"
-    assert golden(problems(scenario(units, refused)))
+    assert each_mentions(
+        problems(scenario(units, refused)),
+        (
+            "a.yaml:7",
+            "units.tyre",
+            "tyre.friction_*",
+            "estimator.friction_*",
+            "estimator.friction",
+            "'inputs'",
+        ),
+    )
     made = plan(scenario(units, 'inputs: {"friction_*": 0.3}\n' + refused))
     assert [unit(made, "tyre").constants[f"friction_{w}"] for w in WHEELS] == [0.3] * 4
     assert sources(made, "friction_fl") == {}
@@ -906,7 +1079,20 @@ def test_recorded_outputs_are_in_the_order_of_the_list_each_once() -> None:
 
 def test_a_record_of_nothing_is_said() -> None:
     rest = CONSTANTS + TORQUES + 'record: [plant.yawrate, "*.beta"]\n'
-    assert golden(problems(scenario(rest=rest)))
+    assert each_mentions(
+        problems(scenario(rest=rest)),
+        ("a.yaml:11", "record[0]", "'yawrate'", "'yaw_rate'", "plant"),
+        (
+            "a.yaml:11",
+            "record[1]",
+            "'beta'",
+            "steer_angle",
+            "torque_request_*",
+            "yaw_rate",
+            "acceleration_y",
+            "slip_angle_*",
+        ),
+    )
 
 
 def test_every_value_says_where_it_comes_from(folder: Path) -> None:
@@ -953,7 +1139,9 @@ def test_any_variable_is_recorded_by_its_name_and_patterns_mean_outputs_first() 
 
 def test_a_record_that_is_like_no_output_is_guessed_among_all_variables() -> None:
     rest = CONSTANTS + TORQUES + "record: [plant.whel_radius]\n"
-    assert golden(problems(scenario(rest=rest)))
+    assert each_mentions(
+        problems(scenario(rest=rest)), ("a.yaml:11", "record[0]", "'whel_radius'", "'wheel_radius'", "plant")
+    )
 
 
 def test_a_scenario_is_wired_anew_when_its_fmu_has_been_mended(folder):
@@ -975,7 +1163,7 @@ def test_an_error_has_a_code_a_location_and_a_message():
     assert str(error) == f"{path}:10: connections[0].to: {error.message}"
     (error,) = problems(scenario(), settings=["plant.mass=-1"])
     assert error.code == "value-invalid"
-    assert golden(error.location)
+    assert mentions(error.location, "--set plant.mass=-1")
 
 
 def test_an_input_without_a_source_is_not_sent_to_whatever_has_its_unit_of_measurement(folder):
@@ -986,7 +1174,11 @@ def test_an_input_without_a_source_is_not_sent_to_whatever_has_its_unit_of_measu
             out("torque_request_*", unit="N.m", variability="discrete"), out("roll_rate_ref", unit="rad/s"),
         ],
     )  # fmt: skip
-    assert golden(problems(scenario()))
+    assert each_mentions(
+        problems(scenario()),
+        ("a.yaml:5", "units.controller", "controller.roll_rate", "rad/s", "plant.yaw_rate", "'inputs'"),
+        ("a.yaml:5", "units.controller", "controller.brake", "'inputs'"),
+    )
 
 
 def test_a_parameter_that_is_text_can_come_from_a_file(folder):
@@ -1002,13 +1194,17 @@ def test_a_parameter_that_is_text_can_come_from_a_file(folder):
     made = unit(plan(with_road("patches: {file: sub/patches.txt}")), "road")
     assert made.parameters["patches"] == "y > 0\nx < 5 # Größe\n"
     assert made.origins["patches"] == ValueOrigin("file", "sub/patches.txt")
-    for given, code in (
-        ("patches: {file: none.txt}", "file-unreadable"),
-        ("patches: {file: sub}", "file-unreadable"),
-        ("mu: {file: sub/patches.txt}", "value-wrong-type"),
-        ("friction_table: {file: sub/patches.txt}", "value-invalid"),
-        ("patches: '1e400: y > 0'", "value-invalid"),
+    for given, code, names in (
+        ("patches: {file: none.txt}", "file-unreadable", ("none.txt",)),
+        ("patches: {file: sub}", "file-unreadable", ("sub", "directory")),
+        ("mu: {file: sub/patches.txt}", "value-wrong-type", ("text",)),
+        (
+            "friction_table: {file: sub/patches.txt}",
+            "value-invalid",
+            ("sub/patches.txt", "line 2", "'x < 5'"),
+        ),
+        ("patches: '1e400: y > 0'", "value-invalid", ("1e400", "'1e400: y > 0'")),
     ):
         found = problems(with_road(given))
         assert places_of(found) == [(code, f"a.yaml:8: units.road.parameters.{given.partition(':')[0]}")]
-        assert golden(found)
+        assert each_mentions(found, names)

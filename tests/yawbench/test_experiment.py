@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import yawbench as yb
-from tests.sentences import golden_in, refused
+from tests.refusals import mentions, refused
 
 
 class Proportional:
@@ -56,9 +56,9 @@ def test_every_row_is_what_the_run_alone_comes_to(base, runs):
 def test_a_metric_is_drawn_over_an_axis_with_a_line_per_level(runs):
     (axes,) = runs.plot("peak(sideslip)", x="plant.initial_speed", lines="controller").axes
     assert [line.get_xdata().tolist() for line in axes.get_lines()] == [[54.0, 90.0], [54.0, 90.0]]
-    with refused(yb.ScenarioError, "argument-invalid"):
+    with refused(yb.ScenarioError, "argument-invalid", names=("'controller'", "axis", "figure")):
         runs.plot("peak(sideslip)", x="plant.initial_speed")
-    with refused(yb.ScenarioError, "metric-unknown"):
+    with refused(yb.ScenarioError, "metric-unknown", names=("'peak(sideslp)'", "'peak(sideslip)'")):
         runs.plot("peak(sideslp)", x="plant.initial_speed", lines="controller")
 
 
@@ -82,7 +82,7 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_others_are_made(base)
 
     made = yb.experiment(base, {"controller": [careless, "controller_off"]}).run(workers=1, keep=False)
     assert made.table["status"].tolist() == ["failed", "completed"]
-    assert golden_in(made.table["reason"][0])
+    assert mentions(made.table["reason"][0], "float", "division", "zero")
     assert made.runs is None
 
 
@@ -113,9 +113,9 @@ def test_what_is_wrong_is_said_before_any_run_is_made(base, axes, said):
 
 
 def test_levels_without_end_and_workers_that_are_no_number_are_refused(base):
-    with refused(yb.ScenarioError, "argument-invalid"):
+    with refused(yb.ScenarioError, "argument-invalid", names=("driver.amplitude", "100,000")):
         yb.experiment(base, {"driver.amplitude": itertools.count(0.01, 0.01)})
-    with refused(TypeError):
+    with refused(TypeError, names=("workers", "'x'")):
         yb.experiment(base, {"driver.amplitude": [0.02]}).run(workers="x")
 
 

@@ -19,7 +19,7 @@ import pytest
 
 import yawbench as yb
 from components.controllers.fnn import Fnn
-from tests.sentences import refused
+from tests.refusals import refused
 
 GAIN = 3e4
 LOG = io.StringIO()  # a value that no FMU can take along
@@ -247,27 +247,37 @@ def uses_numpy(yaw_rate):
     return np.tanh(yaw_rate)
 
 
-REFUSED: dict[str, Any] = {
-    "a file": lambda get: reads_a_file,
-    "numpy": lambda get: uses_numpy,
-    "an array": lambda get: times(np.ones(3)),
-    "no source": lambda get: eval("lambda yaw_rate: 1.0"),
-    "a method": lambda get: Data().output,
-    "a foreign import": lambda get: get("foreign").law,
-    "a foreign import of a module": lambda get: get("deeply_foreign").law,
-    "the name of an FMU": lambda get: "controller_off",
-    "a class": lambda get: Data,
+REFUSED: dict[str, tuple[Any, ...]] = {
+    "a file": (lambda get: reads_a_file, "my:", "reads_a_file", "LOG", "io.StringIO"),
+    "numpy": (lambda get: uses_numpy, "my:", "uses_numpy", "numpy"),
+    "an array": (lambda get: times(np.ones(3)), "my:", "factor", "numpy.ndarray"),
+    "no source": (lambda get: eval("lambda yaw_rate: 1.0"), "my:", "<lambda>", "<string>:1"),
+    "a method": (lambda get: Data().output, "output", "'u'"),
+    "a foreign import": (lambda get: get("foreign").law, "my:", "law", "numpy"),
+    "a foreign import of a module": (
+        lambda get: get("deeply_foreign").law,
+        "my:",
+        "ourlab/foreign.py:1",
+        "numpy",
+    ),
+    "the name of an FMU": (lambda get: "controller_off", "'controller_off'"),
+    "a class": (lambda get: Data, "Data", "Data()"),
 }
 
 
 @pytest.mark.parametrize("what", REFUSED)
 def test_what_an_fmu_cannot_take_along_is_refused_in_a_sentence(what, ourlab, tmp_path):
-    with refused(yb.YawbenchError):
-        yb.export_fmu(REFUSED[what](ourlab), tmp_path / "my.fmu")
+    get, *names = REFUSED[what]
+    with refused(yb.YawbenchError, names=names):
+        yb.export_fmu(get(ourlab), tmp_path / "my.fmu")
     assert not list(tmp_path.iterdir())
 
 
 def test_names_and_roles_that_no_fmu_can_have_are_refused(tmp_path):
-    for wrong in ({"file": "my controller.fmu"}, {"file": "my.zip"}, {"file": "my.fmu", "role": "pilot"}):
-        with refused(yb.ScenarioError, "argument-invalid"):
+    for wrong, names in (
+        ({"file": "my controller.fmu"}, ("file", ".fmu", "'my controller.fmu'")),
+        ({"file": "my.zip"}, ("file", ".fmu", "'my.zip'")),
+        ({"file": "my.fmu", "role": "pilot"}, ("role", "driver", "monitor", "'pilot'")),
+    ):
+        with refused(yb.ScenarioError, "argument-invalid", names=names):
             yb.export_fmu(law, **wrong)

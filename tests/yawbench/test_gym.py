@@ -18,7 +18,7 @@ import yawbench as yb
 import yawbench.gym
 from orchestrator.evaluation.sine_with_dwell import SPUN, amplitudes
 from tests.checkout import ROOT
-from tests.sentences import golden
+from tests.refusals import mentions
 
 LEAST = amplitudes(yawbench.gym.ANGLE)[0]
 SEVEREST = amplitudes(yawbench.gym.ANGLE)[-1]
@@ -159,15 +159,19 @@ def test_what_is_wrong_is_named(wrong, kind, sentence):
         yawbench.gym.SineWithDwell(**wrong)
 
 
-@pytest.mark.parametrize("action", [[math.nan], [0.1, 0.2], [math.inf]])
-def test_an_action_is_one_finite_number(env, action):
+@pytest.mark.parametrize(
+    "action, names", [([math.nan], ("[nan]",)), ([0.1, 0.2], ("[0.1, 0.2]",)), ([math.inf], ("[inf]",))]
+)
+def test_an_action_is_one_finite_number(env, action, names):
     env.reset(seed=1)
     with pytest.raises(ValueError) as caught:
         env.unwrapped.step(action)
-    assert golden(caught.value)
+    assert mentions(caught.value, "action", "-1", *names)
 
 
 def test_without_gymnasium_one_sentence_says_what_to_install():
     code = "import sys; sys.modules['gymnasium'] = None; import yawbench.gym"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert golden(done.stderr.splitlines()[-1])
+    assert mentions(
+        done.stderr.splitlines()[-1], "ImportError", "yawbench.gym", "Gymnasium", '"yawbench[gym]"'
+    )

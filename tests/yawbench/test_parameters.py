@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import yawbench as yb
-from tests.sentences import refused
+from tests.refusals import refused
 
 
 @pytest.fixture(scope="module")
@@ -153,7 +153,7 @@ def test_a_whole_number_stays_whole_in_python(base):
 def test_an_object_that_was_changed_after_it_was_made_has_no_parameters(base):
     changed = Law(2e4)
     changed.half = 5.0
-    with refused(yb.WiringError, "parameter-unknown"):
+    with refused(yb.WiringError, "parameter-unknown", names=("controller.gain=1.0", "Law", "'gain'")):
         base.swap(controller=changed).set({"controller.gain": 1.0}).plan()
     assert np.array_equal(moments(base.swap(controller=changed)), moments(base.swap(controller=Law(10.0))))
 
@@ -174,8 +174,12 @@ def test_an_attribute_of_the_class_that_an_object_has_otherwise_counts_in_what_i
 
 def test_values_outside_the_declared_ones_are_refused(base):
     scenario = base.swap(controller=Data())
-    for target, value in (("controller.gain", -1), ("controller.kind", "third"), ("controller.gian", 1)):
-        with refused(yb.WiringError):
+    for target, value, *names in (
+        ("controller.gain", -1, "0 N.m.s/rad"),
+        ("controller.kind", "third", "whole", "half"),
+        ("controller.gian", 1, "'gian'", "'gain'"),
+    ):
+        with refused(yb.WiringError, names=(f"{target}={value}", *names)):
             scenario.set({target: value}).plan()
 
 
@@ -216,7 +220,7 @@ def test_two_objects_of_a_class_are_ranked_by_their_names(tmp_path):
     assert headroom.nunique() == 3
     other = yb.rank({"weak": Law(1e5)}, against=[], conditions=["hard"], quick=True, out=out)
     assert other.cells["headroom"].tolist() == [headroom["strong"]]  # not the kept run of the first one
-    with refused(yb.ScenarioError, "argument-invalid"):
+    with refused(yb.ScenarioError, "argument-invalid", names=("name", "mapping")):
         yb.rank(both, name="both", against=[], conditions=["hard"], quick=True)
 
 

@@ -12,7 +12,7 @@ import pytest
 
 import yawbench as yb
 from tests.commands import status_of
-from tests.sentences import refused
+from tests.refusals import refused
 
 SMALL = {"population": 5, "generations": 2, "workers": 1}
 ERROR, EFFORT = "rms_error(yaw_rate)", "effort(yaw_moment)"
@@ -125,42 +125,43 @@ def test_trials_that_fail_are_counted_and_lose(base):
     assert [warning.filename for warning in warned] == [__file__]
     assert float(tuned.values["controller.gain"]) < 5e4
     assert 0 < tuned.table["objective"].isna().sum() < 10
-    with refused(yb.ResultsError, "results-missing"), warnings.catch_warnings():
+    with (
+        refused(yb.ResultsError, "results-missing", names=("0 s", "ZeroDivisionError")),
+        warnings.catch_warnings(),
+    ):
         warnings.simplefilter("ignore", yb.YawbenchWarning)
         yb.tune(base.swap(controller=fragile), {"controller.gain": (6e4, 7e4)}, ERROR, **SMALL)
 
 
 def test_scenarios_with_two_programs_of_a_name_are_refused(base):
     both = [base.swap(controller=Law(1e4)), base.swap(controller=Law(2e4))]
-    with refused(yb.ScenarioError, "argument-invalid"):
+    with refused(yb.ScenarioError, "argument-invalid", names=("base[1]", "'Law'")):
         yb.tune(both, {"driver.amplitude": (0.01, 0.02)}, ERROR)
 
 
 @pytest.mark.parametrize(
-    "ranges",
+    ("ranges", "names"),
     [
-        {"controller.gain": (2e4, 1e4)},
-        {"controller.gain": (-1e4, 1e4, "log")},
-        {"controller.gain": (1e4, "20 N.m")},
-        {"controller.gain": (1e4, True)},
-        {"controller.gian": (1e4, 2e4)},
-        {"controller": ("controller_off", "controller_pid")},
-        {"stop_time": (-2, -1)},
+        ({"controller.gain": (2e4, 1e4)}, ("ranges['controller.gain']", "20000", "10000")),
+        ({"controller.gain": (-1e4, 1e4, "log")}, ("ranges['controller.gain']", "0", "log")),
+        ({"controller.gain": (1e4, "20 N.m")}, ("ranges['controller.gain']", "unit")),
+        ({"controller.gain": (1e4, True)}, ("ranges['controller.gain']", "number", "True")),
+        ({"controller.gian": (1e4, 2e4)}, ("controller.gian=15000.0", "'gian'", "'gain'")),
+        ({"controller": ("controller_off", "controller_pid")}, ("ranges['controller']", "'controller_pid'")),
+        ({"stop_time": (-2, -1)}, ("stop_time=-1.5", "0 s")),
     ],
 )
-def test_wrong_ranges_are_refused_before_a_run(base, ranges, monkeypatch):
+def test_wrong_ranges_are_refused_before_a_run(base, ranges, names, monkeypatch):
     monkeypatch.setattr("yawbench._experiment.make_all", None)
-    with refused(yb.ScenarioError) as error:
+    with refused(yb.ScenarioError, names=names):
         yb.tune(base.swap(controller=follow), ranges, ERROR)
-    assert next(iter(ranges)).split(".")[0] in str(error.value)
 
 
 def test_what_is_no_metric_is_refused_by_name(base):
     ranges = {"driver.amplitude": (0.01, 0.02)}
-    for objective in ("rms_eror(yaw_rate)", "peak(nothing)"):
-        with refused(yb.ScenarioError) as error:
+    for objective, *names in (("rms_eror(yaw_rate)", "'rms_eror'", "'rms_error'"), ("peak(nothing)",)):
+        with refused(yb.ScenarioError, names=(objective, *names)):
             yb.tune(base, ranges, objective)
-        assert objective in str(error.value) or "rms_eror" in str(error.value)
 
 
 def test_nothing_is_written(base, tmp_path, monkeypatch):

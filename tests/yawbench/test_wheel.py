@@ -12,7 +12,7 @@ import pytest
 
 import yawbench as yb
 from tests.checkout import ROOT, copy_checkout
-from tests.sentences import golden_in
+from tests.refusals import mentions
 
 pytestmark = pytest.mark.exhaustive
 
@@ -70,7 +70,7 @@ def test_the_wheel_holds_every_file_of_the_packages(installed):
 def test_the_installed_command_lists_the_scenarios_and_vehicles_shipped(installed, empty):
     shown = run(installed / "bin" / "yawbench", "list", cwd=empty)
     assert "fnn_sideslip/25mps" in shown
-    assert golden_in(shown)
+    assert mentions(shown, "electric", "in-wheel", "motors")
     assert not list(empty.iterdir())
 
 

@@ -9,7 +9,7 @@ from fmus.native.compare_with_python import differences
 from fmus.native.emit import emit
 from fmus.native.ir import INEXACT
 from fmus.native.specialise import specialise
-from tests.sentences import golden
+from tests.refusals import mentions
 
 from .small import compiled, component_of, fewer_steps, source
 from .together import comparisons
@@ -130,7 +130,7 @@ def test_what_does_not_get_through_is_not_packed(tmp_path, monkeypatch):
         made = build.native(component, home, source="small.py", guid="{a}", resources=home.parent)
         again = build.native(component, home, source="small.py", guid="{a}", resources=home.parent)
     assert made.files == {} and made == again
-    assert golden(made.why_not)
+    assert mentions(made.why_not, "0.001 s", "5e-324", "0.0", "y")
 
 
 @pytest.mark.parametrize("law", LEFT)
