@@ -45,6 +45,11 @@ def each_mentions(texts: object, *names: tuple[object, ...]) -> bool:
     return True
 
 
+def sentence_has(page: str, *names: object) -> bool:
+    """Assert that one sentence of a page names all of these things, however it is worded."""
+    return mentions(re.split(r"(?<=[.!?]) (?=[A-Z`*([])|(?<=\\|) ", " ".join(page.split())), *names)
+
+
 def _named(text: str, names: Iterable[object]) -> bool:
     """Whether a text holds all names, none of them as a part of a longer word or number."""
     return all(

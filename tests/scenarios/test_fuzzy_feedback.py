@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.refusals import sentence_has
 from tests.studies import judge_all, judge_some, verdicts
 
 STUDY = Path(__file__).parents[2] / "scenarios" / "fuzzy_feedback" / "study.yaml"
@@ -68,17 +69,17 @@ TOLD = " ".join(SECTION.split())
 
 
 def test_the_page_on_papers_tells_what_the_study_found(metric):
-    assert f"({metric('off', 'sideslip') / DEGREE:.0f} degrees of sideslip)" in TOLD
-    assert f"({100 * metric('both', 'rms'):.1f} % RMS of the peak)" in TOLD
+    assert sentence_has(TOLD, f"{metric('off', 'sideslip') / DEGREE:.0f} degrees", "degrees", "sideslip")
+    assert sentence_has(TOLD, f"{100 * metric('both', 'rms'):.1f} %", "RMS", "peak")
     assert f"({100 * metric('both', 'sideslip_rms'):.0f} % RMS)" in TOLD
-    assert f"reaches {metric('both', 'sideslip') / DEGREE:.1f} degrees" in TOLD
-    assert f"the {metric('both', 'sideslip_ref') / DEGREE:.1f} of its reference" in TOLD
-    assert f"and {metric('unlimited/fuzzy_feedback', 'sideslip') / DEGREE:.1f} with the reference" in TOLD
-    assert f"as far as the road bears it ({100 * metric('both', 'path'):.1f} % RMS)" in TOLD
+    assert sentence_has(TOLD, f"{metric('both', 'sideslip') / DEGREE:.1f} degrees", "reaches", "degrees")
+    assert sentence_has(TOLD, f"{metric('both', 'sideslip_ref') / DEGREE:.1f}", "reference")
+    assert sentence_has(TOLD, f"{metric('unlimited/fuzzy_feedback', 'sideslip') / DEGREE:.1f}", "reference")
+    assert sentence_has(TOLD, f"{100 * metric('both', 'path'):.1f} %", "RMS", "road")
 
 
 @pytest.mark.exhaustive
 def test_the_page_on_papers_tells_what_becomes_of_what_the_controller_does_not_know(whole, metric_of_all):
     unknown = [run for run in whole["runs"] if run.startswith("unknown/")]
     rms, path = (max(100 * metric_of_all(run, name) for run in unknown) for name in ("rms", "path"))
-    assert f"({rms:.1f} % at most), but the path leaves its own (up to {path:.0f} %)" in TOLD
+    assert sentence_has(TOLD, f"{rms:.1f} %", f"{path:.0f} %", "path")

@@ -15,6 +15,7 @@ from orchestrator.metrics.expressions import MetricValue
 from orchestrator.results.reader import load_results
 from tests.changed import changed
 from tests.commands import status_of
+from tests.refusals import sentence_has
 from tests.studies import check_figures, judge_all, judge_some, verdicts
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "fuzzy_pid"
@@ -253,11 +254,14 @@ def test_the_page_on_papers_tells_what_the_study_found(metric, derived):
     aside = [
         f"{metric(f'double_lane_change/{law}', 'displacement'):.3f}" for law in ("pid", "fuzzy_pid", "off")
     ]
-    assert f"{aside[0]} and {aside[1]} m against {aside[2]}" in SECTION
+    assert sentence_has(SECTION, aside[0], f"{aside[1]} m", aside[2], "against")
     less = [1 - metric(f"{road}/fuzzy_pid", "jerk") / metric(f"{road}/pid", "jerk") for road in SCENARIOS]
-    assert (
-        f"lateral jerk by {', '.join(f'{100 * x:.1f}' for x in less[:-1])} and {100 * less[-1]:.1f} %"
-        in SECTION
+    assert sentence_has(
+        SECTION,
+        ", ".join(f"{100 * x:.1f}" for x in less[:-1]),
+        f"{100 * less[-1]:.1f} %",
+        "lateral",
+        "jerk",
     )
     assert shown(metric("ramp/off", "sideslip"), "rad").removesuffix(" °") in SECTION
 

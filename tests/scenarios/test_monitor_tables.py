@@ -17,6 +17,7 @@ from orchestrator.experiments.confidence import share_bounds
 from orchestrator.experiments.load_experiment import load_experiment
 from orchestrator.scenario import yaml_lines
 from tests.commands import status_of
+from tests.refusals import sentence_has
 
 STUDY = monitor_tables.RUNS.parent / "faults.yaml"
 
@@ -69,7 +70,7 @@ def test_a_healthy_monitor_gives_no_alarm(published):
         assert [outcome.delays for outcome in healthy] == [[], []]
         number = sum(outcome.number for outcome in healthy)
         most = f"at most {100 * share_bounds(0, number).high:.0f} %"
-        assert f"Of the {number} healthy runs" in page
+        assert sentence_has(page, number, "healthy")
         assert most in page
 
 
@@ -83,25 +84,37 @@ def test_the_sentences_on_faults_have_the_numbers_of_the_runs(published):
     page = " ".join(monitor_tables.SIDESLIP_PAGE.read_text(encoding="utf-8").split())
     before, after = middle("without/B/none"), middle("with/B/none")
     of_c = middle("with/C/none") - middle("without/C/none")
-    assert (
-        f"adds {after - before:.2f} degrees to the largest sideslip angle of B, "
-        f"{100 * (after / before - 1):.0f} % (medians {after:.2f} and {before:.2f}), and {of_c:.2f} to "
-        "that of C; `monitor_parity` adds nothing"
-    ) in page
+    assert sentence_has(
+        page,
+        f"{after - before:.2f} degrees",
+        f"{100 * (after / before - 1):.0f} %",
+        f"{after:.2f}",
+        f"{before:.2f}",
+        f"{of_c:.2f}",
+        "`monitor_parity`",
+        "adds",
+    )
     for paper in "BC":
         assert published[f"parity/{paper}/none"].sideslip == published[f"without/{paper}/none"].sideslip
     noisy = "B/gyro_noise_3"
     assert middle(f"parity/{noisy}") == middle(f"without/{noisy}")
-    assert (
-        f"B slides {middle(f'without/{noisy}'):.1f} degrees without a monitor or with `monitor_parity`, but "
-        f"{middle(f'with/{noisy}'):.0f} with"
-    ) in page
+    assert sentence_has(
+        page,
+        f"{middle(f'without/{noisy}'):.1f} degrees",
+        f"{middle(f'with/{noisy}'):.0f}",
+        "`monitor_parity`",
+        "slides",
+    )
     zero, off = "B/gyro_zero", middle(monitor_tables.OFF["B"])
-    assert (
-        f"B spins without a monitor ({middle(f'without/{zero}'):.0f} degrees); with one it slides "
-        f"{middle(f'with/{zero}'):.0f} and {middle(f'parity/{zero}'):.0f} degrees, hardly less than without "
-        f"control ({off:.0f})"
-    ) in page
+    assert sentence_has(
+        page,
+        f"{middle(f'without/{zero}'):.0f} degrees",
+        f"{middle(f'with/{zero}'):.0f}",
+        f"{middle(f'parity/{zero}'):.0f} degrees",
+        f"{off:.0f}",
+        "spins",
+        "monitor",
+    )
     late = [
         delay
         for key in monitor_tables.MONITORS
@@ -109,13 +122,13 @@ def test_the_sentences_on_faults_have_the_numbers_of_the_runs(published):
         for delay in published[f"{key}/C/{name}"].delays
     ]
     assert len(late) == 60
-    assert f"are found after {min(late):.1f} to {max(late):.1f} s, by both" in page
+    assert sentence_has(page, f"{min(late):.1f}", f"{max(late):.1f} s")
     small = "C/gyro_bias_3"
     counts = {key: len(published[f"{key}/{small}"].delays) for key in monitor_tables.MONITORS}
     assert counts == {"with": 6, "parity": 10}
     assert {spins(f"{key}/{small}") for key in ("without", *counts)} == {8}
     assert "in six runs of ten, by `monitor_parity` in all, and the car spins in eight of ten" in page
-    assert f"adds {after - before:.2f}° to" in monitor_tables.PAGE.read_text(encoding="utf-8")
+    assert sentence_has(monitor_tables.PAGE.read_text(encoding="utf-8"), f"{after - before:.2f}°", "adds")
 
 
 def test_a_run_that_spins_is_counted_and_the_others_keep_their_angle():

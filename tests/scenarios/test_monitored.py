@@ -9,6 +9,7 @@ import pytest
 
 import yawbench as yb
 from tests.checkout import ROOT
+from tests.refusals import sentence_has
 from tests.verdicts import table_in
 
 NEVER = {"monitor.fade_time": 1e9}
@@ -92,12 +93,12 @@ def test_the_table_says_what_a_fault_does_with_the_monitor_and_without(name, tab
 def test_the_sentences_below_the_table_follow_from_it(page, table):
     text = " ".join(page.split())
     _, watched, blind = table["gyro 10 °/s too high"]
-    assert f"with a constant offset it does not help ({watched} against {blind})" in text
+    assert sentence_has(text, watched, blind, "constant", "offset")
     kept, given_up = (
         table["hand wheel frozen (the law is kept)"][1],
         driven(*FAULTS["hand wheel frozen (the law is kept)"], settings=SWITCHED_OFF),
     )
-    assert f"({kept}) is better than switching off ({given_up.peak:.0f} °, not in the table)" in text
+    assert sentence_has(text, kept, f"{given_up.peak:.0f}", "better", "table")
 
 
 @pytest.mark.sampled(2)

@@ -11,6 +11,7 @@ from orchestrator.experiments.experiment_result import judge_results
 from orchestrator.experiments.load_experiment import load_experiment
 from orchestrator.experiments.result_tables import run_tables
 from orchestrator.figures.style import shown
+from tests.refusals import sentence_has
 from tests.studies import check_figures, judge_all, judge_some, verdicts
 from tests.verdicts import recorded
 
@@ -128,7 +129,7 @@ def test_the_page_on_papers_tells_what_the_study_found(study, metric):
     carries = [list(row[1:]) for row in recorded()[experiment.spec.title] if row.says in of_runs]
     assert [row[3:-1] for row in told] == carries
     over = [100 * metric(f"{speed}mps/fuzzy_sideslip", "overshoot") for speed in (15, 40)]
-    assert f"grows with speed, from {over[0]:.0f} to {over[1]:.1f} %" in PROSE
+    assert sentence_has(PROSE, f"{over[0]:.0f}", f"{over[1]:.1f} %", "grows")
 
 
 @pytest.mark.exhaustive
@@ -137,23 +138,21 @@ def test_the_page_on_papers_tells_what_the_variants_of_the_study_found(whole, me
         [f"{100 * metric_of_all(f'three_periods/15mps/{run}', f'period_{k}'):.1f}" for k in (1, 3)]
         for run in ("learning_true", "learning_false")
     )
-    assert f"the error falls from {' to '.join(learning)} % over three periods" in PROSE
-    assert f"with frozen weights from {' to '.join(frozen)} %" in PROSE
+    assert sentence_has(PROSE, f"{' to '.join(learning)} %", "error", "falls")
+    assert sentence_has(PROSE, f"{' to '.join(frozen)} %", "frozen", "weights")
     harm, calm, recalled = (
         f"{100 * metric_of_all(f'harsh/{run}', 'error'):.0f} %"
         for run in ("learning_true", "learning_false", "recall")
     )
-    assert f"its error reaches {harm}, where frozen weights stay at {calm}" in PROSE
-    assert f"holds it at {recalled}" in PROSE
+    assert sentence_has(PROSE, harm, calm, "error", "reaches")
+    assert sentence_has(PROSE, recalled, "holds")
     net_25, fuzzy_25, net_40, fuzzy_40 = (
         shown(metric_of_all(f"one_input/{run}", "error"), "%")
         for run in ("25mps/fnn", "25mps/fuzzy_sideslip", "40mps/fnn", "40mps/fuzzy_sideslip")
     )
-    assert (
-        f"at 25 m/s it has {net_25} (conventional fuzzy {fuzzy_25}), at 40 m/s {net_40} ({fuzzy_40})" in PROSE
-    )
+    assert sentence_has(PROSE, net_25, fuzzy_25, net_40, fuzzy_40, "25", "40", "conventional")
     saved = [f"{100 * whole['derived'][f'grip_{speed}']['value']:.1f}" for speed in SPEEDS]
-    assert f"as the paper says: by {saved[0]}, {saved[1]} and {saved[2]} %" in PROSE
+    assert sentence_has(PROSE, saved[0], saved[1], f"{saved[2]} %", "paper")
 
 
 @pytest.mark.exhaustive
@@ -165,23 +164,23 @@ def test_the_page_on_papers_tells_what_became_of_the_laws_with_motors_that_lag_a
         return found["runs"][run]["metrics"]["error"]["value"]
 
     lost = [shown(error(f"lag/{speed}mps/learning_true"), "%") for speed in (25, 40)]
-    assert f"its error is {lost[0]} at 25 m/s and {lost[1]} at 40" in PROSE
+    assert sentence_has(PROSE, lost[0], lost[1], "25", "error")
     laws = ("learning_false", "fuzzy_sideslip")
     held = [100 * error(f"lag/{speed}mps/{law}") for speed in (15, 25, 40) for law in laws]
-    assert f"have {min(held):.1f} to {max(held):.1f} %" in PROSE
-    assert f"has {shown(error('slow/40mps/fuzzy_sideslip'), '%')} at 40 m/s" in PROSE
+    assert sentence_has(PROSE, f"{min(held):.1f}", f"{max(held):.1f} %")
+    assert sentence_has(PROSE, shown(error("slow/40mps/fuzzy_sideslip"), "%"), "40")
     laws = ("fnn", "frozen", "fuzzy_sideslip", "pd")
     cost = {law: found["derived"][f"cost_{law}"]["value"] for law in laws}
     assert sorted(cost, key=cost.get) == [*laws]
     told = [shown(cost[law], "%").removesuffix(" %") for law in laws]
-    assert f"the network comes to {told[0]} %, frozen weights to {told[1]}" in PROSE
-    assert f"conventional fuzzy control to {told[2]}, a PD law to {told[3]}." in PROSE
+    assert sentence_has(PROSE, f"{told[0]} %", told[1], "network", "frozen")
+    assert sentence_has(PROSE, told[2], told[3], "PD", "conventional")
     lag = {law: found["derived"][f"lag_cost_{law}"]["value"] for law in laws}
     order = ("fuzzy_sideslip", "frozen", "pd", "fnn")
     assert sorted(lag, key=lag.get) == [*order]
     told = [shown(lag[law], "%").removesuffix(" %") for law in order]
-    assert f"conventional fuzzy control {told[0]} %, frozen weights {told[1]}, PD {told[2]}, the" in PROSE
-    assert f"the network {told[3]}." in PROSE
+    assert sentence_has(PROSE, f"{told[0]} %", told[1], told[2], "PD", "conventional")
+    assert sentence_has(PROSE, told[3], "network")
     for law, name in zip(
         laws, ("fuzzy neural network", "frozen weights", "conventional fuzzy", "PD"), strict=True
     ):

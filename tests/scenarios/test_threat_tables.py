@@ -25,6 +25,7 @@ from orchestrator.experiments.threat_scores import (
 from orchestrator.experiments.threats import REFERENCE, SearchPlace, load_threats
 from orchestrator.pages import threats_page
 from tests.commands import status_of
+from tests.refusals import sentence_has
 
 FILE, LANE_CHANGE = threat_tables.FILE, "lane_change"
 WITHOUT_MODEL = [
@@ -67,43 +68,49 @@ def text() -> str:
 def test_the_sentences_on_threats_have_the_numbers_of_the_tables(published, text):
     scores = scored(published)
     _, gains = compared_gains(published).groups.values()
-    assert (
-        f"varies by {100 * gains.gains.value:.1f} % of a threat's range, between these laws by "
-        f"{100 * gains.between.value:.1f} % (difference {_spread(gains.difference, 100)})"
-    ) in text
-    assert (
-        f"they vary by {100 * gains.laws.value:.1f} %, no more than luck may make them: seeds of the search "
-        f"vary by {100 * gains.seeds.value:.1f} %, and the ratio is {gains.ratio.value:.1f} "
-        f"({gains.ratio.bounds.low:.1f} to {gains.ratio.bounds.high:.1f})"
-    ) in text
+    assert sentence_has(
+        text,
+        f"{100 * gains.gains.value:.1f} %",
+        f"{100 * gains.between.value:.1f} %",
+        _spread(gains.difference, 100),
+        "varies",
+        "threat",
+    )
+    assert sentence_has(
+        text,
+        f"{100 * gains.laws.value:.1f} %",
+        f"{100 * gains.seeds.value:.1f} %",
+        f"{gains.ratio.value:.1f}",
+        f"{gains.ratio.bounds.low:.1f}",
+        f"{gains.ratio.bounds.high:.1f}",
+        "vary",
+        "luck",
+    )
     moved = {
         name: 100 * compared_setting(published, name).moved
         for name in threats_page.compared_settings(published)
     }
-    assert f"levels fall by {-moved['bound_15']:.0f} % of a range" in text
-    assert f"levels rise by {moved['bound_30']:.0f} %" in text
-    assert f"levels fall by {-moved['unguarded']:.1f} % of a range" in text
-    assert f"lower levels by {-moved['authors']:.1f} % of a range" in text
+    assert sentence_has(text, f"{-moved['bound_15']:.0f} %", "levels", "fall")
+    assert sentence_has(text, f"{moved['bound_30']:.0f} %", "levels", "rise")
+    assert sentence_has(text, f"{-moved['unguarded']:.1f} %", "levels", "fall")
+    assert sentence_has(text, f"{-moved['authors']:.1f} %", "lower", "levels")
     correlations = {
         test.title: moves_between(scores.by_entry(), test.scores.by_entry(), REFERENCE).correlation
         for test in threats_page.disciplines(published)
     }
     speed, braking, step, wind = (f"{x + 0.0:.1f}".replace("-0.0", "0.0") for x in correlations.values())
-    assert (
-        f"side wind has a rank correlation of {wind}, step steer of {step}, split friction of {braking}, the "
-        f"entry speed of {speed}"
-    ) in text
+    assert sentence_has(text, wind, step, braking, speed, "side", "wind")
     apart = {test.title: test.scores.told_apart for test in threats_page.disciplines(published)}
-    assert f"*Step steer*: {apart['Step steer']} of 210 pairs differ" in text
-    assert f"of 210 pairs {apart['Gust of side wind']} differ" in text
+    assert sentence_has(text, apart["Step steer"], "*Step steer*", "210", "pairs")
+    assert sentence_has(text, apart["Gust of side wind"], "210", "pairs")
 
 
 def test_the_sentences_on_who_is_first_are_those_of_the_tables(published, text):
     scores, titles = scored(published), threats_page.titles_of(published)
     known = threat_tables.differences(published, scores)
-    assert f"is not clearly better than {len(known.equals)} entries" in text
+    assert sentence_has(text, f"{len(known.equals)} entries", "clearly", "better")
     laws = len(known.helped) + len(known.others)
-    assert f"Tuning helps {len(known.helped)} of the {laws} laws clearly" in text
+    assert sentence_has(text, len(known.helped), laws, "helps", "laws")
     entries = published.complete[THREATS.main]
     without = scores_without(entries, published.positions(THREATS.main, entries), REFERENCE)
     assert scores.order()[0] == next(score.entry for score in scores.scores if score.by_rank == 1)
@@ -112,7 +119,7 @@ def test_the_sentences_on_who_is_first_are_those_of_the_tables(published, text):
     }
     ((place, first),) = others.items()
     assert place == ("car", THREATS.cars_in(THREATS.main).index("van"))
-    assert f"if any one car is left out but the van; then {titles[first]} leads" in text
+    assert sentence_has(text, titles[first], "left", "leads")
 
 
 def test_the_sentences_on_settings_are_those_of_the_tables(published, text):
@@ -121,14 +128,14 @@ def test_the_sentences_on_settings_are_those_of_the_tables(published, text):
         for compared in [compared_setting(published, "bound_15")]
         for table in (compared.table, compared.main)
     ]
-    assert f"{lost[0]} instead of {lost[1]} of {len(ENTRIES)} entries lose all cars at the easy end" in text
+    assert sentence_has(text, lost[0], lost[1], f"{len(ENTRIES)} entries", "entries", "lose")
     for bound in ("bound_15", "bound_30"):
         compared = compared_setting(published, bound)
         assert compared.table.order()[0] == compared.main.order()[0] == "pid_tuned"
     compared = compared_setting(published, "unguarded")
     moves = moves_between(compared.main.by_entry(), compared.table.by_entry(), REFERENCE)
     title = threats_page.titles_of(published)[moves.farthest]
-    assert f"{title} goes from place {moves.before} to {moves.after}; levels fall" in text
+    assert sentence_has(text, title, moves.before, moves.after, "goes", "place")
 
 
 def test_the_sentence_on_wrong_stiffness_is_that_of_the_table(published, text):
@@ -139,15 +146,20 @@ def test_the_sentence_on_wrong_stiffness_is_that_of_the_table(published, text):
 
     spec = THREATS.spec.threats["model"]
     assert all(level.end == "hard" for name in WITHOUT_MODEL for level in survived(name))
-    assert f"survive {spec.hard:g} times the stiffness, the end of the range, on every car" in text
+    assert sentence_has(text, f"{spec.hard:g} times", "survive", "times")
     mpc, lqr = (
         [spec.level(level.position) for level in survived(name)]
         for name in ("model_predictive_tuned", "lqr_tuned")
     )
-    assert (
-        f"the predictive law survives {min(mpc):.1f} to {max(mpc):.1f} times, LQR {min(lqr):.1f} to "
-        f"{max(lqr):.0f}"
-    ) in text
+    assert sentence_has(
+        text,
+        f"{min(mpc):.1f}",
+        f"{max(mpc):.1f} times",
+        f"{min(lqr):.1f}",
+        f"{max(lqr):.0f}",
+        "LQR",
+        "predictive",
+    )
 
 
 def test_the_sentences_on_disciplines_are_those_of_the_tables(published, text):
@@ -162,13 +174,12 @@ def test_the_sentences_on_disciplines_are_those_of_the_tables(published, text):
     }
     gained = {car: [of[name] - of[REFERENCE] for name in laws] for car, of in speeds.items()}
     raised = gained.pop("hard") + gained.pop("van")
-    assert f"of `hard` and the van by {min(raised):.1f} to {max(raised):.1f} km/h" in text
+    assert sentence_has(text, f"{min(raised):.1f}", f"{max(raised):.1f} km/h", "`hard`")
     assert max(abs(gain) for gains in gained.values() for gain in gains) < 1.0
     spreads = {car: max(of[n] for n in laws) - min(of[n] for n in laws) for car, of in speeds.items()}
-    assert (
-        f"laws differ by {spreads.pop('van'):.1f} km/h on the van, by {max(spreads.values()):.1f} at most on "
-        "the others"
-    ) in text
+    assert sentence_has(
+        text, f"{spreads.pop('van'):.1f} km/h", f"{max(spreads.values()):.1f}", "laws", "others"
+    )
 
     def of_cars(name: str, entry: str, key: str) -> list[float]:
         return [published.quantities[name, car, entry][key] for car in cars]
@@ -179,20 +190,28 @@ def test_the_sentences_on_disciplines_are_those_of_the_tables(published, text):
         for entry in ENTRIES
         if math.degrees(median(of_cars("braking", entry, "yaw_angle"))) < 2.0
     ]
-    assert (
-        f"need {min(straight):.0f} to {max(straight):.0f} m (medians over cars), no control, which spins, "
-        f"{distances[REFERENCE]:.0f} m"
-    ) in text
+    assert sentence_has(
+        text,
+        f"{min(straight):.0f}",
+        f"{max(straight):.0f} m",
+        f"{distances[REFERENCE]:.0f} m",
+        "cars",
+        "control",
+    )
     spins = sum(angle > math.pi / 2 for angle in of_cars("braking", "pid", "yaw_angle"))
-    assert f"spins on {spins} of {len(cars)} cars, too" in text
+    assert sentence_has(text, spins, f"{len(cars)} cars", "spins", "cars")
     late = sum(published.quantities["step_steer", "small_car", e]["yaw_rate_response"] > 4.0 for e in ENTRIES)
-    assert f"the yaw rate of {late} entries grows until the end" in text
+    assert sentence_has(text, f"{late} entries", "rate", "entries")
     firm = {entry: median(of_cars("wind", entry, "deviation")) for entry in ENTRIES}
     assert sorted(firm, key=firm.__getitem__)[:2] == ["sliding_mode", "fuzzy_feedback"]
-    assert (
-        f"with {firm['sliding_mode']:.1f} and {firm['fuzzy_feedback']:.1f} m of deviation against "
-        f"{firm[REFERENCE]:.1f} m without control"
-    ) in text
+    assert sentence_has(
+        text,
+        f"{firm['sliding_mode']:.1f}",
+        f"{firm['fuzzy_feedback']:.1f} m",
+        f"{firm[REFERENCE]:.1f} m",
+        "deviation",
+        "against",
+    )
 
 
 def _spread(spread, scale: float) -> str:

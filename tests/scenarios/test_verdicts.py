@@ -13,6 +13,7 @@ from orchestrator.experiments.result_tables import FAILS, HOLDS
 from orchestrator.results.run_folder import default_folder
 from tests.checkout import ROOT
 from tests.evidence import RECORD
+from tests.refusals import sentence_has
 from tests.studies import judge_all
 from tests.verdicts import FILE, KINDS, page, recorded, rows_of, studies, summary, table_in
 
@@ -77,4 +78,4 @@ def test_the_page_on_papers_tells_how_far_the_best_of_26_carries():
     )
     section = (ROOT / "docs" / "papers.md").read_text(encoding="utf-8").partition("## Paper B")[2]
     told = " ".join(section.partition("\n## ")[0].split())
-    assert f"the best of 26, by {best.margin}. That {best.verdict}: {best.region}, it {best.flip}" in told
+    assert sentence_has(told, best.margin, best.verdict, best.region, best.flip, "best")
