@@ -12,7 +12,11 @@ def test_log_text_is_safe_to_print_and_warnings_are_no_errors(sample):
     unit = Unit(sample("controllers/talking.py"), logging_on=True)
     unit.start()
     assert each_mentions(
-        unit.log, ("logAll", "42"), ("logAll", "100"), ("0", "logAll"), ("logStatusWarning", "5 %")
+        unit.log,
+        ("0", "logAll", "42"),
+        ("0", "logAll", "100"),
+        ("0", "logAll"),
+        ("1", "logStatusWarning", "5 %", "grip"),
     )
     unit.free()
 

@@ -86,6 +86,7 @@ def test_an_unknown_unit_lists_the_known_ones(attempt):
         "rad.s",
         "Pa/s",
         "controllers/idea.py:19",
+        "1",
     )
     assert problem.endswith("(controllers/idea.py:19)")
 
@@ -258,7 +259,7 @@ def test_an_exception_while_importing_names_file_and_line(attempt):
 
 def test_leaving_the_interpreter_while_importing_is_an_error(attempt):
     (problem,) = attempt(("class Idea", "raise SystemExit(0)\n\n\nclass Idea"))
-    assert mentions(problem, "controller_idea", "SystemExit", "controllers/idea.py:19")
+    assert mentions(problem, "controller_idea", "SystemExit", "0", "controllers/idea.py:19")
 
 
 def test_a_unit_that_cannot_be_instantiated_is_an_error(attempt):

@@ -153,7 +153,7 @@ def test_a_parameter_out_of_its_range_is_refused_in_one_sentence(unit):
     unit.set(proportional_gain=-1.0)
     with pytest.raises(Refused):
         unit.start()
-    assert each_mentions(unit.messages, ("proportional_gain", "-1"))
+    assert each_mentions(unit.messages, ("proportional_gain", "0", "-1"))
 
 
 def test_a_parameter_cannot_be_set_later_and_an_output_never(unit):

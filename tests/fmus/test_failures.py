@@ -34,7 +34,15 @@ def test_an_exception_in_configure_makes_entering_initialization_an_error(failin
     unit = failing(where="configure")
     assert unit.call("fmi2EnterInitializationMode") == ERROR
     assert mentions(
-        unit.messages[0], "0 s", "ValueError", "50 %", "100", "controllers/failing.py:46", "yaw_rate", "0.0"
+        unit.messages[0],
+        "0 s",
+        "ValueError",
+        "50 %",
+        "100",
+        "1",
+        "controllers/failing.py:46",
+        "yaw_rate",
+        "0.0",
     )
 
 
@@ -43,7 +51,15 @@ def test_an_exception_in_start_makes_leaving_initialization_an_error(failing):
     assert unit.call("fmi2EnterInitializationMode") == OK
     assert unit.call("fmi2ExitInitializationMode") == ERROR
     assert mentions(
-        unit.messages[0], "0 s", "ValueError", "50 %", "100", "controllers/failing.py:46", "yaw_rate", "0.25"
+        unit.messages[0],
+        "0 s",
+        "ValueError",
+        "50 %",
+        "100",
+        "1",
+        "controllers/failing.py:46",
+        "yaw_rate",
+        "0.25",
     )
 
 
@@ -68,6 +84,7 @@ def test_an_exception_in_a_step_names_time_place_and_inputs(failing, where):
         "ValueError",
         "50 %",
         "100",
+        "1",
         "controllers/failing.py:46",
         "yaw_rate",
         "0.5",
@@ -93,8 +110,8 @@ def test_the_traceback_is_logged_for_those_who_ask(failing, sample):
         ("failing.py", "line 89", "_fail_in"),
         ("fail(self.p.how)",),
         ("failing.py", "line 46"),
-        ("ValueError", "50 %", "100"),
-        ("ValueError", "50 %", "100"),
+        ("ValueError", "50 %", "100", "1"),
+        ("ValueError", "50 %", "100", "1"),
     )
     assert "in configure" in curious.messages[1]
 
@@ -187,17 +204,19 @@ def test_a_parameter_out_of_range_is_named_with_what_is_allowed(failing):
 def test_what_cannot_be_set_is_refused_by_name(failing):
     unit = failing()
     with refused(
-        Refused, names=("fmi2SetReal", "status 3", "Real", "0 s", "ValueError", "yaw_moment", "yaw_rate")
+        Refused, names=("fmi2SetReal", "status 3", "Real", "1", "0 s", "ValueError", "yaw_moment", "yaw_rate")
     ):
         unit.set(yaw_moment=1.0)
     unit = failing()
     unit.start()
-    with refused(Refused, names=("fmi2SetReal", "status 3", "Real", "0 s", "ValueError", "yaw_rate", "0.0")):
+    with refused(
+        Refused, names=("fmi2SetReal", "status 3", "Real", "2", "0 s", "ValueError", "yaw_rate", "0.0")
+    ):
         unit.set(when=1.0)
     unit = failing()
     unit.start()
     with refused(
-        Refused, names=("fmi2SetString", "status 3", "String", "0 s", "ValueError", "yaw_rate", "0.0")
+        Refused, names=("fmi2SetString", "status 3", "String", "4", "0 s", "ValueError", "yaw_rate", "0.0")
     ):
         unit.set(how="exit")
 

@@ -121,6 +121,7 @@ def test_converge_halves_the_step_and_reports_order_and_cost(yawbench, folder):
         (folder / "o/report.html").read_text(),
         "half.yaml",
         "--halvings",
+        "2",
         "--signal",
         "reference.yaw_rate_ref",
         "--algorithm",
@@ -165,7 +166,7 @@ def test_study_makes_again_only_what_has_not_been_made_of_the_same_scenario(yawb
     ids = [json.loads(file.read_text())["id"] for file in records]
     assert mentions(yawbench("study", "study.yaml", "--out", "o")[2], "all finished already")
     (folder / "o/off/results.csv").write_text("time\n")
-    assert mentions(yawbench("study", "study.yaml", "--out", "o")[2], "2 runs", "finished")
+    assert mentions(yawbench("study", "study.yaml", "--out", "o")[2], "2 runs", "1", "finished")
     again = [
         json.loads((folder / f"o/{run}/run.json").read_text())["id"] for run in ("off", "fuzzy_sideslip")
     ]

@@ -82,7 +82,11 @@ def test_show_tells_what_there_is_and_touches_nothing(full, capsys):
     before = sorted(full.rglob("*"))
     out, _ = told(capsys)
     assert each_mentions(
-        out.splitlines()[:4], ("cache",), ("0.0 MB", "unpacked"), ("1", "0.0 MB"), ("0.0 MB", "left")
+        out.splitlines()[:4],
+        ("cache",),
+        ("1", "0.0 MB", "unpacked"),
+        ("1", "0.0 MB"),
+        ("1", "0.0 MB", "left"),
     )
     assert sorted(full.rglob("*")) == before
 

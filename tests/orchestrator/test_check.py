@@ -127,7 +127,7 @@ def test_defaults_that_do_not_matter_are_shown_on_request(capsys: pytest.Capture
     assert check("Läufe 2/a.yaml") == 0
     shown = capsys.readouterr().out
     assert " gain " not in shown
-    assert mentions(shown, "--all", "left")
+    assert mentions(shown, "1", "--all", "left")
     assert check("Läufe 2/a.yaml", "--all") == 0
     rows = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert ["gain", "3", "default", "driver"] in rows

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -48,20 +47,14 @@ def test_an_error_of_the_program_itself_is_a_sentence_that_says_so(
         cli.main([])
     said = capsys.readouterr().err
     assert ended.value.code == 1
-    assert each_mentions(said, ("ZeroDivisionError", "test_cli.py:51", "YAWBENCH_TRACEBACK", "1 shows"))
+    assert each_mentions(said, ("ZeroDivisionError", "test_cli.py", "YAWBENCH_TRACEBACK", "1 shows"))
     monkeypatch.setenv(cli.TRACEBACK, "1")
     with pytest.raises(SystemExit):
         cli.main([])
-    assert each_mentions(
-        re.sub(r"line \d+", "line *", capsys.readouterr().err),
-        ("recent", "call", "Traceback"),
-        ("cli.py", "_status"),
-        ("_application", "arguments"),
-        ("test_cli.py", "line", "broken"),
-        ("ZeroDivisionError", '"\\x1b[31mof all things"'),
-        ("ZeroDivisionError",),
-        ("ZeroDivisionError", "test_cli.py:51"),
-    )
+    said = capsys.readouterr().err
+    assert mentions(said, "Traceback")
+    assert mentions(said, "test_cli.py", "broken")
+    assert mentions(said.splitlines()[-1], "ZeroDivisionError", "test_cli.py")
 
 
 PROGRAM = Path(sys.executable).with_name("yawbench")

@@ -86,7 +86,7 @@ def test_a_record_of_a_diagnostic_gives_it_back(one):
 
 
 def test_a_text_begins_with_file_line_and_target_and_can_be_printed():
-    assert mentions(str(Diagnostic("x", "must be\x1b 1", location=WHERE)), "a.yaml:3", "units.plant")
+    assert mentions(str(Diagnostic("x", "must be\x1b 1", location=WHERE)), "a.yaml:3", "units.plant", "1")
     assert str(Diagnostic("x", "lost", location=Location(instance="plant", time=2.0))) == "lost"
     assert text_of([Diagnostic("x", "a"), Diagnostic("y", "b", location=Location(target="k"))]) == "a; k: b"
 

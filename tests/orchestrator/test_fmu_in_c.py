@@ -92,7 +92,7 @@ def test_a_failed_instance_is_ended_as_the_standard_allows(fmu, held, answer, en
     with pytest.raises(SimulationError) as caught:
         simulate(chain(fmu, answer), tmp_path / "out")
     assert caught.value.code == "fmu-call-failed"
-    assert mentions(str(caught.value), "b:", "0.25 s", "99.5%")
+    assert mentions(str(caught.value), "b:", "0.25 s", "3", "99.5%")
     assert counters(fmu) == ended
     results = load_results(tmp_path / "out")
     assert results.time[-1] == 0.25
@@ -104,7 +104,7 @@ def test_a_failed_instance_is_ended_as_the_standard_allows(fmu, held, answer, en
 def test_a_warning_with_printf_arguments_is_readable(fmu, held, tmp_path):
     info = simulate(chain(fmu, 1), tmp_path / "out")
     assert each_mentions(
-        [(m.instance, m.time, m.text) for m in info.warnings], ("0.25 valve", "99.5%", "valve", "gedacht")
+        [(m.instance, m.time, m.text) for m in info.warnings], ("0.25", "3", "99.5%", "valve", "gedacht")
     )
     assert counters(fmu) == [2, 2, 2]
 

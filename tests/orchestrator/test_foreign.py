@@ -148,7 +148,7 @@ def test_enumerations_are_wired_and_given_by_name(run, isolate):
 def test_a_step_that_fails_is_a_sentence_and_the_results_so_far(run, isolate, answer):
     status, said, results = run(*isolate, answer=answer)
     assert status == 1
-    assert mentions(said, "b:", "0.25 s", "99.5%")
+    assert mentions(said, "b:", "0.25 s", "3", "99.5%")
     assert results.record.status == "failed"
     assert results.time[-1] == 0.25
     assert results.record.error.inputs == {
@@ -160,7 +160,7 @@ def test_a_step_that_fails_is_a_sentence_and_the_results_so_far(run, isolate, an
 def test_a_warning_is_said_and_the_run_goes_on(run, isolate):
     status, said, results = run(*isolate, answer=1)
     assert status == 0
-    assert mentions(said, "99.5%", "valve", "gedacht")
+    assert mentions(said, "3", "99.5%", "valve", "gedacht")
     assert results.time[-1] == 0.5
 
 
@@ -186,7 +186,7 @@ def test_a_parameter_reaches_an_fmu_that_resets_when_the_experiment_is_set_up(ru
 def test_a_parameter_that_does_not_take_ends_the_run(run, isolate):
     status, said, results = run(*isolate, answer=2, guid="{deaf}")
     assert status == 1
-    assert mentions(said, "b:", "answer")
+    assert mentions(said, "b:", "0", "2", "answer")
     assert results.record.status == "failed"
     assert results.record.error.instance == "b"
 

@@ -212,7 +212,7 @@ def said_of(load: object, text: str) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("text", "expected", "name"),
+    ("text", "expected"),
     [
         (
             f"{SWEEP}axes: {{a: {{vary: plant.mass, from: 1, to: 2, count: 1000000000}}}}\n",

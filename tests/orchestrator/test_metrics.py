@@ -350,7 +350,7 @@ def test_a_metric_of_two_columns_says_against_what_it_judges():
     named = metric("rms_error(estimator.sideslip,plant.sideslip) from 1 s to 2 s")
     assert mentions(named.name, "rms_error(estimator.sideslip, plant.sideslip)", "1.0 s", "2.0 s")
     assert metric(named.name) == named
-    assert mentions(named.title, "RMS", "plant.sideslip", "2 s")
+    assert mentions(named.title, "RMS", "plant.sideslip", "1", "2 s")
     assert mentions(named.formula, "estimator.sideslip", "plant.sideslip")
     assert mentions(metric("rms(a.x - b.x)").definition, "b.x", "square", "difference")
 

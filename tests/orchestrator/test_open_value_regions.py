@@ -141,8 +141,8 @@ def test_points_are_added_to_a_claim_until_it_is_decided(judged):
         assert len(region.points) < 128
         assert region.flip_bounds.low > 0.1
         assert not region.robust
-    assert mentions(region_words(findings.claims[0])[0], "16 flip", "20", "70 %", "flip")
-    assert mentions(region_words(findings.claims[1])[0], "48 flip", "7.4 %", "flip")
+    assert mentions(region_words(findings.claims[0])[0], "7", "16 flip", "20", "70 %", "flip")
+    assert mentions(region_words(findings.claims[1])[0], "0", "48 flip", "7.4 %", "flip")
 
 
 def test_one_look_of_few_points_cannot_make_a_verdict_robust(judged):
@@ -337,7 +337,7 @@ def test_study_makes_the_runs_of_the_region_once_and_quick_leaves_them_out(
         "words": "0.900",
         "chosen": "1.00",
     }
-    assert mentions(" ".join(out.split()), "20 flip", "8.7", "49 %", "flip")
+    assert mentions(" ".join(out.split()), "5", "20 flip", "8.7", "49 %", "flip")
     below = next(csv.DictReader((tmp_path / "o/verdicts.csv").open(encoding="utf-8")))
     assert below["verdict"] == "undecided"
     assert mentions(below["says"], "0.06 rad", "stays")
@@ -355,7 +355,7 @@ def test_study_makes_the_runs_of_the_region_once_and_quick_leaves_them_out(
     out, said, record = study("--no-run", "--quick")
     assert "region of the verdicts" not in said
     only = "at the chosen point only; the region of the open values has not been run"
-    assert mentions(said, "Half", "paper")
+    assert mentions(said, "3", "1", "Half", "paper")
     assert f"verdicts: {only}" in " ".join(out.split())
     assert only in html.fromstring((tmp_path / "o/report.html").read_text("utf-8")).text_content()
     assert record["claims"][0]["region"] is None

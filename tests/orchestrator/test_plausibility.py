@@ -97,7 +97,7 @@ def test_a_value_outside_what_its_model_states_is_named():
     made = plan(pressure={"lowest": 0.0, "highest": 2.0})
     assert found(made, np.linspace(0.0, 2.0, 10)) == {}
     one = found(made, np.linspace(0.0, 3.0, 101))["range-left"]
-    assert mentions(one.message, "plant.pressure", "0.67 s")
+    assert mentions(one.message, "plant.pressure", "3", "0.67 s", "2")
     assert found(made, np.linspace(0.0, -1.0, 101))["range-left"].value == pytest.approx(-1.0)
 
 

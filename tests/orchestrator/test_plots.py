@@ -198,7 +198,7 @@ def test_a_narrow_path_is_stretched_and_the_figure_says_how_much():
     figure = path_of(200.0, 3.0)
     axes = panel(figure, "path")
     assert axes.get_aspect() == 5.0
-    assert mentions(axes.get_title(loc="left"), "lateral", "longitudinal")
+    assert mentions(axes.get_title(loc="left"), "5", "lateral", "longitudinal")
     figure.draw_without_rendering()
     low, high = axes.get_ylim()
     assert 3.0 < high - low < 12.0

@@ -68,9 +68,9 @@ def test_a_size_that_is_none_is_refused(run, capsys):
     assert each_mentions(
         capsys.readouterr().err,
         ("--size 88", "0.5", "100 inches", "height"),
-        ("--size 88x60", "88", "0.5", "100 inches", "height"),
-        ("--size 0x60mm", "88", "0.5", "100 inches", "height"),
-        ("--size 88x9999mm", "88", "0.5", "100 inches", "height"),
+        ("--size 88x60", "0.5", "100 inches", "height"),
+        ("--size 0x60mm", "0.5", "100 inches", "height"),
+        ("--size 88x9999mm", "0.5", "100 inches", "height"),
     )
 
 

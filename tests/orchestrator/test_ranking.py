@@ -184,7 +184,7 @@ def test_a_small_matrix_is_driven_goes_on_where_it_was_and_shows_what_is_missing
     lacking = rows(out / "table.csv")
     assert [(one["entry"], one["place"]) for one in lacking] == [("fuzzy_pid", "1"), ("none", "")]
     assert status_of("rank", file, "--out", out, "--jobs", 2) == 0
-    assert mentions(capsys.readouterr().err, "4 runs", "finished")
+    assert mentions(capsys.readouterr().err, "4 runs", "2", "finished")
     found = rows(out / "table.csv")
     assert [(one["entry"], one["place"], one["passed"]) for one in found] == [
         ("fuzzy_pid", "1", "2"), ("none", "2", "0"),

@@ -103,7 +103,7 @@ def test_results_without_rows_have_empty_columns(folder):
 
 def test_results_that_were_cut_off_are_no_results(folder):
     (folder / "run.json").write_text(json.dumps({**RUN, "rows": 3}))
-    with refused(ResultsError, "results-unreadable", names=("results.csv", "3 rows")):
+    with refused(ResultsError, "results-unreadable", names=("results.csv", "2", "3 rows")):
         load_results(folder)
 
 
@@ -157,7 +157,7 @@ def test_what_is_wrong_in_a_file_of_results_is_named_with_its_place(folder, text
     ("changes", "sentence", "names"),
     [
         ({"rows": "many"}, "rows: input should be a valid integer (got 'many')", ("'many'",)),
-        ({"rows": -1}, "rows: input should be greater than or equal to 0 (got -1)", ("-1",)),
+        ({"rows": -1}, "rows: input should be greater than or equal to 0 (got -1)", ("0", "-1")),
         ({"units": ["s"]}, "units: input should be a valid dictionary (got ['s'])", ("['s']",)),
         ({"fmus": {"car": "plant"}}, "fmus.car: input should be a valid dictionary", ("fmus.car", "'plant'")),
         ({"error": "no"}, "error: input should be a valid dictionary (got 'no')", ("'no'",)),

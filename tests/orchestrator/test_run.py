@@ -269,7 +269,7 @@ def test_a_wrong_value_of_a_parameter_names_the_allowed_ones(yawbench, tmp_path)
 def test_friction_below_zero_is_a_mistake(yawbench, tmp_path):
     status, said = yawbench(car(tmp_path), "--out", tmp_path / "out", "--set", "inputs.friction*=-0.65")
     assert status == 2
-    assert mentions(said, "--set inputs.friction*=-0.65", "tyre.friction_*")
+    assert mentions(said, "--set inputs.friction*=-0.65", "0", "tyre.friction_*")
 
 
 @pytest.mark.parametrize(("value", "word"), [("float('nan')", "not a number"), ("1e999", "infinite")])

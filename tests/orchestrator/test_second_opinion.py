@@ -135,7 +135,7 @@ def test_signals_that_do_not_change_are_told(capsys):
     gaps = differences(request, own, own)
     show([SecondOpinion(MASTERS[0], False, "", gaps, {"theirs": 1e-6, "ours": 1e-6}, still)])
     said = capsys.readouterr().out
-    assert mentions(said, "4 signals", "a.rounded")
+    assert mentions(said, "3", "4 signals", "a.rounded")
     show([SecondOpinion(MASTERS[0], False, "", gaps, {"theirs": 1e-6, "ours": 1e-6}, tuple(gaps))])
     assert mentions(capsys.readouterr().out.splitlines()[-1], "changes", "agreement", "evidence")
     show([SecondOpinion(MASTERS[0], False, "", gaps, {"theirs": 1e-6, "ours": 1e-6})])

@@ -317,7 +317,7 @@ def test_a_series_passes_only_if_no_run_is_missing_fails_or_is_not_judged():
     assert mentions(missing.criteria["stability"].why, "1 runs", "+108.0 degrees")
     assert "has not passed (stability and responsiveness not judged)" in missing.summary
     failed = judge_series(runs(spoil=Verdict(Status.FAILED)), A)
-    assert mentions(failed.criteria["stability"].why, "26 runs", "144.0 degrees", "fail", "smallest")
+    assert mentions(failed.criteria["stability"].why, "1", "26 runs", "144.0 degrees", "fail", "smallest")
     assert "has failed (stability)" in failed.summary
     assert judge_series(runs(spoil=not_judged("too short")), A).data["verdict"] is Status.FAILED
 

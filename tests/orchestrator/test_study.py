@@ -590,7 +590,7 @@ def test_claims_about_several_runs_and_checks_have_tables_of_their_own(study, ou
     paper, project = claim_tables(judge_results(study(), out))
     (row,) = paper.text()
     assert row[2] == "holds"
-    assert mentions(row[0], "network", "better")
+    assert mentions(row[0], "4", "network", "better")
     assert mentions(row[1].splitlines()[1], "4.00 %", "25 m/s", "200 %", "network", "against")
     assert [row[2:] for row in project.text()] == [["holds", "100 %"], ["does not hold", "-100 %"]]
 
@@ -611,7 +611,7 @@ def test_a_study_leaves_figures_tables_and_a_record(study, out):
     assert mentions(said[0], "roll_angle", "recorded")
     assert sorted(path.name for path in (out / "figures").iterdir()) == ["both.png", "both.svg"]
     report = page(findings, out)
-    assert mentions(report, "15 m/s", "140 %", "100 %", "40 %", "2000 N·m", "control", "section")
+    assert mentions(report, "15 m/s", "140 %", "100 %", "3", "40 %", "2000 N·m", "control", "section")
     assert mentions(report, "15 m/s", "figures/both.svg")
     assert mentions(report, "6.5", "8 s", "largest", "absolute")
     assert pq.read_table(out / "table.parquet").num_rows == 5

@@ -259,7 +259,7 @@ def test_a_run_that_kills_its_process_every_time_is_named_and_tried_again_next_t
 
 def test_more_levels_add_runs_and_repeat_none(moods, yawbench, tmp_path):
     yawbench(moods(10), "out")
-    assert mentions(yawbench(moods(10, 15), "out")[2], "4 runs", "finished")
+    assert mentions(yawbench(moods(10, 15), "out")[2], "4 runs", "2", "finished")
     assert len({entry["key"] for entry in journal(tmp_path / "out")}) == len(journal(tmp_path / "out")) == 4
     yawbench(moods(10, 15), "anew")
     assert rows(tmp_path / "out") == rows(tmp_path / "anew")
@@ -284,7 +284,7 @@ def test_kept_results_can_be_loaded_in_every_format_and_are_made_once(moods, yaw
     assert results["controller.yaw_moment"][-1] == pytest.approx(1.0)
     assert mentions(yawbench(file, "out", "--keep")[2], "all finished already")
     more = moods(5, 10)  # what was the first run is the third now
-    assert mentions(yawbench(more, "out", "--keep")[2], "4 runs", "finished")
+    assert mentions(yawbench(more, "out", "--keep")[2], "4 runs", "2", "finished")
     kept = [load_results(tmp_path / "out" / "runs" / row["key"][:12]) for row in rows(tmp_path / "out")]
     assert [run["controller.yaw_moment"][-1] for run in kept] == pytest.approx([0.5, 0.5, 1.0, 1.0])
 
@@ -359,7 +359,7 @@ def test_a_sweep_that_was_stopped_goes_on_where_it_was(number, moods, yawbench, 
     assert len(before) == 4
     status, _, told = yawbench(file, "out")
     assert status == 0
-    assert mentions(told, "8 runs", "finished")
+    assert mentions(told, "8 runs", "4", "finished")
     after = journal(tmp_path / "out")
     assert after[:4] == before
     assert len({entry["key"] for entry in after}) == len(after) == 8

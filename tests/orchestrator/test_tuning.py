@@ -93,7 +93,7 @@ def test_the_least_of_all_trials_is_found_written_down_and_not_sought_twice(yawb
     found = json.loads((tmp_path / "out/experiment.json").read_text())
     assert [*found["runs"]] == ["turned"]
     page = html.fromstring((tmp_path / "out/report.html").read_text())
-    assert mentions(page.text_content(), "2 trials", "seed 2")
+    assert mentions(page.text_content(), "5", "2 trials", "seed 2")
     before = (tmp_path / "out/trials.csv").read_bytes()
     runs = (tmp_path / "out/runs.jsonl").read_bytes()
     status, out, told = yawbench()

@@ -125,7 +125,7 @@ def test_conditions_that_are_not_met_are_warnings(tmp_path):
     assert [one.code for one in few.diagnostics] == ["validation-conditions"] * 2
     assert each_mentions(
         "\n".join(map(str, few.diagnostics)),
-        ("2 tests", "ISO", "19364"),
+        ("2 tests", "ISO", "19364", "3"),
         ("3 m/s2", "acceleration_y", "5 m/s2"),
     )
     assert few.holds
@@ -171,7 +171,13 @@ def test_a_signal_that_is_not_recorded_is_not_judged(tmp_path):
             5,
             (("bands.yaml:5", "bands.steering_wheel_angle.offset", "'5 kg'", "rad", "deg", "mrad"),),
         ),
-        ("3 %", "-3 %", "value-invalid", 5, (("bands.yaml:5", "bands.steering_wheel_angle.gain", "-3 %"),)),
+        (
+            "3 %",
+            "-3 %",
+            "value-invalid",
+            5,
+            (("bands.yaml:5", "bands.steering_wheel_angle.gain", "0", "-3 %"),),
+        ),
         ("5 deg", "5", "value-invalid", 5, (("bands.yaml:5", "bands.steering_wheel_angle.offset"),)),
         (
             "acceleration_y:",

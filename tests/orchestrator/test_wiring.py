@@ -383,7 +383,7 @@ def test_every_type_of_parameter_is_taken() -> None:
         (
             "inputs.friction_fl=5 m",
             "unit-mismatch",
-            (("--set inputs.friction_fl=5", "'5 m'", "tyre.friction_fl"),),
+            (("--set inputs.friction_fl=5", "'5 m'", "1", "tyre.friction_fl"),),
         ),
         (
             "inputs.steer_angle=0",
@@ -501,7 +501,7 @@ def test_an_input_without_a_source_is_said_with_what_fits() -> None:
     assert each_mentions(
         problems(scenario(rest="inputs: {friction: 0.65}\n")),
         ("a.yaml:6", "units.plant", "plant.wheel_torque_*", "N.m", "controller.torque_request_*", "'inputs'"),
-        ("a.yaml:7", "units.tyre", "tyre.friction_*", "'inputs'"),
+        ("a.yaml:7", "units.tyre", "tyre.friction_*", "1", "'inputs'"),
     )
 
 
@@ -519,7 +519,7 @@ def test_an_optional_input_keeps_its_start_value_where_nothing_drives_it(folder:
 def test_an_input_of_one_wheel_without_a_source_is_said_alone() -> None:
     rest = "inputs: {friction: 1, friction_fl: 1, friction_rl: 1, friction_rr: 1}\n" + TORQUES
     assert each_mentions(
-        problems(scenario(rest=rest)), ("a.yaml:7", "units.tyre", "tyre.friction_fr", "'inputs'")
+        problems(scenario(rest=rest)), ("a.yaml:7", "units.tyre", "tyre.friction_fr", "1", "'inputs'")
     )
 
 
@@ -808,7 +808,9 @@ def test_a_constant_integer_feeds_an_enumeration_that_has_its_number(folder: Pat
         return scenario("  sensor: {fmu: sensor}\n  taker: {fmu: taker}\n", "")
 
     assert len(plan(feed(2)).wires) == 1
-    assert each_mentions(problems(feed(3)), ("a.yaml:5", "units.taker", "sensor.road", "taker.road"))
+    assert each_mentions(
+        problems(feed(3)), ("a.yaml:5", "units.taker", "sensor.road", "3", "taker.road", "1", "2")
+    )
 
 
 def test_enumerations_fit_if_the_input_knows_every_item_by_the_same_number(folder: Path) -> None:
@@ -822,7 +824,7 @@ def test_enumerations_fit_if_the_input_knows_every_item_by_the_same_number(folde
 
     assert len(plan(feed("dry", "wet")).wires) == 1
     assert each_mentions(
-        problems(feed("dry", "ice")), ("a.yaml:5", "units.taker", "sensor.road", "taker.road")
+        problems(feed("dry", "ice")), ("a.yaml:5", "units.taker", "sensor.road", "2", "taker.road", "3")
     )
 
 
@@ -1005,6 +1007,7 @@ def test_null_leaves_an_input_without_a_source(folder: Path) -> None:
             "a.yaml:7",
             "units.tyre",
             "tyre.friction_*",
+            "1",
             "estimator.friction_*",
             "estimator.friction",
             "'inputs'",

@@ -45,7 +45,7 @@ def test_read_finds_a_function_with_its_line_its_names_and_the_variables_around_
 
 
 def test_read_refuses_what_it_cannot_tell_from_its_neighbour():
-    with refused(Refused, names=("test_stages.py:33", "lambda", "function")):
+    with refused(Refused, names=("test_stages.py", "lambda", "function")):
         Sources(Path(__file__).parent).of(other)
 
 
