@@ -417,7 +417,7 @@ def test_a_slow_wheel_settles_at_the_slip_of_the_whole_equation():
 
 
 def test_springs_that_cannot_hold_the_body_are_refused():
-    with pytest.raises(AssertionError, match=r"roll_stiffness must exceed .* 4355\.64"):
+    with pytest.raises(AssertionError, match=r"roll_stiffness .*4355\.64"):
         Stand(EightDof, roll_stiffness=4000.0).start()
-    with pytest.raises(AssertionError, match="roll_inertia must exceed"):
+    with pytest.raises(AssertionError, match="roll_inertia"):
         Stand(EightDof, roll_inertia=100.0).start()

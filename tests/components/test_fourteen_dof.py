@@ -311,7 +311,7 @@ def test_a_car_that_rolls_over_is_an_error_with_a_sentence(side):
     force = 0.25 * side * 1830.0 * 1.5 * 9.81  # 1.5 g; it tips from d / 2h = 0.9 g on
     inputs = four("tyre_force_y", *[force] * 4)
     stand.start(**inputs)
-    with pytest.raises(AssertionError, match=r"rolled over: roll -?4\d\S*, pitch \S+ degrees; .* end at 45"):
+    with pytest.raises(AssertionError, match=r"roll -?4\d\S*, pitch \S+ degrees.* 45"):
         for _ in range(3000):
             assert abs(stand.step(0.001, **inputs)["roll_angle"]) < 0.8
     assert stand["roll_angle"] * side > 0.7

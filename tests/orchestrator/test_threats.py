@@ -400,7 +400,7 @@ def test_a_quantity_has_a_geometric_range_and_a_car_that_is_lost_its_bad_end():
 
 @pytest.mark.parametrize("keys", [{"best": 0.0}, {"worst": 50.0}, {"worst": 40.0}])
 def test_a_quantity_without_a_range_is_refused(keys):
-    with pytest.raises(ValueError, match="best, with the offset, has to be above 0 and below worst"):
+    with pytest.raises(ValueError, match=r"best.* 0 .*worst"):
         quantity(**keys)
 
 
