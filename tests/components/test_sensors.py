@@ -172,5 +172,5 @@ def test_a_kind_of_cluster_has_the_figures_of_its_table(sensor, given):
 
 def test_noise_without_a_sample_time_is_refused():
     stand = Stand(Ideal, yaw_rate_noise=0.01)
-    with pytest.raises(AssertionError, match="yaw_rate_noise.* sample_time"):
+    with pytest.raises(AssertionError, match=r"yaw_rate_noise.* sample_time"):
         stand.start()

@@ -117,9 +117,7 @@ def test_a_slipping_wheel_is_released_and_a_creeping_one_held():
 
 
 def test_a_release_that_ends_before_it_begins_is_refused():
-    with pytest.raises(
-        AssertionError, match=r"full_release_slip .*release_slip = 0\.05"
-    ):
+    with pytest.raises(AssertionError, match=r"full_release_slip .*release_slip = 0\.05"):
         Stand(Hydraulic, full_release_slip=0.01).start()
     Stand(Hydraulic, full_release_slip=0.05).start()  # a switch
 

@@ -103,22 +103,22 @@ def test_an_fmu_whose_sources_are_broken_stays_and_one_whose_sources_are_gone_is
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "sentence"),
+    ("old", "new", "names"),
     [
-        ("</fmiModelDescription>", "", "is not well-formed XML"),
-        ('modelIdentifier="controller_idea"', 'modelIdentifier="x"', 'modelIdentifier="controller_idea"'),
-        ('valueReference="5"', 'valueReference="7"', "moment_limit must have the value reference 5"),
-        ('name="yaw_moment"', 'name="moment"', "a controller must declare the output yaw_moment"),
-        ('name="yaw_rate"', 'name="yaw rate"', "'yaw rate' is not a valid name in C"),
-        ('causality="input"', 'causality="local"', "yaw_rate must be an input, an output or a parameter"),
-        ('<Real unit="N.m" start', "<Integer start", "moment_limit is not Real"),
-        ('min="0"', 'min="none"', "min must be a number (got 'none')"),
-        ('unit="N.m/rad" start', 'unit="N/rad" start', 'unit "N/rad"'),
+        ("</fmiModelDescription>", "", ("well-formed",)),
+        ('modelIdentifier="controller_idea"', 'modelIdentifier="x"', ('modelIdentifier="controller_idea"',)),
+        ('valueReference="5"', 'valueReference="7"', ("moment_limit", "reference 5")),
+        ('name="yaw_moment"', 'name="moment"', ("yaw_moment", "controller", "declare")),
+        ('name="yaw_rate"', 'name="yaw rate"', ("'yaw rate'", "valid")),
+        ('causality="input"', 'causality="local"', ("yaw_rate", "output", "parameter")),
+        ('<Real unit="N.m" start', "<Integer start", ("moment_limit", "Real")),
+        ('min="0"', 'min="none"', ("'none'", "min")),
+        ('unit="N.m/rad" start', 'unit="N/rad" start', ('unit "N/rad"',)),
     ],
 )
-def test_a_wrong_model_description_is_told_in_one_sentence(folder, old, new, sentence):
+def test_a_wrong_model_description_is_told_in_one_sentence(folder, old, new, names):
     edited(folder / "modelDescription.xml", old, new)
-    assert sentence in problems(folder)
+    assert mentions(problems(folder), *names)
 
 
 def test_what_is_missing_is_named(folder, root, monkeypatch):

@@ -119,21 +119,21 @@ def test_the_traceback_is_logged_for_those_who_ask(failing, sample):
 @pytest.mark.parametrize(
     ("how", "what"),
     [
-        ("interrupt", "KeyboardInterrupt"),
-        ("exit", "SystemExit: 3"),
-        ("recursion", "RecursionError"),
-        ("surrogate", r"half a character: \ud800, and a \0 in between"),
-        ("unprintable", "step failed (ValueError while reporting it)"),
-        ("none", "TypeError: output() returned nothing; it must return all outputs in declared order (cont"),
-        ("count", "TypeError: output() gave 2 values for 1 outputs"),
-        ("text", "ValueError: could not convert string to float: 'far'"),
+        ("interrupt", ("KeyboardInterrupt",)),
+        ("exit", ("SystemExit: 3",)),
+        ("recursion", ("RecursionError",)),
+        ("surrogate", ("0", "half", "character")),
+        ("unprintable", ("ValueError", "step")),
+        ("none", ("TypeError", "returned", "output")),
+        ("count", ("TypeError", "2 values", "1 outputs")),
+        ("text", ("ValueError", "'far'")),
     ],
 )
 def test_any_other_failure_of_a_step_is_an_error_with_a_sentence(failing, how, what):
     unit = failing(where="output", how=how)
     unit.start()
     assert unit.try_step(0.0) == ERROR
-    assert what in unit.messages[0]
+    assert mentions(unit.messages[0], *what)
     assert unit.get("yaw_moment") == [0.0]  # the last good value
 
 

@@ -193,46 +193,44 @@ connections:
 
 
 @pytest.mark.parametrize(
-    ("answer", "guid", "status", "sentence"),
+    ("answer", "guid", "status", "names"),
     [
-        (1, "{good}", 0, "warning: b at t = 0.25 s: valve 3 of b is 99.5% open"),
-        (2, "{good}", 1, "b: step failed at t = 0.25 s: valve 3"),
-        pytest.param(3, "{good}", 1, "b: step failed at t = 0.25 s: valve 3", marks=pytest.mark.exhaustive),
-        pytest.param(4, "{good}", 1, "b: step failed at t = 0.25 s: valve 3", marks=pytest.mark.exhaustive),
-        (0, "{whole}", 0, "a ended the run at t = 0.3 s"),
-        (0, "{half}", 0, "a ended the run at t = 0.275 s"),
+        (1, "{good}", 0, ("warning", "0.25 s", "3", "99.5%")),
+        (2, "{good}", 1, ("b:", "0.25 s", "3")),
+        pytest.param(3, "{good}", 1, ("b:", "0.25 s", "3"), marks=pytest.mark.exhaustive),
+        pytest.param(4, "{good}", 1, ("b:", "0.25 s", "3"), marks=pytest.mark.exhaustive),
+        (0, "{whole}", 0, ("0.3 s", "ended")),
+        (0, "{half}", 0, ("0.275 s", "ended")),
     ],
 )
-def test_a_status_ends_the_run_with_the_same_sentence(
-    both, library, tmp_path, answer, guid, status, sentence
-):
+def test_a_status_ends_the_run_with_the_same_sentence(both, library, tmp_path, answer, guid, status, names):
     write_fmu(tmp_path / "foreign.fmu", library, "Real", guid=guid)
     (tmp_path / "two.yaml").write_text(FOREIGN.format(answer=answer))
     given, said, _ = both(tmp_path / "two.yaml")
     assert given == status
-    assert sentence in said
+    assert mentions(said, *names)
 
 
 @pytest.mark.parametrize(
-    ("act", "value", "status", "sentence"),
+    ("act", "value", "status", "names"),
     [
         (
             "pass",
             "float('nan') if t > 0.045 else 0.0",
             1,
-            "controller: yaw_moment is not a number at t = 0.05 s",
+            ("controller", "yaw_moment", "0.05 s"),
         ),
         (
             "raise ValueError('flat tyre')",
             "0.0",
             1,
-            "controller: step failed at t = 0.05 s: ValueError: flat tyre",
+            ("controller", "0.05 s", "ValueError"),
         ),
-        ("self.warn('soft tyre')", "0.0", 0, "warning: controller at t = 0.05 s: soft tyre"),
-        ("os.kill(os.getpid(), signal.SIGINT)", "0.0", 130, "the run was interrupted at t = 0.06 s"),
+        ("self.warn('soft tyre')", "0.0", 0, ("warning", "0.05 s")),
+        ("os.kill(os.getpid(), signal.SIGINT)", "0.0", 130, ("0.06 s", "interrupted")),
     ],
 )
-def test_a_component_that_fails_does_so_at_the_same_time(both, fmus, tmp_path, act, value, status, sentence):
+def test_a_component_that_fails_does_so_at_the_same_time(both, fmus, tmp_path, act, value, status, names):
     file = tmp_path / "faulty.py"
     file.write_text(FAULTY.format(name="Faulty", act=act, value=value), encoding="utf-8")
     fmu = build_component(file, tmp_path, role="controllers")
@@ -242,7 +240,7 @@ def test_a_component_that_fails_does_so_at_the_same_time(both, fmus, tmp_path, a
     scenario.write_text(PAIR.format(controller=fmu.name) + follower + wired)
     given, said, _ = both(scenario, "--fmus", fmus)
     assert given == status
-    assert sentence in said
+    assert mentions(said, *names)
 
 
 def test_isolated_instances_are_left_to_the_loop_in_python(both, library, tmp_path):

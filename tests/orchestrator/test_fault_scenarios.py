@@ -119,41 +119,41 @@ def test_a_pattern_stands_for_several_and_each_has_random_numbers_of_its_own(fol
 
 
 @pytest.mark.parametrize(
-    ("fault", "sentence"),
+    ("fault", "names"),
     [
-        ("gyro.yaw_rate", "write --fault 'INSTANCE.OUTPUT: KIND VALUE from TIME until TIME'"),
-        ("gyro.yaw_rte: freeze", "gyro has neither an output nor an input 'yaw_rte'; did you mean"),
-        ("gyr.yaw_rate: freeze", "there is no instance 'gyr'; did you mean 'gyro'?"),
-        ("gyro yaw_rate: freeze", "must be instance.output, instance.input or instance.output -> instance,"),
-        ("plant.yaw_rate -> law: freeze", "no wire leads from plant.yaw_rate to law; it goes to gyro"),
-        ("plant.yaw_rat -> gyro: freeze", "no wire leads from plant.yaw_rat to gyro; did you mean"),
-        ("law.yaw_moment -> gyro: freeze", "no wire leads from law.yaw_moment to gyro; it goes to plant"),
-        ("gyro.yaw_rate -> plant: freeze", "no wire leads from gyro.yaw_rate to plant; it goes to law"),
-        ("law.friction: bias 1", "on no wire: faults of inputs act on outputs of instances"),
-        ("plant.gear: freeze", "plant.gear is Integer: faults are for Real"),
-        ("gyro.yaw_rate: freez", "must be 'bias', 'gain', 'drift', 'noise', 'freeze'"),
-        ("gyro.yaw_rate: bias", "bias needs a value: x + value"),
-        ("gyro.yaw_rate: freeze 3", "freeze takes no value"),
-        ("gyro.yaw_rate: freeze seed 3", "freeze takes no seed: nothing of it is random"),
-        ("gyro.yaw_rate: bias 1 share 0.5", "bias takes no share"),
-        ("gyro.yaw_rate: dropout", "dropout needs a share of the messages"),
-        ("gyro.yaw_rate: dropout share 0", "a share must be above 0 and at most 1 (got 0)"),
-        ("gyro.yaw_rate: noise 1 seed -1", "greater than or equal to 0"),
-        ("gyro.yaw_rate: noise -1", "gyro.yaw_rate: noise must be at least 0 rad/s"),
-        ("gyro.yaw_rate: loss 2", "gyro.yaw_rate: loss must be at least 0 and at most 1"),
-        ("gyro.yaw_rate: bias 3 kg", "'3 kg' is not a value in rad/s: use rad/s, deg/s or rpm"),
-        ("gyro.yaw_rate: drift 3 deg/s", "'3 deg/s' is not a value in (rad/s)/s"),
-        ("gyro.yaw_rate: freeze from 2 s until 1 s", "until must be after from, 2 s (got 1 s)"),
-        ("gyro.yaw_rate: freeze from 1 s from 2 s", "has from twice"),
-        ("gyro.yaw_rate: freeze from soon", "'soon' is neither a number in s nor a number with its unit"),
+        ("gyro.yaw_rate", ('--fault', 'INSTANCE.OUTPUT', 'KIND', 'TIME')),
+        ("gyro.yaw_rte: freeze", ("'yaw_rte'", 'gyro')),
+        ("gyr.yaw_rate: freeze", ("'gyr'", "'gyro'")),
+        ("gyro yaw_rate: freeze", ('instance.output', 'instance.input')),
+        ("plant.yaw_rate -> law: freeze", ('plant.yaw_rate', 'wire', 'leads')),
+        ("plant.yaw_rat -> gyro: freeze", ('plant.yaw_rat', 'wire', 'leads')),
+        ("law.yaw_moment -> gyro: freeze", ('law.yaw_moment', 'wire', 'leads')),
+        ("gyro.yaw_rate -> plant: freeze", ('gyro.yaw_rate', 'leads', 'plant')),
+        ("law.friction: bias 1", ('faults', 'outputs', 'instances')),
+        ("plant.gear: freeze", ('plant.gear', 'Integer', 'Real')),
+        ("gyro.yaw_rate: freez", ("'bias'", "'gain'", "'drift'", "'noise'", "'freeze'")),
+        ("gyro.yaw_rate: bias", ('bias', 'value')),
+        ("gyro.yaw_rate: freeze 3", ('freeze', 'value')),
+        ("gyro.yaw_rate: freeze seed 3", ('freeze', 'seed', 'random')),
+        ("gyro.yaw_rate: bias 1 share 0.5", ('bias', 'share')),
+        ("gyro.yaw_rate: dropout", ('dropout', 'share', 'messages')),
+        ("gyro.yaw_rate: dropout share 0", ('0', '1')),
+        ("gyro.yaw_rate: noise 1 seed -1", ('0', 'greater', 'equal')),
+        ("gyro.yaw_rate: noise -1", ('gyro.yaw_rate', '0 rad/s', 'noise')),
+        ("gyro.yaw_rate: loss 2", ('gyro.yaw_rate', '0', '1', 'loss')),
+        ("gyro.yaw_rate: bias 3 kg", ("'3 kg'", 'rad/s', 'deg/s', 'rpm')),
+        ("gyro.yaw_rate: drift 3 deg/s", ("'3 deg/s'", 'rad/s')),
+        ("gyro.yaw_rate: freeze from 2 s until 1 s", ('2 s', '1 s', 'until')),
+        ("gyro.yaw_rate: freeze from 1 s from 2 s", ('has from twice',)),
+        ("gyro.yaw_rate: freeze from soon", ("'soon'", 'neither', 'number')),
     ],
 )  # fmt: skip
-def test_a_fault_that_cannot_be_is_one_sentence(fault, sentence, folder):
+def test_a_fault_that_cannot_be_is_one_sentence(fault, names, folder):
     with pytest.raises(YawbenchError) as caught:
         planned(fault)
     (problem,) = texts_of(caught.value)
     assert str(problem).startswith(f"--fault {fault}: ")
-    assert sentence in str(problem)
+    assert mentions(str(problem), *names)
 
 
 def test_a_fault_of_a_file_is_told_with_its_line_also_after_an_option_has_moved_it(folder):

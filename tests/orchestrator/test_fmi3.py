@@ -103,18 +103,18 @@ def test_every_type_passes_from_unit_to_unit(run, tmp_path, isolate):
 
 
 @pytest.mark.parametrize(
-    ("kind", "value", "sentence"),
+    ("kind", "value", "names"),
     [
-        ("Int8", 128, "must be a whole number from -128 to 127 (got 128)"),
-        ("UInt64", -1, "must be a whole number from 0 to 18446744073709551615 (got -1)"),
-        ("Float32", 1e39, "must be a finite number (got 1e+39)"),
+        ("Int8", 128, ("-128", "127")),
+        ("UInt64", -1, ("0", "18446744073709551615", "-1")),
+        ("Float32", 1e39, ("1e+39", "finite", "number")),
     ],
 )
-def test_a_constant_that_a_type_cannot_hold_is_refused(run, kind, value, sentence):
+def test_a_constant_that_a_type_cannot_hold_is_refused(run, kind, value, names):
     constants = {f"a.{k}_in": v for k, v in EVERY.items()} | {"a.String_in": "", "a.mode_in": "dry"}
     status, said, _ = run({"a": ("Every", {})}, inputs={**constants, f"a.{kind}_in": value})
     assert status == 2
-    assert sentence in said
+    assert mentions(said, *names)
 
 
 @together_and_apart
@@ -314,20 +314,20 @@ def test_an_fmu_that_refuses_to_be_instantiated_says_why(run, isolate):
 
 
 @pytest.mark.parametrize(
-    ("model", "more", "to", "sentence"),
+    ("model", "more", "to", "names"),
     [
-        ("Matrix", {"parameters": {"n": 3}}, None, "structural parameter, which can only keep its start"),
-        ("Every", {}, "b.raw", "b.raw is Binary, which is not supported"),
-        ("Every", {}, "b.tick", "b.tick is a Clock, which is not supported"),
+        ("Matrix", {"parameters": {"n": 3}}, None, ("structural", "parameter", "start")),
+        ("Every", {}, "b.raw", ("b.raw", "Binary")),
+        ("Every", {}, "b.tick", ("b.tick", "Clock")),
     ],
 )
-def test_what_is_not_supported_is_refused_where_it_is_asked_for(run, model, more, to, sentence):
+def test_what_is_not_supported_is_refused_where_it_is_asked_for(run, model, more, to, names):
     constants = {f"{k}_in": v for k, v in EVERY.items()} | {"String_in": "", "mode_in": "dry"}
     inputs = constants if model == "Every" else {"u[*]": 0.0}
     wires = [{"from": "a.Int8_out", "to": to}] if to else []
     status, said, _ = run({"a": (model, {}), "b": (model, more)}, inputs=inputs, connections=wires)
     assert status == 2
-    assert sentence in said
+    assert mentions(said, *names)
 
 
 @pytest.mark.parametrize(

@@ -282,19 +282,19 @@ def test_start_time_and_tolerance_reach_the_fmu(run, isolate):
 
 
 @pytest.mark.parametrize(
-    ("setting", "sentence"),
+    ("setting", "names"),
     [
-        ("start_time=0.5", "must be after start_time, 0.5 s (got 0.5 s)"),
+        ("start_time=0.5", ("start_time", "0.5 s")),
         (
             "start_time=0.02",
-            "0.48 s from 0.02 s on is not an integer multiple of the communication step 0.05 s",
+            ("0.48 s", "0.02 s", "0.05 s"),
         ),
     ],
 )
-def test_a_start_time_that_does_not_fit_is_said(run, setting, sentence):
+def test_a_start_time_that_does_not_fit_is_said(run, setting, names):
     status, said, _ = run("--set", setting)
     assert status == 2
-    assert sentence in said
+    assert mentions(said, *names)
 
 
 WRONG = {

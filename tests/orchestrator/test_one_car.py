@@ -181,28 +181,28 @@ def test_a_change_that_reaches_no_unit_is_told(plan):
 
 
 @pytest.mark.parametrize(
-    ("car", "fmu", "says"),
+    ("car", "fmu", "names"),
     [
         (
             CAR_TEXT,
             "plant_high",
-            "plant_high takes its car from the vehicle file, which gives neither cg_height",
+            ("plant_high", "cg_height"),
         ),
-        (f"{CAR_TEXT}, mass: 1900", "plant_x", "parameters.mass: 1900 kg contradicts sprung_mass + unsprung"),
-        (f"{CAR_TEXT}, wheel_radius: 31 kg", "plant_x", "wheel_radius: '31 kg' is not a value in m"),
+        (f"{CAR_TEXT}, mass: 1900", "plant_x", ("parameters.mass", "1900 kg", "sprung_mass")),
+        (f"{CAR_TEXT}, wheel_radius: 31 kg", "plant_x", ("wheel_radius", "'31 kg'")),
         (
             f"{CAR_TEXT}, trak_width: 1.5",
             "plant_x",
-            "no instance has a parameter 'trak_width'; did you mean 'track_",
+            ("'trak_width'", "instance", "parameter"),
         ),
-        ("sprung_mass: -5, unsprung_mass: 180", "plant_x", "sprung_mass: must be at least 0 kg (got -5)"),
+        ("sprung_mass: -5, unsprung_mass: 180", "plant_x", ("sprung_mass", "0 kg", "-5")),
     ],
 )
-def test_what_is_wrong_with_a_car_is_said_in_one_sentence(plan, car, fmu, says):
+def test_what_is_wrong_with_a_car_is_said_in_one_sentence(plan, car, fmu, names):
     with pytest.raises(WiringError) as raised:
         plan(car, fmu)
     assert len(raised.value.diagnostics) == 1
-    assert says in str(raised.value)
+    assert mentions(str(raised.value), *names)
 
 
 def test_a_reference_is_told_what_the_tyres_have_at_their_static_loads(plan):

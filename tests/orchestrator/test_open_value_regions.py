@@ -219,22 +219,22 @@ def test_a_variant_may_put_another_scenario_in_place_of_a_runs(judged):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (("runs: [plain], values", "runs: [plan], values"), "no run is named 'plan'; did you mean 'plain'?"),
-        (("driver.steering_ratio", "drivers.ratio"), "ratio: touches no run: none has drivers.ratio"),
-        (("[ratio]", "[ration]"), "there is no open value 'ration'; did you mean 'ratio'?"),
-        (("values: [0.5, 1, 2]", "values: [0.01, 1]"), "region.open_values.ratio: "),
+        (("runs: [plain], values", "runs: [plan], values"), ("'plan'", "'plain'")),
+        (("driver.steering_ratio", "drivers.ratio"), ("ratio", "drivers.ratio", "none")),
+        (("[ratio]", "[ration]"), ("'ration'", "'ratio'")),
+        (("values: [0.5, 1, 2]", "values: [0.01, 1]"), ("region.open_values.ratio: ",)),
         (
             ("times: true, from: 0.5, to: 1.5", "times: true, values: [a, b]"),
-            "times: factors are plain numbers",
+            ("times", "factors", "numbers"),
         ),
-        (("most: 20", "most: 12"), "region: most must be at least points (got 12 and 20)"),
-        (("points: 20", "points: 2"), "region.points: Input should be greater than or equal to 10 (got 2)"),
+        (("most: 20", "most: 12"), ("region", "most", "12 and 20")),
+        (("points: 20", "points: 2"), ("region.points", "10", "2")),
     ],
 )
 def test_a_wrong_region_is_answered_by_a_sentence(judged, change, said):
     with pytest.raises(ScenarioError) as error:
         judged(change)
-    assert said in str(error.value)
+    assert mentions(str(error.value), *said)
 
 
 def test_runs_of_one_claim_that_differ_in_an_open_value_need_factors(judged):

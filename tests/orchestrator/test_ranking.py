@@ -246,24 +246,24 @@ def test_noisy_sensors_give_a_headroom_with_its_confidence(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "wrong, options, sentence",
+    "wrong, options, names",
     [
-        (("car: s,", "car: t,"), (), "conditions.dry.car: there is no car 't'; there are s"),
-        (("every: 20", "evry: 20"), (), "unknown key; did you mean 'every'?"),
-        (("source: paper C", "sauce: paper C"), (), "did you mean 'source'?"),
-        ((), ("--only", "fuzy_pid"), "--only fuzy_pid: unknown entry; did you mean 'fuzzy_pid'?"),
-        ((), ("--condition", "wet"), "there is no condition 'wet'"),
-        ((), ("--controller", "nowhere/my.fmu"), "--controller nowhere/my.fmu: there is no such file"),
-        ((), ("--controller", "none"), "there is already an entry 'none'"),
-        ((), ("--fresh", "--no-run"), "--fresh and --no-run are mutually exclusive"),
-        ((), ("--no-run",), "contains no A of 's' for these FMUs; rank without --no-run"),
+        (("car: s,", "car: t,"), (), ("conditions.dry.car", "'t'")),
+        (("every: 20", "evry: 20"), (), ("'every'", "unknown", "key")),
+        (("source: paper C", "sauce: paper C"), (), ("'source'",)),
+        ((), ("--only", "fuzy_pid"), ("--only fuzy_pid", "'fuzzy_pid'")),
+        ((), ("--condition", "wet"), ("'wet'", "condition")),
+        ((), ("--controller", "nowhere/my.fmu"), ("--controller nowhere/my.fmu", "file")),
+        ((), ("--controller", "none"), ("'none'", "entry")),
+        ((), ("--fresh", "--no-run"), ("--fresh", "--no-run")),
+        ((), ("--no-run",), ("'s'", "--no-run")),
     ],
 )
-def test_what_is_wrong_with_a_ranking_is_said_before_any_run(wrong, options, sentence, tmp_path, capsys):
+def test_what_is_wrong_with_a_ranking_is_said_before_any_run(wrong, options, names, tmp_path, capsys):
     file = tmp_path / "small.yaml"
     file.write_text(SMALL.replace(*wrong) if wrong else SMALL)
     assert status_of("rank", file, "--out", tmp_path / "out", *options) in (1, 2)
-    assert sentence in capsys.readouterr().err
+    assert mentions(capsys.readouterr().err, *names)
     assert not list(tmp_path.rglob("run.json"))
 
 

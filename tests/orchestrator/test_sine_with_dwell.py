@@ -181,18 +181,18 @@ def test_below_26_8_degrees_the_zeroing_range_ends_at_the_first_instant_above_75
 @pytest.mark.parametrize(
     "changes, why",
     [
-        ({"last": END + 1.5}, "1.75 s are needed"),
-        ({"last": END - 0.1}, "completion of steer is not reached"),
-        ({"sampling": lambda last: np.arange(0.7, last, 0.001)}, "1 s are needed"),
-        ({"sampling": lambda last: np.arange(0.0, last, 0.04)}, "at least 50 Hz"),
-        ({"amplitude": radians(12.0)}, "does not exceed 75 deg/s"),
+        ({"last": END + 1.5}, ("1.75 s",)),
+        ({"last": END - 0.1}, ("completion", "steer")),
+        ({"sampling": lambda last: np.arange(0.7, last, 0.001)}, ("1 s",)),
+        ({"sampling": lambda last: np.arange(0.0, last, 0.04)}, ("50 Hz",)),
+        ({"amplitude": radians(12.0)}, ("75 deg/s", "exceed")),
     ],
     ids=["short", "no end", "late", "coarse", "slow"],
 )
 def test_what_cannot_be_judged_says_why_and_passes_nothing(changes, why):
     judged = evaluate_dwell(trace(**changes), radians(4.0))
     assert judged.criteria["stability"].status is Status.NOT_JUDGED
-    assert why in judged.criteria["stability"].why
+    assert mentions(judged.criteria["stability"].why, *why)
     assert judged.verdict.status is Status.NOT_JUDGED
 
 
@@ -475,32 +475,31 @@ def test_units_in_the_file_are_si(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "wrong, sentence",
+    "wrong, names",
     [
-        (("yaw_rate", "yaw_rat"), "unknown signal 'yaw_rat'; did you mean 'yaw_rate'?"),
-        (("deg,", "grad,"), "'grad' is not a unit"),
-        (("LRW", "Lenkrad"), "has no column 'Lenkrad'"),
-        (("unit: deg,", "unit: kg,"), "column 'LRW': its unit 'kg' does not fit: rad is wanted"),
+        (("yaw_rate", "yaw_rat"), ("'yaw_rat'", "'yaw_rate'")),
+        (("deg,", "grad,"), ("'grad'", 'unit')),
+        (("LRW", "Lenkrad"), ("'Lenkrad'", 'column')),
+        (("unit: deg,", "unit: kg,"), ("'LRW'", "'kg'", 'rad')),
         (("yaw_rate: Gier", "yaw_rate: {column: Gier, unit: rad/s}"),
-         "no car reaches yaw_rate of 45.7 rad/s, at most 5 rad/s is allowed; did you mean 'deg/s'?"),
+         ('yaw_rate', '45.7 rad/s', '5 rad/s', "'deg/s'")),
         (("unit: deg,", "unit: rad,"),
-         "no car reaches steering_wheel_angle of 270 rad, at most 12.57 rad is allowed; did you mean 'deg'?"),
-        (("unit: cm/s2", "unit: m/s2"), "no car reaches acceleration_y of"),
-        (("unit: cm/s2", "unit: g"), "no car reaches acceleration_y of"),
+         ('steering_wheel_angle', '270 rad', '12.57 rad', "'deg'")),
+        (("unit: cm/s2", "unit: m/s2"), ('acceleration_y', 'car', 'reaches')),
+        (("unit: cm/s2", "unit: g"), ('acceleration_y', 'car', 'reaches')),
         (("{column: ay, unit: cm/s2}", "ay"),
-         "column 'ay' has no unit, such as m/s2 or g: write 'acceleration_y: {column: ay, unit: m/s2}', "
-         "or in the file's header 'ay [m/s2]'"),
-        (("{column: Zeit, unit: ms}", "Zeit"), "column 'Zeit' has no unit, such as s, ms, min or h"),
-        (("1.8 t", "1.8 m"), "'1.8 m' is not a value in kg"),
-        (("1.8 t", "1800"), "vehicle.mass: must be text with a unit, such as kg (got 1800)"),
+         ("'ay'", "'acceleration_y: {column: ay, unit: m/s2}'", "'ay [m/s2]'")),
+        (("{column: Zeit, unit: ms}", "Zeit"), ("'Zeit'", 'column', 'unit')),
+        (("1.8 t", "1.8 m"), ("'1.8 m'", 'value')),
+        (("1.8 t", "1800"), ('vehicle.mass', '1800')),
     ],
 )  # fmt: skip
-def test_a_wrong_mapping_is_answered_by_a_sentence(wrong, sentence, tmp_path, capsys):
+def test_a_wrong_mapping_is_answered_by_a_sentence(wrong, names, tmp_path, capsys):
     write_measured(trace(sampling=SAMPLING["200 Hz"]), tmp_path / "run.csv")
     (tmp_path / "map.yaml").write_text(MAPPING.replace(*wrong))
     ended = status_of("evaluate", "sine-with-dwell", tmp_path / "map.yaml")
     assert ended in (1, 2)
-    assert sentence in capsys.readouterr().err
+    assert mentions(capsys.readouterr().err, *names)
 
 
 @pytest.mark.exhaustive
@@ -536,32 +535,32 @@ def test_a_series_with_a_car_that_rolls_over_has_a_verdict(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    "options, sentence",
+    "options, names",
     [
-        (("--vehicle", "large_salon"), "did you mean 'large_saloon'?"),
-        (("--set", "driver.amplitude=1"), "driver.amplitude: set by the series itself"),
-        (("--angle", "400 deg"), "--angle: must be between 0 and 360 degrees"),
-        (("--angle", "3 m"), "--angle: '3 m' is not a value in rad"),
+        (("--vehicle", "large_salon"), ("'large_saloon'",)),
+        (("--set", "driver.amplitude=1"), ("driver.amplitude", "series", "itself")),
+        (("--angle", "400 deg"), ("--angle", "0", "360 degrees")),
+        (("--angle", "3 m"), ("--angle", "'3 m'")),
     ],
 )
-def test_what_a_series_cannot_be_driven_with_is_said_before_any_run(options, sentence, capsys, tmp_path):
+def test_what_a_series_cannot_be_driven_with_is_said_before_any_run(options, names, capsys, tmp_path):
     assert status_of("drive", "sine-with-dwell", *options, "--out", tmp_path / "out") == 2
-    assert sentence in capsys.readouterr().err
+    assert mentions(capsys.readouterr().err, *names)
     assert not list(tmp_path.rglob("run.json"))
 
 
 @pytest.mark.parametrize(
-    "options, sentence",
+    "options, names",
     [
-        (("--angle", "40 deg"), "iso-3888-2 takes no A: omit --angle and --slow-steer"),
-        (("--set", "speed=70km/h"), "speed: set by the series itself"),
+        (("--angle", "40 deg"), ("iso-3888-2", "--angle", "--slow-steer")),
+        (("--set", "speed=70km/h"), ("speed", "series", "itself")),
     ],
 )
 def test_what_a_series_of_lane_changes_cannot_be_driven_with_is_said_before_any_run(
-    options, sentence, capsys, tmp_path
+    options, names, capsys, tmp_path
 ):
     assert status_of("drive", "iso-3888-2", *options, "--out", tmp_path / "out") == 2
-    assert sentence in capsys.readouterr().err
+    assert mentions(capsys.readouterr().err, *names)
     assert not list(tmp_path.rglob("run.json"))
 
 

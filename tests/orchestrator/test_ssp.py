@@ -359,54 +359,54 @@ def test_a_start_value_of_a_connected_input_counts_for_nothing(feedback, fmus, t
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "says"),
+    ("before", "after", "names"),
     [
-        ("resources/plant_two_dof.fmu", "../plant_two_dof.fmu", "is not in the archive"),
-        ("resources/plant_two_dof.fmu", "http://host/plant.fmu", "is not in the archive"),
-        ("resources/plant_two_dof.fmu", "resources/nothing.fmu", "there is no resources/nothing.fmu"),
-        ("resources/plant_two_dof.fmu", "plant.ssd", "only FMUs are supported"),
-        ('implementation="CoSimulation"', 'implementation="ModelExchange"', "only CoSimulation is supported"),
-        ("<ssd:Elements>", '<ssd:Elements><ssd:Other name="x"/>', "an element of kind Other (x)"),
-        ('name="tyre"', 'name="plant"', "two elements are called 'plant'"),
+        ("resources/plant_two_dof.fmu", "../plant_two_dof.fmu", ("archive",)),
+        ("resources/plant_two_dof.fmu", "http://host/plant.fmu", ("archive",)),
+        ("resources/plant_two_dof.fmu", "resources/nothing.fmu", ("resources/nothing.fmu",)),
+        ("resources/plant_two_dof.fmu", "plant.ssd", ("supported",)),
+        ('implementation="CoSimulation"', 'implementation="ModelExchange"', ("CoSimulation", "supported")),
+        ("<ssd:Elements>", '<ssd:Elements><ssd:Other name="x"/>', ("Other", "element", "kind")),
+        ('name="tyre"', 'name="plant"', ("'plant'", "elements")),
         (
             'startConnector="steer_angle" endElement="plant"',
             'startConnector="steer" endElement="plant"',
-            "driver has no output 'steer'",
+            ("'steer'", "driver"),
         ),
         (
             'startConnector="steer_angle" endElement="plant" endConnector="steer_angle"',
             'startConnector="velocity_x" endElement="plant" endConnector="steer_angle"',
-            "cannot connect driver.velocity_x and plant.steer_angle: each takes a value",
+            ("driver.velocity_x", "plant.steer_angle"),
         ),
         (
             'endElement="plant" endConnector="tyre_force_x_fr"',
             'endElement="plant" endConnector="tyre_force_x_fl"',
-            "plant.tyre_force_x_fl has more than one source: tyre.tyre_force_x_fl and tyre.tyre_force_x_fr",
+            ("plant.tyre_force_x_fl", "tyre.tyre_force_x_fl", "tyre.tyre_force_x_fr"),
         ),
         (
             "<ssd:Elements>",
             '<ssd:Elements><ssd:SignalDictionaryReference name="bus" dictionary="d"/>',
-            "a signal dictionary (bus)",
+            ("signal", "dictionary", "bus"),
         ),
-        ('startElement="driver"', 'startElement="nobody"', "'nobody': there is no such component"),
-        ('startElement="driver"', "", "the connector 'steer_angle': the system has none of this name"),
+        ('startElement="driver"', 'startElement="nobody"', ("'nobody'", "component")),
+        ('startElement="driver"', "", ("'steer_angle'", "connector", "system")),
         (
             'source="resources/plant_two_dof.fmu"',
             'source="a.fmu" sourceBase="component"',
-            "is in a component",
+            ("component",),
         ),
-        ('startTime="0.0"', 'startTime="1.0"', "must be after start_time, 1 s"),
-        ('value="25.0"', 'value="fast"', "'fast' is not of type Real"),
-        ("</ssd:System>", "", "not well-formed"),
+        ('startTime="0.0"', 'startTime="1.0"', ("start_time", "1 s")),
+        ('value="25.0"', 'value="fast"', ("'fast'", "Real")),
+        ("</ssd:System>", "", ("not well-formed",)),
     ],
 )
 def test_what_an_archive_cannot_mean_here_is_said_in_one_sentence(
-    feedback, fmus, tmp_path, before, after, says
+    feedback, fmus, tmp_path, before, after, names
 ):
     archive = rewritten(feedback, tmp_path / "changed.ssp", (before, after))
     sentence = problem(archive, fmus)
     assert sentence.startswith(str(archive))
-    assert says in sentence
+    assert mentions(sentence, *names)
 
 
 def test_an_archive_without_a_step_asks_for_one_and_takes_it(feedback, fmus, tmp_path):

@@ -102,22 +102,22 @@ def test_the_least_of_all_trials_is_found_written_down_and_not_sought_twice(yawb
 
 
 @pytest.mark.parametrize(
-    ("wrong", "sentence"),
+    ("wrong", "names"),
     [
-        ({"objective: miss": "objective: mist"}, "there is no derived number 'mist'; did you mean 'miss'"),
-        ({"runs: [turned]": "runs: [burned]"}, "no run is named 'burned'; did you mean 'turned'"),
-        ({"from: 0.5, to: 5": "values: [1, 2]"}, "axes.angle: needs from and to, and no count"),
-        ({"entries: driver": "entries: wheel"}, "'big wheel' also changes driver"),
-        ({"swap: {driver: driver_sine}": "stop_time: 1"}, "'big wheel' also changes stop_time"),
-        ({"      swap: {driver: driver_sine}\n": ""}, "'big wheel' names no FMU for it"),
-        ({"population: 5": "population: 3"}, "tuning.population"),
-        ({"tuning:": "axes: {a: {vary: driver.amplitude, values: [1]}}\ntuning:"}, "has axes of its own"),
+        ({"objective: miss": "objective: mist"}, ("'mist'", "'miss'")),
+        ({"runs: [turned]": "runs: [burned]"}, ("'burned'", "'turned'")),
+        ({"from: 0.5, to: 5": "values: [1, 2]"}, ("axes.angle", "count")),
+        ({"entries: driver": "entries: wheel"}, ("'big wheel'", "changes", "driver")),
+        ({"swap: {driver: driver_sine}": "stop_time: 1"}, ("'big wheel'", "stop_time")),
+        ({"      swap: {driver: driver_sine}\n": ""}, ("'big wheel'",)),
+        ({"population: 5": "population: 3"}, ("tuning.population",)),
+        ({"tuning:": "axes: {a: {vary: driver.amplitude, values: [1]}}\ntuning:"}, ("axes",)),
     ],
 )
-def test_what_is_wrong_with_a_tuning_file_is_said_before_anything_runs(yawbench, wrong, sentence):
+def test_what_is_wrong_with_a_tuning_file_is_said_before_anything_runs(yawbench, wrong, names):
     status, out, told = yawbench(**wrong)
     assert (status, out) == (2, "")
-    assert sentence in told
+    assert mentions(told, *names)
 
 
 def test_other_commands_say_what_a_tuning_file_is_for_and_tune_what_it_is_not(yawbench):

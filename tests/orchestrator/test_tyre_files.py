@@ -184,21 +184,21 @@ def test_an_ssp_archive_carries_the_coefficients(folder, fmus, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("tyres", "says"),
+    ("tyres", "names"),
     [
-        ("tyres: none.tir", "straight.yaml:2: tyres: "),
-        ("tyres: none.tir", "none.tir: no such tyre property file"),
-        ("tyres: {front: soft.tir}", "must be a tyre property file, or one each for front and rear"),
-        ("tyres: 3", "must be a tyre property file, or one each for front and rear (got 3)"),
-        ("tyres: bad.tir", "bad.tir:32: PKX1: the slip stiffness must be positive"),
+        ("tyres: none.tir", ("straight.yaml:2: tyres: ",)),
+        ("tyres: none.tir", ("none.tir", "tyre", "property")),
+        ("tyres: {front: soft.tir}", ("tyre", "property", "front")),
+        ("tyres: 3", ("3", "property", "front")),
+        ("tyres: bad.tir", ("bad.tir:32", "PKX1")),
     ],
 )
-def test_files_that_cannot_be_used_are_refused_with_their_place(folder, tyres, says):
+def test_files_that_cannot_be_used_are_refused_with_their_place(folder, tyres, names):
     write(folder / "bad.tir", {"PKX1": "-3"})
     with pytest.raises(ScenarioError) as caught:
         load_scenario(scenario(folder, tyres))
     assert len(caught.value.diagnostics) == 1
-    assert says in str(caught.value.diagnostics[0])
+    assert mentions(str(caught.value.diagnostics[0]), *names)
 
 
 def test_a_value_beyond_what_the_tyre_allows_is_refused_with_file_and_key(folder, fmus):

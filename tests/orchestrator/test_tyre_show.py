@@ -80,14 +80,14 @@ def test_the_command_writes_one_figure_and_tells_warnings(tmp_path, fmus, capsys
 
 
 @pytest.mark.parametrize(
-    ("source", "says"),
+    ("source", "names"),
     [
-        ("none.tir", "none.tir: no such tyre property file"),
-        ("tyre_brush", "tyre_brush"),
-        ("controller_off", "controller_off: not a tyre FMU: it has no tyre_force_x_fl"),
+        ("none.tir", ("none.tir", "tyre", "property")),
+        ("tyre_brush", ("tyre_brush",)),
+        ("controller_off", ("controller_off", "tyre_force_x_fl")),
     ],
 )
-def test_what_is_no_tyre_is_refused_in_a_sentence(tmp_path, fmus, capsys, monkeypatch, source, says):
+def test_what_is_no_tyre_is_refused_in_a_sentence(tmp_path, fmus, capsys, monkeypatch, source, names):
     monkeypatch.chdir(tmp_path)
     assert status_of("tyre", "show", source, "--fmus", fmus) == 2
-    assert says in capsys.readouterr().err
+    assert mentions(capsys.readouterr().err, *names)

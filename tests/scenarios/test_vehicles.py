@@ -191,7 +191,7 @@ def test_a_plant_is_chosen_from_the_folder_as_soon_as_it_is_there(fmus, tmp_path
 
 def test_a_file_that_is_no_car_says_what_it_lacks(fmus, tmp_path):
     (tmp_path / "no_car.yaml").write_text("parameters: {mass: 1e3, wheelbase: 2.5, cg_to_front_axle: 1.2}")
-    with pytest.raises(WiringError, match="yaw_inertia, track_width .*cg_height"):
+    with pytest.raises(WiringError, match=r"yaw_inertia, track_width .*cg_height"):
         fitting_plant(tmp_path / "no_car.yaml", "", fmus, Planner())
 
 
