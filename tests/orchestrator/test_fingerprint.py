@@ -26,7 +26,6 @@ from tests.fingerprint import (
     report,
     write,
 )
-from tests.refusals import texts_of
 
 ROWS = "time,plant.yaw_rate\n0.0,0.0\n0.001,0.25\n0.002,0.5\n"
 
