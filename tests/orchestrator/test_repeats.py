@@ -194,14 +194,14 @@ def test_a_quick_page_says_so_before_anything_else(load, fmus, tmp_path):
 @pytest.mark.parametrize(
     ("change", "names"),
     [
-        (("values: [1, 2, 3, 4]", "from: 1, to: 4, count: 4"), ('repeats', 'list', 'values')),
-        (('["*/noisy"]', '["*/nosy"]'), ('axes.seed.runs[0]', "'*/nosy'", 'weak/quiet')),
-        (('{gain} tells', "{gian} tells"), ('checks[0]', "'gain'")),
-        (('"share/{gain}/{noise}":', '"share/{gain}":'), ("'share/weak'", 'number')),
-        (("noisy, set: {", "noisy, set: {sensor.yaw_rate_gain: 2, "), ('sensor.yaw_rate_gain', 'twice')),
-        (("kind: grid, grid: share", "kind: grid, grid: shares"), ("'shares'", 'grid')),
-        (("kind: grid, grid: share", "kind: curve, metric: last, x: seed"), ("'seed'", 'numbers')),
-        (('    derived: "share/{gain}', '    derived: "share/weak'), ('depend', 'gain')),
+        (("values: [1, 2, 3, 4]", "from: 1, to: 4, count: 4"), ("repeats", "list", "values")),
+        (('["*/noisy"]', '["*/nosy"]'), ("axes.seed.runs[0]", "'*/nosy'", "weak/quiet")),
+        (("{gain} tells", "{gian} tells"), ("checks[0]", "'gain'")),
+        (('"share/{gain}/{noise}":', '"share/{gain}":'), ("'share/weak'", "number")),
+        (("noisy, set: {", "noisy, set: {sensor.yaw_rate_gain: 2, "), ("sensor.yaw_rate_gain", "twice")),
+        (("kind: grid, grid: share", "kind: grid, grid: shares"), ("'shares'", "grid")),
+        (("kind: grid, grid: share", "kind: curve, metric: last, x: seed"), ("'seed'", "numbers")),
+        (('    derived: "share/{gain}', '    derived: "share/weak'), ("depend", "gain")),
     ],
 )  # fmt: skip
 def test_mistakes_are_told_in_a_sentence(load, change, names):
