@@ -47,7 +47,7 @@ def each_mentions(texts: object, *names: tuple[object, ...]) -> bool:
 
 def sentence_has(page: str, *names: object) -> bool:
     """Assert that one sentence of a page names all of these things, however it is worded."""
-    return mentions(re.split(r"(?<=[.!?]) (?=[A-Z`*([])|(?<=\\|) ", " ".join(page.split())), *names)
+    return mentions(re.split(r"(?<=[.!?]) (?=[A-Z`*(\[-])|(?<=[|]) ", " ".join(page.split())), *names)
 
 
 def _named(text: str, names: Iterable[object]) -> bool:

@@ -67,7 +67,7 @@ def test_the_page_on_papers_tells_of_verdicts_what_the_page_does():
     words = "{} hold, {} do not reproduce, {} depend on these values, {} are undecided".format(*counts)
     assert words in " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
     total = sum(map(len, found.values()))
-    assert "Most of the papers' claims depend on values" in section
+    assert sentence_has(section, "Most", "claims", "values")
     assert total - len(decided) > total / 2
 
 
@@ -78,4 +78,5 @@ def test_the_page_on_papers_tells_how_far_the_best_of_26_carries():
     )
     section = (ROOT / "docs" / "papers.md").read_text(encoding="utf-8").partition("## Paper B")[2]
     told = " ".join(section.partition("\n## ")[0].split())
-    assert sentence_has(told, best.margin, best.verdict, best.region, best.flip, "best")
+    assert sentence_has(told, best.margin, "best")
+    assert sentence_has(told, best.verdict, best.region, best.flip)
