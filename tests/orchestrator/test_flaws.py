@@ -181,7 +181,7 @@ def test_at_one_speed_a_late_gyro_and_a_place_are_both_named(tmp_path):
     signals = recording(3, CARS["sport"], lambda seed: (drive(seed)[0], np.full(T.size, 25.0)))
     elsewhere(signals)
     (flaw,) = flaws_of(write(tmp_path, signals))
-    assert mentions(flaw.text, "'at: {x: 0.78 m}'", "yaw_rate", "'delay: 31.1 ms'")
+    assert mentions(flaw.text, "0.78 m ahead", "'at: {x: 0.78 m}'", "yaw_rate", "'delay: 31.1 ms'")
 
 
 @pytest.mark.parametrize("seed", SEEDS)

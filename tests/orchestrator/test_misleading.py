@@ -112,13 +112,14 @@ def test_times_are_shown_with_the_digits_that_tell_them_apart():
                 "0.0333333333333 s",
                 "9.99999999999 s",
                 "10.0333333333233 s",
+                "1/30 s",
                 "step_size",
             ),
         ),  # 3: "nearest allowed: 10 s", which it was
         (
             {"step": "0.0333"},
             "time-grid-invalid",
-            ("a.yaml:2", "stop_time", "10 s", "0.0333 s", "9.99 s", "10.0233 s", "step_size"),
+            ("a.yaml:2", "stop_time", "10 s", "0.0333 s", "9.99 s", "10.0233 s", "step_size", "1/30 s"),
         ),  # 4
         ({"step": "1/0 s"}, "value-invalid", ("a.yaml:3", "step_size", "'1/0 s'")),  # 5
     ],

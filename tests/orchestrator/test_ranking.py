@@ -178,7 +178,7 @@ def test_a_small_matrix_is_driven_goes_on_where_it_was_and_shows_what_is_missing
     file, out = tmp_path / "small.yaml", tmp_path / "out"
     file.write_text(SMALL)
     assert status_of("rank", file, "--out", out, "--only", "fuzzy_pid", "--jobs", 2) == 0
-    assert mentions(capsys.readouterr().err, "ranked", "missing")
+    assert mentions(capsys.readouterr().err, "ranked", "missing", "none")
     page = (out / "report.html").read_text()
     assert mentions(page, "build", "control")
     lacking = rows(out / "table.csv")
