@@ -159,7 +159,10 @@ def test_wrong_ranges_are_refused_before_a_run(base, ranges, names, monkeypatch)
 
 def test_what_is_no_metric_is_refused_by_name(base):
     ranges = {"driver.amplitude": (0.01, 0.02)}
-    for objective, *names in (("rms_eror(yaw_rate)", "'rms_eror'", "'rms_error'"), ("peak(nothing)",)):
+    for objective, *names in (
+        ("rms_eror(yaw_rate)", "'rms_eror'", "'rms_error'"),
+        ("peak(nothing)", "metrics.peak(nothing)", "25mps.yaml"),
+    ):
         with refused(yb.ScenarioError, names=(objective, *names)):
             yb.tune(base, ranges, objective)
 
