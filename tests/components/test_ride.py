@@ -11,6 +11,7 @@ import pytest
 from components.cars.contact_points import contact, contact_velocities
 from components.cars.ride import AT_REST, RESOLVED, loads, move_ride, rates
 from components.cars.sprung_car import FourteenDofParameters, G, ride_of
+from tests.refusals import refused
 
 from . import monolith_c
 from .ride_energy import energy
@@ -259,14 +260,14 @@ def test_modes_of_the_large_saloon_lie_within_two_per_cent_of_their_closed_forms
 
 
 @pytest.mark.parametrize(
-    ("change", "sentence"),
+    ("change", "names"),
     [
-        ({"sprung_mass": 1830.0}, "sprung_mass must be less than mass = 1830 kg"),
-        ({"yaw_inertia": 500.0}, "yaw_inertia is that of the whole car"),
-        ({"anti_roll_stiffness_front": -40000.0}, "springs and anti-roll bars must give more than 7653.95"),
-        ({"spring_stiffness_front": 0.0, "spring_stiffness_rear": 0.0}, "or the body falls over"),
+        ({"sprung_mass": 1830.0}, ("sprung_mass", "1830 kg")),
+        ({"yaw_inertia": 500.0}, ("yaw_inertia", "whole", "car")),
+        ({"anti_roll_stiffness_front": -40000.0}, ("7653.95", "springs", "anti-roll")),
+        ({"spring_stiffness_front": 0.0, "spring_stiffness_rear": 0.0}, ("body", "falls")),
     ],
 )
-def test_a_car_that_cannot_stand_is_refused(change, sentence):
-    with pytest.raises(ValueError, match=sentence):
+def test_a_car_that_cannot_stand_is_refused(change, names):
+    with refused(ValueError, names=names):
         ride_of(dataclasses.replace(P, **change))

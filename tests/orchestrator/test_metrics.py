@@ -366,14 +366,14 @@ def test_wheels_are_compared_in_pairs_and_units_converted():
 
 
 @pytest.mark.parametrize(
-    ("name", "sentence"),
+    ("name", "names"),
     [
-        ("rms_error(x - y)", r"compares with a reference: write rms_error\(x, y\)"),
-        ("rms(x, y)", r"takes a difference, not a reference: write rms\(x - y\)"),
+        ("rms_error(x - y)", ("rms_error", "compares", "reference")),
+        ("rms(x, y)", ("difference", "reference", "rms")),
     ],
 )
-def test_two_columns_that_are_not_compared_so_are_an_error(name, sentence):
-    with pytest.raises(ScenarioError, match=sentence):
+def test_two_columns_that_are_not_compared_so_are_an_error(name, names):
+    with refused(ScenarioError, names=names):
         metric(name)
 
 
@@ -442,15 +442,15 @@ def test_a_value_may_be_of_a_point_of_time():
 
 
 @pytest.mark.parametrize(
-    ("name", "sentence"),
+    ("name", "names"),
     [
-        ("peak(sideslip) at 2 s", "takes a point in time, as at 2 s; all other measures take a time span"),
-        ("value(sideslip)", r"value\(sideslip\) takes a point in time"),
-        ("peak(sideslip) from 3 s to 1 s", "ends before it begins"),
-        ("peak(sideslip) during 3 s", "is not a window: write from 1 s to 3 s, or at 2 s"),
-        ("peak(sideslip) from 1 kg to 3 s", "'1 kg' is not a value in s"),
+        ("peak(sideslip) at 2 s", ("2 s", "point", "time")),
+        ("value(sideslip)", ("sideslip", "point", "time")),
+        ("peak(sideslip) from 3 s to 1 s", ("ends", "begins")),
+        ("peak(sideslip) during 3 s", ("1 s", "3 s", "2 s")),
+        ("peak(sideslip) from 1 kg to 3 s", ("'1 kg'", "value")),
     ],
 )
-def test_a_window_that_is_none_is_said(name, sentence):
-    with pytest.raises(ScenarioError, match=sentence):
+def test_a_window_that_is_none_is_said(name, names):
+    with refused(ScenarioError, names=names):
         metric(name)

@@ -10,7 +10,7 @@ import pytest
 from orchestrator.plan import UnitDefinition
 from orchestrator.scenario import quantities
 from orchestrator.scenario.quantities import conversion, convert, measure_of, parse_unit, seconds
-from tests.refusals import refused
+from tests.refusals import mentions, refused
 
 
 @pytest.mark.parametrize(
@@ -57,34 +57,36 @@ def test_quantity_with_pi_is_converted_to_rounding(text: str, unit: str, value: 
 
 
 @pytest.mark.parametrize(
-    ("text", "unit", "message"),
+    ("text", "unit", "names"),
     [
-        ("5 kg", "rad", "'5 kg' is not a value in rad: use rad, deg or mrad"),
-        ("5 rad", "kg", "'5 rad' is not a value in kg: use kg, g or t"),
-        ("fast", "m/s", "'fast' is neither a number in m/s nor a number with its unit"),
+        ("5 kg", "rad", ("'5 kg'", "rad", "deg", "mrad")),
+        ("5 rad", "kg", ("'5 rad'", "kg", "g", "t")),
+        ("fast", "m/s", ("'fast'", "m/s")),
         (
             "0,5 m",
             "m",
-            "'0,5 m' is neither a number in m nor a number with its unit; write a decimal point: 0.5 m",
+            ("'0,5 m'", "0.5 m"),
         ),
-        ("5 foo", "m", "'foo' is not a unit: use m, mm, cm or km"),
-        ("5 kmh", "m/s", "'kmh' is not a unit; did you mean 'km/h'?"),
+        ("5 foo", "m", ("'foo'", "m", "mm", "cm", "km")),
+        ("5 kmh", "m/s", ("'kmh'", "'km/h'")),
         (
             "0,0325",
             "rad",
-            "'0,0325' is neither a number in rad nor a number with its unit; write a decimal point: 0.0325",
+            ("'0,0325'", "0.0325"),
         ),
-        ("5 m/", "m", "'m/' is not a unit; did you mean 'm'?"),
-        ("5 m/s.kg", "m", "'m/s.kg' is ambiguous: put the denominator in parentheses"),
-        ("5 m", "widgets", "'5 m' cannot be converted to widgets: give a number in widgets"),
-        ("5 m", None, "'5 m' names a unit, but the FMU declares none: give a plain number"),
-        ("5 mkg", "kg", "'mkg' is not a unit; did you mean 'kg'?"),
+        ("5 m/", "m", ("'m/'", "'m'")),
+        ("5 m/s.kg", "m", ("'m/s.kg'", "denominator", "parentheses")),
+        ("5 m", "widgets", ("'5 m'", "widgets")),
+        ("5 m", None, ("'5 m'", "unit", "declares")),
+        ("5 mkg", "kg", ("'mkg'", "'kg'")),
     ],
 )
-def test_what_is_no_such_quantity_is_said_in_a_sentence(text: str, unit: str | None, message: str) -> None:
+def test_what_is_no_such_quantity_is_said_in_a_sentence(
+    text: str, unit: str | None, names: tuple[str, ...]
+) -> None:
     with pytest.raises(ValueError) as caught:
         convert(text, unit)
-    assert str(caught.value) == message
+    assert mentions(caught.value, *names)
 
 
 def test_every_offered_spelling_is_a_unit() -> None:
@@ -156,19 +158,19 @@ def test_times_are_the_fractions_that_were_written(value: object, time: Fraction
 
 
 @pytest.mark.parametrize(
-    ("value", "message"),
+    ("value", "names"),
     [
-        (0, "must be a time above 0 s (got 0)"),
-        ("1e-999 s", "must be a time of at least 1e-09 s (got '1e-999 s')"),
-        ("-1 ms", "must be a time above 0 s (got '-1 ms')"),
-        ("1e400 s", "must be a finite number in s (got '1e400 s')"),
-        (True, "must be a time in s (got True)"),
-        (math.inf, "must be a time in s (got inf)"),
-        ([1], "must be a time in s (got [1])"),
-        ("1 m", "'1 m' is not a value in s: use s, ms, min or h"),
+        (0, ("0 s", "time")),
+        ("1e-999 s", ("1e-09 s", "'1e-999 s'")),
+        ("-1 ms", ("0 s", "'-1 ms'")),
+        ("1e400 s", ("'1e400 s'", "finite", "number")),
+        (True, ("True", "time")),
+        (math.inf, ("inf", "time")),
+        ([1], ("[1]", "time")),
+        ("1 m", ("'1 m'", "s", "ms", "min", "h")),
     ],
 )
-def test_what_is_no_time_is_said_in_a_sentence(value: object, message: str) -> None:
+def test_what_is_no_time_is_said_in_a_sentence(value: object, names: tuple[str, ...]) -> None:
     with pytest.raises(ValueError) as caught:
         seconds(value)
-    assert str(caught.value) == message
+    assert mentions(caught.value, *names)

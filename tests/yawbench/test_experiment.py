@@ -87,28 +87,28 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_others_are_made(base)
 
 
 @pytest.mark.parametrize(
-    ("axes", "said"),
+    ("axes", "names"),
     [
-        ({"controlller": ["a"]}, "the scenario has no instance 'controlller'; did you mean 'controller'"),
-        ({"driver.amplitude": []}, "axes.driver.amplitude.values: has no values"),
+        ({"controlller": ["a"]}, ("'controlller'", "'controller'")),
+        ({"driver.amplitude": []}, ("axes.driver.amplitude.values", "values")),
         (
             {"driver.amplitude": ["1 deg", 2]},
-            "driver.amplitude: give all levels in the same unit, or all without",
+            ("driver.amplitude", "levels", "unit"),
         ),
-        ({"driver.amplitude": ["1.2.3 deg"]}, "'1.2.3 deg': give plain numbers, and their unit"),
-        ({"driver.amplitde": [1, 2]}, "has no parameter 'amplitde'; did you mean 'amplitude'"),
-        ({"driver.amplitude": 1}, r"driver.amplitude: must be a list of levels \(got 1\)"),
-        ({"controller": "controller_off"}, "controller: must be a list of levels"),
-        ({"driver.amplitude": ["0.01", "0.02"]}, "driver.amplitude: give numbers, .* as such, not as text"),
-        ({"driver.amplitude": np.ones((2, 2))}, r"driver.amplitude\[0\]: must be a number"),
+        ({"driver.amplitude": ["1.2.3 deg"]}, ("'1.2.3 deg'", "plain", "numbers")),
+        ({"driver.amplitde": [1, 2]}, ("'amplitde'", "'amplitude'")),
+        ({"driver.amplitude": 1}, ("driver.amplitude", "1")),
+        ({"controller": "controller_off"}, ("controller", "list", "levels")),
+        ({"driver.amplitude": ["0.01", "0.02"]}, ("driver.amplitude", "numbers", "text")),
+        ({"driver.amplitude": np.ones((2, 2))}, ("driver.amplitude", "0")),
         (
             {"controller": [Proportional(), Proportional()]},
-            "controller: two levels have the name 'Proportional'",
+            ("controller", "'Proportional'"),
         ),
     ],
 )
-def test_what_is_wrong_is_said_before_any_run_is_made(base, axes, said):
-    with pytest.raises(yb.ScenarioError, match=said):
+def test_what_is_wrong_is_said_before_any_run_is_made(base, axes, names):
+    with refused(yb.ScenarioError, names=names):
         yb.experiment(base, axes).run()
 
 

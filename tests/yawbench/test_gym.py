@@ -18,7 +18,7 @@ import yawbench as yb
 import yawbench.gym
 from orchestrator.evaluation.sine_with_dwell import SPUN, amplitudes
 from tests.checkout import ROOT
-from tests.refusals import mentions
+from tests.refusals import mentions, refused
 
 LEAST = amplitudes(yawbench.gym.ANGLE)[0]
 SEVEREST = amplitudes(yawbench.gym.ANGLE)[-1]
@@ -144,18 +144,18 @@ def test_the_hand_wheel_angle_is_that_of_the_cars_own_test():
 
 
 @pytest.mark.parametrize(
-    ("wrong", "kind", "sentence"),
+    ("wrong", "kind", "names"),
     [
-        ({"angle": 0.0}, yb.ScenarioError, "angle: must be above 0"),
-        ({"largest": math.nan}, ValueError, "largest: must be a finite number"),
-        ({"signals": ["yawrate"]}, yb.ScenarioError, "did you mean 'yaw_rate'"),
-        ({"signals": []}, ValueError, "signals: must not be empty"),
-        ({"scenario": "nothing"}, yb.ScenarioError, "nothing"),
-        ({"render_mode": "human"}, ValueError, "render_mode: must be None"),
+        ({"angle": 0.0}, yb.ScenarioError, ("angle", "0")),
+        ({"largest": math.nan}, ValueError, ("largest", "finite", "number")),
+        ({"signals": ["yawrate"]}, yb.ScenarioError, ("'yaw_rate'",)),
+        ({"signals": []}, ValueError, ("signals", "empty")),
+        ({"scenario": "nothing"}, yb.ScenarioError, ("nothing",)),
+        ({"render_mode": "human"}, ValueError, ("render_mode", "None")),
     ],
 )
-def test_what_is_wrong_is_named(wrong, kind, sentence):
-    with pytest.raises(kind, match=sentence):
+def test_what_is_wrong_is_named(wrong, kind, names):
+    with refused(kind, names=names):
         yawbench.gym.SineWithDwell(**wrong)
 
 

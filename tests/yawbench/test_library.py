@@ -587,19 +587,19 @@ def test_what_python_code_raises_is_the_cause(base):
 
 
 @pytest.mark.parametrize(
-    ("given", "sentence"),
+    ("given", "names"),
     [
-        (3, "int is not a controller"),
-        (Proportional, r"Proportional is a class; give an object of it, Proportional\(\)"),
-        (lambda **signals: 0.0, r"function: \*\*signals is not the name of a signal: name each"),
-        (lambda x: x, "signal 'x' is not in the signal dictionary"),
-        (type("Mute", (), {"output": lambda self, t, u: 0.0, "inputs": ()})(), "Mute has no outputs"),
-        (type("Text", (Proportional,), {"output": None})(), "output: must be a method"),
-        (type("Text", (Proportional,), {"inputs": "yaw_rate"})(), "inputs: must be a tuple of names"),
+        (3, ("int", "controller")),
+        (Proportional, ("Proportional", "object", "class")),
+        (lambda **signals: 0.0, ("function", "signal")),
+        (lambda x: x, ("'x'", "signal")),
+        (type("Mute", (), {"output": lambda self, t, u: 0.0, "inputs": ()})(), ("Mute", "outputs")),
+        (type("Text", (Proportional,), {"output": None})(), ("output", "method")),
+        (type("Text", (Proportional,), {"inputs": "yaw_rate"})(), ("inputs", "tuple")),
     ],
 )
-def test_what_cannot_stand_for_a_controller_is_refused_in_a_sentence(base, given, sentence):
-    with pytest.raises(yb.ScenarioError, match=sentence):
+def test_what_cannot_stand_for_a_controller_is_refused_in_a_sentence(base, given, names):
+    with refused(yb.ScenarioError, names=names):
         base.swap(controller=given)
 
 
@@ -631,80 +631,80 @@ def test_a_run_can_be_saved_again_into_the_same_folder(run, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "test, angle, sentence",
+    "test, angle, names",
     [
-        ("sine-with-dwel", None, "there is no test 'sine-with-dwel'; did you mean 'sine-with-dwell'?"),
-        ("sine-with-dwell", 0.0, "angle: must be a number between 0 and 2 pi rad (got 0.0)"),
-        ("sine-with-dwell", -0.6, "angle: must be a number between 0 and 2 pi rad (got -0.6)"),
-        ("sine-with-dwell", float("nan"), "angle: must be a finite number (got nan)"),
-        ("sine-with-dwell", "36 deg", "angle: must be a number (got '36 deg')"),
-        ("step-steer", 0.6, "step-steer takes no angle: omit it"),
+        ("sine-with-dwel", None, ("'sine-with-dwel'", "'sine-with-dwell'")),
+        ("sine-with-dwell", 0.0, ("angle", "0", "2 pi", "0.0")),
+        ("sine-with-dwell", -0.6, ("angle", "0", "2 pi", "-0.6")),
+        ("sine-with-dwell", float("nan"), ("angle", "nan")),
+        ("sine-with-dwell", "36 deg", ("angle", "'36 deg'")),
+        ("step-steer", 0.6, ("step-steer", "angle", "omit")),
     ],
 )
-def test_what_a_run_cannot_be_evaluated_with_is_said_in_a_sentence(run, test, angle, sentence):
+def test_what_a_run_cannot_be_evaluated_with_is_said_in_a_sentence(run, test, angle, names):
     with pytest.raises(yb.ScenarioError) as raised:
         run.evaluate(test, angle=angle)
-    assert str(raised.value) == sentence
+    assert mentions(raised.value, *names)
 
 
 @pytest.mark.parametrize(
-    ("call", "kind", "sentence"),
+    ("call", "kind", "names"),
     [
-        (lambda base, run: yb.load(None), TypeError, r"source: must be a name or a path \(got nothing\)"),
-        (lambda base, run: base.set([("a", 1)]), TypeError, "values: must be a mapping of targets to values"),
+        (lambda base, run: yb.load(None), TypeError, ("source", "nothing")),
+        (lambda base, run: base.set([("a", 1)]), TypeError, ("values", "targets")),
         (
             lambda base, run: base.set({"vehicle.mass": b"1"}),
             yb.ScenarioError,
-            "vehicle.mass: must be a number",
+            ("vehicle.mass", "number"),
         ),
-        (lambda base, run: base.run(progress=3), TypeError, "progress: must be a function of done and total"),
-        (lambda base, run: run[0], TypeError, "name of a column: must be text"),
-        (lambda base, run: run.metric(3), TypeError, "name of a metric: must be text"),
-        (lambda base, run: run.metric("peak(sideslip)", (1,)), TypeError, "window: must be a pair of times"),
+        (lambda base, run: base.run(progress=3), TypeError, ("progress", "function", "total")),
+        (lambda base, run: run[0], TypeError, ("column", "text")),
+        (lambda base, run: run.metric(3), TypeError, ("metric", "text")),
+        (lambda base, run: run.metric("peak(sideslip)", (1,)), TypeError, ("window", "pair", "times")),
         (
             lambda base, run: run.metric("peak(sideslip)", ("0", "1")),
             TypeError,
-            r"window\[0\]: must be a number",
+            ("0", "number", "window"),
         ),
         (
             lambda base, run: run.plot("yawrate"),
             yb.ScenarioError,
-            "panel yawrate: .* did you mean 'yaw_rate'",
+            ("panel yawrate:", "'yaw_rate'"),
         ),
         (
             lambda base, run: base.set({"stop_time": 1e9, "step_size": 1e-9}),
             yb.ScenarioError,
-            r"a run has at most 1,000,000,000 steps \(this would have 1e\+18\)",
+            ("1,000,000,000", "+18"),
         ),
         (
             lambda base, run: base.set({"stop_time": 3e5}).run(),
             yb.ScenarioError,
-            "16 GB may be kept in memory",
+            ("16 GB", "kept", "memory"),
         ),
         (
             lambda base, run: base.swap(controller=lambda yawrate: 0.0),
             yb.ScenarioError,
-            "did you mean 'yaw_rate'",
+            ("'yaw_rate'",),
         ),
     ],
 )
-def test_a_wrong_argument_is_named(base, run, call, kind, sentence):
-    with pytest.raises(kind, match=sentence):
+def test_a_wrong_argument_is_named(base, run, call, kind, names):
+    with refused(kind, names=names):
         call(base, run)
 
 
 @pytest.mark.parametrize(
-    ("returned", "sentence"),
+    ("returned", "names"),
     [
-        (None, "nothing was returned; return yaw_moment"),
-        (np.ones((1, 1)), r"an array of shape \(1, 1\) was returned for yaw_moment"),
-        ("1.0", "yaw_moment: must be a number"),
-        (b"1", "yaw_moment: must be a number"),
-        (True, "yaw_moment: must be a number"),
+        (None, ("yaw_moment", "returned", "return")),
+        (np.ones((1, 1)), ("1", "yaw_moment")),
+        ("1.0", ("yaw_moment", "number")),
+        (b"1", ("yaw_moment", "number")),
+        (True, ("yaw_moment", "number")),
     ],
 )
-def test_what_a_controller_must_not_return_ends_the_run_with_a_sentence(base, returned, sentence):
-    with pytest.raises(yb.SimulationError, match=sentence):
+def test_what_a_controller_must_not_return_ends_the_run_with_a_sentence(base, returned, names):
+    with refused(yb.SimulationError, names=names):
         base.swap(controller=lambda yaw_rate: returned).run()
 
 

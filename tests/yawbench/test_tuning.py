@@ -161,7 +161,7 @@ def test_what_is_no_metric_is_refused_by_name(base):
     ranges = {"driver.amplitude": (0.01, 0.02)}
     for objective, *names in (
         ("rms_eror(yaw_rate)", "'rms_eror'", "'rms_error'"),
-        ("peak(nothing)", "metrics.peak(nothing)", "25mps.yaml"),
+        ("peak(nothing)", "metrics.peak(nothing)", "fnn_sideslip/25mps.yaml"),
     ):
         with refused(yb.ScenarioError, names=(objective, *names)):
             yb.tune(base, ranges, objective)
