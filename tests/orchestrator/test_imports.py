@@ -1,4 +1,4 @@
-"""The stages of the orchestrator import one way only; words that all use stand in one place."""
+"""The stages of the orchestrator import one way only."""
 
 from __future__ import annotations
 
@@ -8,11 +8,6 @@ import sys
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
-
-import pytest
-
-from vocabulary.signals import SIGNALS
-from vocabulary.wheels import WHEEL_NAMES
 
 PRODUCT = ("components", "vocabulary", "fmus", "orchestrator", "yawbench")
 ROOT = Path(__file__).parents[2]
@@ -111,31 +106,6 @@ def test_the_vocabulary_imports_nothing_but_the_standard_library():
             elif isinstance(node, ast.ImportFrom):
                 found.add((node.module or "").partition(".")[0] if node.level == 0 else ".")
     assert found <= sys.stdlib_module_names
-
-
-def words_of(names: set[str]) -> dict[str, set[str]]:
-    """Return file -> which of these words stand in it as text of their own."""
-    found: dict[str, set[str]] = {}
-    for folder in PRODUCT:
-        for path in sorted((ROOT / folder).rglob("*.py")):
-            texts = {node.value for node in nodes_of(path) if isinstance(node, ast.Constant)}
-            if common := names & {text for text in texts if isinstance(text, str)}:
-                found[path.relative_to(ROOT).as_posix()] = common
-    return found
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        set(WHEEL_NAMES),
-        set(WHEEL_NAMES.values()),
-        {one.symbol for one in SIGNALS.values() if "_" in one.symbol},
-    ],
-    ids=["wheels", "wheels in words", "symbols"],
-)
-def test_wheels_and_symbols_are_listed_in_the_vocabulary_alone(words):
-    lists = [file for file, found in words_of(words).items() if len(found) > 2]
-    assert len(lists) == 1 and lists[0].startswith("vocabulary/")
 
 
 def modules() -> dict[str, Path]:

@@ -1,4 +1,4 @@
-"""Mistakes of newcomers, and the sentences that say what to do."""
+"""Mistakes of newcomers, and the sentences that answer them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ ROOT = Path(__file__).parents[2]
 NAME = "fuzzy_feedback/single_sine"
 FILE = f"scenarios/{NAME}.yaml"
 RUN = ("run", NAME, "--set", "stop_time=0.01")
-KNOWN = "did you mean"
 
 
 @pytest.fixture

@@ -265,38 +265,40 @@ def test_check_and_run_json_tell_of_a_series_and_a_changed_file_makes_results_st
 
 
 @pytest.mark.parametrize(
-    ("given", "says"),
+    ("given", "names"),
     [
-        ("{file: dta.csv}", "runs/dta.csv: "),
-        ("{file: data.txt}", "runs/data.txt: "),
-        ("{file: data.csv, column: dlta}", "data.csv: has no column 'dlta'; did you mean 'delta'?"),
-        ("{file: data.csv, column: delta, time: t}", "data.csv: has no column 't'"),
+        ("{file: dta.csv}", ("runs/dta.csv: ",)),
+        ("{file: data.txt}", ("runs/data.txt: ",)),
+        ("{file: data.csv, column: dlta}", ("data.csv", "'dlta'", "'delta'")),
+        ("{file: data.csv, column: delta, time: t}", ("data.csv", "'t'")),
         (
             "{file: data.csv, column: 't_fl [m]'}",
-            "data.csv: has no column 't_fl [m]'; did you mean 't_fl'?",
+            ("data.csv", "'t_fl [m]'", "'t_fl'"),
         ),
         ("{file: data.csv, column: word}", "data.csv: column 'word': value 2 is not a number ('high')"),
         ("{file: data.csv, column: void}", "data.csv: column 'void' has no values"),
         ("{file: data.csv, column: far}", "data.csv: column 'far': value 2 is not finite (inf)"),
         (
             "{file: data.csv, column: mass}",
-            "data.csv: column 'mass': its unit 'kg' does not fit: rad is wanted",
+            ("data.csv", "'mass'", "'kg'", "rad"),
         ),
-        ("{file: data.csv, column: low}", "data.csv: must be at least -2 rad (got -7.0)"),
-        ("{file: data.csv, column: twice}", "data.csv: 2 columns are called 'twice'"),
-        ("{file: back.csv, column: x}", "back.csv: time must increase: 0.5 s follows 0.5 s (value 3)"),
+        ("{file: data.csv, column: low}", ("data.csv", "-2 rad", "-7.0")),
+        ("{file: data.csv, column: twice}", ("data.csv", "2 columns", "'twice'")),
+        ("{file: back.csv, column: x}", ("back.csv", "0.5 s", "value 3", "time")),
         (
             "{file: short.csv, column: x}",
-            "short.csv: covers 0 to 0.5 s of a run from 0 to 1 s; 'extrapolate: hold' would hold its ends",
+            ("short.csv", "0", "0.5 s", "1 s", "'extrapolate: hold'"),
         ),
-        ("{file: uneven.csv, column: x}", "runs/uneven.csv: row 3 has 1 values for 2 columns"),
-        ("{file: empty.csv, column: x}", "runs/empty.csv: has no rows"),
-        ("{file: data.csv, colum: x}", "unknown key; did you mean 'column'?"),
-        ("{column: x}", "'file' is missing"),
-        ("{file: data.csv, interpolation: cubic}", "must be 'linear' or 'held' (got 'cubic')"),
+        ("{file: uneven.csv, column: x}", ("runs/uneven.csv", "3", "1 values", "2 columns")),
+        ("{file: empty.csv, column: x}", ("runs/empty.csv", "rows")),
+        ("{file: data.csv, colum: x}", ("'column'", "unknown", "key")),
+        ("{column: x}", ("'file'", "missing")),
+        ("{file: data.csv, interpolation: cubic}", ("'linear'", "'held'", "'cubic'")),
     ],
 )
-def test_what_is_wrong_with_a_series_is_said_before_the_run(given: str, says: str, folder: Path) -> None:
+def test_what_is_wrong_with_a_series_is_said_before_the_run(
+    given: str, names: tuple[str, ...], folder: Path
+) -> None:
     runs = folder / "runs"
     (runs / "data.csv").write_text(
         "time [s];delta;t_fl;word;void;far;mass [kg];low;twice;twice\n"
@@ -308,7 +310,7 @@ def test_what_is_wrong_with_a_series_is_said_before_the_run(given: str, says: st
     (runs / "uneven.csv").write_text("time,x\n0,0\n1\n")
     (runs / "empty.csv").write_text("time,x\n")
     path = scenario(plant_steer_angle=given, gear="1", on="true", **{"torque_*": "0"})
-    assert says in problem(path)
+    assert mentions(problem(path), *names)
 
 
 def test_a_series_may_hold_its_ends_and_a_held_one_reaches_one_interval_on(folder: Path) -> None:

@@ -67,13 +67,3 @@ def test_the_programs_in_the_docstring_of_the_package_run_and_say_the_truth(show
     assert told is not None
     assert f"{run.metric('peak(sideslip)'):.4f}" == told[1]
     assert "def " in program
-
-
-def test_public_methods_without_an_example_are_obvious():
-    for kind in (yb.Run, yb.Scenario):
-        silent = [
-            name
-            for name, value in vars(kind).items()
-            if callable(value) and not name.startswith("_") and ">>>" not in (value.__doc__ or "")
-        ]
-        assert set(silent) <= {"plan", "run", "unit_of"}, silent
