@@ -19,12 +19,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from orchestrator.errors import BuildError, Diagnostic
-from orchestrator.fmu.archive import REASON, runs_as
-from orchestrator.safe_files import draft_of, remove_draft
-from orchestrator.workers import Pool
-from vocabulary.roles import ROLES
+from yawbench.foundation.errors import BuildError, Diagnostic
+from yawbench.foundation.safe_files import draft_of, remove_draft
+from yawbench.foundation.workers import Pool
+from yawbench.vocabulary.roles import ROLES
 
+from .archive import REASON, runs_as
 from .build_stamp import BuildStamp, read_stamp
 from .c.c_recipe import CRecipe, find_c_components
 from .check import defects, reference_files

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from orchestrator.safe_files import check_regular
+from yawbench.foundation.safe_files import check_regular
 
 _SIGN = b"yawbench "
 _UNFINISHED = "-unfinished"

@@ -17,7 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
 
-from orchestrator.fork_server import die_with_parent, how_it_ended, python
+from yawbench.foundation.fork_server import die_with_parent, how_it_ended, python
 
 _checker: subprocess.Popen[str] | None = None
 

@@ -15,9 +15,9 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
-from orchestrator.cache import cache_folder, keep, recall
-from orchestrator.errors import BuildError, YawbenchError
-from orchestrator.messages import printable
+from yawbench.foundation.cache import cache_folder, keep, recall
+from yawbench.foundation.errors import BuildError, YawbenchError
+from yawbench.foundation.messages import printable
 
 HERE = Path(__file__).resolve().parent
 SOURCES = (

@@ -17,11 +17,11 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from orchestrator.cache import cache_folder, keep, recall
-from orchestrator.errors import BuildError
-from orchestrator.fmu.fmu import BuildInfo
+from yawbench.foundation.cache import cache_folder, keep, recall
+from yawbench.foundation.errors import BuildError
 
 from .build_stamp import BuildStamp, read_stamp
+from .fmu import BuildInfo
 from .source_digests import SourceDigests, content_digest
 
 if TYPE_CHECKING:

@@ -11,10 +11,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from orchestrator.errors import BuildError
-from orchestrator.fmu.archive import REASON, UNTRIED
-from vocabulary.roles import ROLES
+from yawbench.foundation.errors import BuildError
+from yawbench.vocabulary.roles import ROLES
 
+from .archive import REASON, UNTRIED
 from .compiler import compile_launcher, compiler_tools
 from .native.build import HEADERS, native, toolchain, tools
 from .packing import LIBRARIES, pack

@@ -24,8 +24,8 @@ from pathlib import Path
 
 import pythonfmu
 
-import vocabulary
-from orchestrator.errors import BuildError
+from yawbench import vocabulary
+from yawbench.foundation.errors import BuildError
 
 from .source_digests import SourceDigests, content_digest
 
@@ -307,8 +307,10 @@ class Sources:
     def _absolute(self, module: str) -> Parts | None:
         """Return the module of the package for an absolute name, None if it is not in the package."""
         names = tuple(module.split("."))
-        if names[0] == "components":
-            return names[1:]
+        if names[:2] == ("yawbench", "components"):
+            return names[2:]
+        if names[:2] == ("yawbench", "vocabulary"):
+            names = names[1:]
         if names[0] in BESIDE:
             return names if len(names) > 1 else None
         if self.user and names == ("yawbench",):
@@ -386,9 +388,10 @@ _WAYS_OUT = (
 def _outside(name: str, where: str) -> str | None:
     """Return the package of an absolute import, None if it is in the standard library."""
     top = name.partition(".")[0]
-    if top in ("components", *BESIDE):
+    ours = name if top == "yawbench" else f"yawbench.{name}"
+    if top in ("components", *BESIDE) or ours.split(".")[1] in ("components", "vocabulary"):
         raise BuildError(
-            f"{where}: write 'from {name}{'.<module>' if name == top else ''} import ...'",
+            f"{where}: write 'from {ours}{'.<module>' if ours.count('.') == 1 else ''} import ...'",
             code="component-import-forbidden",
         )
     return None if top in sys.stdlib_module_names else top

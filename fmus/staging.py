@@ -21,9 +21,9 @@ from types import FrameType
 from typing import Any
 from xml.etree.ElementTree import Element
 
-from orchestrator.errors import BuildError
-from vocabulary.roles import Role
-from vocabulary.wheels import wheels
+from yawbench.foundation.errors import BuildError
+from yawbench.vocabulary.roles import Role
+from yawbench.vocabulary.wheels import wheels
 
 from .source_files import Parts
 

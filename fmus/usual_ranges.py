@@ -6,7 +6,7 @@ to the limit of its tyres on a dry road.
 
 from __future__ import annotations
 
-from vocabulary.wheels import WHEELS
+from yawbench.vocabulary.wheels import WHEELS
 
 _RANGES = {
     "velocity_x": (15.0, 30.0),

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 if TYPE_CHECKING:
     import numpy as np
 
-from vocabulary.roles import role_of
+from yawbench.fmus.fmu import Fmu, Value
+from yawbench.foundation.errors import Diagnostic
+from yawbench.foundation.messages import cut
+from yawbench.vocabulary.roles import role_of
 
-from .errors import Diagnostic
 from .fault_kinds import FaultList, FaultySignal
-from .fmu.fmu import Fmu, Value
-from .messages import cut
 from .signal_names import SignalName, Target
 
 OverrideOrigin = Literal[
@@ -217,9 +217,6 @@ class Override:
         return f"{self.origin} {cut(str(self.target))}={cut(value)}"
 
 
-Override.__module__ = "yawbench"  # where users import it from
-
-
 @dataclass(frozen=True)
 class Plan:
     """A run to be executed: instances in evaluation order, wires, and the time grid in integers.
@@ -245,6 +242,3 @@ class Plan:
     def time(self, k: int) -> float:
         """Return the time [s] of communication point `k`, correctly rounded."""
         return float(self.start + k * self.step)
-
-
-Plan.__module__ = "yawbench"  # where users import it from

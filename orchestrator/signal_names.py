@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import Literal, NamedTuple
 
-from vocabulary.signals import SYMBOLS
-
-from .messages import short
+from yawbench.foundation.messages import short
+from yawbench.vocabulary.signals import SYMBOLS
 
 TIMES = ("start_time", "stop_time", "step_size")
 OF_RUN = (*TIMES, "algorithm")

@@ -24,18 +24,18 @@ from time import perf_counter, perf_counter_ns
 
 import numpy as np
 
-from fmus.build import HERE as FMUS
-from orchestrator.fmu.archive import runs_as
-from orchestrator.interop.second_opinion import MASTERS, installed, second_opinion
-from orchestrator.interrupts import StopFlag
-from orchestrator.master.compiled_loop import WANTED as LOOP
-from orchestrator.master.fmi import open_instance
-from orchestrator.master.process_state import Log
-from orchestrator.master.step_loop import Master
-from orchestrator.master.step_program import Operation
-from orchestrator.plan import Plan
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.wiring.make_plan import make_plan
+from yawbench.fmus.archive import runs_as
+from yawbench.fmus.build import HERE as FMUS
+from yawbench.foundation.interrupts import StopFlag
+from yawbench.interop.second_opinion import MASTERS, installed, second_opinion
+from yawbench.orchestrator.master.compiled_loop import WANTED as LOOP
+from yawbench.orchestrator.master.fmi import open_instance
+from yawbench.orchestrator.master.process_state import Log
+from yawbench.orchestrator.master.step_loop import Master
+from yawbench.orchestrator.master.step_program import Operation
+from yawbench.orchestrator.plan import Plan
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.wiring.make_plan import make_plan
 
 DEFAULT = Path(__file__).parents[1] / "scenarios" / "fnn_sideslip" / "25mps.yaml"
 REPEATS = 3
@@ -204,8 +204,8 @@ def busy() -> float:
 def imports() -> float:
     """Return the time [s] to import what a run needs, in a fresh interpreter."""
     code = (
-        "import time; t = time.perf_counter(); import orchestrator.cli, orchestrator.master.simulate, "
-        "orchestrator.wiring.make_plan; print(time.perf_counter() - t)"
+        "import time; t = time.perf_counter(); import yawbench.cli, yawbench.orchestrator.master.simulate, "
+        "yawbench.orchestrator.wiring.make_plan; print(time.perf_counter() - t)"
     )
     command = [sys.executable, "-c", code]
     return min(float(subprocess.run(command, capture_output=True, check=True).stdout) for _ in range(REPEATS))

@@ -18,9 +18,9 @@ from time import perf_counter
 
 import pytest
 
-from orchestrator.pages.page_parts import PAGE
-from orchestrator.pages.server import ResultsServer
-from orchestrator.pages.sliders import Bench
+from yawbench.bench.server import ResultsServer
+from yawbench.bench.sliders import Bench
+from yawbench.reports.page_parts import PAGE
 
 from .commands import status_of
 from .pages.browser import Browser, start

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterable
 
-from orchestrator.fmu.fmu import Value
-from orchestrator.plan import Override
-from orchestrator.scenario.overrides import read_changes
+from yawbench.fmus.fmu import Value
+from yawbench.orchestrator.plan import Override
+from yawbench.orchestrator.scenario.overrides import read_changes
 
 
 def changed(

@@ -34,7 +34,7 @@ def run_in(folder: Path, *command: str | Path, **environment: str) -> subprocess
 
     `yawbench` and `python` are those of the environment in use.
     """
-    named = {"yawbench": [sys.executable, "-m", "orchestrator.cli"], "python": [sys.executable]}
+    named = {"yawbench": [sys.executable, "-m", "yawbench"], "python": [sys.executable]}
     first, *others = map(str, command)
     sources = folder if (folder / "orchestrator").is_dir() else ROOT
     return subprocess.run(

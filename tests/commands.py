@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from orchestrator.cli import main
+from yawbench.cli import main
 
 
 def status_of(*arguments: object) -> int:

@@ -268,7 +268,7 @@ def first_line(text: object) -> str:
 
 def compare(path: Path, inputs: str = "start", *, validate: bool = True) -> Comparison:
     """Run an FMU here and in FMPy; return what came of it."""
-    from orchestrator.results.reader import load_results
+    from yawbench.orchestrator.results.reader import load_results
 
     name = path.stem
     job, version, reason = job_of(path.resolve(), inputs, validate)

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.workers import default_workers
 from tests.commands import status_of
 from tests.fmu_copies import put_fmus
+from yawbench.foundation.workers import default_workers
 
 TESTS = Path(__file__).parent
 LONGEST_FIRST = (

@@ -6,8 +6,8 @@ import shutil
 from collections.abc import Iterable
 from pathlib import Path
 
-from fmus.build import HERE as FMUS
-from fmus.build import build_all, find_recipes
+from yawbench.fmus.build import HERE as FMUS
+from yawbench.fmus.build import build_all, find_recipes
 
 
 def put_fmus(folder: Path, *, components: Iterable[str] | None = None) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from orchestrator.errors import Diagnostic
+from yawbench.foundation.errors import Diagnostic
 
 
 def texts_of(told: Any) -> tuple[str, ...]:

@@ -8,15 +8,15 @@ from typing import Any
 
 import pytest
 
-from fmus.build import HERE as FMUS
-from fmus.build import build_all
-from orchestrator.cli import main
-from orchestrator.experiments.executor import left_to_do
-from orchestrator.experiments.experiment import plan_experiment
-from orchestrator.experiments.experiment_result import judge_results
-from orchestrator.experiments.jobs import execute
-from orchestrator.experiments.load_experiment import load_experiment
-from orchestrator.experiments.result_files import RECORD, write_findings
+from yawbench.cli import main
+from yawbench.fmus.build import HERE as FMUS
+from yawbench.fmus.build import build_all
+from yawbench.studies.executor import left_to_do
+from yawbench.studies.experiment import plan_experiment
+from yawbench.studies.experiment_result import judge_results
+from yawbench.studies.jobs import execute
+from yawbench.studies.load_experiment import load_experiment
+from yawbench.studies.result_files import RECORD, write_findings
 
 
 def judge_some(file: Path, out: Path, *runs: str) -> dict[str, Any]:

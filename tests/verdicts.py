@@ -13,10 +13,12 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from orchestrator.experiments.confidence import Bounds
-from orchestrator.experiments.experiment import LoadedExperiment
-from orchestrator.experiments.load_experiment import found_studies, load_experiment
-from orchestrator.experiments.result_tables import (
+from tests.checkout import ROOT
+from yawbench.foundation.messages import listed
+from yawbench.studies.confidence import Bounds
+from yawbench.studies.experiment import LoadedExperiment
+from yawbench.studies.load_experiment import found_studies, load_experiment
+from yawbench.studies.result_tables import (
     FAILS,
     HOLDS,
     NO_FLIP,
@@ -26,8 +28,6 @@ from orchestrator.experiments.result_tables import (
     share,
     share_words,
 )
-from orchestrator.messages import listed
-from tests.checkout import ROOT
 
 FILE = ROOT / "docs" / "verdicts.md"
 HEAD = """# Every verdict, and how far it carries

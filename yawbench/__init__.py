@@ -29,15 +29,12 @@ are those of the first:
 A run that succeeds but is probably not as intended (the car spins) issues one `YawbenchWarning`.
 """
 
-import sys
 from importlib import import_module
-from importlib.machinery import PathFinder
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from components.fmi.variables import output, parameter, signal
-    from orchestrator.errors import (
+    from yawbench.components.fmi.variables import output, parameter, signal
+    from yawbench.foundation.errors import (
         BuildError,
         Diagnostic,
         Location,
@@ -50,23 +47,23 @@ if TYPE_CHECKING:
         YawbenchError,
         YawbenchWarning,
     )
-    from orchestrator.evaluation.standard_tests import Evaluation, TestQuantity
-    from orchestrator.evaluation.validation import Validation
-    from orchestrator.metrics.expressions import MetricValue
-    from orchestrator.metrics.verdict import Verdict
-    from orchestrator.plan import Override, Plan
+    from yawbench.linear.linear_model import LinearModel, linearize
+    from yawbench.measured_cars.library_fit import Fit, fit
+    from yawbench.measured_cars.library_validate import validate
+    from yawbench.measured_cars.validation import Validation
+    from yawbench.metrics.expressions import MetricValue
+    from yawbench.metrics.verdict import Verdict
+    from yawbench.orchestrator.plan import Override, Plan
+    from yawbench.proving_ground.standard_tests import Evaluation, TestQuantity
+    from yawbench.ranking.library import Ranking, rank
 
     from ._controller import Controller
     from ._experiment import Experiment, Runs, experiment
     from ._export import export_fmu
-    from ._fit import Fit, fit
-    from ._linear import LinearModel, linearize
     from ._open import RecordedRuns, open
-    from ._ranking import Ranking, rank
     from ._run import Run, measured
     from ._scenario import Scenario, load
     from ._tuning import Tuning, tune
-    from ._validate import validate
     from ._view import View, view
 
 __all__ = [
@@ -115,55 +112,35 @@ __all__ = [
     "view",
 ]
 
-_PACKAGES = ("components", "fmus", "orchestrator", "scenarios", "vocabulary")
 _MODULES = {
-    "components.fmi.variables": ("output", "parameter", "signal"),
-    "orchestrator.evaluation.standard_tests": ("Evaluation", "TestQuantity"),
-    "orchestrator.evaluation.validation": ("Validation",),
-    "orchestrator.metrics.expressions": ("MetricValue",),
-    "orchestrator.metrics.verdict": ("Verdict",),
-    "orchestrator.plan": ("Override", "Plan"),
+    "yawbench.components.fmi.variables": ("output", "parameter", "signal"),
+    "yawbench.proving_ground.standard_tests": ("Evaluation", "TestQuantity"),
+    "yawbench.measured_cars.validation": ("Validation",),
+    "yawbench.metrics.expressions": ("MetricValue",),
+    "yawbench.metrics.verdict": ("Verdict",),
+    "yawbench.orchestrator.plan": ("Override", "Plan"),
     "yawbench._controller": ("Controller",),
     "yawbench._experiment": ("Experiment", "Runs", "experiment"),
     "yawbench._export": ("export_fmu",),
-    "yawbench._fit": ("Fit", "fit"),
-    "yawbench._linear": ("LinearModel", "linearize"),
-    "yawbench._ranking": ("Ranking", "rank"),
+    "yawbench.measured_cars.library_fit": ("Fit", "fit"),
+    "yawbench.linear.linear_model": ("LinearModel", "linearize"),
+    "yawbench.ranking.library": ("Ranking", "rank"),
     "yawbench._open": ("RecordedRuns", "open"),
     "yawbench._run": ("Run", "measured"),
     "yawbench._scenario": ("Scenario", "load"),
     "yawbench._tuning": ("Tuning", "tune"),
-    "yawbench._validate": ("validate",),
+    "yawbench.measured_cars.library_validate": ("validate",),
     "yawbench._view": ("View", "view"),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
-"""Public name -> module; names not listed are in `orchestrator.errors`."""
-
-
-def _refuse_foreign_packages() -> None:
-    """Raise ImportError if a package of another project hides a package of yawbench."""
-    home = Path(__file__).resolve().parents[1]
-    for name in _PACKAGES:
-        loaded = sys.modules.get(name)
-        spec = loaded.__spec__ if loaded else PathFinder.find_spec(name)
-        folders = [Path(folder) for folder in (spec and spec.submodule_search_locations) or ()]
-        if spec and home / name not in [folder.resolve() for folder in folders]:
-            where = folders[0] if folders else spec.origin
-            raise ImportError(
-                f"yawbench needs its own package {name!r}, but {where} hides it; "
-                "rename that, or start Python in another folder",
-                name="yawbench",
-            )
-
-
-_refuse_foreign_packages()
+"""Public name -> module; names not listed are in `foundation.errors`."""
 
 
 def __getattr__(name: str) -> object:
     """Import a public name at its first use, so that `import yawbench` itself is fast."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(_MODULE_OF.get(name, "orchestrator.errors")), name)
+    value = getattr(import_module(_MODULE_OF.get(name, "yawbench.foundation.errors")), name)
     globals()[name] = value
     return value
 

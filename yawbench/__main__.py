@@ -1,6 +1,6 @@
 """`python -m yawbench`: the command line."""
 
-from orchestrator.cli import main
+from .cli import main
 
 if __name__ == "__main__":
     main()

@@ -24,17 +24,17 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from components.fmi.component import Component
-from components.fmi.variables import VariableSpec, output, parameter, signal
-from orchestrator.errors import ScenarioError
-from orchestrator.fmu.description import describe
-from orchestrator.fmu.fmu import Fmu, Value, ValueRef
-from orchestrator.master.instance import Buffers, ExperimentSetup, Status, StepCalls, nothing_to_do
-from orchestrator.master.process_state import ERROR, OK, Log
-from orchestrator.messages import counted, listed
-from orchestrator.plan import Instance
-from vocabulary.roles import ROLES
-from vocabulary.wheels import wheels
+from yawbench.components.fmi.component import Component
+from yawbench.components.fmi.variables import VariableSpec, output, parameter, signal
+from yawbench.fmus.description import describe
+from yawbench.fmus.fmu import Fmu, Value, ValueRef
+from yawbench.foundation.errors import ScenarioError
+from yawbench.foundation.messages import counted, listed
+from yawbench.orchestrator.master.instance import Buffers, ExperimentSetup, Status, StepCalls, nothing_to_do
+from yawbench.orchestrator.master.process_state import ERROR, OK, Log
+from yawbench.orchestrator.plan import Instance
+from yawbench.vocabulary.roles import ROLES
+from yawbench.vocabulary.wheels import wheels
 
 from . import _parameters, arguments
 from ._native import in_native_code, of_function, of_object, zipped
@@ -80,8 +80,6 @@ class Controller(Protocol):
             u: a named tuple with the values of the inputs in SI.
         """
 
-
-Controller.__module__ = "yawbench"  # set here, since the body of a protocol may only contain members
 
 Numbers = float | Sequence[float] | np.ndarray
 """Return value of a program: the value of its only output, or a value for each, shape (outputs,)."""

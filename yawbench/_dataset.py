@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from orchestrator.errors import ResultsError
+from yawbench.foundation.errors import ResultsError
 
 from ._run import Run
 

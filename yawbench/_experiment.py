@@ -9,25 +9,25 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from orchestrator.errors import Diagnostic, Location, ScenarioError
-from orchestrator.experiments.claim_schema import si_number, text_of
-from orchestrator.experiments.experiment import LoadedExperiment as Design
-from orchestrator.experiments.experiment import NamedRun, metrics_of, plan_experiment
-from orchestrator.experiments.experiment_result import ExperimentResult
-from orchestrator.experiments.jobs import Job, Outcome, measured
-from orchestrator.experiments.result_files import columns_of, draw_over_axes
-from orchestrator.experiments.schema import ExperimentSpec, FigureSpec
-from orchestrator.experiments.tables import to_pandas
-from orchestrator.fmu.fmu import Value
-from orchestrator.master.fmi import open_instance
-from orchestrator.master.run_lifecycle import OpenInstance
-from orchestrator.master.simulate import simulate_in_memory
-from orchestrator.messages import hint, listed, short
-from orchestrator.metrics.plausibility import PlausibilityWatch
-from orchestrator.results.reader import Results
-from orchestrator.scenario.quantities import number_and_unit
-from orchestrator.scenario.schema_validation import Model, validate
-from orchestrator.scenario.yaml_lines import Document, scalar
+from yawbench.fmus.fmu import Value
+from yawbench.foundation.errors import Diagnostic, Location, ScenarioError
+from yawbench.foundation.messages import hint, listed, short
+from yawbench.metrics.plausibility import PlausibilityWatch
+from yawbench.orchestrator.master.fmi import open_instance
+from yawbench.orchestrator.master.run_lifecycle import OpenInstance
+from yawbench.orchestrator.master.simulate import simulate_in_memory
+from yawbench.orchestrator.results.reader import Results
+from yawbench.orchestrator.scenario.quantities import number_and_unit
+from yawbench.orchestrator.scenario.schema_validation import Model, validate
+from yawbench.orchestrator.scenario.yaml_lines import Document, scalar
+from yawbench.studies.claim_schema import si_number, text_of
+from yawbench.studies.experiment import LoadedExperiment as Design
+from yawbench.studies.experiment import NamedRun, metrics_of, plan_experiment
+from yawbench.studies.experiment_result import ExperimentResult
+from yawbench.studies.jobs import Job, Outcome, measured
+from yawbench.studies.result_files import columns_of, draw_over_axes
+from yawbench.studies.schema import ExperimentSpec, FigureSpec
+from yawbench.studies.tables import to_pandas
 
 from . import arguments
 from ._controller import PythonComponent
@@ -150,8 +150,6 @@ class Experiment:
     1              0.03  completed
     """
 
-    __module__ = "yawbench"
-
     base: Scenario
     _design: Design
 
@@ -238,8 +236,6 @@ class Runs:
     Attributes:
         runs: every run, None for a failed run; None if results were not kept.
     """
-
-    __module__ = "yawbench"
 
     _findings: ExperimentResult
     runs: list[Run | None] | None = None

@@ -14,19 +14,19 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from components.fmi.component import Component
-from fmus.build import COMPONENTS, put
-from fmus.build_stamp import BuildStamp
-from fmus.native.compare_with_python import Twin, random_inputs
-from fmus.packing import to_bytes
-from fmus.presentation import presented
-from fmus.recipe import TOOL, PythonRecipe
-from fmus.source_files import Parts, Sources, UserModules
-from fmus.staging import staged
-from orchestrator.errors import BuildError, ScenarioError, YawbenchWarning
-from orchestrator.fmu.archive import runs_as
-from orchestrator.messages import listed, short
-from vocabulary.roles import ROLES
+from yawbench.components.fmi.component import Component
+from yawbench.fmus.archive import runs_as
+from yawbench.fmus.build import COMPONENTS, put
+from yawbench.fmus.build_stamp import BuildStamp
+from yawbench.fmus.native.compare_with_python import Twin, random_inputs
+from yawbench.fmus.packing import to_bytes
+from yawbench.fmus.presentation import presented
+from yawbench.fmus.recipe import TOOL, PythonRecipe
+from yawbench.fmus.source_files import Parts, Sources, UserModules
+from yawbench.fmus.staging import staged
+from yawbench.foundation.errors import BuildError, ScenarioError, YawbenchWarning
+from yawbench.foundation.messages import listed, short
+from yawbench.vocabulary.roles import ROLES
 
 from . import _parameters, arguments
 from ._controller import ControllerLike, PythonComponent

@@ -21,10 +21,10 @@ from pathlib import Path
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any
 
-from fmus.native.read import Sources as SourceTrees
-from fmus.native.values import Refused
-from fmus.source_files import NOT_PACKED, Parts, Sources
-from orchestrator.errors import BuildError
+from yawbench.fmus.native.read import Sources as SourceTrees
+from yawbench.fmus.native.values import Refused
+from yawbench.fmus.source_files import NOT_PACKED, Parts, Sources
+from yawbench.foundation.errors import BuildError
 
 from . import arguments
 

@@ -17,13 +17,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import components
-import vocabulary
-from components.fmi.component import Component
-from orchestrator.errors import YawbenchError
-from orchestrator.fmu.archive import PYTHON_WANTED, REASON, open_fmu, python_wanted
-from orchestrator.fmu.description import binary_of
-from orchestrator.fmu.fmu import Fmu, RunsAs
+from yawbench import components, vocabulary
+from yawbench.components.fmi.component import Component
+from yawbench.fmus.archive import PYTHON_WANTED, REASON, open_fmu, python_wanted
+from yawbench.fmus.description import binary_of
+from yawbench.fmus.fmu import Fmu, RunsAs
+from yawbench.foundation.errors import YawbenchError
 
 from ._parameters import ProgramParameters, functions_of, has_constructor
 
@@ -150,7 +149,10 @@ def in_native_code(
     """
     if python_wanted():
         return replace(fmu, runs_as=PYTHON_WANTED)
-    from fmus.native.build import NATIVE_LIBRARY, native  # here, because most scenarios do not need it
+    from yawbench.fmus.native.build import (  # here, because most scenarios do not need it
+        NATIVE_LIBRARY,
+        native,
+    )
 
     with tempfile.TemporaryDirectory(prefix="yawbench_") as folder:
         made = native(

@@ -9,11 +9,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.errors import ResultsError
-from orchestrator.messages import counted, listed
-from orchestrator.results.file_formats import RESULTS_FILE
-from orchestrator.results.reader import found_runs, load_results
-from orchestrator.results.run_folder import PART, RUN_FILE, RunStatus
+from yawbench.foundation.errors import ResultsError
+from yawbench.foundation.messages import counted, listed
+from yawbench.orchestrator.results.file_formats import RESULTS_FILE
+from yawbench.orchestrator.results.reader import found_runs, load_results
+from yawbench.orchestrator.results.run_folder import PART, RUN_FILE, RunStatus
 
 from . import arguments
 from ._dataset import dataset
@@ -72,8 +72,6 @@ class RecordedRuns:
         folder: the folder.
         files: name -> file of each table.
     """
-
-    __module__ = "yawbench"
 
     folder: Path
     files: Mapping[str, Path]
@@ -145,9 +143,10 @@ class RecordedRuns:
             ScenarioError: a signal was not recorded.
             ResultsError: no results were kept, or no recorded signal can be drawn.
         """
-        from orchestrator.figures import panels as drawing
-        from orchestrator.figures.plots import OVERVIEW, draw
-        from orchestrator.figures.style import LabelledRun
+        from yawbench.figures.plots import OVERVIEW, draw
+        from yawbench.figures.style import LabelledRun
+
+        from .figures import panels as drawing
 
         wanted = [arguments.text(panel, f"panels[{k}]") for k, panel in enumerate(panels)]
         title = None if title is None else arguments.text(title, "title")

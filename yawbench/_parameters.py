@@ -23,10 +23,10 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from components.fmi.component import Component
-from components.fmi.variables import VariableSpec, parameter, parameter_class
-from orchestrator.fmu.fmu import Value
-from orchestrator.signal_names import SETTINGS
+from yawbench.components.fmi.component import Component
+from yawbench.components.fmi.variables import VariableSpec, parameter, parameter_class
+from yawbench.fmus.fmu import Value
+from yawbench.orchestrator.signal_names import SETTINGS
 
 from . import arguments
 

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.messages import printable
+from yawbench.foundation.messages import printable
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from orchestrator.errors import Diagnostic, ResultsError, ScenarioError, warnings_in
-from orchestrator.evaluation.standard_tests import TESTS, Evaluation, TestName
-from orchestrator.evaluation.trace import trace_of
-from orchestrator.messages import hint, short
-from orchestrator.metrics.expressions import STANDARD, MetricValue, evaluate, evaluate_all, metric, why_none
-from orchestrator.plan import Override
-from orchestrator.results.measurement_results import filtered_alike, measured_results
-from orchestrator.results.reader import Results
-from orchestrator.scenario.overrides import with_changes
+from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError, warnings_in
+from yawbench.foundation.messages import hint, short
+from yawbench.metrics.expressions import STANDARD, MetricValue, evaluate, evaluate_all, metric, why_none
+from yawbench.orchestrator.plan import Override
+from yawbench.orchestrator.results.measurement_results import filtered_alike, measured_results
+from yawbench.orchestrator.results.reader import Results
+from yawbench.orchestrator.scenario.overrides import with_changes
+from yawbench.proving_ground.standard_tests import TESTS, Evaluation, TestName
+from yawbench.proving_ground.trace import trace_of
 
 from . import arguments
 
@@ -63,8 +63,6 @@ class Run:
     >>> run.unit_of("plant.yaw_rate")
     'rad/s'
     """
-
-    __module__ = "yawbench"
 
     def __init__(self, results: Results) -> None:
         self.results = arguments.instance(results, "results", Results, "a run; yawbench.open reads folders")
@@ -221,9 +219,10 @@ class Run:
             ScenarioError: a signal was not recorded.
             ResultsError: no recorded signal can be drawn.
         """
-        from orchestrator.figures import panels as drawing
-        from orchestrator.figures.plots import OVERVIEW, draw
-        from orchestrator.figures.style import LabelledRun
+        from yawbench.figures.plots import OVERVIEW, draw
+        from yawbench.figures.style import LabelledRun
+
+        from .figures import panels as drawing
 
         wanted = [arguments.text(panel, f"panels[{k}]") for k, panel in enumerate(panels)]
         title = None if title is None else arguments.text(title, "title")
@@ -240,7 +239,7 @@ class Run:
         Raises:
             ResultsError: they cannot be written.
         """
-        from orchestrator.results.recorder import write_results
+        from yawbench.orchestrator.results.recorder import write_results
 
         path = arguments.path(folder, "folder")
         write_results(self.results, path, format=arguments.text(format, "format"))
@@ -256,7 +255,7 @@ class Run:
         return f"<Run {self._full_title!r}: {len(self)} rows of {len(self.results.columns)} variables{noted}>"
 
     def _repr_html_(self) -> str:
-        from orchestrator.figures.style import shown
+        from yawbench.figures.style import shown
 
         changed = "".join(
             f"<br>{escape(str(change.target))} = {escape(str(change.plain))}" for change in self.changes

@@ -6,14 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from orchestrator.errors import YawbenchError
-from orchestrator.experiments.jobs import Job, Outcome, execute
-from orchestrator.master.fmi import open_instance
-from orchestrator.master.process_state import Log
-from orchestrator.plan import Instance
-from orchestrator.planner import Planner
+from yawbench.foundation.errors import YawbenchError
+from yawbench.orchestrator.master.fmi import open_instance
+from yawbench.orchestrator.master.process_state import Log
+from yawbench.orchestrator.plan import Instance
+from yawbench.studies.jobs import Job, Outcome, execute
 
 from ._controller import PythonComponent
+from .planner import Planner
 
 
 def opener_of(programs: Mapping[Path, PythonComponent]) -> Callable[[Instance, Log, set[Path]], Any]:

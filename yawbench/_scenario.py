@@ -10,7 +10,8 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from orchestrator.errors import (
+from yawbench.fmus.fmu import Fmu, RunsAs, Value
+from yawbench.foundation.errors import (
     Diagnostic,
     Location,
     ScenarioError,
@@ -19,27 +20,26 @@ from orchestrator.errors import (
     text_of,
     warnings_in,
 )
-from orchestrator.fault_kinds import FaultList, FaultName
-from orchestrator.fmu.fmu import Fmu, RunsAs, Value
-from orchestrator.master.process_state import Log
-from orchestrator.master.simulate import simulate_in_memory
-from orchestrator.messages import hint, short
-from orchestrator.metrics.plausibility import PlausibilityWatch
-from orchestrator.plan import Instance, Override, Plan
-from orchestrator.planner import Planner
-from orchestrator.scenario import loader
-from orchestrator.scenario.overrides import faults_at, setting, with_changes
-from orchestrator.scenario.schema import LoadedScenario
-from orchestrator.signal_names import Target
-from orchestrator.wiring.context import FACTS
-from vocabulary.roles import role_of
-from vocabulary.vehicle import CAR
+from yawbench.foundation.messages import hint, short
+from yawbench.metrics.plausibility import PlausibilityWatch
+from yawbench.orchestrator.fault_kinds import FaultList, FaultName
+from yawbench.orchestrator.master.process_state import Log
+from yawbench.orchestrator.master.simulate import simulate_in_memory
+from yawbench.orchestrator.plan import Instance, Override, Plan
+from yawbench.orchestrator.scenario import loader
+from yawbench.orchestrator.scenario.overrides import faults_at, setting, with_changes
+from yawbench.orchestrator.scenario.schema import LoadedScenario
+from yawbench.orchestrator.signal_names import Target
+from yawbench.orchestrator.wiring.context import FACTS
+from yawbench.vocabulary.roles import role_of
+from yawbench.vocabulary.vehicle import CAR
 
 from . import arguments
 from ._controller import ControllerLike, PythonComponent
 from ._progress import bar
 from ._run import Run
 from ._run_many import opener_of, planner_of
+from .planner import Planner
 
 
 def load(source: str | Path) -> Scenario:
@@ -73,8 +73,6 @@ class Scenario:
         path: the file.
         changes: overrides of the file.
     """
-
-    __module__ = "yawbench"
 
     path: Path
     changes: tuple[Override, ...] = ()

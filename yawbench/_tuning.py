@@ -9,17 +9,17 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.errors import Diagnostic, Location, ResultsError, ScenarioError
-from orchestrator.experiments.axes import AxisSpec
-from orchestrator.experiments.experiment import LoadedExperiment as Design
-from orchestrator.experiments.experiment import NamedRun
-from orchestrator.experiments.experiment_result import ExperimentResult
-from orchestrator.experiments.schema import ExperimentSpec
-from orchestrator.experiments.tables import to_pandas
-from orchestrator.experiments.tuning import TunedLaw, columns_of, history_figure, search
-from orchestrator.fmu.fmu import Value
-from orchestrator.messages import counted, listed, short
-from orchestrator.metrics.expressions import metric
+from yawbench.fmus.fmu import Value
+from yawbench.foundation.errors import Diagnostic, Location, ResultsError, ScenarioError
+from yawbench.foundation.messages import counted, listed, short
+from yawbench.metrics.expressions import metric
+from yawbench.studies.axes import AxisSpec
+from yawbench.studies.experiment import LoadedExperiment as Design
+from yawbench.studies.experiment import NamedRun
+from yawbench.studies.experiment_result import ExperimentResult
+from yawbench.studies.schema import ExperimentSpec
+from yawbench.studies.tables import to_pandas
+from yawbench.studies.tuning import TunedLaw, columns_of, history_figure, search
 
 from . import arguments
 from ._controller import PythonComponent
@@ -230,8 +230,6 @@ class Tuning:
     >>> base.set(tuned.values).run().metric("peak(sideslip)") == tuned.objective
     True
     """
-
-    __module__ = "yawbench"
 
     _design: Design
     _tuned: TunedLaw

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-from orchestrator.errors import ResultsError
-from orchestrator.figures.style import LabelledRun
-from orchestrator.messages import counted, listed
-from orchestrator.metrics.expressions import columns_of
-from orchestrator.pages.page_parts import packed
-from orchestrator.pages.viewer import SETTINGS, Settings, page
-from orchestrator.pages.viewer import View as Selection
-from orchestrator.safe_files import reason, write_whole
-from orchestrator.scenario.overrides import changed
+from yawbench.figures.style import LabelledRun
+from yawbench.foundation.errors import ResultsError
+from yawbench.foundation.messages import counted, listed
+from yawbench.foundation.safe_files import reason, write_whole
+from yawbench.metrics.expressions import columns_of
+from yawbench.orchestrator.scenario.overrides import changed
+from yawbench.reports.page_parts import packed
+from yawbench.reports.viewer import SETTINGS, Settings, page
+from yawbench.reports.viewer import View as Selection
 
 from . import arguments
 from ._run import Run
@@ -103,8 +103,6 @@ class View:
         html: the complete page, which works offline.
         height: height in a notebook [px].
     """
-
-    __module__ = "yawbench"
 
     labels: tuple[str, ...]
     html: str

@@ -20,8 +20,8 @@ from typing import Any, NoReturn, TypeGuard, TypeVar, cast
 
 import numpy as np
 
-from orchestrator.errors import ScenarioError, code_of
-from orchestrator.messages import listed, resolved, short, unprintable
+from yawbench.foundation.errors import ScenarioError, code_of
+from yawbench.foundation.messages import listed, resolved, short, unprintable
 
 MOST = 100_000
 """Largest number of items of an argument. Chosen: the limit on runs of an experiment."""

@@ -28,13 +28,13 @@ except ImportError:
         'yawbench.gym needs Gymnasium: python -m pip install "yawbench[gym]"', name="gymnasium"
     ) from None
 
-from orchestrator.errors import ScenarioError
-from orchestrator.evaluation.sine_with_dwell import SPUN, amplitudes
-from orchestrator.master.simulate import simulate_in_memory
-from orchestrator.metrics.plausibility import PlausibilityWatch
-from orchestrator.motion import LEAST_SPEED
-from orchestrator.plan import Plan
-from orchestrator.results.reader import Results
+from yawbench.foundation.errors import ScenarioError
+from yawbench.metrics.plausibility import PlausibilityWatch
+from yawbench.orchestrator.master.simulate import simulate_in_memory
+from yawbench.orchestrator.plan import Plan
+from yawbench.orchestrator.recordings.motion import LEAST_SPEED
+from yawbench.orchestrator.results.reader import Results
+from yawbench.proving_ground.sine_with_dwell import SPUN, amplitudes
 
 from . import arguments
 from ._run import Run

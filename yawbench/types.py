@@ -7,12 +7,8 @@ plan = yb.load("fnn_sideslip/25mps").plan()
 sensors: list[Instance] = [instance for instance in plan.instances if instance.role == "sensor"]
 """
 
-from components.fmi.variables import VariableSpec
-from orchestrator.errors import Messages, Severity
-from orchestrator.evaluation.standard_tests import TestName
-from orchestrator.evaluation.validation import ComparedTest, CrossPlot
-from orchestrator.fault_kinds import Fault, FaultList, FaultLocation, FaultName, FaultySignal
-from orchestrator.fmu.fmu import (
+from yawbench.components.fmi.variables import VariableSpec
+from yawbench.fmus.fmu import (
     BuildInfo,
     Causality,
     Fmu,
@@ -24,8 +20,11 @@ from orchestrator.fmu.fmu import (
     Variable,
     VariableType,
 )
-from orchestrator.metrics.verdict import Relation, Status
-from orchestrator.plan import (
+from yawbench.foundation.errors import Messages, Severity
+from yawbench.measured_cars.validation import ComparedTest, CrossPlot
+from yawbench.metrics.verdict import Relation, Status
+from yawbench.orchestrator.fault_kinds import Fault, FaultList, FaultLocation, FaultName, FaultySignal
+from yawbench.orchestrator.plan import (
     InputSeries,
     Instance,
     OriginKind,
@@ -35,9 +34,10 @@ from orchestrator.plan import (
     ValueSource,
     Wire,
 )
-from orchestrator.results.reader import Results
-from orchestrator.results.run_record import RunRecord
-from orchestrator.signal_names import SignalName, Target, TargetKind
+from yawbench.orchestrator.results.reader import Results
+from yawbench.orchestrator.results.run_record import RunRecord
+from yawbench.orchestrator.signal_names import SignalName, Target, TargetKind
+from yawbench.proving_ground.standard_tests import TestName
 
 from ._controller import ControllerLike, Numbers
 

@@ -11,7 +11,7 @@ Source: paper A, section 3.3: "equal distribution", s_i = 1/4. Ours differs: the
 
 from dataclasses import dataclass
 
-from vocabulary.wheels import Four
+from yawbench.vocabulary.wheels import Four
 
 from ..cars.published_cars import PaperA
 from ..control_laws.allocator import Allocator, DriveParameters

@@ -17,7 +17,7 @@ sin(delta); (38), (39) give both rear wheels the same sign; "2d" is 2/d.
 
 from dataclasses import dataclass
 
-from vocabulary.wheels import Four, wheels
+from yawbench.vocabulary.wheels import Four, wheels
 
 from ..cars.published_cars import PaperA
 from ..cars.wheel_kinematics import lever_arms

@@ -16,7 +16,7 @@ controller's moment in place of a fixed delay.
 
 from dataclasses import dataclass
 
-from vocabulary.wheels import Four
+from yawbench.vocabulary.wheels import Four
 
 from ..cars.published_cars import PaperC
 from ..cars.wheel_kinematics import lever_arms

@@ -7,7 +7,7 @@ Source: paper B, equations (25)-(28).
 
 from dataclasses import dataclass
 
-from vocabulary.wheels import Four
+from yawbench.vocabulary.wheels import Four
 
 from ..cars.published_cars import PaperB
 from ..control_laws.allocator import Allocator, DriveParameters

@@ -28,7 +28,7 @@ dead band.
 
 from dataclasses import dataclass
 
-from vocabulary.wheels import Four
+from yawbench.vocabulary.wheels import Four
 
 from ..cars.published_cars import PaperC
 from ..control_laws.allocator import BASIC, Allocator, DriveParameters

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from math import atan2, cos, sin
 from typing import Any, ClassVar
 
-from vocabulary.wheels import Four
+from yawbench.vocabulary.wheels import Four
 
 from ..fmi.component import Component
 from ..fmi.variables import output, parameter, signal

@@ -9,8 +9,8 @@ then carries the load of the axle, so that the loads always add up to m g.
 
 from typing import Protocol
 
-from vocabulary.gravity import G
-from vocabulary.wheels import Four
+from yawbench.vocabulary.gravity import G
+from yawbench.vocabulary.wheels import Four
 
 from .plane_body import Geometry
 

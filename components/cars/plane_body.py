@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from math import cos, sin
 from typing import Protocol
 
-from vocabulary.wheels import Four
+from yawbench.vocabulary.wheels import Four
 
 Motion = tuple[float, float, float, float, float, float]
 """v_x, v_y [m/s], r [rad/s], x, y [m], psi [rad]."""

@@ -40,7 +40,7 @@ from collections.abc import Sequence
 from math import ceil, sin, sqrt
 from typing import NamedTuple
 
-from vocabulary.gravity import G
+from yawbench.vocabulary.gravity import G
 
 from ..mathematics.integrators import rk4
 

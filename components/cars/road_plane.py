@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from math import sin, sqrt
 from typing import NamedTuple
 
-from vocabulary.gravity import G
+from yawbench.vocabulary.gravity import G
 
 from ..fmi.variables import signal
 

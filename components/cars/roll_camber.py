@@ -14,7 +14,7 @@ lifts one side. Neglected: static camber, and camber due to heave, steering (cas
 
 from dataclasses import dataclass
 
-from vocabulary.wheels import Four
+from yawbench.vocabulary.wheels import Four
 
 from ..fmi.variables import of_car
 

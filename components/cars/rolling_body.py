@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import sin
 
-from vocabulary.gravity import G
-from vocabulary.wheels import Four
+from yawbench.vocabulary.gravity import G
+from yawbench.vocabulary.wheels import Four
 
 from ..fmi.variables import like, of_car, parameter
 from .car import DrivenCarParameters, StartParameters

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from vocabulary.gravity import G
+from yawbench.vocabulary.gravity import G
 
 from ..fmi.variables import like, of_car, parameter
 from .car import DrivenCarParameters, StartParameters

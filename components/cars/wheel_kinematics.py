@@ -16,7 +16,7 @@ to the last bit.
 
 from math import atan2, cos, sin, sqrt
 
-from vocabulary.wheels import Four
+from yawbench.vocabulary.wheels import Four
 
 from .plane_body import Geometry
 

@@ -7,7 +7,7 @@ moment: with steered front wheels it turns the car by itself, as it does without
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from vocabulary.wheels import Four
+from yawbench.vocabulary.wheels import Four
 
 from ..cars.wheel_kinematics import lever_arms
 from ..fmi.component import Component

@@ -10,7 +10,7 @@ share, so that less than `LEAST_CARRIED` of the shares is left.
 
 from collections.abc import Sequence
 
-from vocabulary.wheels import Four
+from yawbench.vocabulary.wheels import Four
 
 LEAST_CARRIED = 0.05
 

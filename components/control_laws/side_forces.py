@@ -14,7 +14,7 @@ Source: paper B, equations (25)-(29). The paper leaves open which of the two rea
 fits the second.
 """
 
-from vocabulary.wheels import Four
+from yawbench.vocabulary.wheels import Four
 
 from .moment_sharing import share_moment
 

@@ -8,7 +8,7 @@ up to which tyres respond to steering; equation (18) of paper B is the same.
 
 from math import atan
 
-from vocabulary.gravity import G
+from yawbench.vocabulary.gravity import G
 
 PER_FRICTION = 0.02 * G
 """c [1]."""

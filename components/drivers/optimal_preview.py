@@ -30,7 +30,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from math import copysign, cos, sin
 
-from vocabulary.gravity import G
+from yawbench.vocabulary.gravity import G
 
 from ..cars.published_cars import PaperA, PaperC
 from ..cars.single_track_car import SingleTrackCar

@@ -24,7 +24,7 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from math import inf
 
-from vocabulary.lane_change import Lane
+from yawbench.vocabulary.lane_change import Lane
 
 from ..mathematics.linear_equations import solve
 from .track import Outline

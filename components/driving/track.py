@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import cos, hypot, pi, sin
 from typing import NamedTuple
 
-from vocabulary.lane_change import PART_1, PART_2, lanes
+from yawbench.vocabulary.lane_change import PART_1, PART_2, lanes
 
 from ..fmi.variables import output, parameter
 

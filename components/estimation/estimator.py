@@ -27,7 +27,7 @@ instead of the road. Connect `friction` explicitly to inputs that need it per wh
 
 from math import atan2
 
-from vocabulary.wheels import wheels
+from yawbench.vocabulary.wheels import wheels
 
 from ..cars.load_transfer import quasi_static_loads
 from ..cars.wheel_kinematics import slip_angle, slip_ratio, wheel_velocities

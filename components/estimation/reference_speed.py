@@ -20,7 +20,7 @@ without fuzzy rules.
 from collections.abc import Sequence
 from math import cos, sin
 
-from vocabulary.gravity import G
+from yawbench.vocabulary.gravity import G
 
 from ..mathematics.sums import added
 from .estimator_parameters import EstimatorParameters

@@ -24,7 +24,7 @@ Ours has other tyres and another gain, and adds the share and (4) to (6).
 from dataclasses import dataclass
 from math import atan2, cos
 
-from vocabulary.gravity import G
+from yawbench.vocabulary.gravity import G
 
 from ..fmi.variables import parameter
 from .dugoff_axle import axle_force

@@ -10,7 +10,7 @@ measurements, and stays within the bounds below, so that it recovers after a sli
 from math import sqrt
 from typing import Any
 
-from vocabulary.gravity import G
+from yawbench.vocabulary.gravity import G
 
 SUBSTEPS = 4
 """Euler steps per step; chosen: stable above `SLOWEST`."""

@@ -13,7 +13,7 @@ Source: sampling and latency as in `sensing.channel`, equation (4) there.
 
 from dataclasses import dataclass
 
-from vocabulary.signals import SIGNALS
+from yawbench.vocabulary.signals import SIGNALS
 
 from ..estimation.estimator import NAMES
 from ..fmi.component import Component

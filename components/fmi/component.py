@@ -40,8 +40,8 @@ from xml.etree.ElementTree import Element
 from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
-from vocabulary.roles import ROLES
-from vocabulary.wheels import wheels
+from yawbench.vocabulary.roles import ROLES
+from yawbench.vocabulary.wheels import wheels
 
 from . import model_description
 from .variables import (

@@ -8,7 +8,7 @@ the content.
 from collections.abc import Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement
 
-from vocabulary.units import UNITS
+from yawbench.vocabulary.units import UNITS
 
 from .variables import VariableSpec
 

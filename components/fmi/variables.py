@@ -10,10 +10,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, make_dataclass, replace
 from typing import Any
 
-from vocabulary.signals import SIGNALS
-from vocabulary.units import UNITS
-from vocabulary.vehicle import CAR
-from vocabulary.wheels import WHEEL_NAMES, WHEELS, wheels
+from yawbench.vocabulary.signals import SIGNALS
+from yawbench.vocabulary.units import UNITS
+from yawbench.vocabulary.vehicle import CAR
+from yawbench.vocabulary.wheels import WHEEL_NAMES, WHEELS, wheels
 
 _FMI_TYPES: dict[type, str] = {float: "Real", int: "Integer", bool: "Boolean", str: "String"}
 

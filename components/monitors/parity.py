@@ -48,8 +48,8 @@ Zanten, SAE 2000-01-1633. Tolerances are chosen on the runs described in docs/fa
 from dataclasses import dataclass
 from math import inf
 
-from vocabulary.gravity import G
-from vocabulary.wheels import wheels
+from yawbench.vocabulary.gravity import G
+from yawbench.vocabulary.wheels import wheels
 
 from ..cars.published_cars import PaperB
 from ..estimation.estimator_parameters import EstimatorParameters

@@ -36,8 +36,8 @@ Source: relations between signals as in van Zanten, Bosch ESP Systems: 5 Years o
 from dataclasses import dataclass
 from math import inf
 
-from vocabulary.gravity import G
-from vocabulary.wheels import wheels
+from yawbench.vocabulary.gravity import G
+from yawbench.vocabulary.wheels import wheels
 
 from ..cars.published_cars import PaperB
 from ..fmi.component import Component

@@ -26,7 +26,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from vocabulary.gravity import G
+from yawbench.vocabulary.gravity import G
 
 from ..cars.car import DRIVEN_WHEELS, MOTION, DrivenCar, DrivenCarParameters, StartParameters
 from ..cars.load_transfer import quasi_static_loads

@@ -32,7 +32,7 @@ from dataclasses import dataclass
 from math import cos, sin
 from typing import Any
 
-from vocabulary.gravity import G
+from yawbench.vocabulary.gravity import G
 
 from ..cars.car import MOTION, Car, StartParameters, of_steered_wheels
 from ..cars.load_transfer import quasi_static_loads

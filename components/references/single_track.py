@@ -20,7 +20,7 @@ Source: paper B, equations (16)-(18); paper D, equation (3).
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from vocabulary.gravity import G
+from yawbench.vocabulary.gravity import G
 
 from ..cars.published_cars import PaperB
 from ..cars.single_track_car import SingleTrackCar

@@ -18,7 +18,7 @@ beta_max, which the paper leaves open.
 
 from dataclasses import dataclass
 
-from vocabulary.gravity import G
+from yawbench.vocabulary.gravity import G
 
 from ..cars.published_cars import PaperA
 from ..cars.single_track_car import SMALLEST, SingleTrackCar

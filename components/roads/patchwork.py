@@ -28,9 +28,9 @@ motion on the wind.
 from dataclasses import dataclass
 from math import asin, cos, pi, sin
 
-from vocabulary.friction_table import table_of
-from vocabulary.patches import friction_at, patches_of
-from vocabulary.wheels import Four
+from yawbench.vocabulary.friction_table import table_of
+from yawbench.vocabulary.patches import friction_at, patches_of
+from yawbench.vocabulary.wheels import Four
 
 from ..cars.published_cars import PaperA
 from ..fmi.component import Component

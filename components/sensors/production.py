@@ -23,9 +23,9 @@ Sources are given with the parameters. `sensors.ideal` and `sensors.poor` are th
 
 from math import cos, sin
 
-from vocabulary.gravity import G
-from vocabulary.signals import SIGNALS
-from vocabulary.wheels import wheels
+from yawbench.vocabulary.gravity import G
+from yawbench.vocabulary.signals import SIGNALS
+from yawbench.vocabulary.wheels import wheels
 
 from ..fmi.component import Component
 from ..fmi.variables import output, parameter, signal

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from orchestrator.commands.new import MODELS, schema_text
+from yawbench.commands.new import kinds, schema_text
 
 from . import (
     blind_tables,
@@ -60,7 +60,7 @@ def main() -> None:
     for tables in PUBLISHED:
         for page, text in tables.pages_with_tables().items():
             page.write_text(text, encoding="utf-8")
-    for kind in MODELS:
+    for kind in kinds():
         (SCHEMAS / f"{kind}.json").write_text(schema_text(kind), encoding="utf-8")
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.experiments.confidence import Bounds, bootstrap, percentile_bounds, resample
+from yawbench.studies.confidence import Bounds, bootstrap, percentile_bounds, resample
 
 from .published import replaced, wrapped, write_pages
 

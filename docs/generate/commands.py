@@ -8,7 +8,7 @@ import re
 import click
 import typer
 
-from orchestrator.cli import _application
+from yawbench.cli import _application
 
 from .text import NOTE, cell, code, plain, table
 

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, FancyArrow, FancyBboxPatch, Rectangle
 
-from fmus.presentation import ICONS
+from yawbench.fmus.presentation import ICONS
 
 INK, ACCENT = "#1f3a5f", "#d1495b"
 

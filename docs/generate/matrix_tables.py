@@ -12,19 +12,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from orchestrator.experiments.confidence import ConfidenceInterval
-from orchestrator.experiments.jobs import STEP_TIME
-from orchestrator.experiments.ranking import load_ranking
-from orchestrator.experiments.ranking_scores import (
-    EntryScore,
-    RankedState,
-    RankingCell,
-    RankingResult,
-    placed,
-)
-from orchestrator.experiments.ranking_tables import interval_words, sign_of
-from orchestrator.experiments.tables import Table
-from orchestrator.pages import ranking_page
+from yawbench.ranking import ranking_page
+from yawbench.ranking.ranking import load_ranking
+from yawbench.ranking.ranking_scores import EntryScore, RankedState, RankingCell, RankingResult, placed
+from yawbench.ranking.ranking_tables import interval_words, sign_of
+from yawbench.studies.confidence import ConfidenceInterval
+from yawbench.studies.jobs import STEP_TIME
+from yawbench.studies.tables import Table
 
 from .published import markdown, replaced, wrapped, write_pages
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from orchestrator.metrics import expressions
-from orchestrator.metrics.measures import catalogue
+from yawbench.metrics import expressions
+from yawbench.metrics.measures import catalogue
 
 from .text import NOTE, cell, code, docstring, table
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from orchestrator.experiments.confidence import share_bounds
+from yawbench.studies.confidence import share_bounds
 
 from .published import replaced, wrapped, write_pages
 
@@ -308,7 +308,7 @@ def pages_with_tables() -> dict[Path, str]:
 
 def draw(results: dict[str, Outcome]) -> None:
     """Draw detection, delay and blame over the size of every kind of fault with four sizes or more."""
-    from orchestrator.figures.style import new_figure, save
+    from yawbench.figures.style import new_figure, save
 
     kinds = [kind for kind in KINDS if len(kind.sizes) >= 4]
     with new_figure() as figure:
@@ -339,7 +339,7 @@ def draw(results: dict[str, Outcome]) -> None:
 
 
 def _draw_kind(axes: Sequence[Axes], kind: Kind, known: Sequence[Outcome], number: int) -> None:
-    from orchestrator.figures.style import line_style
+    from yawbench.figures.style import line_style
 
     style = {**line_style(number), "marker": "os"[number], "markersize": 4}
     sizes = kind.sizes

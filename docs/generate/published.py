@@ -8,7 +8,7 @@ import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from orchestrator.experiments.tables import Table
+from yawbench.studies.tables import Table
 
 
 def replaced(page: str, name: str, text: str) -> str:

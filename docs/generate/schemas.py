@@ -12,12 +12,12 @@ from typing import Any, Literal
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from orchestrator.experiments import ranking as ranking
-from orchestrator.experiments import schema as experiment
-from orchestrator.experiments import threats as threats
-from orchestrator.fault_kinds import KINDS, FaultLocation
-from orchestrator.scenario import schema as scenario
-from orchestrator.signal_names import SignalName, Target
+from yawbench.orchestrator.fault_kinds import KINDS, FaultLocation
+from yawbench.orchestrator.scenario import schema as scenario
+from yawbench.orchestrator.signal_names import SignalName, Target
+from yawbench.ranking import ranking as ranking
+from yawbench.ranking import threats as threats
+from yawbench.studies import schema as experiment
 
 from .text import NOTE, cell, code, docstring, table
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from vocabulary import roles, signals
-from vocabulary.roles import ROLES
-from vocabulary.signals import SIGNALS
+from yawbench.vocabulary import roles, signals
+from yawbench.vocabulary.roles import ROLES
+from yawbench.vocabulary.signals import SIGNALS
 
 from .text import NOTE, cell, code, docstring, table
 

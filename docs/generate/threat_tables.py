@@ -6,13 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from orchestrator.experiments.confidence import percentile_bounds
-from orchestrator.experiments.ranking_tables import gains_sentence, gains_table, seeds_table
-from orchestrator.experiments.threat_runs import ThreatResult, published_result
-from orchestrator.experiments.threat_scores import ScoreTable, compared_gains, resampled_scores, scored
-from orchestrator.experiments.threats import REFERENCE, load_threats
-from orchestrator.messages import listed
-from orchestrator.pages import threats_page
+from yawbench.foundation.messages import listed
+from yawbench.ranking import threats_page
+from yawbench.ranking.ranking_tables import gains_sentence, gains_table, seeds_table
+from yawbench.ranking.threat_runs import ThreatResult, published_result
+from yawbench.ranking.threat_scores import ScoreTable, compared_gains, resampled_scores, scored
+from yawbench.ranking.threats import REFERENCE, load_threats
+from yawbench.studies.confidence import percentile_bounds
 
 from .published import markdown, replaced, wrapped
 

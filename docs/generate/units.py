@@ -8,9 +8,9 @@ import zipfile
 from typing import Any
 from xml.etree import ElementTree
 
-from fmus.build import HERE, find_components
-from orchestrator.messages import fold
-from vocabulary.roles import ROLES
+from yawbench.fmus.build import HERE, find_components
+from yawbench.foundation.messages import fold
+from yawbench.vocabulary.roles import ROLES
 
 from .text import NOTE, cell, code, docstring, table
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from orchestrator.wiring import derivations
-from orchestrator.wiring.derivations import DERIVATIONS
-from vocabulary import vehicle
-from vocabulary.vehicle import CAR, VehicleQuantity
+from yawbench.orchestrator.wiring import derivations
+from yawbench.orchestrator.wiring.derivations import DERIVATIONS
+from yawbench.vocabulary import vehicle
+from yawbench.vocabulary.vehicle import CAR, VehicleQuantity
 
 from .text import NOTE, cell, code, docstring, table
 

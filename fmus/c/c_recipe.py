@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
-from orchestrator.errors import BuildError
-from orchestrator.fmu.description import platform
-from vocabulary.roles import ROLES
+from yawbench.foundation.errors import BuildError
+from yawbench.vocabulary.roles import ROLES
 
 from ..compiler import compile_library, compiler_command, compiler_tools, compiler_version
+from ..description import platform
 from ..packing import DESCRIPTION
 from ..presentation import PAGE, icon
 from ..source_digests import SourceDigests

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
-from orchestrator.errors import BuildError
-from vocabulary.roles import Role
+from yawbench.foundation.errors import BuildError
+from yawbench.vocabulary.roles import Role
 
 from ..packing import DESCRIPTION
 from ..staging import missing_signals

@@ -21,8 +21,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from orchestrator.cache import keep, recall
-from orchestrator.errors import BuildError
+from yawbench.foundation.cache import keep, recall
+from yawbench.foundation.errors import BuildError
 
 from .. import usual_ranges
 from ..compiler import compile_library, compiler_command, compiler_version

@@ -34,14 +34,15 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import Interrupted, SimulationError, YawbenchError, error_record, rebuilt
-from ..fmu.fmu import Value
-from ..fork_server import ForkedChild, die_with_parent
-from ..interrupts import StopFlag, stop_requested_at
-from ..messages import listed
+from yawbench.fmus.fmu import Value
+from yawbench.foundation.errors import Interrupted, SimulationError, YawbenchError, error_record, rebuilt
+from yawbench.foundation.fork_server import ForkedChild, die_with_parent
+from yawbench.foundation.interrupts import StopFlag, stop_requested_at
+from yawbench.foundation.messages import listed
+from yawbench.foundation.supervised_process import LOG, REPLY, PipeChannel, ProcessLost, ProtocolError
+
 from ..plan import Plan
 from ..results.recorder import BLOCK, RowBlock
-from ..supervised_process import LOG, REPLY, PipeChannel, ProcessLost, ProtocolError
 from .fmi import open_instance
 from .instance import CtypesInstance
 from .isolation import Isolation

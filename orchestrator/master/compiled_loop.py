@@ -244,6 +244,6 @@ def _unwanted() -> bool:
 
 def _library() -> tuple[ctypes.CDLL | None, str]:
     """Return the library of the loop, or None and why there is none."""
-    from fmus.compiler import load_compiled
+    from yawbench.fmus.compiler import load_compiled
 
     return load_compiled(Path(__file__).with_name("step_loop.c"))

@@ -24,8 +24,9 @@ from fmpy.fmi2 import (
 )
 from fmpy.fmi3 import fmi3IntermediateUpdateCallback, fmi3LogMessageCallback
 
-from ..fmu.archive import is_native
-from ..fmu.description import INTEGERS
+from yawbench.fmus.archive import is_native
+from yawbench.fmus.description import INTEGERS
+
 from ..plan import Instance, Plan
 from .compiled_loop import Kind, OperationData
 from .instance import BoundCall, CtypesInstance, ExperimentSetup, PlainCall, Status

@@ -16,9 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import SimulationError
-from ..fmu.fmu import Value, Variable
-from ..messages import listed
+from yawbench.fmus.fmu import Value, Variable
+from yawbench.foundation.errors import SimulationError
+from yawbench.foundation.messages import listed
+
 from ..plan import Wire
 from .instance import ExperimentSetup, Status
 from .process_state import FATAL, OK, STATUS, WARNING, Log, known

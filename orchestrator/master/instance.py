@@ -24,11 +24,12 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 import fmpy
 import numpy as np
 
-from ..errors import ModelDescriptionError, SimulationError
-from ..fmu.archive import binary_problem
-from ..fmu.description import CORE, INTEGERS, binary_of
-from ..fmu.fmu import Value, ValueRef
-from ..messages import listed
+from yawbench.fmus.archive import binary_problem
+from yawbench.fmus.description import CORE, INTEGERS, binary_of
+from yawbench.fmus.fmu import Value, ValueRef
+from yawbench.foundation.errors import ModelDescriptionError, SimulationError
+from yawbench.foundation.messages import listed
+
 from ..plan import Instance
 from .compiled_loop import Kind, OperationData
 from .process_state import ERROR, FATAL, OK, STATUS, WARNING, Log, known, relisten, unlisten

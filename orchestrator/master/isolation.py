@@ -30,12 +30,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..errors import SimulationError, YawbenchError, error_record, rebuilt
-from ..fmu.fmu import Value, ValueRef
-from ..fork_server import start
-from ..interrupts import stop_requested_at
+from yawbench.fmus.fmu import Value, ValueRef
+from yawbench.foundation.errors import SimulationError, YawbenchError, error_record, rebuilt
+from yawbench.foundation.fork_server import start
+from yawbench.foundation.interrupts import stop_requested_at
+from yawbench.foundation.supervised_process import (
+    ANSWER,
+    FAILED,
+    LOG,
+    REPLY,
+    REQUEST,
+    PipeChannel,
+    ProcessLost,
+    stand_guard,
+)
+
 from ..plan import Instance, Plan
-from ..supervised_process import ANSWER, FAILED, LOG, REPLY, REQUEST, PipeChannel, ProcessLost, stand_guard
 from .fmi import INSTANCE_TYPES, open_instance
 from .instance import (
     Buffers,

@@ -31,9 +31,10 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from ..fork_server import Child
+from yawbench.foundation.fork_server import Child
+from yawbench.foundation.supervised_process import LOG, PipeChannel, ProtocolError, SupervisedProcess
+
 from ..plan import Instance
-from ..supervised_process import LOG, PipeChannel, ProtocolError, SupervisedProcess
 
 OK, WARNING, DISCARD, ERROR, FATAL, PENDING, UNKNOWN = range(7)
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending", "a status that FMI does not have")

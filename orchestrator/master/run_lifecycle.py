@@ -15,10 +15,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..errors import ResultsError, SimulationError
-from ..fmu.fmu import Value
-from ..interrupts import StopFlag
-from ..messages import listed
+from yawbench.fmus.fmu import Value
+from yawbench.foundation.errors import ResultsError, SimulationError
+from yawbench.foundation.interrupts import StopFlag
+from yawbench.foundation.messages import listed
+
 from ..plan import Instance, Plan
 from ..results.recorder import BLOCK
 from .instance import FmuInstance, Status, StepCalls

@@ -29,11 +29,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from yawbench.fmus.fmu import Value, Variable, integer_limits
+from yawbench.foundation.errors import SimulationError
+from yawbench.foundation.messages import listed
+
 from ..coupling_algorithms import ALGORITHMS, WireTiming
-from ..errors import SimulationError
 from ..fault_kinds import KINDS, Disturbance, LinearDisturbance
-from ..fmu.fmu import Value, Variable, integer_limits
-from ..messages import listed
 from ..plan import Instance, Plan, Wire
 from .compiled_loop import Kind, OperationData
 from .instance import FmuInstance, Status, StepCalls

@@ -14,9 +14,17 @@ from typing import Protocol
 
 import numpy as np
 
-from ..errors import Diagnostic, Interrupted, ResultsError, ScenarioError, SimulationError, YawbenchError
-from ..interrupts import StopFlag, interrupts
-from ..messages import printable
+from yawbench.foundation.errors import (
+    Diagnostic,
+    Interrupted,
+    ResultsError,
+    ScenarioError,
+    SimulationError,
+    YawbenchError,
+)
+from yawbench.foundation.interrupts import StopFlag, interrupts
+from yawbench.foundation.messages import printable
+
 from ..plan import Plan
 from ..results.freshness import key_of, recorded_variables, run_record, units_of
 from ..results.reader import Results

@@ -22,10 +22,11 @@ from typing import cast
 
 import numpy as np
 
-from ..errors import Interrupted, SimulationError
-from ..fmu.fmu import Value
-from ..interrupts import StopFlag
-from ..messages import listed
+from yawbench.fmus.fmu import Value
+from yawbench.foundation.errors import Interrupted, SimulationError
+from yawbench.foundation.interrupts import StopFlag
+from yawbench.foundation.messages import listed
+
 from ..plan import Plan
 from .compiled_loop import Answer, CompiledLoop, missing_loop
 from .initialization import initialize

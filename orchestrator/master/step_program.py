@@ -20,8 +20,9 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from yawbench.fmus.fmu import ValueRef, Variable
+
 from ..coupling_algorithms import ALGORITHMS, CouplingWeights, WireTiming, delayed
-from ..fmu.fmu import ValueRef, Variable
 from ..plan import InputSeries, Plan
 from .compiled_loop import Kind, OperationData
 from .instance import PlainCall, Status

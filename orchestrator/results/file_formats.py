@@ -25,9 +25,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from ..errors import ResultsError, ScenarioError
-from ..messages import hint, short
-from ..safe_files import open_regular
+from yawbench.foundation.errors import ResultsError, ScenarioError
+from yawbench.foundation.messages import hint, short
+from yawbench.foundation.safe_files import open_regular
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -212,7 +212,7 @@ def rows_text(block: np.ndarray) -> bytes:
 @functools.cache
 def _writer() -> Callable[[np.ndarray], bytes] | None:
     """Return the function in C, with its tables; None if it cannot be compiled here."""
-    from fmus.compiler import load_compiled
+    from yawbench.fmus.compiler import load_compiled
 
     library, _ = load_compiled(Path(__file__).with_name("rows_text.c"))
     if library is None:

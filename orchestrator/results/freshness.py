@@ -18,10 +18,11 @@ from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any, cast
 
-from ..cache import OF_RESULTS, checksum, sources_hash
-from ..errors import ResultsError
-from ..fmu.archive import runs_as
-from ..fmu.fmu import Fmu, Variable
+from yawbench.fmus.archive import runs_as
+from yawbench.fmus.fmu import Fmu, Variable
+from yawbench.foundation.cache import OF_RESULTS, checksum, sources_hash
+from yawbench.foundation.errors import ResultsError
+
 from ..plan import DEFAULT, InputSeries, Instance, Plan, ValueSource, Wire
 from ..signal_names import SignalName
 from .reader import load_results

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import ResultsError
-from ..measured.gaps import notes_on
-from ..measured.measurement import ENDINGS, MEASURABLE, load_measurement
-from ..measured.segment import LowPass, even_grid
+from yawbench.foundation.errors import ResultsError
+
+from ..recordings.gaps import notes_on
+from ..recordings.measurement import ENDINGS, MEASURABLE, load_measurement
+from ..recordings.segment import LowPass, even_grid
 from .reader import Results, load_results
 from .run_folder import RunStatus
 from .run_record import DiagnosticRecord, FmuRecord, RunRecord

@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ResultsError
+from yawbench.foundation.errors import ResultsError
+
 from ..scenario.overrides import with_changes
 from .file_formats import FILES, FORMATS, column_of, plain, values_of
 from .recorder import ColumnRecorder

@@ -17,10 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ..cache import checksum
-from ..errors import ResultsError
-from ..messages import fold, listed, short
-from ..safe_files import check_regular, reads, reason
+from yawbench.foundation.cache import checksum
+from yawbench.foundation.errors import ResultsError
+from yawbench.foundation.messages import fold, listed, short
+from yawbench.foundation.safe_files import check_regular, reads, reason
+
 from ..scenario.quantities import conversion, measure_of
 from ..signal_names import SignalName
 from .file_formats import FILES, FORMATS, ResultsSource, load_class

@@ -20,10 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from ..cache import checksum, shown
-from ..errors import ResultsError
-from ..fmu.fmu import Value
-from ..safe_files import reason, write_whole
+from yawbench.fmus.fmu import Value
+from yawbench.foundation.cache import checksum, shown
+from yawbench.foundation.errors import ResultsError
+from yawbench.foundation.safe_files import reason, write_whole
+
 from .file_formats import FORMATS, RESULTS_FILE, check_format, load_class, plain, rows_text
 from .reader import Results
 from .run_folder import PART, RUN_FILE, FolderLock, RunStatus, put_in_place, tidy

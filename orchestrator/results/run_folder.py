@@ -36,10 +36,9 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
-from ..errors import ResultsError, ScenarioError
-from ..messages import cut
-from ..plan import Override
-from ..safe_files import (
+from yawbench.foundation.errors import ResultsError, ScenarioError
+from yawbench.foundation.messages import cut
+from yawbench.foundation.safe_files import (
     LOCK_FILE,
     NEW,
     claim,
@@ -50,6 +49,8 @@ from ..safe_files import (
     refuse_link,
     refuse_links_within,
 )
+
+from ..plan import Override
 from ..scenario.overrides import value_in_words
 from .file_formats import FILES, RESULTS_FILE
 

@@ -24,13 +24,13 @@ from pydantic import (
 from pydantic_core import PydanticKnownError
 from typing_extensions import TypedDict
 
-from vocabulary.roles import role_of
+from yawbench.foundation.cache import KEY, changed_since, warn_of_record, with_checksums
+from yawbench.foundation.errors import Diagnostic, Location, ResultsError, Severity, warnings_in
+from yawbench.foundation.messages import short
+from yawbench.foundation.safe_files import read_bytes, reading, reason
+from yawbench.vocabulary.roles import role_of
 
-from ..cache import KEY, changed_since, warn_of_record, with_checksums
-from ..errors import Diagnostic, Location, ResultsError, Severity, warnings_in
-from ..messages import short
 from ..plan import NEUTRAL, Override, OverrideOrigin, SourceKind, ValueSource
-from ..safe_files import read_bytes, reading, reason
 from ..signal_names import SignalName
 from .file_formats import FILES, RESULTS_FILE
 from .run_folder import FAILED, LARGEST, RUN_FILE, RunStatus, refuse_dead
@@ -297,7 +297,7 @@ class RunRecord(_Part):
     checksum: str = ""  # of that file
     smallest: Mapping[str, float | NotFinite] = {}
     largest: Mapping[str, float | NotFinite] = {}
-    checksums: dict[str, str] = {}  # of the keys of the record itself; see `orchestrator.cache`
+    checksums: dict[str, str] = {}  # of the keys of the record itself; see `foundation.cache`
 
     @property
     def overrides(self) -> tuple[Override, ...]:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ..cache import KEY, checksum
-from ..errors import ResultsError
-from ..safe_files import open_own, reason, write_whole
+from yawbench.foundation.cache import KEY, checksum
+from yawbench.foundation.errors import ResultsError
+from yawbench.foundation.safe_files import open_own, reason, write_whole
+
 from .file_formats import FILES, RESULTS_FILE, CsvFile
 from .run_folder import (
     PART,

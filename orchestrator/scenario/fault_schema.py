@@ -11,10 +11,11 @@ from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, WithJsonSchema, model_validator
 
-from ..errors import Location, ScenarioError
+from yawbench.fmus.fmu import Value
+from yawbench.foundation.errors import Location, ScenarioError
+from yawbench.foundation.messages import listed, short
+
 from ..fault_kinds import KINDS, NO_FAULTS, WORDS, Fault, FaultList, FaultLocation
-from ..fmu.fmu import Value
-from ..messages import listed, short
 from . import quantities, yaml_lines
 from .schema_validation import Instant, OneOf, StrictModel, Time, in_unit, validate
 

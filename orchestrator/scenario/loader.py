@@ -10,10 +10,11 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from ..errors import ScenarioError
-from ..messages import hint, listed, short
+from yawbench.foundation.errors import ScenarioError
+from yawbench.foundation.messages import hint, listed, short
+from yawbench.foundation.safe_files import TEXT, read_bytes, reads
+
 from ..plan import Override
-from ..safe_files import TEXT, read_bytes, reads
 from . import overrides, quantities, schema_validation, yaml_lines
 from .schema import Connection, LoadedScenario, ScenarioSpec, Vehicle, endpoint
 from .schema_validation import KINDS

@@ -26,10 +26,11 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from ..errors import Diagnostic, Location, ScenarioError
+from yawbench.fmus.fmu import Value, is_path
+from yawbench.foundation.errors import Diagnostic, Location, ScenarioError
+from yawbench.foundation.messages import hint, listed
+
 from ..fault_kinds import WORDS, FaultList
-from ..fmu.fmu import Value, is_path
-from ..messages import hint, listed
 from ..plan import Override, OverrideOrigin
 from ..signal_names import FACTS, FAULTS, INPUTS, OF_RUN, TYRES, VEHICLE, Target
 from . import yaml_lines

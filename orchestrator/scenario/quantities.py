@@ -23,9 +23,9 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache, lru_cache
 
-from ..errors import InvalidValueError
-from ..fmu.fmu import UnitDefinition, Variable
-from ..messages import closest, listed, short
+from yawbench.fmus.fmu import UnitDefinition, Variable
+from yawbench.foundation.errors import InvalidValueError
+from yawbench.foundation.messages import closest, listed, short
 
 BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 Powers = tuple[int, int, int, int, int, int, int, int]  # of BASE_UNITS

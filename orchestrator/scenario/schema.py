@@ -35,11 +35,11 @@ from pydantic import (
     model_validator,
 )
 
-from vocabulary.vehicle import CAR
+from yawbench.fmus.fmu import Value
+from yawbench.foundation.messages import listed, short
+from yawbench.vocabulary.vehicle import CAR
 
 from ..coupling_algorithms import ALGORITHMS
-from ..fmu.fmu import Value
-from ..messages import listed, short
 from ..plan import Override
 from ..signal_names import RESERVED, SignalName
 from .fault_schema import FaultSpec

@@ -12,8 +12,9 @@ from typing import Annotated, Any, TypeVar
 from pydantic import BaseModel, ConfigDict, PlainSerializer, PlainValidator, ValidationError, WithJsonSchema
 from pydantic_core.core_schema import no_info_after_validator_function
 
-from ..errors import code_of
-from ..messages import closest, listed, short
+from yawbench.foundation.errors import code_of
+from yawbench.foundation.messages import closest, listed, short
+
 from .quantities import instant, quantity_pattern, seconds
 from .yaml_lines import Document, KeyPath
 

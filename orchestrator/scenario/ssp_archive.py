@@ -28,10 +28,19 @@ from urllib.parse import unquote, urlsplit
 from lxml import etree
 from lxml.etree import _Element
 
-from ..errors import Diagnostic, Location
-from ..fmu.fmu import Causality, UnitDefinition, element_names
-from ..messages import listed, short
-from ..safe_files import PACKED, ArchiveError, TooLargeError, members, misplaced, read_bytes, reason
+from yawbench.fmus.fmu import Causality, UnitDefinition, element_names
+from yawbench.foundation.errors import Diagnostic, Location
+from yawbench.foundation.messages import listed, short
+from yawbench.foundation.safe_files import (
+    PACKED,
+    ArchiveError,
+    TooLargeError,
+    members,
+    misplaced,
+    read_bytes,
+    reason,
+)
+
 from .quantities import BASE_UNITS, Unit, measure_of
 
 DESCRIPTION_FILE = "SystemStructure.ssd"

@@ -31,9 +31,10 @@ from typing import Any
 from lxml import etree
 from lxml.etree import _Element
 
-from ..errors import Diagnostic, Location
-from ..fmu.fmu import UnitDefinition, Value, integer_limits
-from ..messages import fold, listed
+from yawbench.fmus.fmu import UnitDefinition, Value, integer_limits
+from yawbench.foundation.errors import Diagnostic, Location
+from yawbench.foundation.messages import fold, listed
+
 from ..signal_names import RESERVED
 from .quantities import Unit, conversion, converted, measure_of
 from .ssp_archive import (

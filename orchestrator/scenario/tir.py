@@ -20,9 +20,9 @@ from math import atan, inf, isfinite, nan, pi, prod, sin, tan
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from ..errors import Diagnostic, Location, ScenarioError, Severity
-from ..messages import listed, short
-from ..safe_files import TEXT, read_bytes, reads, reason
+from yawbench.foundation.errors import Diagnostic, Location, ScenarioError, Severity
+from yawbench.foundation.messages import listed, short
+from yawbench.foundation.safe_files import TEXT, read_bytes, reads, reason
 
 Side = Literal["LEFT", "RIGHT"]
 SIDES: tuple[Side, ...] = ("LEFT", "RIGHT")

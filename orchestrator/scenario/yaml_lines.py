@@ -11,10 +11,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from ..errors import Diagnostic, Location, ScenarioError
-from ..messages import closest, listed, short, unprintable
+from yawbench.foundation.errors import Diagnostic, Location, ScenarioError
+from yawbench.foundation.messages import closest, listed, short, unprintable
+from yawbench.foundation.safe_files import TEXT, read_bytes, reason
+
 from ..plan import Override
-from ..safe_files import TEXT, read_bytes, reason
 
 MOST_ERRORS = 200
 """Maximum number of reported errors of a file. Chosen: users check again before correcting more."""

@@ -15,8 +15,9 @@ from dataclasses import replace
 from graphlib import CycleError
 from itertools import pairwise
 
-from ..fmu.fmu import Variable
-from ..messages import fold, hint, listed
+from yawbench.fmus.fmu import Variable
+from yawbench.foundation.messages import fold, hint, listed
+
 from ..plan import Wire
 from ..scenario.loader import Connection
 from ..scenario.quantities import conversion, measure_of, parse_unit, unit_of

@@ -9,9 +9,10 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import InvalidValueError, ScenarioError, code_of, text_of
-from ..fmu.fmu import Value, Variable
-from ..messages import fold, hint, resolved, span
+from yawbench.fmus.fmu import Value, Variable
+from yawbench.foundation.errors import InvalidValueError, ScenarioError, code_of, text_of
+from yawbench.foundation.messages import fold, hint, resolved, span
+
 from ..plan import InputSeries, ValueOrigin
 from ..scenario.loader import LoadedScenario
 from ..scenario.quantities import unit_of
@@ -24,7 +25,7 @@ from .parameters import origin, value_for
 if TYPE_CHECKING:
     import numpy as np
 
-    from ..measured.recording_formats import FileColumn
+    from ..recordings.recording_formats import FileColumn
 
 Input = tuple[str, str]  # instance, variable
 
@@ -161,10 +162,10 @@ def _series_reader(system: WiringContext) -> Reader:
     """
     scenario = system.scenario
     # NumPy takes long to import
-    from ..measured.clocks import seconds_of
-    from ..measured.gaps import Gap, gaps_in
-    from ..measured.measurement import ENDINGS, Measurement, load_measurement
-    from ..measured.recording_formats import ColumnFile, reading_series
+    from ..recordings.clocks import seconds_of
+    from ..recordings.gaps import Gap, gaps_in
+    from ..recordings.measurement import ENDINGS, Measurement, load_measurement
+    from ..recordings.recording_formats import ColumnFile, reading_series
 
     asked: dict[str, list[str]] = {}
 
@@ -236,7 +237,7 @@ def _values(column: FileColumn, name: str, variable: Variable) -> np.ndarray:
     """Convert the values of a column to the type and unit of a variable."""
     import numpy as np
 
-    from ..measured.recording_formats import numbers_in
+    from ..recordings.recording_formats import numbers_in
 
     if variable.type == "Real":
         wanted = unit_of(variable)

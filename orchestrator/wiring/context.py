@@ -18,11 +18,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from vocabulary.wheels import WHEELS, wheels
+from yawbench.fmus.fmu import Fmu, Value, Variable
+from yawbench.foundation.errors import Diagnostic, Severity, WiringError
+from yawbench.foundation.messages import fold_sentences
+from yawbench.vocabulary.wheels import WHEELS, wheels
 
-from ..errors import Diagnostic, Severity, WiringError
-from ..fmu.fmu import Fmu, Value, Variable
-from ..messages import fold_sentences
 from ..plan import DEFAULT, Instance, Plan, ValueOrigin
 from ..scenario.loader import LoadedScenario
 from ..scenario.yaml_lines import MOST_ERRORS, Document, KeyPath

@@ -17,8 +17,8 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NamedTuple
 
-from vocabulary.gravity import G
-from vocabulary.vehicle import CAR
+from yawbench.vocabulary.gravity import G
+from yawbench.vocabulary.vehicle import CAR
 
 AGREES = 0.01
 """Tolerated relative difference between a given and a derived value. Chosen: rounding of data sheets."""

@@ -7,9 +7,10 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from yawbench.fmus.fmu import Variable
+from yawbench.foundation.messages import fold, hint, listed
+
 from ..fault_kinds import KINDS, Fault, FaultLocation, FaultySignal
-from ..fmu.fmu import Variable
-from ..messages import fold, hint, listed
 from ..plan import Wire
 from ..scenario.loader import LoadedScenario
 from ..scenario.quantities import convert

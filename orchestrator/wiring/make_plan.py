@@ -20,14 +20,29 @@ from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from vocabulary.roles import role_in, role_of
-from vocabulary.wheels import WHEELS
+from yawbench.fmus.description import CORE
+from yawbench.fmus.fmu import Fmu, Value, Variable, is_path
+from yawbench.fmus.opener import (
+    Opener,
+    find_fmu,
+    find_folder,
+    hidden,
+    host_needs,
+    shadowed_modules,
+    stale_fmus,
+)
+from yawbench.foundation.errors import (
+    BuildError,
+    Diagnostic,
+    Location,
+    ModelDescriptionError,
+    WiringError,
+    YawbenchError,
+)
+from yawbench.foundation.messages import closest, fold, hint, listed
+from yawbench.vocabulary.roles import role_in, role_of
+from yawbench.vocabulary.wheels import WHEELS
 
-from ..errors import BuildError, Diagnostic, Location, ModelDescriptionError, WiringError, YawbenchError
-from ..fmu.description import CORE
-from ..fmu.fmu import Fmu, Value, Variable, is_path
-from ..fmu.opener import Opener, find_fmu, find_folder, hidden, host_needs, shadowed_modules, stale_fmus
-from ..messages import closest, fold, hint, listed
 from ..plan import DEFAULT, InputSeries, Instance, Plan, ValueOrigin, Wire
 from ..scenario.loader import LoadedScenario
 from ..signal_names import SignalName, match

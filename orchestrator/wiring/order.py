@@ -27,8 +27,9 @@ from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from itertools import chain
 
-from ..fmu.fmu import Fmu
-from ..messages import star
+from yawbench.fmus.fmu import Fmu
+from yawbench.foundation.messages import star
+
 from ..plan import Wire
 
 Node = tuple[str, str]  # instance, variable

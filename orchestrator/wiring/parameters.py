@@ -15,15 +15,15 @@ from dataclasses import replace
 from functools import cache, lru_cache
 from pathlib import Path
 
-from vocabulary.friction_table import table_of
-from vocabulary.patches import patches_of
-from vocabulary.vehicle import CAR
+from yawbench.fmus.fmu import Fmu, Value, Variable, integer_limits
+from yawbench.foundation.errors import code_of
+from yawbench.foundation.messages import closest, fold, hint, listed, short
+from yawbench.foundation.safe_files import TEXT, read_bytes
+from yawbench.vocabulary.friction_table import table_of
+from yawbench.vocabulary.patches import patches_of
+from yawbench.vocabulary.vehicle import CAR
 
-from ..errors import code_of
-from ..fmu.fmu import Fmu, Value, Variable, integer_limits
-from ..messages import closest, fold, hint, listed, short
 from ..plan import DEFAULT, LITERATURE, VARIED, OriginKind, ValueOrigin, ValueSource
-from ..safe_files import TEXT, read_bytes
 from ..scenario import quantities
 from ..scenario.loader import LoadedScenario
 from ..scenario.schema import TextSpec

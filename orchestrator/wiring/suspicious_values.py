@@ -19,12 +19,12 @@ from functools import lru_cache
 from itertools import product
 from typing import NamedTuple
 
-from vocabulary.roles import without_role
-from vocabulary.vehicle import CAR, DYNAMIC_INDEX
+from yawbench.fmus.fmu import Value, Variable
+from yawbench.foundation.errors import Diagnostic, Location
+from yawbench.foundation.messages import fold, listed
+from yawbench.vocabulary.roles import without_role
+from yawbench.vocabulary.vehicle import CAR, DYNAMIC_INDEX
 
-from ..errors import Diagnostic, Location
-from ..fmu.fmu import Value, Variable
-from ..messages import fold, listed
 from ..plan import DEFAULT, SENSING, Instance, OriginKind, Wire
 from ..scenario.loader import LoadedScenario
 from ..scenario.quantities import exact_text, meant_unit, number_and_unit

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from components.cars.sprung_car import FourteenDofParameters, ride_of
-from components.drivers.sine import Sine
-from components.plants.fourteen_dof import FourteenDof
-from components.tyres.magic_formula import MagicFormula
-from vocabulary.wheels import WHEELS
+from yawbench.components.cars.sprung_car import FourteenDofParameters, ride_of
+from yawbench.components.drivers.sine import Sine
+from yawbench.components.plants.fourteen_dof import FourteenDof
+from yawbench.components.tyres.magic_formula import MagicFormula
+from yawbench.vocabulary.wheels import WHEELS
 
 from .loop import Loop
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from components.fmi.component import Component
-from components.fmi.variables import output
+from yawbench.components.fmi.component import Component
+from yawbench.components.fmi.variables import output
 
 
 class Straight(Component):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from components.tyre_models import bakker_1987, pacejka_2002
+from yawbench.components.tyre_models import bakker_1987, pacejka_2002
 
 
 def forces_and_moment(kappa, alpha, f_z, mu, axle):

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from components.cars.ride import Ride
-from components.cars.sprung_car import FourteenDofParameters, G, ride_of
+from yawbench.components.cars.ride import Ride
+from yawbench.components.cars.sprung_car import FourteenDofParameters, G, ride_of
 
 Vector = np.ndarray[Any, Any]
 

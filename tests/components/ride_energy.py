@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import cos
 
-from components.cars.ride import Ride
+from yawbench.components.cars.ride import Ride
 
 
 def energy(ride: Ride, r: float, y: Sequence[float]) -> float:

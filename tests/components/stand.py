@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from components.fmi.component import Component
+from yawbench.components.fmi.component import Component
 
 
 class Stand:

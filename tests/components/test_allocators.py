@@ -7,11 +7,11 @@ from math import atan
 import numpy as np
 import pytest
 
-from components.allocators.fixed_share import FixedShare
-from components.allocators.load_proportional import LoadProportional
-from components.cars.wheel_kinematics import lever_arms
-from components.control_laws.moment_sharing import share_moment
-from vocabulary.wheels import WHEELS
+from yawbench.components.allocators.fixed_share import FixedShare
+from yawbench.components.allocators.load_proportional import LoadProportional
+from yawbench.components.cars.wheel_kinematics import lever_arms
+from yawbench.components.control_laws.moment_sharing import share_moment
+from yawbench.vocabulary.wheels import WHEELS
 
 from .stand import Stand
 

@@ -10,14 +10,14 @@ import pytest
 from scipy.linalg import expm, solve_continuous_are, solve_discrete_are
 from scipy.optimize import nnls
 
-from components.cars.single_track_car import SingleTrackCar
-from components.control_laws.linear_feedback import error_dynamics, optimal_gains
-from components.control_laws.predictive_law import CostWeights, PredictiveLaw, _discrete
-from components.control_laws.sideslip_bound import sideslip_bound
-from components.controllers.dead_band import DeadBand, beyond
-from components.controllers.lqr import Lqr
-from components.controllers.mpc import Mpc
-from components.mathematics.quadratic_program import inverse, multipliers
+from yawbench.components.cars.single_track_car import SingleTrackCar
+from yawbench.components.control_laws.linear_feedback import error_dynamics, optimal_gains
+from yawbench.components.control_laws.predictive_law import CostWeights, PredictiveLaw, _discrete
+from yawbench.components.control_laws.sideslip_bound import sideslip_bound
+from yawbench.components.controllers.dead_band import DeadBand, beyond
+from yawbench.components.controllers.lqr import Lqr
+from yawbench.components.controllers.mpc import Mpc
+from yawbench.components.mathematics.quadratic_program import inverse, multipliers
 
 from .stand import Stand
 

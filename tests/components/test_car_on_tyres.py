@@ -10,14 +10,14 @@ from math import isfinite, log2, pi, sin
 import numpy as np
 import pytest
 
-from components.drivers.sine import Sine
-from components.fmi.component import Component
-from components.fmi.variables import parameter
-from components.plants.seven_dof import SevenDof, SevenDofParameters
-from components.tyres.dugoff import Dugoff
-from components.tyres.linear import LinearTyre
 from tests.evidence import measured
-from vocabulary.wheels import WHEELS
+from yawbench.components.drivers.sine import Sine
+from yawbench.components.fmi.component import Component
+from yawbench.components.fmi.variables import parameter
+from yawbench.components.plants.seven_dof import SevenDof, SevenDofParameters
+from yawbench.components.tyres.dugoff import Dugoff
+from yawbench.components.tyres.linear import LinearTyre
+from yawbench.vocabulary.wheels import WHEELS
 
 from . import monolith
 from .loop import Loop

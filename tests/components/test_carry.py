@@ -7,14 +7,14 @@ import random
 import numpy as np
 import pytest
 
-from components.cars.resistance import ResistanceParameters
-from components.drivers.sine import Sine
-from components.mathematics.carry import Carried, limited
-from components.plants.eight_dof import EightDof
-from components.plants.fourteen_dof import FourteenDof
-from components.plants.seven_dof import SevenDof
-from components.tyres.dugoff import Dugoff
-from vocabulary.wheels import WHEELS
+from yawbench.components.cars.resistance import ResistanceParameters
+from yawbench.components.drivers.sine import Sine
+from yawbench.components.mathematics.carry import Carried, limited
+from yawbench.components.plants.eight_dof import EightDof
+from yawbench.components.plants.fourteen_dof import FourteenDof
+from yawbench.components.plants.seven_dof import SevenDof
+from yawbench.components.tyres.dugoff import Dugoff
+from yawbench.vocabulary.wheels import WHEELS
 
 from .loop import Loop
 from .stand import Stand

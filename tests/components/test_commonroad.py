@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from components.fmi.component import Component
-from components.fmi.variables import output, parameter
-from components.plants.fourteen_dof import FourteenDof
 from tests.evidence import measured
-from vocabulary.wheels import WHEELS
+from yawbench.components.fmi.component import Component
+from yawbench.components.fmi.variables import output, parameter
+from yawbench.components.plants.fourteen_dof import FourteenDof
+from yawbench.vocabulary.wheels import WHEELS
 
 from .loop import Loop
 

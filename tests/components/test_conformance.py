@@ -11,10 +11,10 @@ from math import isfinite
 
 import pytest
 
-from components.fmi.component import Component
-from fmus.build import find_components
-from vocabulary.vehicle import CAR
-from vocabulary.wheels import wheels
+from yawbench.components.fmi.component import Component
+from yawbench.fmus.build import find_components
+from yawbench.vocabulary.vehicle import CAR
+from yawbench.vocabulary.wheels import wheels
 
 from .stand import Stand
 

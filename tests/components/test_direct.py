@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from components.wheel_controls.direct import Direct
+from yawbench.components.wheel_controls.direct import Direct
 
 from .stand import Stand
 

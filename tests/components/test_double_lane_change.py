@@ -7,8 +7,8 @@ import random
 
 import pytest
 
-from components.drivers.double_lane_change import DoubleLaneChange
-from components.driving.track import LaneChangeParameters, Track
+from yawbench.components.drivers.double_lane_change import DoubleLaneChange
+from yawbench.components.driving.track import LaneChangeParameters, Track
 
 from .stand import Stand
 

@@ -7,8 +7,8 @@ from math import atan, hypot, isfinite, pi, radians, sin, tan
 import numpy as np
 import pytest
 
-from components.tyres.dugoff import Dugoff, dugoff
 from tests.evidence import measured
+from yawbench.components.tyres.dugoff import Dugoff, dugoff
 
 from .monolith import tyre
 from .stand import Stand

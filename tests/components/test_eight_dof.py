@@ -7,15 +7,15 @@ from math import atan, cos, exp, hypot, pi, sin, sqrt, tan
 import numpy as np
 import pytest
 
-from components.cars.rolling_body import G, RollingCarParameters
-from components.cars.wheel_spin import spin
-from components.drivers.sine import Sine
-from components.plants.eight_dof import EightDof
-from components.plants.seven_dof import SevenDof
-from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
-from components.tyres.dugoff import Dugoff
-from components.tyres.magic_formula import MagicFormula
 from tests.evidence import measured
+from yawbench.components.cars.rolling_body import G, RollingCarParameters
+from yawbench.components.cars.wheel_spin import spin
+from yawbench.components.drivers.sine import Sine
+from yawbench.components.plants.eight_dof import EightDof
+from yawbench.components.plants.seven_dof import SevenDof
+from yawbench.components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
+from yawbench.components.tyres.dugoff import Dugoff
+from yawbench.components.tyres.magic_formula import MagicFormula
 
 from . import monolith, monolith_b
 from .loop import Loop

@@ -6,13 +6,13 @@ from math import atan2, sin
 
 import pytest
 
-from components.estimation.dugoff_axle import axle_force
-from components.estimators.kinematic import Kinematic
-from components.estimators.observer import Observer
-from components.estimators.told import Told
-from components.mathematics.low_pass import LowPass
-from components.tyres.dugoff import dugoff
-from vocabulary.wheels import WHEELS
+from yawbench.components.estimation.dugoff_axle import axle_force
+from yawbench.components.estimators.kinematic import Kinematic
+from yawbench.components.estimators.observer import Observer
+from yawbench.components.estimators.told import Told
+from yawbench.components.mathematics.low_pass import LowPass
+from yawbench.components.tyres.dugoff import dugoff
+from yawbench.vocabulary.wheels import WHEELS
 
 from .stand import Stand
 

@@ -8,8 +8,9 @@ import random
 import numpy as np
 import pytest
 
-from components.controllers import fnn
-from components.controllers.fnn import (
+from tests.components.stand import Stand
+from yawbench.components.controllers import fnn
+from yawbench.components.controllers.fnn import (
     CENTRES,
     Fnn,
     firing_strengths,
@@ -17,7 +18,6 @@ from components.controllers.fnn import (
     normalised_grades,
     set_gradients,
 )
-from tests.components.stand import Stand
 
 
 def any_network(seed: int):

@@ -8,17 +8,17 @@ from dataclasses import dataclass
 
 import pytest
 
-from components.allocators.load_proportional import LoadProportional
-from components.controllers.fnn import Fnn
-from components.controllers.fuzzy_sideslip import FuzzySideslip
-from components.controllers.off import Off
-from components.drivers.sine import Sine
-from components.plants.seven_dof import SevenDof
-from components.references.steady_state import SteadyState
-from components.tyres.dugoff import Dugoff
-from components.wheel_controls.direct import Direct
 from tests.components.loop import Loop
-from vocabulary.wheels import WHEELS
+from yawbench.components.allocators.load_proportional import LoadProportional
+from yawbench.components.controllers.fnn import Fnn
+from yawbench.components.controllers.fuzzy_sideslip import FuzzySideslip
+from yawbench.components.controllers.off import Off
+from yawbench.components.drivers.sine import Sine
+from yawbench.components.plants.seven_dof import SevenDof
+from yawbench.components.references.steady_state import SteadyState
+from yawbench.components.tyres.dugoff import Dugoff
+from yawbench.components.wheel_controls.direct import Direct
+from yawbench.vocabulary.wheels import WHEELS
 
 pytestmark = pytest.mark.exhaustive  # the papers' studies check the same on FMUs
 

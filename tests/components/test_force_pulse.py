@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from components.drivers.force_pulse import ForcePulse, ForcePulseParameters, held_steer, pulse_force
+from yawbench.components.drivers.force_pulse import ForcePulse, ForcePulseParameters, held_steer, pulse_force
 
 from .stand import Stand
 

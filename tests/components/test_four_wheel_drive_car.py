@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-from components.actuators.lag import Lag
-from components.allocators.side_share import SideShare
-from components.controllers.fuzzy_sliding_mode import FuzzySlidingMode
-from components.controllers.sliding_mode import SlidingMode
-from components.plants.eight_dof import EightDof
-from components.references.single_track import SingleTrack
-from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
+from yawbench.components.actuators.lag import Lag
+from yawbench.components.allocators.side_share import SideShare
+from yawbench.components.controllers.fuzzy_sliding_mode import FuzzySlidingMode
+from yawbench.components.controllers.sliding_mode import SlidingMode
+from yawbench.components.plants.eight_dof import EightDof
+from yawbench.components.references.single_track import SingleTrack
+from yawbench.components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
 
 from .magic import forces_and_moment
 

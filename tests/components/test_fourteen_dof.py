@@ -7,11 +7,11 @@ from math import atan, cos, isfinite, pi, radians, sin, sqrt, tan
 import numpy as np
 import pytest
 
-from components.cars.sprung_car import G
-from components.plants.fourteen_dof import FourteenDof
-from components.tyres.dugoff import Dugoff
-from components.tyres.magic_formula import MagicFormula
 from tests.evidence import measured
+from yawbench.components.cars.sprung_car import G
+from yawbench.components.plants.fourteen_dof import FourteenDof
+from yawbench.components.tyres.dugoff import Dugoff
+from yawbench.components.tyres.magic_formula import MagicFormula
 
 from .fourteen_dof import (
     FREE,

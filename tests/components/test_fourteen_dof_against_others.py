@@ -8,15 +8,15 @@ from math import log2
 import numpy as np
 import pytest
 
-from components.allocators.single_wheel import SingleWheel
-from components.drivers.ramp import Ramp
-from components.plants.eight_dof import EightDof
-from components.plants.fourteen_dof import FourteenDof
-from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
-from components.tyres.dugoff import Dugoff
-from components.tyres.magic_formula import MagicFormula
-from components.wheel_controls.hydraulic import Hydraulic
 from tests.evidence import measured
+from yawbench.components.allocators.single_wheel import SingleWheel
+from yawbench.components.drivers.ramp import Ramp
+from yawbench.components.plants.eight_dof import EightDof
+from yawbench.components.plants.fourteen_dof import FourteenDof
+from yawbench.components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
+from yawbench.components.tyres.dugoff import Dugoff
+from yawbench.components.tyres.magic_formula import MagicFormula
+from yawbench.components.wheel_controls.hydraulic import Hydraulic
 
 from . import monolith, monolith_c
 from .fourteen_dof import (

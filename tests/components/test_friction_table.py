@@ -7,9 +7,9 @@ import re
 
 import pytest
 
-from components.roads.patchwork import Patchwork
-from vocabulary.friction_table import FrictionTable, table_of
-from vocabulary.wheels import WHEELS
+from yawbench.components.roads.patchwork import Patchwork
+from yawbench.vocabulary.friction_table import FrictionTable, table_of
+from yawbench.vocabulary.wheels import WHEELS
 
 from .stand import Stand
 

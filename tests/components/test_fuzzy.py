@@ -9,9 +9,16 @@ import random
 import numpy as np
 import pytest
 
-from components.mathematics import fuzzy
-from components.mathematics.fuzzy import FIVE, SEVEN, Mamdani, Partition, clipped_pair, gaussian_grades
 from tests.refusals import refused
+from yawbench.components.mathematics import fuzzy
+from yawbench.components.mathematics.fuzzy import (
+    FIVE,
+    SEVEN,
+    Mamdani,
+    Partition,
+    clipped_pair,
+    gaussian_grades,
+)
 
 STANDARD_7X7 = """
     NB NB NB NB NM NS ZO

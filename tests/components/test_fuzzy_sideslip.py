@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from components.controllers.fuzzy_sideslip import FuzzySideslip
 from tests.components.stand import Stand
+from yawbench.components.controllers.fuzzy_sideslip import FuzzySideslip
 
 
 def moment(e: float, rate: float = 0.0, **parameters: float) -> float:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from components.control_laws.sliding_surface import ERRORS
-from components.controllers.fuzzy_sliding_mode import FuzzySlidingMode
-from components.controllers.sliding_mode import SlidingMode
+from yawbench.components.control_laws.sliding_surface import ERRORS
+from yawbench.components.controllers.fuzzy_sliding_mode import FuzzySlidingMode
+from yawbench.components.controllers.sliding_mode import SlidingMode
 
 from .stand import Stand
 

@@ -6,7 +6,7 @@ from math import cos, exp, log2, sin
 
 import pytest
 
-from components.mathematics.integrators import rk4
+from yawbench.components.mathematics.integrators import rk4
 
 
 def oscillate(steps, until=2.0, omega=3.0):

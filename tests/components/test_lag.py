@@ -6,8 +6,8 @@ from math import exp
 
 import pytest
 
-from components.actuators.lag import Lag, blend
-from components.mathematics.first_order_lag import relax
+from yawbench.components.actuators.lag import Lag, blend
+from yawbench.components.mathematics.first_order_lag import relax
 
 from .stand import Stand
 

@@ -6,7 +6,7 @@ from math import hypot, pi
 
 import pytest
 
-from components.tyres.linear import LinearTyre, LinearTyreParameters
+from yawbench.components.tyres.linear import LinearTyre, LinearTyreParameters
 
 from .stand import Stand
 

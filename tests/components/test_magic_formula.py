@@ -10,17 +10,17 @@ from math import atan, cos, degrees, exp, hypot, isfinite, pi, radians, sin, sqr
 import pytest
 from scipy.optimize import minimize_scalar
 
-from components.tyre_models.pacejka_2002 import (
+from tests.components.slopes import slip_stiffness
+from tests.evidence import measured
+from tests.refusals import mentions
+from yawbench.components.tyre_models.pacejka_2002 import (
     lateral_slip,
     longitudinal_curve,
     longitudinal_force,
     practical_slip,
 )
-from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
-from components.tyres.magic_formula import MagicFormula
-from tests.components.slopes import slip_stiffness
-from tests.evidence import measured
-from tests.refusals import mentions
+from yawbench.components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
+from yawbench.components.tyres.magic_formula import MagicFormula
 
 from .magic import forces_and_moment
 from .stand import Stand

@@ -7,10 +7,14 @@ from math import atan, atan2, cos, exp, hypot, isfinite, pi, radians, sin, tan
 
 import pytest
 
-from components.tyre_models.bakker_1987 import MagicFormula1987Parameters, coefficients_1987, loaded_tyre
-from components.tyres.magic_formula_1987 import MagicFormula1987
 from tests.components.slopes import slip_stiffness
 from tests.evidence import measured
+from yawbench.components.tyre_models.bakker_1987 import (
+    MagicFormula1987Parameters,
+    coefficients_1987,
+    loaded_tyre,
+)
+from yawbench.components.tyres.magic_formula_1987 import MagicFormula1987
 
 from .magic import forces_1987
 from .stand import Stand

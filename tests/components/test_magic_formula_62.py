@@ -7,12 +7,12 @@ from math import atan, pi, sin
 import numpy as np
 import pytest
 
-from components.fmi.variables import parameter_variables
-from components.plants.seven_dof import SevenDof
-from components.tyre_models.pacejka_2012_set import COMMON, LONGITUDINAL, REST, Pacejka2012Parameters
-from components.tyres.magic_formula_62 import MagicFormula62
 from tests.evidence import measured
-from vocabulary.wheels import wheels
+from yawbench.components.fmi.variables import parameter_variables
+from yawbench.components.plants.seven_dof import SevenDof
+from yawbench.components.tyre_models.pacejka_2012_set import COMMON, LONGITUDINAL, REST, Pacejka2012Parameters
+from yawbench.components.tyres.magic_formula_62 import MagicFormula62
+from yawbench.vocabulary.wheels import wheels
 
 from . import magic_62
 from .loop import Loop

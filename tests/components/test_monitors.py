@@ -7,8 +7,8 @@ from math import cos, exp, pi, sin
 
 import pytest
 
-from components.monitors.redundancy import ACCELEROMETER, GYRO, HAND_WHEEL, WHEEL, Redundancy
-from vocabulary.gravity import G
+from yawbench.components.monitors.redundancy import ACCELEROMETER, GYRO, HAND_WHEEL, WHEEL, Redundancy
+from yawbench.vocabulary.gravity import G
 
 from .stand import Stand
 

@@ -8,10 +8,10 @@ from math import pi, sin
 import numpy as np
 import pytest
 
-from components.cars.contact_points import contact
-from components.cars.ride import AT_REST, Ride, loads, rates
-from components.cars.sprung_car import FourteenDofParameters, G, ride_of
 from tests.evidence import measured
+from yawbench.components.cars.contact_points import contact
+from yawbench.components.cars.ride import AT_REST, Ride, loads, rates
+from yawbench.components.cars.sprung_car import FourteenDofParameters, G, ride_of
 
 from .multibody import MultiBody, follow, straight_path_forces
 

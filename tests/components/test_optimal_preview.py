@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, solve_discrete_are
 
-from components.cars.single_track_car import SingleTrackCar
-from components.drivers.optimal_preview import (
+from yawbench.components.cars.single_track_car import SingleTrackCar
+from yawbench.components.drivers.optimal_preview import (
     MOST,
     OptimalPreview,
     OptimalPreviewParameters,
     lane_dynamics,
     planned,
 )
-from components.driving import lane_path
-from components.driving.track import Track
-from components.mathematics.linear_equations import solve
-from components.mathematics.preview_control import TrackingLaw, discrete
-from vocabulary.gravity import G
+from yawbench.components.driving import lane_path
+from yawbench.components.driving.track import Track
+from yawbench.components.mathematics.linear_equations import solve
+from yawbench.components.mathematics.preview_control import TrackingLaw, discrete
+from yawbench.vocabulary.gravity import G
 
 from .stand import Stand
 

@@ -8,19 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from components.actuators.lag import Lag
-from components.allocators.load_proportional import LoadProportional
-from components.allocators.side_share import SideShare
-from components.controllers.fuzzy_sliding_mode import FuzzySlidingMode
-from components.controllers.off import Off
-from components.controllers.sliding_mode import SlidingMode
-from components.drivers.sine import Sine
-from components.plants.eight_dof import EightDof
-from components.references.single_track import SingleTrack
-from components.tyres.magic_formula import MagicFormula
-from components.wheel_controls.direct import Direct
-from components.wheel_controls.slip import Slip
-from vocabulary.wheels import WHEELS
+from yawbench.components.actuators.lag import Lag
+from yawbench.components.allocators.load_proportional import LoadProportional
+from yawbench.components.allocators.side_share import SideShare
+from yawbench.components.controllers.fuzzy_sliding_mode import FuzzySlidingMode
+from yawbench.components.controllers.off import Off
+from yawbench.components.controllers.sliding_mode import SlidingMode
+from yawbench.components.drivers.sine import Sine
+from yawbench.components.plants.eight_dof import EightDof
+from yawbench.components.references.single_track import SingleTrack
+from yawbench.components.tyres.magic_formula import MagicFormula
+from yawbench.components.wheel_controls.direct import Direct
+from yawbench.components.wheel_controls.slip import Slip
+from yawbench.vocabulary.wheels import WHEELS
 
 from .loop import Loop
 

@@ -7,8 +7,8 @@ from math import pi, radians, sin
 
 import pytest
 
-from components.estimation.steered_track import SteeredTrack
-from components.monitors.parity import (
+from yawbench.components.estimation.steered_track import SteeredTrack
+from yawbench.components.monitors.parity import (
     ACCELEROMETER,
     GYRO,
     HAND_WHEEL,
@@ -17,7 +17,7 @@ from components.monitors.parity import (
     Parity,
     ParityParameters,
 )
-from vocabulary.gravity import G
+from yawbench.vocabulary.gravity import G
 
 from .stand import Stand
 

@@ -8,9 +8,9 @@ from math import atan2, pi, radians, sin
 
 import pytest
 
-from components.roads.patchwork import Patchwork, inclination, section
-from vocabulary.patches import friction_at, patches_of
-from vocabulary.wheels import WHEELS
+from yawbench.components.roads.patchwork import Patchwork, inclination, section
+from yawbench.vocabulary.patches import friction_at, patches_of
+from yawbench.vocabulary.wheels import WHEELS
 
 from .stand import Stand
 from .test_conformance import mirrored

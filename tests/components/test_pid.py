@@ -6,10 +6,10 @@ import math
 
 import pytest
 
-from components.controllers.fuzzy_feedback import FuzzyFeedback
-from components.controllers.fuzzy_pid import FuzzyPid, FuzzyPidParameters, GainSchedule
-from components.controllers.pid import PidController
-from components.mathematics.pid_loop import Gains, Pid
+from yawbench.components.controllers.fuzzy_feedback import FuzzyFeedback
+from yawbench.components.controllers.fuzzy_pid import FuzzyPid, FuzzyPidParameters, GainSchedule
+from yawbench.components.controllers.pid import PidController
+from yawbench.components.mathematics.pid_loop import Gains, Pid
 
 from .stand import Stand
 

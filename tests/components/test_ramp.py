@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from components.drivers.ramp import Ramp
-from components.drivers.sine import Sine
+from yawbench.components.drivers.ramp import Ramp
+from yawbench.components.drivers.sine import Sine
 
 from .stand import Stand
 

@@ -6,8 +6,8 @@ import random
 
 import pytest
 
-from components.allocators.releasing import release_and_brake
-from components.cars.wheel_kinematics import lever_arms
+from yawbench.components.allocators.releasing import release_and_brake
+from yawbench.components.cars.wheel_kinematics import lever_arms
 
 CAR = {"a": 1.4, "half_track": 0.8}
 

@@ -8,10 +8,10 @@ from math import cos, pi, sin, sqrt
 import numpy as np
 import pytest
 
-from components.cars.contact_points import contact, contact_velocities
-from components.cars.ride import AT_REST, RESOLVED, loads, move_ride, rates
-from components.cars.sprung_car import FourteenDofParameters, G, ride_of
 from tests.refusals import refused
+from yawbench.components.cars.contact_points import contact, contact_velocities
+from yawbench.components.cars.ride import AT_REST, RESOLVED, loads, move_ride, rates
+from yawbench.components.cars.sprung_car import FourteenDofParameters, G, ride_of
 
 from . import monolith_c
 from .ride_energy import energy

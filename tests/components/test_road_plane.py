@@ -6,15 +6,15 @@ from math import cos, radians, sin, sqrt
 
 import pytest
 
-from components.cars.road_plane import LEVEL, pull_of
-from components.plants.eight_dof import EightDof
-from components.plants.fourteen_dof import FourteenDof
-from components.plants.seven_dof import SevenDof
-from components.plants.two_dof import TwoDof
-from components.roads.patchwork import Patchwork
-from components.tyres.magic_formula_62_transient import MagicFormula62Transient
-from vocabulary.gravity import G
-from vocabulary.wheels import WHEELS
+from yawbench.components.cars.road_plane import LEVEL, pull_of
+from yawbench.components.plants.eight_dof import EightDof
+from yawbench.components.plants.fourteen_dof import FourteenDof
+from yawbench.components.plants.seven_dof import SevenDof
+from yawbench.components.plants.two_dof import TwoDof
+from yawbench.components.roads.patchwork import Patchwork
+from yawbench.components.tyres.magic_formula_62_transient import MagicFormula62Transient
+from yawbench.vocabulary.gravity import G
+from yawbench.vocabulary.wheels import WHEELS
 
 from .loop import Loop
 from .stand import Stand

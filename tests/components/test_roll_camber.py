@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from components.plants.eight_dof import EightDof
-from components.plants.fourteen_dof import FourteenDof
-from components.tyres.magic_formula_62 import MagicFormula62
 from tests.components.test_transient_tyre import SYMMETRIC
-from vocabulary.wheels import WHEELS, wheels
+from yawbench.components.plants.eight_dof import EightDof
+from yawbench.components.plants.fourteen_dof import FourteenDof
+from yawbench.components.tyres.magic_formula_62 import MagicFormula62
+from yawbench.vocabulary.wheels import WHEELS, wheels
 
 from .loop import Loop
 from .stand import Stand

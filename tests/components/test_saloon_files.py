@@ -7,14 +7,18 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-from components.drivers.sine import Sine
-from components.plants.fourteen_dof import FourteenDof
-from components.plants.two_dof import TwoDof
-from components.references.single_track import SingleTrack
-from components.tyre_models.bakker_1987 import MagicFormula1987Parameters, coefficients_1987, loaded_tyre
-from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
-from components.tyres.magic_formula import MagicFormula
-from components.tyres.magic_formula_1987 import MagicFormula1987
+from yawbench.components.drivers.sine import Sine
+from yawbench.components.plants.fourteen_dof import FourteenDof
+from yawbench.components.plants.two_dof import TwoDof
+from yawbench.components.references.single_track import SingleTrack
+from yawbench.components.tyre_models.bakker_1987 import (
+    MagicFormula1987Parameters,
+    coefficients_1987,
+    loaded_tyre,
+)
+from yawbench.components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
+from yawbench.components.tyres.magic_formula import MagicFormula
+from yawbench.components.tyres.magic_formula_1987 import MagicFormula1987
 
 from .magic import forces_and_moment
 

@@ -8,12 +8,12 @@ from statistics import correlation, fmean, pstdev
 
 import pytest
 
-from components.sensing.channel import Channel, ChannelSpec
-from components.sensing.cluster_parameters import CHANNELS
-from components.sensing.noise import key, normal, uniform
-from components.sensors.ideal import Ideal
-from components.sensors.poor import POOR, Poor
-from components.sensors.production import PRODUCTION, Production
+from yawbench.components.sensing.channel import Channel, ChannelSpec
+from yawbench.components.sensing.cluster_parameters import CHANNELS
+from yawbench.components.sensing.noise import key, normal, uniform
+from yawbench.components.sensors.ideal import Ideal
+from yawbench.components.sensors.poor import POOR, Poor
+from yawbench.components.sensors.production import PRODUCTION, Production
 
 from .stand import Stand
 

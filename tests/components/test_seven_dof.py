@@ -7,9 +7,9 @@ from math import atan2, cos, isfinite, sin
 import numpy as np
 import pytest
 
-from components.cars.load_transfer import quasi_static_loads
-from components.plants.seven_dof import SevenDof, SevenDofParameters
-from vocabulary.wheels import WHEELS
+from yawbench.components.cars.load_transfer import quasi_static_loads
+from yawbench.components.plants.seven_dof import SevenDof, SevenDofParameters
+from yawbench.vocabulary.wheels import WHEELS
 
 from .stand import Stand
 

@@ -6,10 +6,10 @@ import random
 
 import pytest
 
-from components.allocators.load_proportional import LoadProportional
-from components.allocators.side_share import SideShare
-from components.cars.wheel_kinematics import lever_arms
-from components.control_laws.side_forces import SIDE_FORCES
+from yawbench.components.allocators.load_proportional import LoadProportional
+from yawbench.components.allocators.side_share import SideShare
+from yawbench.components.cars.wheel_kinematics import lever_arms
+from yawbench.components.control_laws.side_forces import SIDE_FORCES
 
 from .stand import Stand
 

@@ -6,9 +6,13 @@ from math import exp, pi, sin
 
 import pytest
 
-from components.drivers.sine import Sine, SineParameters, sine_steer
-from components.drivers.sine_sweep import SineSweepParameters, sweep
-from components.drivers.sine_with_dwell import SineWithDwell, SineWithDwellParameters, sine_with_dwell
+from yawbench.components.drivers.sine import Sine, SineParameters, sine_steer
+from yawbench.components.drivers.sine_sweep import SineSweepParameters, sweep
+from yawbench.components.drivers.sine_with_dwell import (
+    SineWithDwell,
+    SineWithDwellParameters,
+    sine_with_dwell,
+)
 
 from .stand import Stand
 

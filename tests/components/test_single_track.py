@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from components.cars.single_track_car import SingleTrackCar
-from components.references.single_track import G, SingleTrack, SingleTrackParameters
-from components.references.steady_state import SteadyState
+from yawbench.components.cars.single_track_car import SingleTrackCar
+from yawbench.components.references.single_track import G, SingleTrack, SingleTrackParameters
+from yawbench.components.references.steady_state import SteadyState
 
 from .stand import Stand
 

@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from components.allocators.single_wheel import FL, FR, RL, RR, SingleWheel, chosen_wheel
-from components.cars.wheel_kinematics import lever_arms
-from components.wheel_controls.hydraulic import Hydraulic, HydraulicParameters, asked_pressure
+from yawbench.components.allocators.single_wheel import FL, FR, RL, RR, SingleWheel, chosen_wheel
+from yawbench.components.cars.wheel_kinematics import lever_arms
+from yawbench.components.wheel_controls.hydraulic import Hydraulic, HydraulicParameters, asked_pressure
 
 from .stand import Stand
 

@@ -6,8 +6,8 @@ import random
 
 import pytest
 
-from components.control_laws.sliding_surface import ERRORS, saturation, sign
-from components.controllers.sliding_mode import SlidingMode
+from yawbench.components.control_laws.sliding_surface import ERRORS, saturation, sign
+from yawbench.components.controllers.sliding_mode import SlidingMode
 
 from .stand import Stand
 

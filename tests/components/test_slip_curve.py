@@ -8,14 +8,14 @@ from math import sin
 import pytest
 from scipy.optimize import brentq
 
-from components.tyre_models.slip_curve import slip_for_force
-from components.tyres.dugoff import Dugoff
-from components.tyres.linear import LinearTyre
-from components.tyres.magic_formula import MagicFormula
-from components.tyres.magic_formula_62 import MagicFormula62
-from components.tyres.magic_formula_1987 import MagicFormula1987
-from components.wheel_controls.slip import TYRES as KNOWN
-from components.wheel_controls.slip import SlipParameters
+from yawbench.components.tyre_models.slip_curve import slip_for_force
+from yawbench.components.tyres.dugoff import Dugoff
+from yawbench.components.tyres.linear import LinearTyre
+from yawbench.components.tyres.magic_formula import MagicFormula
+from yawbench.components.tyres.magic_formula_62 import MagicFormula62
+from yawbench.components.tyres.magic_formula_1987 import MagicFormula1987
+from yawbench.components.wheel_controls.slip import TYRES as KNOWN
+from yawbench.components.wheel_controls.slip import SlipParameters
 
 from .slopes import slip_stiffness
 from .stand import Stand

@@ -7,11 +7,11 @@ from itertools import product
 import numpy as np
 import pytest
 
-from components.tyres.dugoff import Dugoff, dugoff
-from components.tyres.linear import LinearTyre
-from components.tyres.magic_formula import MagicFormula
-from components.tyres.magic_formula_62 import MagicFormula62
-from components.tyres.magic_formula_1987 import MagicFormula1987
+from yawbench.components.tyres.dugoff import Dugoff, dugoff
+from yawbench.components.tyres.linear import LinearTyre
+from yawbench.components.tyres.magic_formula import MagicFormula
+from yawbench.components.tyres.magic_formula_62 import MagicFormula62
+from yawbench.components.tyres.magic_formula_1987 import MagicFormula1987
 
 from .stand import Stand
 

@@ -7,9 +7,9 @@ from math import isfinite, pi, sin
 
 import pytest
 
-from components.cars.single_track_car import SingleTrackCar
-from components.references.single_track import SingleTrack
-from components.references.steady_state import SteadyState, SteadyStateParameters, steady_state
+from yawbench.components.cars.single_track_car import SingleTrackCar
+from yawbench.components.references.single_track import SingleTrack
+from yawbench.components.references.steady_state import SteadyState, SteadyStateParameters, steady_state
 
 from .stand import Stand
 

@@ -6,7 +6,7 @@ from math import exp
 
 import pytest
 
-from components.drivers.steady_turn import SteadyTurn
+from yawbench.components.drivers.steady_turn import SteadyTurn
 
 from .stand import Stand
 

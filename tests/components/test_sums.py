@@ -5,8 +5,8 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
-import components
-from components.mathematics.sums import added, dot
+from yawbench import components
+from yawbench.components.mathematics.sums import added, dot
 
 WHOLE = {"self.rolling", "self.lost"}
 """Lists of booleans, whose sums are whole numbers."""

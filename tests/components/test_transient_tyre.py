@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from components.cars.wheel_kinematics import slip_angle, slip_ratio
-from components.plants.fourteen_dof import FourteenDof
-from components.plants.seven_dof import SevenDof
-from components.tyre_models.pacejka_2012_set import COMMON, LONGITUDINAL, REST
-from components.tyre_models.relaxation import deflected, gripped
-from components.tyres.magic_formula_62 import MagicFormula62
-from components.tyres.magic_formula_62_transient import MagicFormula62Transient
-from vocabulary.wheels import wheels
+from yawbench.components.cars.wheel_kinematics import slip_angle, slip_ratio
+from yawbench.components.plants.fourteen_dof import FourteenDof
+from yawbench.components.plants.seven_dof import SevenDof
+from yawbench.components.tyre_models.pacejka_2012_set import COMMON, LONGITUDINAL, REST
+from yawbench.components.tyre_models.relaxation import deflected, gripped
+from yawbench.components.tyres.magic_formula_62 import MagicFormula62
+from yawbench.components.tyres.magic_formula_62_transient import MagicFormula62Transient
+from yawbench.vocabulary.wheels import wheels
 
 from .loop import Loop
 from .stand import Stand

@@ -10,17 +10,21 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from components.cars.load_transfer import quasi_static_loads
-from components.drivers.sine import Sine
-from components.fmi.component import Component
-from components.fmi.variables import parameter
-from components.plants.two_dof import TwoDof, TwoDofParameters
-from components.tyre_models.bakker_1987 import MagicFormula1987Parameters, coefficients_1987, loaded_tyre
-from components.tyres.linear import LinearTyre
-from components.tyres.magic_formula_1987 import MagicFormula1987
 from tests.evidence import measured
-from vocabulary.roles import ROLES
-from vocabulary.wheels import WHEELS, wheels
+from yawbench.components.cars.load_transfer import quasi_static_loads
+from yawbench.components.drivers.sine import Sine
+from yawbench.components.fmi.component import Component
+from yawbench.components.fmi.variables import parameter
+from yawbench.components.plants.two_dof import TwoDof, TwoDofParameters
+from yawbench.components.tyre_models.bakker_1987 import (
+    MagicFormula1987Parameters,
+    coefficients_1987,
+    loaded_tyre,
+)
+from yawbench.components.tyres.linear import LinearTyre
+from yawbench.components.tyres.magic_formula_1987 import MagicFormula1987
+from yawbench.vocabulary.roles import ROLES
+from yawbench.vocabulary.wheels import WHEELS, wheels
 
 from .loop import Loop
 from .magic import forces_1987

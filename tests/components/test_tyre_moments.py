@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from components.plants.eight_dof import EightDof
-from components.plants.fourteen_dof import FourteenDof
-from components.plants.seven_dof import SevenDof
-from components.plants.two_dof import TwoDof
-from vocabulary.wheels import wheels
+from yawbench.components.plants.eight_dof import EightDof
+from yawbench.components.plants.fourteen_dof import FourteenDof
+from yawbench.components.plants.seven_dof import SevenDof
+from yawbench.components.plants.two_dof import TwoDof
+from yawbench.vocabulary.wheels import wheels
 
 from .stand import Stand
 

@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-from components.allocators.fixed_share import FixedShare
-from components.allocators.load_proportional import LoadProportional
-from components.plants.seven_dof import SevenDof
-from components.references.steady_state import SteadyState
-from components.tyres.dugoff import Dugoff
-from components.tyres.linear import LinearTyre
-from components.wheel_controls.direct import Direct
+from yawbench.components.allocators.fixed_share import FixedShare
+from yawbench.components.allocators.load_proportional import LoadProportional
+from yawbench.components.plants.seven_dof import SevenDof
+from yawbench.components.references.steady_state import SteadyState
+from yawbench.components.tyres.dugoff import Dugoff
+from yawbench.components.tyres.linear import LinearTyre
+from yawbench.components.wheel_controls.direct import Direct
 
 CAR = Path(__file__).parents[2] / "scenarios" / "vehicles" / "in_wheel_motor_car.yaml"
 UNITS = (SteadyState, LoadProportional, FixedShare, Direct, SevenDof, Dugoff, LinearTyre)

@@ -7,16 +7,16 @@ from math import log2
 import numpy as np
 import pytest
 
-from components.drivers.sine import Sine
-from components.plants.eight_dof import EightDof
-from components.plants.fourteen_dof import FourteenDof
-from components.plants.seven_dof import SevenDof
-from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
-from components.tyres.dugoff import Dugoff
-from components.tyres.linear import LinearTyre
-from components.tyres.magic_formula import MagicFormula
-from components.tyres.magic_formula_1987 import MagicFormula1987
-from vocabulary.wheels import WHEELS
+from yawbench.components.drivers.sine import Sine
+from yawbench.components.plants.eight_dof import EightDof
+from yawbench.components.plants.fourteen_dof import FourteenDof
+from yawbench.components.plants.seven_dof import SevenDof
+from yawbench.components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
+from yawbench.components.tyres.dugoff import Dugoff
+from yawbench.components.tyres.linear import LinearTyre
+from yawbench.components.tyres.magic_formula import MagicFormula
+from yawbench.components.tyres.magic_formula_1987 import MagicFormula1987
+from yawbench.vocabulary.wheels import WHEELS
 
 from . import monolith, monolith_b
 from .loop import Loop

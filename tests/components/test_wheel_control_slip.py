@@ -7,12 +7,12 @@ from math import isfinite, pi, sin
 
 import pytest
 
-from components.control_laws.slip_control import SlipControlParameters, slip_torque, wheel_torque
-from components.plants.eight_dof import EightDof
-from components.tyre_models.slip_curve import slip_for_force
-from components.tyres.magic_formula import MagicFormula
-from components.wheel_controls.direct import Direct
-from components.wheel_controls.slip import Slip, SlipParameters
+from yawbench.components.control_laws.slip_control import SlipControlParameters, slip_torque, wheel_torque
+from yawbench.components.plants.eight_dof import EightDof
+from yawbench.components.tyre_models.slip_curve import slip_for_force
+from yawbench.components.tyres.magic_formula import MagicFormula
+from yawbench.components.wheel_controls.direct import Direct
+from yawbench.components.wheel_controls.slip import Slip, SlipParameters
 
 from .loop import Loop, Straight
 from .stand import Stand

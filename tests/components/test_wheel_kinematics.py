@@ -7,14 +7,14 @@ from math import atan2, cos, hypot, isfinite, pi, radians, sin
 import numpy as np
 import pytest
 
-from components.cars.wheel_kinematics import (
+from yawbench.components.cars.wheel_kinematics import (
     earth_velocity,
     lever_arms,
     slip_angle,
     slip_ratio,
     wheel_velocities,
 )
-from components.plants.seven_dof import SevenDofParameters
+from yawbench.components.plants.seven_dof import SevenDofParameters
 
 CAR = SevenDofParameters()
 A, B, HALF = CAR.cg_to_front_axle, CAR.cg_to_rear_axle, 0.5 * CAR.track_width

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from components.cars.wheel_spin import spin
+from yawbench.components.cars.wheel_spin import spin
 
 R, J, LOW = 0.31, 2.0, 0.5
 WHEEL = {"radius": R, "inertia": J, "stiffness": 0.0, "v_low": LOW, "resistance": 0.0}

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from components.wheel_controls.slip import TYRES as KNOWN
-from components.wheel_controls.slip import SlipParameters
+from yawbench.components.wheel_controls.slip import TYRES as KNOWN
+from yawbench.components.wheel_controls.slip import SlipParameters
 
 CAP, SHARE = 0.25, 0.95
 SHALLOW = 0.01  # a dip that the search may pass over

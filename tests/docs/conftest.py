@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import HERE, build_all
 from tests.checkout import ROOT
+from yawbench.fmus.build import HERE, build_all
 
 
 @pytest.fixture(scope="session")

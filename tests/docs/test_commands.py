@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import pytest
 
-from fmus.build import HERE, build_all
 from tests.checkout import ROOT, copy_checkout, run_in
+from yawbench.fmus.build import HERE, build_all
 
 PAGES = [
     "docs/tutorial.md",

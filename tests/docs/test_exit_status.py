@@ -10,11 +10,11 @@ import pytest
 
 import yawbench as yb
 from docs.generate import library
-from fmus.build import build_component
 from tests.checkout import ROOT
 from tests.commands import status_of
 from tests.orchestrator.test_batch_commands import SCENARIO, STUDY
 from tests.orchestrator.test_validation import line
+from yawbench.fmus.build import build_component
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
 PAGE = ROOT / "docs/running.md"
@@ -85,14 +85,14 @@ def test_commands_end_with_the_status_that_the_page_tells(
 
 def test_a_failed_run_ends_with_1_and_an_interrupted_one_with_130(folder, fmus, tmp_path, monkeypatch):
     (tmp_path / "controller_law.py").write_text(
-        "from components.fmi.component import Component\n\n\n"
+        "from yawbench.components.fmi.component import Component\n\n\n"
         'class Law(Component):\n    """Fails."""\n\n    inputs = ("yaw_rate_ref",)\n'
         '    outputs = ("yaw_moment",)\n\n    def output(self, t, u):\n        return (1.0 / (t < 0.2),)\n'
     )
     fmu = build_component(tmp_path / "controller_law.py", tmp_path)
     assert status_of("run", "half.yaml", "--fmus", fmus, "--swap", f"controller={fmu}") == 1
     assert "a run" in statuses()[1]
-    monkeypatch.setattr("orchestrator.commands.build.list", _interrupted)
+    monkeypatch.setattr("yawbench.commands.build.list", _interrupted)
     assert status_of("list") == 130
     assert set(statuses()) == {0, 1, 2, 130, 143}
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from docs.generate.__main__ import DOCS, PAGES, text_of
-from fmus.build import HERE, build_all
 from tests.checkout import ROOT
+from yawbench.fmus.build import HERE, build_all
 
 _LINK = re.compile(r'\[(?:[^\[\]]|\[[^\]]*\])*\]\(<?([^)\s>]+)>?(?: "[^"]*")?\)|(?:src|href)="([^"]+)"')
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import yawbench as yb
-from orchestrator.evaluation.validation import load_bands
-from orchestrator.experiments.fit import load_fit
 from tests.checkout import ROOT
 from tests.refusals import mentions
+from yawbench.measured_cars.fit import load_fit
+from yawbench.measured_cars.validation import load_bands
 
 PLACE = ROOT / "notebooks" / "ferrari_250_lm"
 FILES = ("delta", "vx", "yawRate", "axCG", "ayCG", "beta_true")

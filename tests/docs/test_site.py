@@ -13,15 +13,15 @@ import typer
 from docs.generate import schemas
 from docs.generate.formulas import to_mathml
 from docs.generate.text import docstring, table
-from fmus.build import find_components
-from orchestrator.cli import _application
-from orchestrator.experiments.schema import ExperimentSpec
-from orchestrator.fmu.archive import open_fmu
-from orchestrator.messages import fold
-from orchestrator.metrics.measures import MEASURES
-from orchestrator.scenario.schema import ScenarioSpec
 from tests.checkout import ROOT
-from vocabulary.signals import SIGNALS
+from yawbench.cli import _application
+from yawbench.fmus.archive import open_fmu
+from yawbench.fmus.build import find_components
+from yawbench.foundation.messages import fold
+from yawbench.metrics.measures import MEASURES
+from yawbench.orchestrator.scenario.schema import ScenarioSpec
+from yawbench.studies.schema import ExperimentSpec
+from yawbench.vocabulary.signals import SIGNALS
 
 
 class Page(HTMLParser):

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import HERE as FMUS
-from fmus.build import build_all, build_component
 from tests.fmus.bare import Fmu
+from yawbench.fmus.build import HERE as FMUS
+from yawbench.fmus.build import build_all, build_component
 
 TESTS = Path(__file__).resolve().parent
 

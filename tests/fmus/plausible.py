@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Iterable
 
-from fmus.usual_ranges import pattern_of, usual_range
+from yawbench.fmus.usual_ranges import pattern_of, usual_range
 
 _SPEEDS = {"velocity_x", "wheel_speed_*", "wheel_velocity_*"}
 

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import HERE as FMUS
-from fmus.c.c_recipe import TO_WINDOWS
 from tests.fmus.bare import Fmu, Unit
 from tests.fmus.plausible import plausible
+from yawbench.fmus.build import HERE as FMUS
+from yawbench.fmus.c.c_recipe import TO_WINDOWS
 
 WINE = shutil.which("wine64") or next(map(str, Path("/usr/lib/wine").glob("wine64")), None)
 in_windows = pytest.mark.skipif(

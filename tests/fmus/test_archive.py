@@ -19,20 +19,20 @@ from fmpy.util import read_csv, read_ref_opt_file
 from fmpy.validation import validate_fmu
 from lxml import html
 
-from fmus import compiler
-from fmus.build import COMPONENTS, build_all, build_component, find_components, put
-from fmus.build import HERE as FMUS
-from fmus.build_stamp import read_stamp
-from fmus.check import reference_files
-from fmus.compiler import compile_launcher
-from fmus.packing import to_bytes
-from fmus.reference_result import FOLDER
-from orchestrator.cache import content_of
-from orchestrator.errors import BuildError
-from orchestrator.fmu.archive import open_fmu
-from orchestrator.plan import Instance
 from tests.refusals import each_mentions, mentions, refused, texts_of
-from vocabulary.roles import ROLES, role_in
+from yawbench.fmus import compiler
+from yawbench.fmus.archive import open_fmu
+from yawbench.fmus.build import COMPONENTS, build_all, build_component, find_components, put
+from yawbench.fmus.build import HERE as FMUS
+from yawbench.fmus.build_stamp import read_stamp
+from yawbench.fmus.check import reference_files
+from yawbench.fmus.compiler import compile_launcher
+from yawbench.fmus.packing import to_bytes
+from yawbench.fmus.reference_result import FOLDER
+from yawbench.foundation.cache import content_of
+from yawbench.foundation.errors import BuildError
+from yawbench.orchestrator.plan import Instance
+from yawbench.vocabulary.roles import ROLES, role_in
 
 NAMES = list(find_components())
 SOME = ["controller_off", "driver_sine", "tyre_linear"]
@@ -168,7 +168,7 @@ def test_the_same_sources_give_the_same_bytes_in_another_process(tmp_path):
     """With another hash seed, so no order of a set or dictionary leaks into the archive."""
     here, there = tmp_path / "here", tmp_path / "there"
     build_all(here, components=SOME)
-    script = f"from fmus.build import *; build_all(Path({str(there)!r}), components={SOME})"
+    script = f"from yawbench.fmus.build import *; build_all(Path({str(there)!r}), components={SOME})"
     environment = os.environ | {"PYTHONHASHSEED": "1"}
     subprocess.run([sys.executable, "-c", script], env=environment, cwd=COMPONENTS.parent, check=True)
     for name in SOME:
@@ -189,7 +189,7 @@ def test_the_launcher_compiles_to_the_same_bytes_again(tmp_path, monkeypatch):
     made = []
     for cache in ("a", "b"):
         monkeypatch.setattr(
-            "orchestrator.cache.cache_folders", lambda folder=tmp_path / cache: iter([folder])
+            "yawbench.foundation.cache.cache_folders", lambda folder=tmp_path / cache: iter([folder])
         )
         compiler._launcher.cache_clear()
         made.append(compile_launcher()[0])
@@ -203,7 +203,7 @@ def test_the_launcher_compiles_to_the_same_bytes_again(tmp_path, monkeypatch):
 @pytest.mark.usefixtures("quick_launcher")
 def test_a_damaged_launcher_in_the_cache_is_compiled_anew(harm, tmp_path, monkeypatch):
     """Believed, it would end the build with SIGBUS, or have every FMU fail."""
-    monkeypatch.setattr("orchestrator.cache.cache_folders", lambda: iter([tmp_path]))
+    monkeypatch.setattr("yawbench.foundation.cache.cache_folders", lambda: iter([tmp_path]))
     good = compile_launcher()[0]
     (kept,) = tmp_path.glob("launcher/*")
     kept.write_bytes(harm(good))

@@ -10,12 +10,12 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from fmus.build import find_recipes
-from orchestrator.commands.build import build
-from orchestrator.errors import BuildError
-from orchestrator.safe_files import claim
-from orchestrator.workers import Pool
 from tests.refusals import each_mentions, mentions
+from yawbench.commands.build import build
+from yawbench.fmus.build import find_recipes
+from yawbench.foundation.errors import BuildError
+from yawbench.foundation.safe_files import claim
+from yawbench.foundation.workers import Pool
 
 APP = typer.Typer()
 APP.command()(build)
@@ -40,7 +40,7 @@ class Backwards(Pool):
 
 
 def test_it_names_what_is_built_in_the_order_asked_for_whichever_takes_longer(tmp_path, monkeypatch):
-    monkeypatch.setattr("fmus.build.Pool", Backwards)
+    monkeypatch.setattr("yawbench.fmus.build.Pool", Backwards)
     done = run("controller_off", "driver_sine", "--out", tmp_path)
     assert each_mentions(done.stderr, ("controller_off", "built"), ("driver_sine", "built"))
 
@@ -67,7 +67,7 @@ def test_a_name_that_is_no_component_is_wrong_input(tmp_path):
 def test_a_python_file_from_anywhere_can_be_named(tmp_path):
     file = tmp_path / "controller_zero.py"
     file.write_text(
-        "from components.fmi.component import Component\n\n\n"
+        "from yawbench.components.fmi.component import Component\n\n\n"
         'class Zero(Component):\n    """Nothing."""\n\n    outputs = ("yaw_moment",)\n\n'
         "    def output(self, t, u):\n        return (0.0,)\n"
     )
@@ -84,7 +84,7 @@ def test_a_component_that_cannot_be_built_ends_with_status_1_and_one_sentence(tm
     assert isinstance(error, BuildError)
     assert error.exit_status == 1
     assert str(error).startswith("controller_bad: ")
-    command = [sys.executable, "-m", "orchestrator.cli", "build", str(file), "--out", str(tmp_path / "out")]
+    command = [sys.executable, "-m", "yawbench", "build", str(file), "--out", str(tmp_path / "out")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert mentions(done.stderr, "standard", "library")
@@ -100,9 +100,9 @@ def test_without_a_compiler_it_warns(tmp_path, monkeypatch):
     assert mentions(done.stderr, "no-such-compiler", "compiler")
 
 
-@pytest.mark.parametrize("what", ["orchestrator.commands.build", "orchestrator.cli"])
+@pytest.mark.parametrize("what", ["yawbench.commands.build", "yawbench.cli"])
 def test_the_builder_is_loaded_only_when_it_is_needed(what):
-    script = f"import sys, {what}; print('fmus.build' in sys.modules or 'pythonfmu' in sys.modules)"
+    script = f"import sys, {what}; print('yawbench.fmus.build' in sys.modules or 'pythonfmu' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"
 

@@ -10,14 +10,14 @@ import sys
 
 import pytest
 
-from fmus import check
-from fmus.build import COMPONENTS, build_all, build_component
-from fmus.check import defects
-from orchestrator.errors import BuildError, ModelDescriptionError
-from orchestrator.fmu.opener import Opener, host_needs
 from tests.fmus.bare import Fmu, Unit
 from tests.orchestrator.fake_fmus import make_fmu
 from tests.refusals import each_mentions, mentions, refused, texts_of
+from yawbench.fmus import check
+from yawbench.fmus.build import COMPONENTS, build_all, build_component
+from yawbench.fmus.check import defects
+from yawbench.fmus.opener import Opener, host_needs
+from yawbench.foundation.errors import BuildError, ModelDescriptionError
 
 GOOD = '''"""A controller."""
 
@@ -25,8 +25,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from components.fmi.component import Component
-from components.fmi.variables import parameter
+from yawbench.components.fmi.component import Component
+from yawbench.components.fmi.variables import parameter
 
 
 @dataclass(frozen=True)
@@ -203,33 +203,39 @@ def test_an_import_that_only_type_checkers_see_is_allowed(tmp_path):
 
 def test_an_import_of_the_whole_package_says_how_to_write_it(attempt):
     (problem,) = attempt(
-        ("from components.fmi.component import Component", "import components.fmi.component")
+        (
+            "from yawbench.components.fmi.component import Component",
+            "import yawbench.components.fmi.component",
+        )
     )
     assert mentions(
-        problem, "controller_idea", "controllers/idea.py:7", "'from components.fmi.component import ...'"
+        problem,
+        "controller_idea",
+        "controllers/idea.py:7",
+        "'from yawbench.components.fmi.component import ...'",
     )
 
 
 def test_a_module_that_does_not_exist_is_named_with_the_line(attempt):
-    (problem,) = attempt(("components.fmi.variables", "components.fmi.variable"))
+    (problem,) = attempt(("yawbench.components.fmi.variables", "yawbench.components.fmi.variable"))
     assert mentions(problem, "controller_idea", "controllers/idea.py:8", "fmi.variable", "components", "fmi")
 
 
 def test_a_module_that_stands_in_another_room_is_pointed_to(attempt):
-    (problem,) = attempt(("components.fmi.variables", "components.core.variables"))
+    (problem,) = attempt(("yawbench.components.fmi.variables", "components.core.variables"))
     assert mentions(
         problem,
         "controller_idea",
         "controllers/idea.py:8",
         "core.variables",
         "components",
-        "components.fmi.variables",
+        "yawbench.components.fmi.variables",
         "core",
     )
 
 
 def test_an_import_beyond_the_package_is_refused(attempt):
-    (problem,) = attempt(("from components.fmi.component", "from ....fmi.component"))
+    (problem,) = attempt(("from yawbench.components.fmi.component", "from ....fmi.component"))
     assert mentions(problem, "controller_idea", "controllers/idea.py:7")
 
 
@@ -325,9 +331,13 @@ def test_a_file_without_a_role_or_that_does_not_exist_is_an_error(tmp_path):
 def test_a_file_from_anywhere_becomes_an_fmu_with_its_neighbours(tmp_path, unpack, place):
     file = tmp_path / "my own work" / place
     file.parent.mkdir(parents=True)
-    text = GOOD.replace("from components.fmi.c", "from .gains import FACTOR\nfrom components.fmi.c")
+    text = GOOD.replace(
+        "from yawbench.components.fmi.c", "from .gains import FACTOR\nfrom yawbench.components.fmi.c"
+    )
     file.write_text(text.replace("-self.p.gain", "-FACTOR * self.p.gain"))
-    (file.parent / "gains.py").write_text("from vocabulary.wheels import WHEELS\n\nFACTOR = len(WHEELS)\n")
+    (file.parent / "gains.py").write_text(
+        "from yawbench.vocabulary.wheels import WHEELS\n\nFACTOR = len(WHEELS)\n"
+    )
     fmu = build_component(file, tmp_path / "out", defaults={"gain": 10, "mode": "b", "fast": True})
     assert fmu == tmp_path / "out" / "controller_idea.fmu"
     unit = Unit(Fmu(unpack(fmu)), yaw_rate=0.5)
@@ -348,7 +358,7 @@ def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path, monkeypatch):
     def refuse(*args, **kwargs):
         raise PermissionError(13, "Permission denied", str(tmp_path))
 
-    monkeypatch.setattr("orchestrator.safe_files.claim", refuse)
+    monkeypatch.setattr("yawbench.foundation.safe_files.claim", refuse)
     with pytest.raises(BuildError) as caught:
         build_all(tmp_path, components=["tyre_linear"], force=True)
     assert each_mentions(texts_of(caught.value), ("tyre_linear", "[Errno 13]"))

@@ -9,16 +9,16 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import HERE as FMUS
-from fmus.build import build_all, build_component
-from fmus.build_stamp import read_stamp
-from fmus.c import c_recipe
-from fmus.c.c_recipe import TO_WINDOWS
-from orchestrator.commands.new import begin
-from orchestrator.errors import BuildError
 from tests.fmus.bare import ERROR, OK, Fmu, Refused, Unit
 from tests.fmus.programs import in_windows, in_wine, run, ten_steps
 from tests.refusals import each_mentions, mentions, refused
+from yawbench.commands.new import begin
+from yawbench.fmus.build import HERE as FMUS
+from yawbench.fmus.build import build_all, build_component
+from yawbench.fmus.build_stamp import read_stamp
+from yawbench.fmus.c import c_recipe
+from yawbench.fmus.c.c_recipe import TO_WINDOWS
+from yawbench.foundation.errors import BuildError
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build_component, find_components
-from orchestrator.commands.new import begin
 from tests.fmus.bare import ERROR, OK, Fmu, Refused, Unit
 from tests.fmus.plausible import plausible
 from tests.refusals import each_mentions, mentions
+from yawbench.commands.new import begin
+from yawbench.fmus.build import build_component, find_components
 
 IN_C = "a unit in C"
 H = 0.002

@@ -14,11 +14,11 @@ import struct
 
 import pytest
 
-from components.fmi.component import Component
-from fmus.build import find_components
 from tests.components.stand import Stand
 from tests.fmus.plausible import plausible
-from vocabulary.wheels import WHEELS
+from yawbench.components.fmi.component import Component
+from yawbench.fmus.build import find_components
+from yawbench.vocabulary.wheels import WHEELS
 
 COMPONENTS = find_components()
 ALL_TRIALS = 21

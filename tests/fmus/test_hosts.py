@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import COMPONENTS, find_components
 from tests.fmus.bare import Refused, Unit
 from tests.fmus.programs import (
     OURS_FIRST,
@@ -24,6 +23,7 @@ from tests.fmus.programs import (
     unpacked_inputs,
 )
 from tests.refusals import refused
+from yawbench.fmus.build import COMPONENTS, find_components
 
 NAMES = list(find_components())
 BARE = Path(__file__).with_name("bare.py")

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import COMPONENTS, build_component
 from tests.fmus.bare import Fmu, Unit
 from tests.fmus.programs import python_libraries
 from tests.fmus.test_rebuild_stale import without_native_libraries
+from yawbench.fmus.build import COMPONENTS, build_component
 
 TESTS = Path(__file__).resolve().parent
 

@@ -6,13 +6,13 @@ import sys
 
 import pytest
 
-from fmus.build import build_component, recipe_of
-from fmus.source_digests import SourceDigests
-from fmus.staging import staged
-from orchestrator.errors import BuildError
 from tests.fmus.bare import Fmu, Unit
 from tests.fmus.test_build_errors import GOOD
 from tests.refusals import refused
+from yawbench.fmus.build import build_component, recipe_of
+from yawbench.fmus.source_digests import SourceDigests
+from yawbench.fmus.staging import staged
+from yawbench.foundation.errors import BuildError
 
 PACKAGE = {
     "__init__": "import numpy\n\nSHARE = 0.5\n",
@@ -47,7 +47,9 @@ FORBIDDEN = {
 
 
 def component(imports: str) -> str:
-    text = GOOD.replace("from components.fmi.component", f"{imports}from components.fmi.component")
+    text = GOOD.replace(
+        "from yawbench.components.fmi.component", f"{imports}from yawbench.components.fmi.component"
+    )
     return text.replace("-self.p.gain", "-FACTOR * self.p.gain")
 
 

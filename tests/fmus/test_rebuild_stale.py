@@ -13,12 +13,12 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build_component, find_recipes
-from fmus.native import build as native_build
-from fmus.rebuild_stale import FmuUpdater
-from fmus.source_digests import SourceDigests
 from tests.checkout import CODE, ROOT, copy_checkout, run_in
 from tests.refusals import each_mentions, mentions
+from yawbench.fmus.build import build_component, find_recipes
+from yawbench.fmus.native import build as native_build
+from yawbench.fmus.rebuild_stale import FmuUpdater
+from yawbench.fmus.source_digests import SourceDigests
 
 DRIVER = "title: Driver\nstop_time: 0.01\nstep_size: 0.001\nunits: {driver: {fmu: driver_sine}}\n"
 
@@ -72,7 +72,9 @@ def own(written: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def without_native_libraries(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave native libraries out of what is built: they take most of the time."""
-    monkeypatch.setattr("fmus.recipe.native", lambda *_, **__: native_build.Native(why_not="left out"))
+    monkeypatch.setattr(
+        "yawbench.fmus.recipe.native", lambda *_, **__: native_build.Native(why_not="left out")
+    )
 
 
 def record(project: Path, folder: str = "out") -> dict:
@@ -305,9 +307,9 @@ def test_nobody_waits_for_the_builder_if_everything_is_current(tmp_path, yawbenc
     (tmp_path / "driver.yaml").write_text(DRIVER)
     yawbench("check", tmp_path / "driver.yaml")
     script = (
-        "import sys; from orchestrator.cli import main\n"
+        "import sys; from yawbench.cli import main\n"
         "try: main(['check', 'driver.yaml'])\n"
-        "except SystemExit: print('fmus.build' in sys.modules, 'pythonfmu' in sys.modules)\n"
+        "except SystemExit: print('yawbench.fmus.build' in sys.modules, 'pythonfmu' in sys.modules)\n"
     )
     done = run_in(tmp_path, "python", "-c", script)
     assert done.stdout.endswith("False False\n"), done.stderr
@@ -402,7 +404,7 @@ def _run_as_nobody(project: Path, room: Path, environment: dict[str, str]) -> No
     command = [
         _python_of_others(),
         "-m",
-        "orchestrator.cli",
+        "yawbench.cli",
         "run",
         "driver.yaml",
         "--out",

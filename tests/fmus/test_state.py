@@ -8,9 +8,9 @@ import struct
 
 import pytest
 
-from fmus.build import find_components
 from tests.fmus.bare import Unit
 from tests.fmus.plausible import plausible
+from yawbench.fmus.build import find_components
 
 
 def bits(values):

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build_component
-from fmus.c import c_recipe
+from yawbench.fmus.build import build_component
+from yawbench.fmus.c import c_recipe
 
 HERE = Path(__file__).parent
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from orchestrator.fmu.description import platform
-from vocabulary.wheels import WHEELS
+from yawbench.fmus.description import platform
+from yawbench.vocabulary.wheels import WHEELS
 
 
 @dataclass(frozen=True)

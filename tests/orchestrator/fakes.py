@@ -7,12 +7,12 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from orchestrator.fault_kinds import FaultySignal
-from orchestrator.fmu.fmu import Fmu, ValueRef, Variable
-from orchestrator.master.instance import ExperimentSetup, FmuInstance, StepCalls
-from orchestrator.master.process_state import ERROR, OK, Log
-from orchestrator.plan import Instance, Plan, Wire
-from orchestrator.signal_names import SignalName
+from yawbench.fmus.fmu import Fmu, ValueRef, Variable
+from yawbench.orchestrator.fault_kinds import FaultySignal
+from yawbench.orchestrator.master.instance import ExperimentSetup, FmuInstance, StepCalls
+from yawbench.orchestrator.master.process_state import ERROR, OK, Log
+from yawbench.orchestrator.plan import Instance, Plan, Wire
+from yawbench.orchestrator.signal_names import SignalName
 
 
 class Behaviour:

@@ -10,7 +10,7 @@ from typing import Any
 from fmpy.fmi2 import FMU2Slave
 from fmpy.ssp import simulation as ssp
 
-from orchestrator.interop.second_opinion import Recording, Request, run_fmpy_ssp
+from yawbench.interop.second_opinion import Recording, Request, run_fmpy_ssp
 
 _leave_initialization = FMU2Slave.exitInitializationMode
 _instantiate, _connections_of, _step = ssp.instantiate_fmu, ssp.get_connections, ssp.do_step

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.errors import ScenarioError
-from orchestrator.measured.measurement import Measurement, load_measurement
-from orchestrator.measured.segment import Segment
+from yawbench.foundation.errors import ScenarioError
+from yawbench.orchestrator.recordings.measurement import Measurement, load_measurement
+from yawbench.orchestrator.recordings.segment import Segment
 
 TIMES = np.round(0.1 * np.arange(700), 1)
 """s: 70 s at 10 Hz, past the end of a minute."""

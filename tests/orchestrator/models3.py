@@ -8,7 +8,7 @@ from pathlib import Path
 
 from fmpy.fmi3 import FMU3Slave
 
-from orchestrator.fmu.description import INTEGERS, binary_of
+from yawbench.fmus.description import INTEGERS, binary_of
 
 HERE = Path(__file__).parent
 TYPES = ("Float64", "Float32", *INTEGERS, "Boolean")

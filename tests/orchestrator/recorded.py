@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cache import with_checksums
-from orchestrator.results.reader import Results
-from orchestrator.results.run_record import RunRecord
+from yawbench.foundation.cache import with_checksums
+from yawbench.orchestrator.results.reader import Results
+from yawbench.orchestrator.results.run_record import RunRecord
 
 UNITS = {
     "driver.steer_angle": "rad",

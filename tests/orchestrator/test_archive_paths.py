@@ -12,14 +12,14 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cli import main
-from orchestrator.errors import YawbenchError
-from orchestrator.fmu.archive import open_fmu
-from orchestrator.results.reader import load_results
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.refusals import texts_of
+from yawbench.cli import main
+from yawbench.fmus.archive import open_fmu
+from yawbench.foundation.errors import YawbenchError
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.wiring.make_plan import make_plan
 
 from .fake_fmus import Var, make_fmu
 from .test_foreign import write_fmu

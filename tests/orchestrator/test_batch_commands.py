@@ -11,10 +11,10 @@ import sys
 
 import pytest
 
-from orchestrator.cli import main
-from orchestrator.results.run_folder import FolderLock, LockHolder
-from orchestrator.safe_files import LOCK_FILE
 from tests.refusals import each_mentions, mentions
+from yawbench.cli import main
+from yawbench.foundation.safe_files import LOCK_FILE
+from yawbench.orchestrator.results.run_folder import FolderLock, LockHolder
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
 
@@ -272,7 +272,7 @@ metrics:"""
 
 def test_ctrl_c_ends_a_study_and_keeps_finished_runs(fmus, folder):
     (folder / "study.yaml").write_text(STUDY.replace("\nmetrics:", LONG))
-    command = [sys.executable, "-m", "orchestrator.cli", "study", "study.yaml", "--out", "o", "--jobs", "1"]
+    command = [sys.executable, "-m", "yawbench", "study", "study.yaml", "--out", "o", "--jobs", "1"]
     process = subprocess.Popen(
         [*command, "--fmus", str(fmus)], stderr=subprocess.PIPE, text=True, start_new_session=True
     )
@@ -365,8 +365,8 @@ def test_every_command_that_makes_runs_isolates_units_if_told(command, folder, f
         limits.extend(job.call_limit for job in jobs)
         raise SystemExit(7)
 
-    monkeypatch.setattr("orchestrator.experiments.jobs.ready", ready)
-    monkeypatch.setattr("orchestrator.experiments.experiment.plans_of", ready)
+    monkeypatch.setattr("yawbench.studies.jobs.ready", ready)
+    monkeypatch.setattr("yawbench.studies.experiment.plans_of", ready)
     with pytest.raises(SystemExit) as exit_:
         main([*command, "--fmus", str(fmus), "--isolate", "--call-limit", "3 s"])
     assert exit_.value.code == 7

@@ -7,10 +7,10 @@ from math import cos, exp, pi, radians, sin
 import numpy as np
 import pytest
 
-from orchestrator.errors import ResultsError
-from orchestrator.evaluation.braking_and_wind import evaluate_braking, evaluate_side_wind
-from orchestrator.evaluation.trace import Trace
 from tests.refusals import each_mentions, mentions
+from yawbench.foundation.errors import ResultsError
+from yawbench.proving_ground.braking_and_wind import evaluate_braking, evaluate_side_wind
+from yawbench.proving_ground.trace import Trace
 
 from .test_sine_with_dwell import as_sampled
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cache import STORES, cache_folder, keep, recall
-from orchestrator.cli import main
-from orchestrator.fmu.archive import open_fmu
-from orchestrator.safe_files import write_whole
 from tests.refusals import each_mentions, mentions, refused
+from yawbench.cli import main
+from yawbench.fmus.archive import open_fmu
+from yawbench.foundation.cache import STORES, cache_folder, keep, recall
+from yawbench.foundation.safe_files import write_whole
 
 from .fake_fmus import make_fmu
 
@@ -137,7 +137,7 @@ def test_a_cache_that_cannot_be_made_is_passed_over(tmp_path, monkeypatch):
 
 USER = """
 import sys
-from orchestrator.fmu.archive import open_fmu
+from yawbench.fmus.archive import open_fmu
 open_fmu(sys.argv[1])
 print("opened", flush=True)
 sys.stdin.read()

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 import yawbench as yb
-from orchestrator.errors import ScenarioError
-from orchestrator.scenario import loader
 from tests.refusals import mentions, refused
+from yawbench.foundation.errors import ScenarioError
+from yawbench.orchestrator.scenario import loader
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 NAME = "fuzzy_feedback/single_sine"
@@ -126,7 +126,7 @@ def test_the_shell_completes_names(tmp_path, words, completed):
         "COMP_WORDS": f"yawbench {words}",
         "COMP_CWORD": str(len(words.split())),
     }
-    program = "import sys; sys.argv[0] = 'yawbench'; from orchestrator.cli import main; main()"
+    program = "import sys; sys.argv[0] = 'yawbench'; from yawbench.cli import main; main()"
     command = [sys.executable, "-c", program]
     done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.stdout.split() == completed, done.stderr

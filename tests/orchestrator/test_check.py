@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cli import main
 from tests.refusals import each_mentions, mentions
+from yawbench.cli import main
 
 from .fake_fmus import Var, make_fmu, out
 
@@ -75,7 +75,7 @@ def test_without_standard_output_the_exit_status_still_tells(monkeypatch: pytest
 
 def test_what_a_terminal_cannot_show_is_escaped() -> None:
     environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
-    command = [sys.executable, "-m", "orchestrator.cli", "check", "Läufe 2/a.yaml"]
+    command = [sys.executable, "-m", "yawbench", "check", "Läufe 2/a.yaml"]
     done = subprocess.run(command, capture_output=True, env=environment, check=False)
     assert (done.returncode, done.stderr) == (0, b"")
     assert done.stdout.startswith(b"L\\xe4ufe 2/a.yaml: Single sine [mu 0.65]")
@@ -182,8 +182,8 @@ def test_every_problem_is_a_line_on_stderr_and_the_status_is_2(
 
 def test_checking_loads_no_simulation_and_no_figures() -> None:
     code = (
-        "import sys; from orchestrator.scenario.loader import load_scenario\n"
-        "from orchestrator.wiring.make_plan import make_plan\n"
+        "import sys; from yawbench.orchestrator.scenario.loader import load_scenario\n"
+        "from yawbench.orchestrator.wiring.make_plan import make_plan\n"
         "make_plan(load_scenario('Läufe 2/a.yaml'))\n"
         "print(sorted({'fmpy', 'numpy', 'lxml', 'matplotlib', 'rich', 'components'} & set(sys.modules)))"
     )

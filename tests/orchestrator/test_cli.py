@@ -13,11 +13,12 @@ from pathlib import Path
 import pytest
 import typer
 
-from orchestrator import cli
-from orchestrator.cli import COMMANDS, _application, main
-from orchestrator.errors import Interrupted, ScenarioError
-from orchestrator.messages import printable
 from tests.refusals import each_mentions, mentions
+from yawbench import cli
+from yawbench.cli import _application, main
+from yawbench.foundation import plugins
+from yawbench.foundation.errors import Interrupted, ScenarioError
+from yawbench.foundation.messages import printable
 
 
 def say(capsys, *arguments):
@@ -33,7 +34,9 @@ def test_the_version_is_that_of_the_installed_distribution(capsys):
 def test_the_help_names_every_command(capsys):
     status, text = say(capsys, "--help")
     assert status == 0
-    assert {line.split()[0] for line in text.splitlines() if line.startswith("  ")} >= set(COMMANDS)
+    assert {line.split()[0] for line in text.splitlines() if line.startswith("  ")} >= set(
+        plugins.names("command")
+    )
 
 
 def test_an_error_of_the_program_itself_is_a_sentence_that_says_so(
@@ -82,15 +85,15 @@ def test_a_reader_who_has_seen_enough_is_told_nothing():
 
 def test_a_command_imports_what_it_needs_itself():
     code = (
-        "import sys; from orchestrator.cli import main\n"
+        "import sys; from yawbench.cli import main\n"
         "try: main(['list', 'metrics'])\n"
         "except SystemExit: print(*sorted(sys.modules), file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = set(done.stderr.split())
-    assert "orchestrator.commands.build" in loaded
+    assert "yawbench.commands.build" in loaded
     assert (
-        not {f"orchestrator.commands.{name}" for name in COMMANDS.values() if name != COMMANDS["list"]}
+        not {f"yawbench.commands.{name}" for name in plugins.names("command").values() if name != "build"}
         & loaded
     )
 
@@ -115,13 +118,13 @@ def test_every_command_that_sets_parameters_takes_faults() -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="os.kill ends the process there")
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("name", plugins.names("command"))
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_ends_every_command_with_a_word_and_the_same_status(name, number, monkeypatch, capsys):
     def ended() -> None:
         os.kill(os.getpid(), number)
 
-    module = importlib.import_module(f"orchestrator.commands.{COMMANDS[name]}")
+    module = importlib.import_module(f"yawbench.commands.{COMMANDS[name]}")
     monkeypatch.setattr(module, name.replace("-", "_"), ended)
     before = signal.getsignal(signal.SIGTERM)
     with pytest.raises(SystemExit) as end:
@@ -140,7 +143,7 @@ def test_a_signal_while_a_class_is_being_made_is_no_error_of_the_program(monkeyp
     def ended() -> None:
         type("Made", (), {"attribute": Stopping()})
 
-    monkeypatch.setattr(importlib.import_module("orchestrator.commands.build"), "cache", ended)
+    monkeypatch.setattr(importlib.import_module("yawbench.commands.build"), "cache", ended)
     with pytest.raises(SystemExit) as end:
         main(["cache"])
     assert end.value.code == 143

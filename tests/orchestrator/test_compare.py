@@ -11,22 +11,22 @@ from types import SimpleNamespace
 import pytest
 from matplotlib.figure import Figure
 
-from orchestrator.commands.results import distinct
-from orchestrator.errors import Diagnostic, ScenarioError
-from orchestrator.experiments import result_files
-from orchestrator.experiments.claim_schema import MetricSpec
-from orchestrator.experiments.experiment import NamedRun, experiment_of
-from orchestrator.experiments.experiment_result import judge_results
-from orchestrator.experiments.jobs import Job, Outcome
-from orchestrator.experiments.result_files import draw_all, write_findings
-from orchestrator.experiments.scenario_experiments import FIGURE_SPECS, comparison_table, variants
-from orchestrator.experiments.schema import ExperimentSpec
-from orchestrator.figures.plots import LabelledRun, shown_by
-from orchestrator.figures.style import save
-from orchestrator.metrics.expressions import MetricValue
-from orchestrator.pages.comparison import BEST, comparison_facts, metric_table
 from tests.changed import changed
 from tests.refusals import each_mentions, refused
+from yawbench.commands.results import distinct
+from yawbench.figures.plots import LabelledRun, shown_by
+from yawbench.figures.style import save
+from yawbench.foundation.errors import Diagnostic, ScenarioError
+from yawbench.metrics.expressions import MetricValue
+from yawbench.reports.comparison import BEST, comparison_facts, metric_table
+from yawbench.studies import result_files
+from yawbench.studies.claim_schema import MetricSpec
+from yawbench.studies.experiment import NamedRun, experiment_of
+from yawbench.studies.experiment_result import judge_results
+from yawbench.studies.jobs import Job, Outcome
+from yawbench.studies.result_files import draw_all, write_findings
+from yawbench.studies.scenario_experiments import FIGURE_SPECS, comparison_table, variants
+from yawbench.studies.schema import ExperimentSpec
 
 from .recorded import car, write
 

@@ -15,16 +15,16 @@ import numpy as np
 import pytest
 
 import yawbench as yb
-from fmus.build import build_component
-from fmus.compiler import load_compiled
-from orchestrator.cli import main
-from orchestrator.errors import Interrupted
-from orchestrator.master import compiled_loop
-from orchestrator.master.simulate import simulate
-from orchestrator.results.reader import load_results
-from orchestrator.scenario.loader import load_scenario, names
-from orchestrator.wiring.make_plan import make_plan
 from tests.refusals import mentions, refused
+from yawbench.cli import main
+from yawbench.fmus.build import build_component
+from yawbench.fmus.compiler import load_compiled
+from yawbench.foundation.errors import Interrupted
+from yawbench.orchestrator.master import compiled_loop
+from yawbench.orchestrator.master.simulate import simulate
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.orchestrator.scenario.loader import load_scenario, names
+from yawbench.orchestrator.wiring.make_plan import make_plan
 
 from . import models3
 from .conftest import compiled

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from orchestrator.experiments.confidence import bootstrap, interval, percentile_bounds, resample, share_bounds
+from yawbench.studies.confidence import bootstrap, interval, percentile_bounds, resample, share_bounds
 
 
 def test_the_interval_is_that_of_students_t_test():

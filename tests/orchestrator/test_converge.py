@@ -9,20 +9,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.errors import Diagnostic, ResultsError, ScenarioError
-from orchestrator.experiments.experiment import NamedRun, experiment_of
-from orchestrator.experiments.experiment_result import judge_results
-from orchestrator.experiments.jobs import Job, Outcome
-from orchestrator.experiments.scenario_experiments import (
+from tests.changed import changed
+from tests.refusals import mentions, refused
+from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError
+from yawbench.studies.experiment import NamedRun, experiment_of
+from yawbench.studies.experiment_result import judge_results
+from yawbench.studies.jobs import Job, Outcome
+from yawbench.studies.scenario_experiments import (
     columns_of,
     convergence_figure,
     convergence_table,
     measure,
     refinements,
 )
-from orchestrator.experiments.tables import to_csv
-from tests.changed import changed
-from tests.refusals import mentions, refused
+from yawbench.studies.tables import to_csv
 
 from .recorded import results, write
 

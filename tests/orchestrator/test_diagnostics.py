@@ -9,9 +9,16 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator import errors
-from orchestrator.errors import Diagnostic, Location, ScenarioError, SimulationError, text_of, warnings_in
 from tests.refusals import mentions
+from yawbench.foundation import errors
+from yawbench.foundation.errors import (
+    Diagnostic,
+    Location,
+    ScenarioError,
+    SimulationError,
+    text_of,
+    warnings_in,
+)
 
 ROOT = Path(__file__).parents[2]
 CODE = re.compile(r"[a-z]+(-[a-z]+)*")

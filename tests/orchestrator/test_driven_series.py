@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.commands.standard_tests import DRIVE, EvaluatedRuns
-from orchestrator.evaluation.sine_with_dwell import amplitudes, judge_series
-from orchestrator.evaluation.standard_tests import TESTS
-from orchestrator.evaluation.trace import Trace, trace_of
-from orchestrator.results.reader import load_results
 from tests.commands import status_of
+from yawbench.commands.standard_tests import DRIVE, EvaluatedRuns
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.proving_ground.sine_with_dwell import amplitudes, judge_series
+from yawbench.proving_ground.standard_tests import TESTS
+from yawbench.proving_ground.trace import Trace, trace_of
 
 from .recorded import results, write
 from .test_sine_with_dwell import SAMPLING, slow_steer, trace

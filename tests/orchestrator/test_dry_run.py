@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from fmus import rebuild_stale
-from fmus.build_stamp import BuildStamp
-from fmus.rebuild_stale import FmuUpdater
-from orchestrator.experiments import dry_run
-from orchestrator.experiments.dry_run import Forecast, Pace, Span, forecast_table
-from orchestrator.experiments.journal import records_in
-from orchestrator.fmu.opener import HOME
 from tests.checkout import ROOT
+from yawbench.fmus import rebuild_stale
+from yawbench.fmus.build_stamp import BuildStamp
+from yawbench.fmus.opener import HOME
+from yawbench.fmus.rebuild_stale import FmuUpdater
+from yawbench.studies import dry_run
+from yawbench.studies.dry_run import Forecast, Pace, Span, forecast_table
+from yawbench.studies.journal import records_in
 
 from .test_batch_commands import SCENARIO, STUDY
 from .test_output import ALWAYS, SWEEP, documented
@@ -138,7 +138,7 @@ def test_time_is_that_of_the_processors_and_bounds_are_in_words():
 
 
 def test_further_sets_of_fmus_are_not_measured(monkeypatch, fmus, tmp_path):
-    from orchestrator.planner import Planner
+    from yawbench.planner import Planner
 
     (tmp_path / "half.yaml").write_text(SCENARIO)
     planner = Planner(build=False)

@@ -8,14 +8,14 @@ from dataclasses import replace
 
 import pytest
 
-from orchestrator import workers
-from orchestrator.errors import Diagnostic, ResultsError, ScenarioError
-from orchestrator.experiments.axes import DesignAxisSpec, Level, axis_of_levels
-from orchestrator.experiments.executor import Executor, highest_passing, runner_of, side_by_side
-from orchestrator.experiments.experiment import NamedRun, experiment_of
-from orchestrator.experiments.jobs import MeasuredRun, Outcome, run_job
-from orchestrator.plan import Override
 from tests.refusals import mentions
+from yawbench.foundation import workers
+from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError
+from yawbench.orchestrator.plan import Override
+from yawbench.studies.axes import DesignAxisSpec, Level, axis_of_levels
+from yawbench.studies.executor import Executor, highest_passing, runner_of, side_by_side
+from yawbench.studies.experiment import NamedRun, experiment_of
+from yawbench.studies.jobs import MeasuredRun, Outcome, run_job
 
 from .test_repeats import SCENARIO
 
@@ -132,7 +132,7 @@ def test_signals_are_recorded_by_patterns_of_their_names(executor, tmp_path):
 
 def bytes_per_run(folder, fmus, monkeypatch, *, few=50, many=150):
     """Return how many bytes each run adds to what an experiment holds when all have been planned and made."""
-    monkeypatch.setattr("orchestrator.experiments.on_demand.IN_MEMORY", 1)
+    monkeypatch.setattr("yawbench.studies.on_demand.IN_MEMORY", 1)
     monkeypatch.setattr("os.fsync", lambda file: None)
 
     def runner(jobs, done):
@@ -163,7 +163,7 @@ def test_memory_holds_neither_plans_nor_cases_of_a_campaign(tmp_path, fmus, monk
 
 
 def test_plans_that_cannot_be_stored_are_one_sentence(executor, tmp_path, monkeypatch):
-    monkeypatch.setattr("orchestrator.experiments.on_demand.IN_MEMORY", 1)
+    monkeypatch.setattr("yawbench.studies.on_demand.IN_MEMORY", 1)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "missing"))
     execute, _ = executor()
     with execute, pytest.raises(ResultsError) as error:

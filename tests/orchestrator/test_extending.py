@@ -12,25 +12,25 @@ import numpy as np
 import pytest
 
 import yawbench as yb
-from orchestrator.coupling_algorithms import ALGORITHMS, CouplingAlgorithm, CouplingWeights
-from orchestrator.errors import ScenarioError
-from orchestrator.evaluation import standard_tests
-from orchestrator.evaluation.standard_tests import DRIVEN, TESTS, SeriesRun, StandardTest, evaluation
-from orchestrator.experiments.axis_figures import MetricDrawing
-from orchestrator.experiments.experiment import PlannedExperiment
-from orchestrator.experiments.experiment_result import ExperimentResult
-from orchestrator.experiments.jobs import Job, MeasuredRun
-from orchestrator.experiments.load_experiment import load_experiment
-from orchestrator.experiments.result_files import draw_all
-from orchestrator.experiments.schema import FIGURE_KINDS, FigureKind
-from orchestrator.fault_kinds import KINDS, FaultKind
-from orchestrator.master.simulate import simulate_in_memory
-from orchestrator.metrics.verdict import compare
-from orchestrator.results import file_formats
-from orchestrator.results.recorder import ColumnRecorder
-from orchestrator.scenario.overrides import read_changes
 from tests.commands import status_of
 from tests.refusals import mentions, refused
+from yawbench.foundation.errors import ScenarioError
+from yawbench.metrics.verdict import compare
+from yawbench.orchestrator.coupling_algorithms import ALGORITHMS, CouplingAlgorithm, CouplingWeights
+from yawbench.orchestrator.fault_kinds import KINDS, FaultKind
+from yawbench.orchestrator.master.simulate import simulate_in_memory
+from yawbench.orchestrator.results import file_formats
+from yawbench.orchestrator.results.recorder import ColumnRecorder
+from yawbench.orchestrator.scenario.overrides import read_changes
+from yawbench.proving_ground import standard_tests
+from yawbench.proving_ground.standard_tests import DRIVEN, TESTS, SeriesRun, StandardTest, evaluation
+from yawbench.studies.axis_figures import MetricDrawing
+from yawbench.studies.experiment import PlannedExperiment
+from yawbench.studies.experiment_result import ExperimentResult
+from yawbench.studies.jobs import Job, MeasuredRun
+from yawbench.studies.load_experiment import load_experiment
+from yawbench.studies.result_files import draw_all
+from yawbench.studies.schema import FIGURE_KINDS, FigureKind
 
 from .fakes import Clock, Stage, Witness, make_plan
 
@@ -92,7 +92,7 @@ class NpzFile:
 
 
 def test_a_format_is_a_module_and_an_entry(steered, monkeypatch):
-    module = ModuleType("orchestrator.results.npz")
+    module = ModuleType("yawbench.orchestrator.results.npz")
     module.NpzRecorder, module.NpzFile = NpzRecorder, NpzFile
     monkeypatch.setitem(sys.modules, module.__name__, module)
     entry = file_formats.Format("results.npz", "NumPy's archive", "npz:NpzRecorder", "npz:NpzFile", 8)
@@ -145,7 +145,7 @@ def test_a_standard_test_with_its_series_is_a_module_and_an_entry(steered, monke
             judged, f"{len(judged)} runs of {driver.duration:g} s.", {"runs": len(judged)}
         )
 
-    module = ModuleType("orchestrator.evaluation.wiggle")
+    module = ModuleType("yawbench.proving_ground.wiggle")
     module.evaluate, module.drive = evaluate, drive
     monkeypatch.setitem(sys.modules, module.__name__, module)
     entry = StandardTest(
@@ -153,7 +153,7 @@ def test_a_standard_test_with_its_series_is_a_module_and_an_entry(steered, monke
     )
     monkeypatch.setitem(TESTS, "wiggle", entry)
     monkeypatch.setitem(DRIVEN, "wiggle-1", entry)
-    monkeypatch.delitem(sys.modules, "orchestrator.commands.standard_tests", raising=False)
+    monkeypatch.delitem(sys.modules, "yawbench.commands.standard_tests", raising=False)
     assert status_of("drive", "wiggle-1", "--scenario", "steered.yaml", "--out", "out") == 0
     found = json.loads(Path("out/evaluation.json").read_text())
     assert found["series"] == {"runs": 2}
@@ -179,7 +179,7 @@ figures: [{name: bars, kind: bar, metric: angle, x: amplitude}]
 
 
 def test_a_figure_on_the_report_is_a_drawing_and_an_entry(steered, monkeypatch):
-    module = ModuleType("orchestrator.experiments.bars")
+    module = ModuleType("yawbench.studies.bars")
     module.BarDrawing = BarDrawing
     monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setitem(FIGURE_KINDS, "bar", FigureKind("metric", "bars:BarDrawing"))

@@ -5,11 +5,11 @@ import signal
 
 import pytest
 
-from orchestrator.errors import Interrupted, SimulationError
-from orchestrator.master.process_state import DISCARD, ERROR, FATAL, OK, PENDING, WARNING
-from orchestrator.master.simulate import simulate
-from orchestrator.results.reader import load_results
 from tests.refusals import each_mentions, mentions
+from yawbench.foundation.errors import Interrupted, SimulationError
+from yawbench.orchestrator.master.process_state import DISCARD, ERROR, FATAL, OK, PENDING, WARNING
+from yawbench.orchestrator.master.simulate import simulate
+from yawbench.orchestrator.results.reader import load_results
 
 from .fakes import Behaviour, Clock, Echo, FakeSlave, Function, Mixed, Stage, make_plan
 

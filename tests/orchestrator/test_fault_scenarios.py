@@ -9,18 +9,18 @@ import pytest
 from matplotlib.colors import to_hex
 
 import yawbench as yb
-from orchestrator.cli import main
-from orchestrator.commands.experiments import command_of
-from orchestrator.errors import ScenarioError, YawbenchError
-from orchestrator.experiments.load_experiment import load_experiment
-from orchestrator.fault_kinds import Fault, FaultLocation, FaultySignal
-from orchestrator.figures.plots import FAULTY, LabelledRun, draw
-from orchestrator.plan import Override
-from orchestrator.results.freshness import key_of
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.scenario.overrides import read_changes
-from orchestrator.wiring.make_plan import make_plan as plan_of_scenario
 from tests.refusals import each_mentions, mentions, texts_of
+from yawbench.cli import main
+from yawbench.commands.experiments import command_of
+from yawbench.figures.plots import FAULTY, LabelledRun, draw
+from yawbench.foundation.errors import ScenarioError, YawbenchError
+from yawbench.orchestrator.fault_kinds import Fault, FaultLocation, FaultySignal
+from yawbench.orchestrator.plan import Override
+from yawbench.orchestrator.results.freshness import key_of
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.scenario.overrides import read_changes
+from yawbench.orchestrator.wiring.make_plan import make_plan as plan_of_scenario
+from yawbench.studies.load_experiment import load_experiment
 
 from .fake_fmus import Var, make_fmu, out
 from .recorded import car, noted

@@ -9,14 +9,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orchestrator.fault_kinds import KINDS, CountedNoise, Fault, FaultLocation, FaultySignal
-from orchestrator.interrupts import StopFlag
-from orchestrator.master.process_state import Log
-from orchestrator.master.simulate import simulate, simulate_in_memory
-from orchestrator.master.step_loop import Master
-from orchestrator.results.freshness import staleness
-from orchestrator.results.reader import load_results
 from tests.refusals import mentions
+from yawbench.foundation.interrupts import StopFlag
+from yawbench.orchestrator.fault_kinds import KINDS, CountedNoise, Fault, FaultLocation, FaultySignal
+from yawbench.orchestrator.master.process_state import Log
+from yawbench.orchestrator.master.simulate import simulate, simulate_in_memory
+from yawbench.orchestrator.master.step_loop import Master
+from yawbench.orchestrator.results.freshness import staleness
+from yawbench.orchestrator.results.reader import load_results
 
 from .fakes import Clock, Function, Integrator, Stage, Witness, make_plan
 

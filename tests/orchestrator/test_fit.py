@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import yawbench as yb
-from orchestrator.cli import main
-from orchestrator.errors import ScenarioError
-from orchestrator.experiments.fit import load_fit
-from orchestrator.scenario import yaml_lines
 from tests.pages.made_up import unpacked
+from yawbench.cli import main
+from yawbench.foundation.errors import ScenarioError
+from yawbench.measured_cars.fit import load_fit
+from yawbench.orchestrator.scenario import yaml_lines
 
 from .test_output import ALWAYS, documented
 
@@ -113,7 +113,7 @@ def test_a_car_is_found_again_and_the_single_track_stands_beside(folder, capsys)
 
 
 def test_an_interrupted_fit_goes_on(folder, monkeypatch):
-    from orchestrator.experiments import fit as module
+    from yawbench.measured_cars import fit as module
 
     made = []
     original = module.execute

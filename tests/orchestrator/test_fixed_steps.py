@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cli import main
-from orchestrator.errors import Diagnostic
-from orchestrator.fmu.description import binary_of
-from orchestrator.results.reader import load_results
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
+from yawbench.cli import main
+from yawbench.fmus.description import binary_of
+from yawbench.foundation.errors import Diagnostic
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.wiring.make_plan import make_plan
 
 from .conftest import compiled
 from .fake_fmus import make_fmu, model_description

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.measured.flaws import FlawKind, flaws_of
-from orchestrator.measured.measurement import load_measurement
-from orchestrator.measured.single_track import effects_in
 from tests.commands import status_of
 from tests.refusals import mentions
+from yawbench.measured_cars.flaws import FlawKind, flaws_of
+from yawbench.measured_cars.single_track import effects_in
+from yawbench.orchestrator.recordings.measurement import load_measurement
 
 T = np.arange(0.0, 30.0, 0.01)
 Drive = Callable[[int], tuple[np.ndarray, np.ndarray]]

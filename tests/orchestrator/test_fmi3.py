@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.cli import main
-from orchestrator.results.reader import load_results
 from tests.refusals import mentions
+from yawbench.cli import main
+from yawbench.orchestrator.results.reader import load_results
 
 from . import models3
 from .conftest import compiled

@@ -14,13 +14,13 @@ from typing import Any
 
 import pytest
 
-from orchestrator import safe_files
-from orchestrator.cache import KEEP_DAYS, cache_folder, delete_unused
-from orchestrator.errors import ModelDescriptionError
-from orchestrator.fmu import archive as fmu_archive
-from orchestrator.fmu.archive import open_fmu
-from orchestrator.fmu.description import platform
 from tests.refusals import mentions, refused
+from yawbench.fmus import archive as fmu_archive
+from yawbench.fmus.archive import open_fmu
+from yawbench.fmus.description import platform
+from yawbench.foundation import safe_files
+from yawbench.foundation.cache import KEEP_DAYS, cache_folder, delete_unused
+from yawbench.foundation.errors import ModelDescriptionError
 
 from .fake_fmus import Var, make_fmu, model_description, out
 
@@ -123,7 +123,7 @@ def test_a_damaged_cache_entry_is_put_right(fmu: Path, harm: str) -> None:
 
 
 def test_processes_that_unpack_at_the_same_time_do_not_collide(fmu: Path, cache: Path) -> None:
-    code = "import sys; from orchestrator.fmu.archive import open_fmu; print(open_fmu(sys.argv[1]).directory)"
+    code = "import sys; from yawbench.fmus.archive import open_fmu; print(open_fmu(sys.argv[1]).directory)"
     command = [sys.executable, "-c", code, str(fmu)]
     started = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]
     said = {process.communicate()[0].strip() for process in started}

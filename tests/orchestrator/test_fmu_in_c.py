@@ -9,15 +9,15 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from orchestrator.errors import ModelDescriptionError, SimulationError
-from orchestrator.fmu.fmu import Fmu, Variable
-from orchestrator.master.fmi import open_instance
-from orchestrator.master.isolation import Isolation
-from orchestrator.master.simulate import simulate
-from orchestrator.plan import Instance, Plan, Wire
-from orchestrator.results.reader import load_results
-from orchestrator.signal_names import SignalName
 from tests.refusals import each_mentions, mentions, refused
+from yawbench.fmus.fmu import Fmu, Variable
+from yawbench.foundation.errors import ModelDescriptionError, SimulationError
+from yawbench.orchestrator.master.fmi import open_instance
+from yawbench.orchestrator.master.isolation import Isolation
+from yawbench.orchestrator.master.simulate import simulate
+from yawbench.orchestrator.plan import Instance, Plan, Wire
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.orchestrator.signal_names import SignalName
 
 HERE = Path(__file__).parent
 TYPES = ("Real", "Integer", "Boolean", "String")

@@ -9,17 +9,17 @@ import sys
 
 import pytest
 
-from orchestrator.errors import ResultsError, SimulationError
-from orchestrator.experiments.tables import runs_table
-from orchestrator.master.simulate import simulate
-from orchestrator.results import recorder
-from orchestrator.results import run_folder as module
-from orchestrator.results.reader import found_runs, load_results
-from orchestrator.results.run_folder import FolderLock, holder_of, writing
-from orchestrator.results.salvage import lost_format, salvage
-from orchestrator.safe_files import LOCK_FILE
 from tests.refusals import mentions, refused
 from tests.trees import snapshot
+from yawbench.foundation.errors import ResultsError, SimulationError
+from yawbench.foundation.safe_files import LOCK_FILE
+from yawbench.orchestrator.master.simulate import simulate
+from yawbench.orchestrator.results import recorder
+from yawbench.orchestrator.results import run_folder as module
+from yawbench.orchestrator.results.reader import found_runs, load_results
+from yawbench.orchestrator.results.run_folder import FolderLock, holder_of, writing
+from yawbench.orchestrator.results.salvage import lost_format, salvage
+from yawbench.studies.tables import runs_table
 
 from .fakes import Clock, Function, Stage, make_plan
 
@@ -210,8 +210,9 @@ def test_the_second_command_in_a_folder_is_told_who_is_first(tmp_path, monkeypat
 
 @needs_locks
 def test_a_folder_below_one_that_another_process_writes_is_refused(tmp_path):
-    holding = "import sys; from pathlib import Path; from orchestrator.results.run_folder import *\n" + (
-        "with writing(Path(sys.argv[1])): print('held', flush=True); input()"
+    holding = (
+        "import sys; from pathlib import Path; from yawbench.orchestrator.results.run_folder import *\n"
+        + ("with writing(Path(sys.argv[1])): print('held', flush=True); input()")
     )
     command = [sys.executable, "-c", holding, str(tmp_path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.errors import ScenarioError
-from orchestrator.plan import Override
-from orchestrator.results.run_folder import LONGEST, default_folder
 from tests.refusals import refused
+from yawbench.foundation.errors import ScenarioError
+from yawbench.orchestrator.plan import Override
+from yawbench.orchestrator.results.run_folder import LONGEST, default_folder
 
 FILE = Path("scenarios/paper/25mps.yaml")
 

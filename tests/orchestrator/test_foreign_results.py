@@ -17,13 +17,13 @@ import pytest
 from lxml import html
 
 import yawbench as yb
-from orchestrator.errors import ResultsError, ScenarioError, YawbenchError
-from orchestrator.plan import Override
-from orchestrator.results.run_folder import FolderLock, below_results, default_folder, holder_of
-from orchestrator.results.salvage import salvage
-from orchestrator.safe_files import LOCK_FILE, NEW, write_whole
 from tests.refusals import mentions, refused
 from tests.trees import snapshot
+from yawbench.foundation.errors import ResultsError, ScenarioError, YawbenchError
+from yawbench.foundation.safe_files import LOCK_FILE, NEW, write_whole
+from yawbench.orchestrator.plan import Override
+from yawbench.orchestrator.results.run_folder import FolderLock, below_results, default_folder, holder_of
+from yawbench.orchestrator.results.salvage import salvage
 
 from . import recorded
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator import fork_server
-from orchestrator.fork_server import ForkServer, python, start
+from yawbench.foundation import fork_server
+from yawbench.foundation.fork_server import ForkServer, python, start
 
 SCENARIO = "fuzzy_feedback/single_sine"
 SHADOWED = ("json", "numpy", "socket", "selectors", "struct", "signal", "pickle", "multiprocessing", "random")
@@ -104,7 +104,7 @@ def test_a_server_that_is_killed_takes_its_children_along_and_is_replaced(starte
     reading, writing = os.pipe()
     child = start("time", writing)  # `time` has no `main`
     assert child.collect() == 1
-    waiting = start("orchestrator.workers", reading, writing)
+    waiting = start("yawbench.foundation.workers", reading, writing)
     server._process.kill()
     assert waiting.ended(10)
     assert waiting.collect() == -signal.SIGKILL

@@ -10,16 +10,16 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from orchestrator.cli import main
-from orchestrator.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
-from orchestrator.master.simulate import simulate, simulate_in_memory
-from orchestrator.results import parquet_and_mdf
-from orchestrator.results.file_formats import FILES
-from orchestrator.results.reader import load_results
-from orchestrator.results.recorder import BLOCK, MemoryRecorder, recorder_of
-from orchestrator.results.run_record import RunRecord
 from tests.fmu_copies import put_fmus
 from tests.refusals import mentions, refused
+from yawbench.cli import main
+from yawbench.foundation.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
+from yawbench.orchestrator.master.simulate import simulate, simulate_in_memory
+from yawbench.orchestrator.results import parquet_and_mdf
+from yawbench.orchestrator.results.file_formats import FILES
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.orchestrator.results.recorder import BLOCK, MemoryRecorder, recorder_of
+from yawbench.orchestrator.results.run_record import RunRecord
 
 from .fakes import Clock, Function, Stage, make_plan
 from .recorded import car, record_text, write

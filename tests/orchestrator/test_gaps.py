@@ -9,20 +9,20 @@ import numpy as np
 import pytest
 
 import yawbench as yb
-from orchestrator.errors import ScenarioError
-from orchestrator.evaluation.steering_tests import evaluate_step
-from orchestrator.evaluation.trace import trace_of
-from orchestrator.experiments.fit import load_fit
-from orchestrator.figures.plots import spans_of
-from orchestrator.figures.style import LabelledRun
-from orchestrator.measured.flaws import FlawKind, flaws_of
-from orchestrator.measured.gaps import gaps_in
-from orchestrator.measured.measurement import load_measurement
-from orchestrator.measured.single_track import effects_in
-from orchestrator.planner import Planner
-from orchestrator.results.measurement_results import load_run
-from orchestrator.scenario.loader import load_scenario
 from tests.commands import status_of
+from yawbench.figures.plots import spans_of
+from yawbench.figures.style import LabelledRun
+from yawbench.foundation.errors import ScenarioError
+from yawbench.measured_cars.fit import load_fit
+from yawbench.measured_cars.flaws import FlawKind, flaws_of
+from yawbench.measured_cars.single_track import effects_in
+from yawbench.orchestrator.recordings.gaps import gaps_in
+from yawbench.orchestrator.recordings.measurement import load_measurement
+from yawbench.orchestrator.results.measurement_results import load_run
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.planner import Planner
+from yawbench.proving_ground.steering_tests import evaluate_step
+from yawbench.proving_ground.trace import trace_of
 
 UNITS = ("tyre_linear",)
 T = np.round(np.arange(0.0, 8.005, 0.01), 2)

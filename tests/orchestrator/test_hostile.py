@@ -13,14 +13,14 @@ import sys
 import numpy as np
 import pytest
 
-from orchestrator import supervised_process
-from orchestrator.fork_server import Child
-from orchestrator.master import isolation
-from orchestrator.master.isolation import InstanceProcess
-from orchestrator.master.process_state import Log
-from orchestrator.results.reader import load_results
-from orchestrator.supervised_process import FAILED, LOG, REPLY, PipeChannel, ProcessLost, ProtocolError
 from tests.refusals import mentions
+from yawbench.foundation import supervised_process
+from yawbench.foundation.fork_server import Child
+from yawbench.foundation.supervised_process import FAILED, LOG, REPLY, PipeChannel, ProcessLost, ProtocolError
+from yawbench.orchestrator.master import isolation
+from yawbench.orchestrator.master.isolation import InstanceProcess
+from yawbench.orchestrator.master.process_state import Log
+from yawbench.orchestrator.results.reader import load_results
 
 from ..trials.hostile_fmus import VALUES_OF, Case, attack, make_files
 
@@ -174,7 +174,7 @@ def test_a_unit_that_copies_the_process_of_its_run_ends_it_before_there_are_many
     scenario = make_files(tmp_path)
     command = ["run", str(scenario), "--out", "out", "--set", "stop_time=0.3"]
     done = subprocess.run(
-        [sys.executable, "-m", "orchestrator.cli", *command],
+        [sys.executable, "-m", "yawbench", *command],
         cwd=tmp_path, env=os.environ | {"HOSTILE": does}, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 1

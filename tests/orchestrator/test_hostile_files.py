@@ -9,24 +9,24 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator import safe_files
-from orchestrator.cli import main
-from orchestrator.commands.check import show
-from orchestrator.commands.output import print_tables, say
-from orchestrator.errors import Diagnostic, ScenarioError, YawbenchError
-from orchestrator.experiments.claim_schema import parse
-from orchestrator.experiments.experiment import LoadedExperiment
-from orchestrator.experiments.experiment_result import judge_results
-from orchestrator.experiments.load_experiment import load_experiment
-from orchestrator.experiments.schema import ExperimentSpec
-from orchestrator.experiments.tables import Table
-from orchestrator.pages.study_page import chapter, study_page
-from orchestrator.safe_files import reading
-from orchestrator.scenario import yaml_lines
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.scenario.overrides import read_changes
-from orchestrator.wiring.make_plan import make_plan
 from tests.refusals import each_mentions, mentions, places_of, refused, texts_of
+from yawbench.cli import main
+from yawbench.commands.check import show
+from yawbench.commands.output import print_tables, say
+from yawbench.foundation import safe_files
+from yawbench.foundation.errors import Diagnostic, ScenarioError, YawbenchError
+from yawbench.foundation.safe_files import reading
+from yawbench.orchestrator.scenario import yaml_lines
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.scenario.overrides import read_changes
+from yawbench.orchestrator.wiring.make_plan import make_plan
+from yawbench.reports.study_page import chapter, study_page
+from yawbench.studies.claim_schema import parse
+from yawbench.studies.experiment import LoadedExperiment
+from yawbench.studies.experiment_result import judge_results
+from yawbench.studies.load_experiment import load_experiment
+from yawbench.studies.schema import ExperimentSpec
+from yawbench.studies.tables import Table
 
 from .fake_fmus import Var, make_fmu
 

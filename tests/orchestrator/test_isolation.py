@@ -13,18 +13,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orchestrator.cli import main
-from orchestrator.commands.new import begin
-from orchestrator.errors import SimulationError
-from orchestrator.interrupts import StopFlag
-from orchestrator.master import child_run
-from orchestrator.master.isolation import Isolation
-from orchestrator.master.simulate import simulate
-from orchestrator.results.reader import load_results
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.refusals import mentions
+from yawbench.cli import main
+from yawbench.commands.new import begin
+from yawbench.foundation.errors import SimulationError
+from yawbench.foundation.interrupts import StopFlag
+from yawbench.orchestrator.master import child_run
+from yawbench.orchestrator.master.isolation import Isolation
+from yawbench.orchestrator.master.simulate import simulate
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.wiring.make_plan import make_plan
 
 from .conftest import build_here
 
@@ -106,17 +106,17 @@ def test_no_process_outlives_a_run(fmus, tmp_path):
 def test_units_end_when_the_master_is_killed(fmus, tmp_path):
     code = (
         "import sys, os, signal; from pathlib import Path\n"
-        "from orchestrator.plan import Override\n"
-        "from orchestrator.scenario.loader import load_scenario\n"
-        "from orchestrator.wiring.make_plan import make_plan\n"
-        "from orchestrator.master.isolation import Isolation\n"
-        "from orchestrator.master.simulate import simulate\n"
+        "from yawbench.orchestrator.plan import Override\n"
+        "from yawbench.orchestrator.scenario.loader import load_scenario\n"
+        "from yawbench.orchestrator.wiring.make_plan import make_plan\n"
+        "from yawbench.orchestrator.master.isolation import Isolation\n"
+        "from yawbench.orchestrator.master.simulate import simulate\n"
         f"short = [Override.of('stop_time', 0.01, 'test')]\n"
         f"plan = make_plan(load_scenario({str(CAR)!r}, changes=short), fmus=Path({str(fmus)!r}))\n"
         "isolation = Isolation(plan.instances)\n"
         f"simulate(plan, {str(tmp_path)!r}, opener=isolation)\n"
         "again = Isolation(plan.instances)\n"
-        "from orchestrator.master.process_state import Log\n"
+        "from yawbench.orchestrator.master.process_state import Log\n"
         "[again(unit, Log(), set()) for unit in plan.instances]\n"
         "print(*(p.child.pid for p in again._processes.values()), flush=True)\n"
         "os.kill(os.getpid(), signal.SIGKILL)\n"
@@ -232,9 +232,9 @@ def test_a_limit_that_is_no_time_is_refused(option, says, capsys):
 
 NOBODY = """
 import os, threading
-from orchestrator.supervised_process import PipeChannel
-from orchestrator.interrupts import StopFlag
-from orchestrator.master.child_run import _tell_where
+from yawbench.foundation.supervised_process import PipeChannel
+from yawbench.foundation.interrupts import StopFlag
+from yawbench.orchestrator.master.child_run import _tell_where
 nobody, writing = os.pipe()
 os.close(nobody)
 asking, ask = os.pipe()

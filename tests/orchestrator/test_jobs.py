@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
-from orchestrator.experiments.jobs import Job, execute, read_back, ready
-from orchestrator.fmu.fmu import Fmu, Variable
-from orchestrator.results.reader import load_results
-from orchestrator.supervised_process import PipeChannel
-from orchestrator.workers import Pool
 from tests.refusals import each_mentions, mentions, refused, texts_of
+from yawbench.fmus.fmu import Fmu, Variable
+from yawbench.foundation.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
+from yawbench.foundation.supervised_process import PipeChannel
+from yawbench.foundation.workers import Pool
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.studies.jobs import Job, execute, read_back, ready
 
 from .recorded import car, write
 
@@ -98,7 +98,7 @@ def test_when_the_caller_stops_all_runs_end(tmp_path, monkeypatch, why):
     def stop(outcome):
         raise why
 
-    monkeypatch.setattr("orchestrator.supervised_process.GRACE", 0.0)
+    monkeypatch.setattr("yawbench.foundation.supervised_process.GRACE", 0.0)
     os.mkfifo(tmp_path / "fifo")
     with pytest.raises(why):
         execute(jobs(tmp_path, "hangs", "waits"), workers=2, run=obey, done=stop)
@@ -123,14 +123,14 @@ def test_ctrl_c_does_not_reach_a_run_even_while_its_process_starts(tmp_path):
 CALLER = """
 import sys
 from pathlib import Path
-from orchestrator.experiments.jobs import execute
+from yawbench.studies.jobs import execute
 from tests.orchestrator.test_jobs import jobs, tell_and_wait
 execute(jobs(Path(sys.argv[1]), "waits"), run=tell_and_wait)
 """
 SHARING = """
 import sys
 from pathlib import Path
-from orchestrator.workers import Pool
+from yawbench.foundation.workers import Pool
 from tests.orchestrator.test_jobs import jobs, tell_and_wait
 with Pool(2) as pool:
     pool.map(tell_and_wait, jobs(Path(sys.argv[1]), "waits"))

@@ -13,15 +13,15 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.commands.new import begin
-from orchestrator.experiments import jobs as jobs_module
-from orchestrator.experiments.jobs import Job, execute, keyed, ready, run_job
-from orchestrator.experiments.on_demand import StoredPlans
-from orchestrator.fmu.archive import WANTED, is_native
-from orchestrator.master import fmi
-from orchestrator.master.process_state import Log
-from orchestrator.results.run_folder import RUN_FILE
 from tests.changed import changed
+from yawbench.commands.new import begin
+from yawbench.fmus.archive import WANTED, is_native
+from yawbench.orchestrator.master import fmi
+from yawbench.orchestrator.master.process_state import Log
+from yawbench.orchestrator.results.run_folder import RUN_FILE
+from yawbench.studies import jobs as jobs_module
+from yawbench.studies.jobs import Job, execute, keyed, ready, run_job
+from yawbench.studies.on_demand import StoredPlans
 
 from .conftest import build_here
 from .test_isolation import STEP

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestrator.measured import single_track
-from orchestrator.measured.least_squares import (
+from yawbench.measured_cars import single_track
+from yawbench.measured_cars.least_squares import (
     NotIdentifiable,
     Parameter,
     Residuals,
@@ -21,7 +21,7 @@ from orchestrator.measured.least_squares import (
     identifiability,
     intervals_of,
 )
-from orchestrator.measured.single_track import SingleTrack, SingleTrackWindow
+from yawbench.measured_cars.single_track import SingleTrack, SingleTrackWindow
 
 TRUTH = {
     "stiffness_front": 95e3, "stiffness_rear": 130e3, "friction_front": 0.95, "friction_rear": 1.0,

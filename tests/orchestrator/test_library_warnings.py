@@ -10,16 +10,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orchestrator.errors import RecordWarning
-from orchestrator.figures.panels import LabelledRun
-from orchestrator.figures.plots import draw
-from orchestrator.figures.style import digits_of, save
-from orchestrator.metrics.expressions import STANDARD, evaluate_all
-from orchestrator.metrics.measures import catalogue
-from orchestrator.pages.comparison import divergence
-from orchestrator.pages.viewer import page
 from tests.commands import status_of
 from tests.pages.made_up import whole_car
+from yawbench.figures.panels import LabelledRun
+from yawbench.figures.plots import draw
+from yawbench.figures.style import digits_of, save
+from yawbench.foundation.errors import RecordWarning
+from yawbench.metrics.expressions import STANDARD, evaluate_all
+from yawbench.metrics.measures import catalogue
+from yawbench.reports.comparison import divergence
+from yawbench.reports.viewer import page
 
 from .recorded import write
 
@@ -87,8 +87,8 @@ def test_users_own_warnings_are_shown_and_those_of_libraries_are_not(tmp_path):
     program = """
 import sys, warnings
 import numpy as np
-from orchestrator.errors import hide_library_warnings
-from orchestrator.results import reader
+from yawbench.foundation.errors import hide_library_warnings
+from yawbench.orchestrator.results import reader
 hide_library_warnings()
 warnings.warn("of mine")
 warnings.warn_explicit("of numpy", RuntimeWarning, np.__file__, 1)

@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from orchestrator.commands.check import show
-from orchestrator.errors import WiringError
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.wiring.make_plan import make_plan
 from tests.refusals import mentions, texts_of
+from yawbench.commands.check import show
+from yawbench.foundation.errors import WiringError
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.wiring.make_plan import make_plan
 
 from ..trials.large import write_ring
 

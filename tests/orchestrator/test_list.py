@@ -5,16 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.experiments.tables import runs_table
-from orchestrator.metrics.expressions import columns_for, evaluate_all
-from orchestrator.motion import LEAST_SPEED
-from orchestrator.pages.comparison import differences
-from orchestrator.results.reader import found_runs, load_results
-from orchestrator.results.run_folder import RunStatus
-from orchestrator.results.run_record import FmuRecord, RunRecord
-from orchestrator.scenario.loader import title_of
 from tests.fmu_copies import put_fmus
 from tests.refusals import each_mentions, mentions
+from yawbench.metrics.expressions import columns_for, evaluate_all
+from yawbench.orchestrator.recordings.motion import LEAST_SPEED
+from yawbench.orchestrator.results.reader import found_runs, load_results
+from yawbench.orchestrator.results.run_folder import RunStatus
+from yawbench.orchestrator.results.run_record import FmuRecord, RunRecord
+from yawbench.orchestrator.scenario.loader import title_of
+from yawbench.reports.comparison import differences
+from yawbench.studies.tables import runs_table
 
 from .recorded import car, write
 

@@ -7,8 +7,8 @@ import time
 
 import pytest
 
-from orchestrator.commands import output
 from tests.commands import status_of
+from yawbench.commands import output
 
 from .test_batch_commands import SCENARIO, STUDY
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orchestrator.errors import ScenarioError
-from orchestrator.measured.measurement import load_measurement
-from orchestrator.measured.segment import Segment
+from yawbench.foundation.errors import ScenarioError
+from yawbench.orchestrator.recordings.measurement import load_measurement
+from yawbench.orchestrator.recordings.segment import Segment
 
 from .measured_files import GRAVITY, SIDE, SPEED, TIMES, YAW, described, read, refusal, rows, segment
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import yawbench as yb
-from orchestrator.commands.results import read_runs
-from orchestrator.figures.plots import draw
-from orchestrator.figures.style import MEASURED_LINE, LabelledRun
 from tests.commands import status_of
 from tests.pages.made_up import unpacked
 from tests.refusals import each_mentions
+from yawbench.commands.results import read_runs
+from yawbench.figures.plots import draw
+from yawbench.figures.style import MEASURED_LINE, LabelledRun
 
 TIME = np.arange(10.0, 16.0, 0.01)
 SLOW, FAST = (np.sin(2.0 * np.pi * f * TIME) for f in (0.5, 15.0))

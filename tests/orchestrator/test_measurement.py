@@ -10,17 +10,17 @@ import pyarrow.parquet as pq
 import pytest
 
 import yawbench as yb
-from orchestrator.cli import main
-from orchestrator.errors import ResultsError, ScenarioError
-from orchestrator.measured.measurement import load_measurement
-from orchestrator.measured.segment import LowPass, Segment, to_centre_of_mass
-from orchestrator.measured.single_track import start_states
-from orchestrator.plan import InputSeries
-from orchestrator.planner import Planner
-from orchestrator.results.measurement_results import load_run
-from orchestrator.scenario.loader import load_scenario
 from tests.pages.made_up import unpacked
 from tests.refusals import each_mentions, mentions
+from yawbench.cli import main
+from yawbench.foundation.errors import ResultsError, ScenarioError
+from yawbench.measured_cars.single_track import start_states
+from yawbench.orchestrator.plan import InputSeries
+from yawbench.orchestrator.recordings.measurement import load_measurement
+from yawbench.orchestrator.recordings.segment import LowPass, Segment, to_centre_of_mass
+from yawbench.orchestrator.results.measurement_results import load_run
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.planner import Planner
 
 T = np.arange(0.0, 6.0, 0.01)
 STEER = 0.5 * np.sin(2.0 * T)

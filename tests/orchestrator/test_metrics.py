@@ -9,14 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.errors import ScenarioError
-from orchestrator.evaluation.standard_tests import Evaluation
-from orchestrator.experiments.result_tables import run_table
-from orchestrator.experiments.tables import metrics_of_run
-from orchestrator.figures.plots import LabelledRun, draw, shown_by
-from orchestrator.figures.style import digits_of, shown, shown_unit
-from orchestrator.metrics import measures
-from orchestrator.metrics.expressions import (
+from tests.refusals import mentions, refused
+from yawbench.figures.plots import LabelledRun, draw, shown_by
+from yawbench.figures.style import digits_of, shown, shown_unit
+from yawbench.foundation.errors import ScenarioError
+from yawbench.metrics import measures
+from yawbench.metrics.expressions import (
     AT_A_TIME,
     STANDARD,
     MetricValue,
@@ -26,13 +24,15 @@ from orchestrator.metrics.expressions import (
     while_moving,
     why_none,
 )
-from orchestrator.metrics.measures import catalogue
-from orchestrator.metrics.verdict import compare
-from orchestrator.pages.comparison import divergence, partings_table
-from orchestrator.results.reader import Results
-from orchestrator.results.run_record import ConnectionRecord, FmuRecord, RunRecord
-from tests.refusals import mentions, refused
-from vocabulary.wheels import WHEELS
+from yawbench.metrics.measures import catalogue
+from yawbench.metrics.verdict import compare
+from yawbench.orchestrator.results.reader import Results
+from yawbench.orchestrator.results.run_record import ConnectionRecord, FmuRecord, RunRecord
+from yawbench.proving_ground.standard_tests import Evaluation
+from yawbench.reports.comparison import divergence, partings_table
+from yawbench.studies.result_tables import run_table
+from yawbench.studies.tables import metrics_of_run
+from yawbench.vocabulary.wheels import WHEELS
 
 from .recorded import UNITS, car, noted, results
 
@@ -596,7 +596,7 @@ def test_without_a_speed_a_sideslip_is_taken_as_it_is():
 
 
 def test_a_line_has_a_gap_while_the_car_stands_and_keeps_its_time():
-    from orchestrator.figures.plots import draw
+    from yawbench.figures.plots import draw
 
     run = moving_car([20.0, 15.0, 10.0, 5.0, 0.0, 0.0], [0.0, 0.02, 0.01, 0.0, np.pi, -np.pi])
     figure = draw([LabelledRun("a", run)], ["sideslip", "velocity_x", "velocity_x(sideslip)"])

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cli import main
 from tests.refusals import mentions
+from yawbench.cli import main
 
 ROOT = Path(__file__).parents[2]
 NAME = "fuzzy_feedback/single_sine"

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fmus.build import build_all
-from orchestrator.cli import main
-from orchestrator.results.reader import load_results
 from tests.checkout import copy_checkout, run_in
 from tests.refusals import each_mentions, mentions
+from yawbench.cli import main
+from yawbench.fmus.build import build_all
+from yawbench.orchestrator.results.reader import load_results
 
 UNITS = (
     "driver_sine", "reference_steady_state", "controller_off", "controller_fnn", "controller_fuzzy_sideslip",

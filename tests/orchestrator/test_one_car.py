@@ -7,16 +7,16 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-from components.cars.sprung_car import FourteenDofParameters, ride_of
-from orchestrator.commands.check import show
-from orchestrator.errors import WiringError
-from orchestrator.plan import ValueOrigin
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.wiring.derivations import DERIVATIONS, adapted, car_of, contradictions
-from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.refusals import each_mentions, mentions, refused, texts_of
-from vocabulary.gravity import G
+from yawbench.commands.check import show
+from yawbench.components.cars.sprung_car import FourteenDofParameters, ride_of
+from yawbench.foundation.errors import WiringError
+from yawbench.orchestrator.plan import ValueOrigin
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.wiring.derivations import DERIVATIONS, adapted, car_of, contradictions
+from yawbench.orchestrator.wiring.make_plan import make_plan
+from yawbench.vocabulary.gravity import G
 
 from .fake_fmus import Var, make_fmu, out
 

@@ -10,22 +10,22 @@ import re
 import pytest
 from lxml import html
 
-from orchestrator.cli import main
-from orchestrator.errors import Diagnostic, ScenarioError
-from orchestrator.experiments.claim_schema import Claim
-from orchestrator.experiments.claims import Judgement, Region, judge
-from orchestrator.experiments.confidence import SequentialTest
-from orchestrator.experiments.experiment import plan_experiment
-from orchestrator.experiments.experiment_result import ExperimentResult
-from orchestrator.experiments.jobs import MeasuredRun
-from orchestrator.experiments.load_experiment import load_experiment
-from orchestrator.experiments.open_value_regions import judge_region, next_jobs, plan_region, runs_of
-from orchestrator.experiments.result_tables import region_words, verdict
-from orchestrator.metrics.expressions import MetricValue
-from orchestrator.metrics.verdict import Status, Verdict, compare, not_judged, worst
-from orchestrator.planner import Planner
 from tests.checkout import ROOT
 from tests.refusals import mentions, refused
+from yawbench.cli import main
+from yawbench.foundation.errors import Diagnostic, ScenarioError
+from yawbench.metrics.expressions import MetricValue
+from yawbench.metrics.verdict import Status, Verdict, compare, not_judged, worst
+from yawbench.planner import Planner
+from yawbench.studies.claim_schema import Claim
+from yawbench.studies.claims import Judgement, Region, judge
+from yawbench.studies.confidence import SequentialTest
+from yawbench.studies.experiment import plan_experiment
+from yawbench.studies.experiment_result import ExperimentResult
+from yawbench.studies.jobs import MeasuredRun
+from yawbench.studies.load_experiment import load_experiment
+from yawbench.studies.open_value_regions import judge_region, next_jobs, plan_region, runs_of
+from yawbench.studies.result_tables import region_words, verdict
 
 SCENARIO = """
 title: A sine

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.fmu.fmu import Fmu, Variable
-from orchestrator.plan import Wire
-from orchestrator.wiring.order import EvaluationOrder, evaluate
 from tests.refusals import each_mentions
+from yawbench.fmus.fmu import Fmu, Variable
+from yawbench.orchestrator.plan import Wire
+from yawbench.orchestrator.wiring.order import EvaluationOrder, evaluate
 
 
 def fmu(inputs: str = "", **outputs: str | None) -> Fmu:

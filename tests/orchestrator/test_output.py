@@ -11,10 +11,11 @@ from typing import Any
 
 import pytest
 
-from fmus.build import build_component
-from orchestrator.cli import COMMANDS, main
-from orchestrator.commands import output
-from orchestrator.errors import Diagnostic
+from yawbench.cli import main
+from yawbench.commands import output
+from yawbench.fmus.build import build_component
+from yawbench.foundation import plugins
+from yawbench.foundation.errors import Diagnostic
 
 from .test_batch_commands import SCENARIO, STUDY
 
@@ -35,7 +36,7 @@ TALKING = '''
 import os
 import sys
 
-from components.fmi.component import Component
+from yawbench.components.fmi.component import Component
 
 
 class Talking(Component):
@@ -87,7 +88,7 @@ def documented() -> dict[str, set[str]]:
 
 
 def test_the_page_tells_the_fields_of_every_command_that_has_some():
-    assert set(documented()) <= set(output.COMMANDS) <= set(COMMANDS)
+    assert set(documented()) <= set(output.COMMANDS) <= set(plugins.names("command"))
     for always in ALWAYS:
         assert f"| `{always}` |" in (ROOT / "docs/editors.md").read_text(encoding="utf-8")
 
@@ -193,7 +194,7 @@ def test_errors_are_in_the_object_with_the_same_status(answers, arguments, code,
 def test_a_failed_run_is_an_error_at_a_time_of_an_instance(answers, fmus, tmp_path):
     law = tmp_path / "controller_law.py"
     law.write_text(
-        "from components.fmi.component import Component\n\n\n"
+        "from yawbench.components.fmi.component import Component\n\n\n"
         'class Law(Component):\n    """Fails."""\n\n    inputs = ("yaw_rate_ref",)\n'
         '    outputs = ("yaw_moment",)\n\n    def output(self, t, u):\n        return (1.0 / (t < 0.2),)\n'
     )
@@ -251,7 +252,7 @@ def test_latex_is_all_that_is_printed_and_compiles_by_its_shape(fmus, tmp_path, 
 
 def test_every_command_that_prints_tables_takes_both_forms():
     printing = set()
-    for file in (ROOT / "orchestrator/commands").glob("*.py"):
+    for file in (ROOT / "yawbench/commands").glob("*.py"):
         if "print_tables(" in file.read_text() and file.name != "output.py":
             printing.add(file.stem)
     assert {COMMANDS[name] for name in output.COMMANDS} == printing

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.fmu import opener
-from orchestrator.fmu.opener import HOME
-from orchestrator.results.reader import Results, load_results
 from tests.refusals import each_mentions, mentions
+from yawbench.fmus import opener
+from yawbench.fmus.opener import HOME
+from yawbench.orchestrator.results.reader import Results, load_results
 
 from .test_batch_commands import SCENARIO
 
@@ -21,7 +21,7 @@ UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_
 LAW = '''
 """A proportional law, with a gain from a file beside it."""
 
-from components.fmi.component import Component
+from yawbench.components.fmi.component import Component
 
 from ._gains import GAIN
 

@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.errors import Diagnostic, Location, warnings_in
-from orchestrator.experiments.tables import MARK, marked, remarks
-from orchestrator.fmu.fmu import Fmu, Variable
-from orchestrator.metrics.plausibility import CHECKS, PlausibilityWatch
-from orchestrator.plan import Instance, Plan, Wire
-from orchestrator.results.run_record import RunRecord
-from orchestrator.signal_names import SignalName
 from tests.refusals import mentions
-from vocabulary.wheels import WHEELS
+from yawbench.fmus.fmu import Fmu, Variable
+from yawbench.foundation.errors import Diagnostic, Location, warnings_in
+from yawbench.metrics.plausibility import CHECKS, PlausibilityWatch
+from yawbench.orchestrator.plan import Instance, Plan, Wire
+from yawbench.orchestrator.results.run_record import RunRecord
+from yawbench.orchestrator.signal_names import SignalName
+from yawbench.studies.tables import MARK, marked, remarks
+from yawbench.vocabulary.wheels import WHEELS
 
 from .recorded import car, noted
 

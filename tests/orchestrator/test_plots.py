@@ -9,12 +9,12 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from orchestrator.errors import ResultsError, ScenarioError
-from orchestrator.figures.panels import LabelledRun, check_panels, thinned
-from orchestrator.figures.plots import draw, provenance, title_of
-from orchestrator.figures.style import LINES, NOTE_WIDTH, REFERENCE, save
-from orchestrator.messages import printable
 from tests.refusals import each_mentions, mentions, refused
+from yawbench.figures.panels import LabelledRun, check_panels, thinned
+from yawbench.figures.plots import draw, provenance, title_of
+from yawbench.figures.style import LINES, NOTE_WIDTH, REFERENCE, save
+from yawbench.foundation.errors import ResultsError, ScenarioError
+from yawbench.foundation.messages import printable
 
 from .recorded import car, noted, results
 

@@ -12,10 +12,10 @@ import matplotlib
 import pytest
 from PIL import Image
 
-from orchestrator.figures.plots import draw
-from orchestrator.figures.style import LINES, STYLES, LabelledRun
 from tests.commands import status_of
 from tests.refusals import each_mentions
+from yawbench.figures.plots import draw
+from yawbench.figures.style import LINES, STYLES, LabelledRun
 
 from .recorded import car, write
 

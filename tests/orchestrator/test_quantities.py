@@ -7,10 +7,10 @@ from fractions import Fraction
 
 import pytest
 
-from orchestrator.fmu.fmu import UnitDefinition
-from orchestrator.scenario import quantities
-from orchestrator.scenario.quantities import conversion, convert, measure_of, parse_unit, seconds
 from tests.refusals import mentions, refused
+from yawbench.fmus.fmu import UnitDefinition
+from yawbench.orchestrator.scenario import quantities
+from yawbench.orchestrator.scenario.quantities import conversion, convert, measure_of, parse_unit, seconds
 
 
 @pytest.mark.parametrize(

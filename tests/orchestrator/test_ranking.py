@@ -14,10 +14,12 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.errors import Diagnostic, RecordWarning
-from orchestrator.experiments.jobs import MeasuredRun
-from orchestrator.experiments.ranking import EntrySpec, load_ranking
-from orchestrator.experiments.ranking_scores import (
+from tests.commands import status_of
+from tests.refusals import mentions
+from yawbench.figures.style import shown
+from yawbench.foundation.errors import Diagnostic, RecordWarning
+from yawbench.ranking.ranking import EntrySpec, load_ranking
+from yawbench.ranking.ranking_scores import (
     UNHELD,
     WORST,
     EntryScore,
@@ -28,10 +30,8 @@ from orchestrator.experiments.ranking_scores import (
     placed,
     told_apart,
 )
-from orchestrator.experiments.ranking_tables import state_words
-from orchestrator.figures.style import shown
-from tests.commands import status_of
-from tests.refusals import mentions
+from yawbench.ranking.ranking_tables import state_words
+from yawbench.studies.jobs import MeasuredRun
 
 ROOT = Path(__file__).parents[2]
 GROUND = ROOT / "scenarios" / "proving_ground"
@@ -221,7 +221,7 @@ def test_a_small_matrix_is_driven_goes_on_where_it_was_and_shows_what_is_missing
 def test_a_ranking_that_was_killed_goes_on_where_it_was(tmp_path, capsys):
     file, out = tmp_path / "small.yaml", tmp_path / "out"
     file.write_text(SMALL)
-    program = "import sys; from orchestrator.cli import main; main(sys.argv[1:])"
+    program = "import sys; from yawbench.cli import main; main(sys.argv[1:])"
     command = [sys.executable, "-c", program, "rank", str(file), "--out", str(out), "--jobs", "1"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=ROOT) as process:
         assert process.stderr is not None

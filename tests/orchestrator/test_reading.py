@@ -10,13 +10,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from orchestrator.errors import InvalidValueError, ScenarioError
-from orchestrator.measured.clocks import seconds_of
-from orchestrator.measured.measurement import load_measurement
-from orchestrator.measured.segment import even_grid
-from orchestrator.measured.units_of_loggers import unit_in_file
-from orchestrator.scenario.quantities import parse_unit
 from tests.commands import status_of
+from yawbench.foundation.errors import InvalidValueError, ScenarioError
+from yawbench.orchestrator.recordings.clocks import seconds_of
+from yawbench.orchestrator.recordings.measurement import load_measurement
+from yawbench.orchestrator.recordings.segment import even_grid
+from yawbench.orchestrator.recordings.units_of_loggers import unit_in_file
+from yawbench.orchestrator.scenario.quantities import parse_unit
 
 from .measured_files import GRAVITY, SIDE, SPEED, TIMES, YAW, described, read, refusal, rows, segment
 

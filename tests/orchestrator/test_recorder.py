@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 from pydantic import BaseModel
 
-from orchestrator.errors import ResultsError, SimulationError
-from orchestrator.master.instance import StepCalls
-from orchestrator.master.simulate import simulate
-from orchestrator.results import file_formats
-from orchestrator.results import recorder as module
-from orchestrator.results.reader import load_results
-from orchestrator.results.recorder import BLOCK, Recorder, recorder_of
-from orchestrator.results.run_record import RunRecord
-from orchestrator.safe_files import write_whole
 from tests.refusals import each_mentions, mentions, refused, texts_of
+from yawbench.foundation.errors import ResultsError, SimulationError
+from yawbench.foundation.safe_files import write_whole
+from yawbench.orchestrator.master.instance import StepCalls
+from yawbench.orchestrator.master.simulate import simulate
+from yawbench.orchestrator.results import file_formats
+from yawbench.orchestrator.results import recorder as module
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.orchestrator.results.recorder import BLOCK, Recorder, recorder_of
+from yawbench.orchestrator.results.run_record import RunRecord
 
 from .fakes import Clock, Function, Stage, make_plan
 

@@ -9,16 +9,16 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cli import main
-from orchestrator.errors import YawbenchError
-from orchestrator.fmu.archive import open_fmu
-from orchestrator.fmu.fmu import Variable
-from orchestrator.interop.ssp_write import for_omsimulator, write_ssp
-from orchestrator.plan import Plan
-from orchestrator.results.reader import load_results
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
+from yawbench.cli import main
+from yawbench.fmus.archive import open_fmu
+from yawbench.fmus.fmu import Variable
+from yawbench.foundation.errors import YawbenchError
+from yawbench.interop.ssp_write import for_omsimulator, write_ssp
+from yawbench.orchestrator.plan import Plan
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.wiring.make_plan import make_plan
 
 from .fake_fmus import Var, make_fmu, out
 from .test_foreign import write_fmu

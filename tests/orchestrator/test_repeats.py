@@ -7,20 +7,20 @@ from dataclasses import replace
 import pytest
 from lxml import html
 
-from components.sensing.noise import key, normal
-from orchestrator.commands.experiments import chapter_of
-from orchestrator.errors import ScenarioError
-from orchestrator.experiments.confidence import interval, share_bounds
-from orchestrator.experiments.experiment import plan_experiment
-from orchestrator.experiments.experiment_result import judge_records
-from orchestrator.experiments.jobs import run_job
-from orchestrator.experiments.load_experiment import load_experiment
-from orchestrator.experiments.result_files import draw_over_axes
-from orchestrator.experiments.result_tables import limit_tables, run_tables, verdict
-from orchestrator.figures.style import shown
-from orchestrator.metrics.expressions import MetricValue
-from orchestrator.pages.study_page import study_page
 from tests.refusals import each_mentions, mentions, texts_of
+from yawbench.commands.experiments import chapter_of
+from yawbench.components.sensing.noise import key, normal
+from yawbench.figures.style import shown
+from yawbench.foundation.errors import ScenarioError
+from yawbench.metrics.expressions import MetricValue
+from yawbench.reports.study_page import study_page
+from yawbench.studies.confidence import interval, share_bounds
+from yawbench.studies.experiment import plan_experiment
+from yawbench.studies.experiment_result import judge_records
+from yawbench.studies.jobs import run_job
+from yawbench.studies.load_experiment import load_experiment
+from yawbench.studies.result_files import draw_over_axes
+from yawbench.studies.result_tables import limit_tables, run_tables, verdict
 
 SCENARIO = """
 title: A car that turns, and its gyro

@@ -4,12 +4,12 @@ import json
 import numpy as np
 import pytest
 
-from orchestrator.errors import ResultsError
-from orchestrator.results import reader
-from orchestrator.results.file_formats import BLOCK, CsvFile
-from orchestrator.results.reader import load_results
-from orchestrator.results.run_record import check_record
 from tests.refusals import mentions, refused, texts_of
+from yawbench.foundation.errors import ResultsError
+from yawbench.orchestrator.results import reader
+from yawbench.orchestrator.results.file_formats import BLOCK, CsvFile
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.orchestrator.results.run_record import check_record
 
 RUN = {
     "status": "completed",

@@ -11,16 +11,16 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build_component
-from orchestrator.cli import main
-from orchestrator.master import process_state as log
-from orchestrator.master.fmi import open_instance
-from orchestrator.master.simulate import simulate
-from orchestrator.results.reader import load_results
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.wiring.make_plan import make_plan
 from tests.fmu_copies import put_fmus
 from tests.refusals import each_mentions, mentions
+from yawbench.cli import main
+from yawbench.fmus.build import build_component
+from yawbench.orchestrator.master import process_state as log
+from yawbench.orchestrator.master.fmi import open_instance
+from yawbench.orchestrator.master.simulate import simulate
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.wiring.make_plan import make_plan
 
 UNITS = (
     "driver_sine", "reference_steady_state", "controller_fnn", "controller_off",
@@ -56,7 +56,7 @@ FAULTY = '''
 import os
 import signal
 
-from components.fmi.component import Component
+from yawbench.components.fmi.component import Component
 
 
 class {name}(Component):
@@ -318,7 +318,7 @@ def test_ctrl_c_inside_a_component_ends_the_run_after_the_step(yawbench, faulty,
 
 def run_process(*arguments):
     """Run the command line in a process of its own; its stderr is no terminal."""
-    command = [sys.executable, "-m", "orchestrator.cli", *map(str, arguments)]
+    command = [sys.executable, "-m", "yawbench", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=60)
 
 
@@ -353,7 +353,7 @@ def test_a_terminal_shows_a_progress_bar_and_keeps_only_the_last_line(columns, s
     scenario = car(tmp_path, stop=2)
     text = scenario.read_text(encoding="utf-8")
     scenario.write_text(text.replace("on a slalom", "on a slalom of the [second] kind"), encoding="utf-8")
-    command = [sys.executable, "-m", "orchestrator.cli", "run", scenario, "--fmus", fmus,
+    command = [sys.executable, "-m", "yawbench", "run", scenario, "--fmus", fmus,
                "--out", tmp_path / "out"]  # fmt: skip
     environment = {**os.environ, "TERM": "xterm", "COLUMNS": str(columns)}
     process = subprocess.Popen([str(c) for c in command], stderr=follower, env=environment)

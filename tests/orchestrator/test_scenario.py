@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from orchestrator.errors import Diagnostic, ScenarioError
-from orchestrator.scenario.loader import ScenarioSpec, load_scenario
-from orchestrator.signal_names import SignalName
 from tests.changed import changed
 from tests.refusals import each_mentions, mentions, places_of
+from yawbench.foundation.errors import Diagnostic, ScenarioError
+from yawbench.orchestrator.scenario.loader import ScenarioSpec, load_scenario
+from yawbench.orchestrator.signal_names import SignalName
 
 GOOD = """\
 title: Single sine

@@ -15,14 +15,15 @@ from typing import Any
 import jsonschema
 import pytest
 
-from orchestrator.cli import main
-from orchestrator.commands.new import MODELS, begin, model_of, schema_of, schema_text
-from orchestrator.experiments import fit, ranking, threats
-from orchestrator.measured import measurement
-from orchestrator.scenario import yaml_lines
-from orchestrator.scenario.loader import kind_of
-from orchestrator.scenario.schema_validation import validate
-from orchestrator.scenario.yaml_lines import Document
+from yawbench.cli import main
+from yawbench.commands.new import begin, kinds, model_of, schema_of, schema_text
+from yawbench.measured_cars import fit
+from yawbench.orchestrator.recordings import measurement
+from yawbench.orchestrator.scenario import yaml_lines
+from yawbench.orchestrator.scenario.loader import kind_of
+from yawbench.orchestrator.scenario.schema_validation import validate
+from yawbench.orchestrator.scenario.yaml_lines import Document
+from yawbench.ranking import ranking, threats
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 KIND = {
@@ -31,7 +32,7 @@ KIND = {
     "a file of entries": "entries", "a threat file": "threats", "a file of bands": "bands",
 }  # fmt: skip
 FILES = {path: KIND[kind_of(path)] for path in sorted(SCENARIOS.rglob("*.yaml"))}
-VALIDATORS = {kind: jsonschema.Draft7Validator(schema_of(kind)) for kind in MODELS}
+VALIDATORS = {kind: jsonschema.Draft7Validator(schema_of(kind)) for kind in kinds()}
 
 MEASUREMENT = {"files": ["a.csv"], "signals": {"yaw_rate": {"column": "Gyro", "unit": "deg/s"}}}
 FIT = {
@@ -59,7 +60,7 @@ def accepted(kind: str, data: Any) -> bool:
     return validate(model_of(kind), document) is not None and not document.errors
 
 
-@pytest.mark.parametrize("kind", MODELS)
+@pytest.mark.parametrize("kind", kinds())
 def test_the_schemas_in_the_package_are_those_of_the_models(kind):
     jsonschema.Draft7Validator.check_schema(schema_of(kind))
     file = SCENARIOS / "schemas" / f"{kind}.json"
@@ -100,14 +101,14 @@ def test_new_files_are_valid_and_name_their_schema(kind, tmp_path):
         first, _, _ = text.partition("\n")
         named = first.removeprefix("# yaml-language-server: $schema=../schemas/").removesuffix(".json")
         (tmp_path / path.name).write_text(text)
-        assert named in MODELS
+        assert named in kinds()
         assert problems(named, data_of(tmp_path / path.name)) == []
 
 
 def test_the_command_lists_the_kinds_and_prints_a_schema(capsys):
     with pytest.raises(SystemExit):
         main(["schema"])
-    assert capsys.readouterr().out.split() == [*MODELS]
+    assert capsys.readouterr().out.split() == [*kinds()]
     for name, kind in {"fit": "fit", "sweep": "experiment"}.items():
         with pytest.raises(SystemExit):
             main(["schema", name])

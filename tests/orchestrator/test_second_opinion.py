@@ -11,11 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.cli import main
-from orchestrator.commands.interop import show
-from orchestrator.errors import WiringError
-from orchestrator.interop import second_opinion as module
-from orchestrator.interop.second_opinion import (
+from tests.changed import changed
+from tests.evidence import measured
+from tests.refusals import mentions, refused
+from yawbench.cli import main
+from yawbench.foundation.errors import WiringError
+from yawbench.interop import second_opinion as module
+from yawbench.interop.command import show
+from yawbench.interop.second_opinion import (
     AGREEMENT,
     MASTERS,
     OtherMaster,
@@ -26,12 +29,9 @@ from orchestrator.interop.second_opinion import (
     second_opinion,
     still_signals,
 )
-from orchestrator.master.simulate import simulate_in_memory
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.wiring.make_plan import make_plan
-from tests.changed import changed
-from tests.evidence import measured
-from tests.refusals import mentions, refused
+from yawbench.orchestrator.master.simulate import simulate_in_memory
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.wiring.make_plan import make_plan
 
 from . import fmpy_exchanging
 

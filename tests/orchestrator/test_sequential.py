@@ -9,11 +9,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from orchestrator.experiments.axes import RegionSpec, hypercube
-from orchestrator.experiments.claims import ONE_IN
-from orchestrator.experiments.confidence import TAIL, Decision, SequentialTest, share_bounds
 from tests.checkout import ROOT
 from tests.verdicts import table_in
+from yawbench.studies.axes import RegionSpec, hypercube
+from yawbench.studies.claims import ONE_IN
+from yawbench.studies.confidence import TAIL, Decision, SequentialTest, share_bounds
 
 PAGE = ROOT / "docs" / "regions.md"
 CLAIMS = 1000

@@ -12,18 +12,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.cli import main
-from orchestrator.errors import RecordWarning, ResultsError, YawbenchError
-from orchestrator.interop.ssp_write import write_ssp
-from orchestrator.master.simulate import simulate
-from orchestrator.measured.recording_formats import ColumnFile
-from orchestrator.plan import InputSeries, Plan
-from orchestrator.results.freshness import staleness
-from orchestrator.results.reader import load_results
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.wiring.make_plan import make_plan
 from tests.refusals import each_mentions, mentions, refused, texts_of
-from vocabulary.wheels import WHEELS
+from yawbench.cli import main
+from yawbench.foundation.errors import RecordWarning, ResultsError, YawbenchError
+from yawbench.interop.ssp_write import write_ssp
+from yawbench.orchestrator.master.simulate import simulate
+from yawbench.orchestrator.plan import InputSeries, Plan
+from yawbench.orchestrator.recordings.recording_formats import ColumnFile
+from yawbench.orchestrator.results.freshness import staleness
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.wiring.make_plan import make_plan
+from yawbench.vocabulary.wheels import WHEELS
 
 from .fake_fmus import Var, make_fmu, out
 from .fakes import Behaviour, Stage

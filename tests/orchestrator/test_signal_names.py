@@ -11,19 +11,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.experiments.experiment import plan_experiment
-from orchestrator.experiments.load_experiment import load_experiment
-from orchestrator.experiments.open_value_regions import RegionRuns
-from orchestrator.figures.panels import panels_of
-from orchestrator.figures.style import LabelledRun
-from orchestrator.metrics.expressions import evaluate, metric
-from orchestrator.pages.comparison import divergence
-from orchestrator.results.reader import load_results
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.signal_names import SignalName, Target, match, matching
-from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.commands import status_of
+from yawbench.figures.panels import panels_of
+from yawbench.figures.style import LabelledRun
+from yawbench.metrics.expressions import evaluate, metric
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.signal_names import SignalName, Target, match, matching
+from yawbench.orchestrator.wiring.make_plan import make_plan
+from yawbench.reports.comparison import divergence
+from yawbench.studies.experiment import plan_experiment
+from yawbench.studies.load_experiment import load_experiment
+from yawbench.studies.open_value_regions import RegionRuns
 
 UNITS = ("driver_sine", "plant_two_dof", "tyre_linear")
 

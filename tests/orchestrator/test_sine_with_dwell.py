@@ -10,17 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from components.drivers.sine_with_dwell import SineWithDwellParameters, sine_with_dwell
-from orchestrator.evaluation.sine_with_dwell import amplitudes, evaluate_dwell, is_series, judge_series
-from orchestrator.evaluation.standard_tests import TESTS, Evaluation
-from orchestrator.evaluation.steering_tests import G, characteristic_angle, evaluate_slow_steer
-from orchestrator.evaluation.trace import Trace, trace_of
-from orchestrator.figures.style import save
-from orchestrator.metrics.verdict import NotJudged, Status, Verdict, apart, not_judged
-from orchestrator.results.measurement_results import load_run
 from tests.commands import status_of
 from tests.refusals import mentions
-from vocabulary.units import UNITS
+from yawbench.components.drivers.sine_with_dwell import SineWithDwellParameters, sine_with_dwell
+from yawbench.figures.style import save
+from yawbench.metrics.verdict import NotJudged, Status, Verdict, apart, not_judged
+from yawbench.orchestrator.results.measurement_results import load_run
+from yawbench.proving_ground.sine_with_dwell import amplitudes, evaluate_dwell, is_series, judge_series
+from yawbench.proving_ground.standard_tests import TESTS, Evaluation
+from yawbench.proving_ground.steering_tests import G, characteristic_angle, evaluate_slow_steer
+from yawbench.proving_ground.trace import Trace, trace_of
+from yawbench.vocabulary.units import UNITS
 
 A, LARGE = radians(36.0), radians(270.0)
 START = 1.5

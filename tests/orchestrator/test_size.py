@@ -7,11 +7,11 @@ from collections import namedtuple
 
 import pytest
 
-from orchestrator.cli import main
-from orchestrator.results import file_formats
-from orchestrator.results.file_formats import expected_size, size_note
 from tests.fmu_copies import put_fmus
 from tests.refusals import mentions
+from yawbench.cli import main
+from yawbench.orchestrator.results import file_formats
+from yawbench.orchestrator.results.file_formats import expected_size, size_note
 
 from .fakes import Clock, make_plan
 

@@ -6,8 +6,8 @@ import shutil
 
 import pytest
 
-from orchestrator import cache as module
-from orchestrator.cache import OF_METRICS, OF_RESULTS, sources_hash
+from yawbench.foundation import cache as module
+from yawbench.foundation.cache import OF_METRICS, OF_RESULTS, sources_hash
 
 from .test_imports import ORCHESTRATOR, SOURCES, imported_by, stage_of
 

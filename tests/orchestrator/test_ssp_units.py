@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.errors import YawbenchError
-from orchestrator.interop.ssp_write import for_omsimulator, system_structure, write_ssp
-from orchestrator.plan import Plan, Wire
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.scenario.ssp_archive import SSC, SSD, SSV
-from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.refusals import each_mentions, mentions, refused, texts_of
+from yawbench.foundation.errors import YawbenchError
+from yawbench.interop.ssp_write import for_omsimulator, system_structure, write_ssp
+from yawbench.orchestrator.plan import Plan, Wire
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.scenario.ssp_archive import SSC, SSD, SSV
+from yawbench.orchestrator.wiring.make_plan import make_plan
 
 from .fake_fmus import Var, make_fmu, out
 

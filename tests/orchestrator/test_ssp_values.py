@@ -11,15 +11,15 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from orchestrator.cli import main
-from orchestrator.errors import YawbenchError
-from orchestrator.interop.ssp_write import write_ssp
-from orchestrator.plan import Instance, Plan
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.scenario.ssp_archive import SSC, SSD, SSM, SSV
-from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.refusals import texts_of
+from yawbench.cli import main
+from yawbench.foundation.errors import YawbenchError
+from yawbench.interop.ssp_write import write_ssp
+from yawbench.orchestrator.plan import Instance, Plan
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.scenario.ssp_archive import SSC, SSD, SSM, SSV
+from yawbench.orchestrator.wiring.make_plan import make_plan
 
 from . import models3
 from .conftest import compiled

@@ -10,25 +10,25 @@ import numpy as np
 import pytest
 
 import yawbench as yb
-from components.drivers.sine_sweep import SineSweepParameters, sweep
-from orchestrator.evaluation.braking_and_wind import evaluate_turn
-from orchestrator.evaluation.standard_tests import Evaluation
-from orchestrator.evaluation.steering_tests import (
+from tests.refusals import each_mentions, mentions
+from yawbench.components.drivers.sine_sweep import SineSweepParameters, sweep
+from yawbench.metrics.verdict import Status, Verdict
+from yawbench.orchestrator.results.reader import Results
+from yawbench.orchestrator.results.run_record import RunRecord
+from yawbench.orchestrator.scenario.loader import SHIPPED, load_scenario
+from yawbench.orchestrator.wiring.make_plan import make_plan
+from yawbench.proving_ground.braking_and_wind import evaluate_turn
+from yawbench.proving_ground.standard_tests import Evaluation
+from yawbench.proving_ground.steering_tests import (
     evaluate_lane_change,
     evaluate_step,
     evaluate_sweep,
     evaluate_understeer,
     judge_entry_speeds,
 )
-from orchestrator.evaluation.trace import Trace, trace_of
-from orchestrator.metrics.verdict import Status, Verdict
-from orchestrator.results.reader import Results
-from orchestrator.results.run_record import RunRecord
-from orchestrator.scenario.loader import SHIPPED, load_scenario
-from orchestrator.tyre_stand import cornering_stiffness
-from orchestrator.wiring.make_plan import make_plan
-from tests.refusals import each_mentions, mentions
-from vocabulary.wheels import WHEELS
+from yawbench.proving_ground.trace import Trace, trace_of
+from yawbench.tyre_stand import cornering_stiffness
+from yawbench.vocabulary.wheels import WHEELS
 
 from .test_sine_with_dwell import as_sampled
 

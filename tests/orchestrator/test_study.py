@@ -14,20 +14,20 @@ import pytest
 from lxml import html
 from rich.console import Console
 
-from orchestrator.errors import Diagnostic, ScenarioError
-from orchestrator.experiments.claim_schema import Claim, GridSpec, calculate, rank_correlation
-from orchestrator.experiments.claims import correlation, judge
-from orchestrator.experiments.experiment_result import judge_results
-from orchestrator.experiments.jobs import Job, Outcome
-from orchestrator.experiments.load_experiment import load_experiment
-from orchestrator.experiments.result_files import draw_all, draw_over_axes, write_findings
-from orchestrator.experiments.result_tables import claim_tables, derived_tables, run_tables, share
-from orchestrator.experiments.tables import Table, for_terminal
-from orchestrator.figures.style import shown
-from orchestrator.metrics.expressions import MetricValue
-from orchestrator.pages.study_page import chapter, study_page, viewer_of
-from orchestrator.plan import Override
 from tests.refusals import each_mentions, mentions, refused, texts_of
+from yawbench.figures.style import shown
+from yawbench.foundation.errors import Diagnostic, ScenarioError
+from yawbench.metrics.expressions import MetricValue
+from yawbench.orchestrator.plan import Override
+from yawbench.reports.study_page import chapter, study_page, viewer_of
+from yawbench.studies.claim_schema import Claim, GridSpec, calculate, rank_correlation
+from yawbench.studies.claims import correlation, judge
+from yawbench.studies.experiment_result import judge_results
+from yawbench.studies.jobs import Job, Outcome
+from yawbench.studies.load_experiment import load_experiment
+from yawbench.studies.result_files import draw_all, draw_over_axes, write_findings
+from yawbench.studies.result_tables import claim_tables, derived_tables, run_tables, share
+from yawbench.studies.tables import Table, for_terminal
 
 from .recorded import car, write
 

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.errors import WiringError, warnings_in
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.wiring.make_plan import make_plan
-from orchestrator.wiring.suspicious_values import seen_as
 from tests.changed import changed
 from tests.refusals import each_mentions, mentions, refused
-from vocabulary.wheels import WHEELS
+from yawbench.foundation.errors import WiringError, warnings_in
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.wiring.make_plan import make_plan
+from yawbench.orchestrator.wiring.suspicious_values import seen_as
+from yawbench.vocabulary.wheels import WHEELS
 
 from .fake_fmus import Var, make_fmu, out
 

@@ -14,15 +14,15 @@ import pyarrow.parquet as pq
 import pytest
 from lxml import html
 
-from fmus.build import build_component
-from orchestrator.cli import main
-from orchestrator.errors import Diagnostic, Location, RecordWarning, ResultsError
-from orchestrator.experiments.executor import finish
-from orchestrator.experiments.jobs import Job, MeasuredRun, Outcome
-from orchestrator.experiments.journal import Journal
-from orchestrator.results.reader import load_results
 from tests.pages.made_up import unpacked
 from tests.refusals import each_mentions, mentions, refused
+from yawbench.cli import main
+from yawbench.fmus.build import build_component
+from yawbench.foundation.errors import Diagnostic, Location, RecordWarning, ResultsError
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.studies.executor import finish
+from yawbench.studies.jobs import Job, MeasuredRun, Outcome
+from yawbench.studies.journal import Journal
 
 UNIT = '''
 import os
@@ -31,8 +31,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from components.fmi.component import Component
-from components.fmi.variables import parameter
+from yawbench.components.fmi.component import Component
+from yawbench.components.fmi.variables import parameter
 
 HERE = Path({folder!r})
 
@@ -401,7 +401,7 @@ def test_results_are_kept_beside_limits_and_of_failed_runs_or_of_all_or_none(
 def interrupted(file, out, fmus, tmp_path, number):
     """Start a sweep in a process, stop it by a signal once its slow runs have begun; return its stderr."""
     os.mkfifo(tmp_path / "slow")
-    command = [sys.executable, "-m", "orchestrator.cli", "sweep", str(file), "--out", str(tmp_path / out)]
+    command = [sys.executable, "-m", "yawbench", "sweep", str(file), "--out", str(tmp_path / out)]
     process = subprocess.Popen(
         [*command, "--fmus", str(fmus), "--jobs", "1"], stderr=subprocess.PIPE, text=True
     )

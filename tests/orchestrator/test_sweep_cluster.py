@@ -13,12 +13,12 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cli import main
-from orchestrator.experiments.executor import left_to_do
-from orchestrator.experiments.experiment import plan_experiment
-from orchestrator.experiments.jobs import Job, Outcome
-from orchestrator.experiments.load_experiment import load_experiment
 from tests.refusals import mentions
+from yawbench.cli import main
+from yawbench.studies.executor import left_to_do
+from yawbench.studies.experiment import plan_experiment
+from yawbench.studies.jobs import Job, Outcome
+from yawbench.studies.load_experiment import load_experiment
 
 from .test_sweep import UNITS, moods, rows, yawbench  # noqa: F401
 
@@ -27,7 +27,7 @@ from .test_sweep import UNITS, moods, rows, yawbench  # noqa: F401
 def cluster_module():
     """The module of clusters; imported late, as Dask takes a second of all who collect the tests."""
     pytest.importorskip("distributed")
-    from orchestrator.experiments import cluster
+    from yawbench.cluster import cluster
 
     return cluster
 
@@ -84,7 +84,7 @@ def test_so_does_a_cluster_of_processes(moods, yawbench, cluster, tmp_path):  # 
 
 
 def test_runs_travel_in_batches_as_long_as_workers_stay_busy_alike():
-    from orchestrator.experiments.cluster import AHEAD, BATCH_TIME, _Batches
+    from yawbench.cluster.cluster import AHEAD, BATCH_TIME, _Batches
 
     jobs = [Job(str(number), Path("made_up.yaml"), Path()) for number in range(1000)]
     batches = _Batches(jobs, threads=2)
@@ -166,7 +166,7 @@ def test_a_run_that_kills_its_process_leaves_the_workers_alone(moods, yawbench, 
 def test_a_worker_that_is_killed_costs_no_run(moods, fmus, cluster, tmp_path):  # noqa: F811
     from distributed import Client
 
-    from orchestrator.experiments.cluster import run_on_cluster
+    from yawbench.cluster.cluster import run_on_cluster
 
     experiment = load_experiment(moods(1, 2, 3, 4, 5, 6))
     planned = plan_experiment(experiment, tmp_path, fmus=fmus, keep=False)
@@ -189,8 +189,8 @@ def test_a_worker_that_is_killed_costs_no_run(moods, fmus, cluster, tmp_path):  
 def test_a_cluster_that_dies_is_one_sentence_and_keeps_what_is_finished(moods, fmus, capfd, tmp_path):  # noqa: F811
     from distributed import Client
 
-    from orchestrator.errors import ResultsError
-    from orchestrator.experiments.cluster import run_on_cluster
+    from yawbench.cluster.cluster import run_on_cluster
+    from yawbench.foundation.errors import ResultsError
 
     experiment = load_experiment(moods(1, 2, 3, 4, 5, 6))
     planned = plan_experiment(experiment, tmp_path, fmus=fmus, keep=False)
@@ -229,7 +229,7 @@ def _dask(what, file, *options):
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense"])
 def test_a_scheduler_that_does_not_answer_is_one_sentence(address, moods, yawbench, tmp_path, monkeypatch):  # noqa: F811
-    monkeypatch.setattr("orchestrator.experiments.cluster.TIMEOUT", 0.5)
+    monkeypatch.setattr("yawbench.cluster.cluster.TIMEOUT", 0.5)
     status, _, err = yawbench(moods(10), "out", "--scheduler", address)
     assert status == 2
     assert mentions(err.splitlines()[-1], "--scheduler", "Dask", "0.5 s", f"--scheduler {address}")
@@ -247,7 +247,7 @@ def test_a_scheduler_without_workers_is_one_sentence(moods, yawbench, tmp_path):
 
 
 def test_workers_of_another_version_are_refused(moods, yawbench, cluster_of_threads, monkeypatch):  # noqa: F811
-    from orchestrator.experiments import cluster as module
+    from yawbench.cluster import cluster as module
 
     theirs = module.versions()
     ours = {**theirs, "yawbench": "99.0"}
@@ -273,14 +273,14 @@ class _Restarting:
 
 
 def test_a_worker_that_begins_anew_is_not_taken_for_one_without_this_program():
-    from orchestrator.experiments.cluster import _check_workers
+    from yawbench.cluster.cluster import _check_workers
 
     assert _check_workers(_Restarting(), "tcp://c") == 2
 
 
 def test_without_its_package_the_option_says_how_to_get_it(moods, fmus, capsys, tmp_path, monkeypatch):  # noqa: F811
     monkeypatch.setitem(sys.modules, "distributed", None)
-    monkeypatch.delitem(sys.modules, "orchestrator.experiments.cluster", raising=False)
+    monkeypatch.delitem(sys.modules, "yawbench.cluster.cluster", raising=False)
     arguments = ["--fmus", str(fmus), "--out", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:9"]
     with pytest.raises(SystemExit) as end:
         main(["sweep", str(moods(10)), *arguments])

@@ -8,15 +8,15 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from orchestrator.errors import Diagnostic, ResultsError
-from orchestrator.experiments.axis_figures import boundary, edges
-from orchestrator.experiments.experiment import PlannedExperiment
-from orchestrator.experiments.experiment_result import ExperimentResult, limit_table, limits_of
-from orchestrator.experiments.jobs import Job, MeasuredRun, measured
-from orchestrator.experiments.load_experiment import load_experiment
-from orchestrator.experiments.result_files import columns_of, draw_over_axes, write_table
-from orchestrator.experiments.tables import to_pandas
 from tests.refusals import each_mentions, mentions, refused
+from yawbench.foundation.errors import Diagnostic, ResultsError
+from yawbench.studies.axis_figures import boundary, edges
+from yawbench.studies.experiment import PlannedExperiment
+from yawbench.studies.experiment_result import ExperimentResult, limit_table, limits_of
+from yawbench.studies.jobs import Job, MeasuredRun, measured
+from yawbench.studies.load_experiment import load_experiment
+from yawbench.studies.result_files import columns_of, draw_over_axes, write_table
+from yawbench.studies.tables import to_pandas
 
 from .fakes import Clock, make_plan
 from .recorded import car, noted

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.errors import ScenarioError
-from orchestrator.experiments.axes import AxisSpec, level_at
-from orchestrator.experiments.experiment import plan_experiment
-from orchestrator.experiments.load_experiment import load_experiment
 from tests.changed import changed
 from tests.refusals import mentions, refused, texts_of
+from yawbench.foundation.errors import ScenarioError
+from yawbench.studies.axes import AxisSpec, level_at
+from yawbench.studies.experiment import plan_experiment
+from yawbench.studies.load_experiment import load_experiment
 
 
 def planned_of(experiment, fmus):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from orchestrator.experiments.tables import Column, Table, column, for_terminal, to_csv, to_latex, to_pandas
-from orchestrator.metrics.expressions import MetricValue
+from yawbench.metrics.expressions import MetricValue
+from yawbench.studies.tables import Column, Table, column, for_terminal, to_csv, to_latex, to_pandas
 
 
 @pytest.fixture

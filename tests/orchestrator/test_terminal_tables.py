@@ -16,11 +16,11 @@ import pytest
 from rich.cells import cell_len
 
 import yawbench as yb
-from orchestrator.commands import output
-from orchestrator.experiments import tables
-from orchestrator.experiments.tables import Table
-from orchestrator.metrics.expressions import MetricValue
 from tests.commands import status_of
+from yawbench.commands import output
+from yawbench.metrics.expressions import MetricValue
+from yawbench.studies import tables
+from yawbench.studies.tables import Table
 
 from .test_batch_commands import SCENARIO, STUDY
 from .test_dry_run import TUNING

@@ -8,10 +8,14 @@ import math
 import numpy as np
 import pytest
 
-from orchestrator.errors import ScenarioError
-from orchestrator.experiments.executor import side_by_side
-from orchestrator.experiments.threat_runs import RESOLUTION, Attempt, Survived, ThreatResult, _search
-from orchestrator.experiments.threat_scores import (
+from tests.checkout import ROOT
+from tests.commands import status_of
+from tests.pages.made_up import unpacked
+from tests.refusals import mentions
+from yawbench.foundation.errors import ScenarioError
+from yawbench.orchestrator.scenario.loader import SHIPPED
+from yawbench.ranking.threat_runs import RESOLUTION, Attempt, Survived, ThreatResult, _search
+from yawbench.ranking.threat_scores import (
     compared_gains,
     compared_setting,
     gains_and_laws,
@@ -24,14 +28,10 @@ from orchestrator.experiments.threat_scores import (
     scored,
     scores_without,
 )
-from orchestrator.experiments.threats import LoadedThreats, QuantitySpec, ThreatSpec, load_threats
-from orchestrator.pages.page_parts import _templates
-from orchestrator.pages.threats_page import car_tables, discipline_table, disciplines, overview
-from orchestrator.scenario.loader import SHIPPED
-from tests.checkout import ROOT
-from tests.commands import status_of
-from tests.pages.made_up import unpacked
-from tests.refusals import mentions
+from yawbench.ranking.threats import LoadedThreats, QuantitySpec, ThreatSpec, load_threats
+from yawbench.ranking.threats_page import car_tables, discipline_table, disciplines, overview
+from yawbench.reports.page_parts import _templates
+from yawbench.studies.executor import side_by_side
 
 UNITS = (
     "driver_sine_with_dwell", "reference_steady_state", "controller_off", "controller_fuzzy_pid",

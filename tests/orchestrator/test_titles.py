@@ -8,15 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.experiments import result_files
-from orchestrator.figures import plots
-from orchestrator.figures.panels import LabelledRun
-from orchestrator.figures.plots import changed_each, draw
-from orchestrator.figures.style import save
-from orchestrator.plan import Override
-from orchestrator.results.reader import load_results
-from orchestrator.scenario.overrides import changed, with_changes
 from tests.refusals import mentions
+from yawbench.figures import plots
+from yawbench.figures.panels import LabelledRun
+from yawbench.figures.plots import changed_each, draw
+from yawbench.figures.style import save
+from yawbench.orchestrator.plan import Override
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.orchestrator.scenario.overrides import changed, with_changes
+from yawbench.studies import result_files
 
 from .recorded import car, noted
 
@@ -110,11 +110,11 @@ def test_everything_made_of_a_run_names_all_that_was_changed(yawbench, tmp_path,
 @pytest.mark.exhaustive
 def test_the_figure_of_a_sweep_names_what_options_changed(yawbench, fmus, tmp_path):
 
-    from orchestrator.experiments.experiment import plan_experiment
-    from orchestrator.experiments.experiment_result import judge_records
-    from orchestrator.experiments.jobs import MeasuredRun
-    from orchestrator.experiments.load_experiment import load_experiment
     from tests.changed import changed as given
+    from yawbench.studies.experiment import plan_experiment
+    from yawbench.studies.experiment_result import judge_records
+    from yawbench.studies.jobs import MeasuredRun
+    from yawbench.studies.load_experiment import load_experiment
 
     (tmp_path / "sweep.yaml").write_text(SWEEP)
     sweep = load_experiment(tmp_path / "sweep.yaml", changes=given(settings=["inputs.friction*=0.3"]))
@@ -169,7 +169,7 @@ def test_the_heading_of_a_page_on_one_run_and_its_text_in_python_name_what_was_c
     from lxml import html
 
     import yawbench as yb
-    from orchestrator.pages.viewer import page
+    from yawbench.reports.viewer import page
 
     run = made(SLOW)
     run.record.title = "ISO 3888-2 at 60 km/h, mu 0.9"

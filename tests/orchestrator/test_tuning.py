@@ -9,11 +9,11 @@ import pytest
 from lxml import html
 from ruamel.yaml import YAML
 
-from orchestrator.cli import main
-from orchestrator.experiments.ranking import EntriesSpec
-from orchestrator.scenario import yaml_lines
-from orchestrator.scenario.schema_validation import validate
 from tests.refusals import mentions
+from yawbench.cli import main
+from yawbench.orchestrator.scenario import yaml_lines
+from yawbench.orchestrator.scenario.schema_validation import validate
+from yawbench.ranking.ranking import EntriesSpec
 
 SCENARIO = """
 title: A steering wheel

@@ -10,21 +10,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.cli import main
-from orchestrator.errors import ScenarioError, WiringError, warnings_in
-from orchestrator.experiments.experiment import plan_experiment
-from orchestrator.experiments.load_experiment import load_experiment
-from orchestrator.interop.ssp_write import write_ssp
-from orchestrator.pages.page_parts import groups_of
-from orchestrator.results.freshness import key_of, run_record
-from orchestrator.results.reader import load_results
-from orchestrator.results.run_folder import default_folder
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.scenario.overrides import changes_of, read_changes
-from orchestrator.signal_names import Target
-from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.refusals import mentions, refused, texts_of
+from yawbench.cli import main
+from yawbench.foundation.errors import ScenarioError, WiringError, warnings_in
+from yawbench.interop.ssp_write import write_ssp
+from yawbench.orchestrator.results.freshness import key_of, run_record
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.orchestrator.results.run_folder import default_folder
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.scenario.overrides import changes_of, read_changes
+from yawbench.orchestrator.signal_names import Target
+from yawbench.orchestrator.wiring.make_plan import make_plan
+from yawbench.reports.page_parts import groups_of
+from yawbench.studies.experiment import plan_experiment
+from yawbench.studies.load_experiment import load_experiment
 
 from .tir_files import write
 

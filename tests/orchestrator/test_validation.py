@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 import yawbench as yb
-from orchestrator.errors import ResultsError, ScenarioError
-from orchestrator.evaluation.validation import BANDS, Tolerance, load_bands
-from orchestrator.experiments.experiment_result import judge_results
-from orchestrator.experiments.load_experiment import load_experiment
-from orchestrator.experiments.result_files import record_of
-from orchestrator.experiments.result_tables import all_tables
 from tests.commands import status_of
 from tests.refusals import each_mentions, mentions
+from yawbench.foundation.errors import ResultsError, ScenarioError
+from yawbench.measured_cars.validation import BANDS, Tolerance, load_bands
+from yawbench.studies.experiment_result import judge_results
+from yawbench.studies.load_experiment import load_experiment
+from yawbench.studies.result_files import record_of
+from yawbench.studies.result_tables import all_tables
 
 from . import recorded
 from .test_output import ALWAYS, documented

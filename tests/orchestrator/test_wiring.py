@@ -10,15 +10,15 @@ from typing import Any
 
 import pytest
 
-from orchestrator.errors import Diagnostic, Location, ModelDescriptionError, WiringError, YawbenchError
-from orchestrator.fmu import opener
-from orchestrator.plan import Instance, Override, Plan, ValueOrigin, Wire
-from orchestrator.planner import Planner
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.refusals import each_mentions, mentions, places_of, texts_of
-from vocabulary.wheels import WHEELS
+from yawbench.fmus import opener
+from yawbench.foundation.errors import Diagnostic, Location, ModelDescriptionError, WiringError, YawbenchError
+from yawbench.orchestrator.plan import Instance, Override, Plan, ValueOrigin, Wire
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.wiring.make_plan import make_plan
+from yawbench.planner import Planner
+from yawbench.vocabulary.wheels import WHEELS
 
 from .fake_fmus import Var, make_fmu, out
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.scenario.yaml_lines import Document, read
 from tests.refusals import each_mentions, mentions
+from yawbench.orchestrator.scenario.yaml_lines import Document, read
 
 
 def sentences(made):
@@ -80,7 +80,7 @@ def test_a_chain_of_aliases_too_deep_to_follow_is_refused(document):
 
 
 def test_a_long_list_without_aliases_is_no_bomb(document, monkeypatch):
-    monkeypatch.setattr("orchestrator.scenario.yaml_lines.ALIASED", 50)
+    monkeypatch.setattr("yawbench.orchestrator.scenario.yaml_lines.ALIASED", 50)
     numbers = list(range(100))
     assert document(f"a: {numbers}").data == {"a": numbers}
 

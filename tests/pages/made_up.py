@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.results.reader import Results
 from tests.orchestrator.recorded import car, noted, results
-from vocabulary.wheels import WHEELS
+from yawbench.orchestrator.results.reader import Results
+from yawbench.vocabulary.wheels import WHEELS
 
 HALF_A_CAR = """
 title: Half a car

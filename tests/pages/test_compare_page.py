@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from lxml import html
 
-from orchestrator.cli import main
 from tests.fmu_copies import put_fmus
 from tests.refusals import each_mentions, mentions
+from yawbench.cli import main
 
 from .browser import DESK, PHONE
 from .flaws import check_whole, flaws, looks, open_all, size_without_samples

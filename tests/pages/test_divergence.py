@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orchestrator.metrics.expressions import MetricValue
-from orchestrator.pages.comparison import SAME, difference, divergence, parting_summary, targets_of
 from tests.orchestrator.recorded import car, noted, results
 from tests.refusals import each_mentions, mentions
+from yawbench.metrics.expressions import MetricValue
+from yawbench.reports.comparison import SAME, difference, divergence, parting_summary, targets_of
 
 T = np.linspace(0.0, 1.0, 101)
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from lxml import html
 
-from orchestrator.evaluation.standard_tests import TESTS, Evaluation
-from orchestrator.evaluation.trace import trace_of
-from orchestrator.metrics.verdict import compare, not_judged
-from orchestrator.pages.evaluation_page import criteria_table, evaluation_page, results_of
-from orchestrator.pages.page_parts import save_page
 from tests.orchestrator.recorded import write
+from yawbench.metrics.verdict import compare, not_judged
+from yawbench.proving_ground.standard_tests import TESTS, Evaluation
+from yawbench.proving_ground.trace import trace_of
+from yawbench.reports.evaluation_page import criteria_table, evaluation_page, results_of
+from yawbench.reports.page_parts import save_page
 
 from .browser import DESK, PHONE, Browser
 from .flaws import check_first_screen, check_whole, looks

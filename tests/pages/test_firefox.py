@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.figures.panels import LabelledRun
-from orchestrator.pages.page_parts import save_page
-from orchestrator.pages.viewer import assets, carried, embedded, page, write_side
+from yawbench.figures.panels import LabelledRun
+from yawbench.reports.page_parts import save_page
+from yawbench.reports.viewer import assets, carried, embedded, page, write_side
 
 from .browser import Firefox, start_firefox
 from .made_up import whole_car

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from lxml import html
 
-from orchestrator.experiments.fit import load_fit
-from orchestrator.figures.style import shown
 from tests.orchestrator.test_fit import TRUTH, folder, run
+from yawbench.figures.style import shown
+from yawbench.measured_cars.fit import load_fit
 
 from .browser import DESK, PHONE, Browser
 from .flaws import check_whole, looks

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orchestrator.figures.style import LabelledRun
-from orchestrator.pages.road import POLYGONS, clipped, ground_of
-from orchestrator.pages.viewer import viewer
 from tests.orchestrator.recorded import noted
 from tests.refusals import mentions
-from vocabulary.friction_table import table_of
-from vocabulary.patches import friction_at, inside_polygon, patches_of
+from yawbench.figures.style import LabelledRun
+from yawbench.reports.road import POLYGONS, clipped, ground_of
+from yawbench.reports.viewer import viewer
+from yawbench.vocabulary.friction_table import table_of
+from yawbench.vocabulary.patches import friction_at, inside_polygon, patches_of
 
 from .made_up import data_in, whole_car
 

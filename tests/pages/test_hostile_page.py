@@ -13,10 +13,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from orchestrator.pages.server import ResultsServer
-from orchestrator.pages.sliders import Bench
-from orchestrator.pages.viewer import page
 from tests.orchestrator.recorded import write
+from yawbench.bench.server import ResultsServer
+from yawbench.bench.sliders import Bench
+from yawbench.reports.viewer import page
 
 from .browser import Browser
 from .made_up import whole_car

@@ -8,17 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cache import checksum
-from orchestrator.pages.page_parts import groups_of
-from orchestrator.plan import CHOSEN, ERRATUM, LITERATURE, NEUTRAL, PAPER, ValueSource
-from orchestrator.results.freshness import key_of, run_record, staleness
-from orchestrator.results.run_record import RunRecord
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.fmu_copies import put_fmus
 from tests.orchestrator.recorded import record_text
 from tests.refusals import mentions
+from yawbench.foundation.cache import checksum
+from yawbench.orchestrator.plan import CHOSEN, ERRATUM, LITERATURE, NEUTRAL, PAPER, ValueSource
+from yawbench.orchestrator.results.freshness import key_of, run_record, staleness
+from yawbench.orchestrator.results.run_record import RunRecord
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.wiring.make_plan import make_plan
+from yawbench.reports.page_parts import groups_of
 
 NOW = datetime.now(timezone.utc)
 UNITS = ("driver_sine", "reference_steady_state", "controller_fnn")

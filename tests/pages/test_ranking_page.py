@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from lxml import html
 
-from orchestrator.cli import main
-from orchestrator.experiments.ranking import load_ranking
-from orchestrator.pages.ranking_page import result_of_threats
 from tests.orchestrator.test_ranking import SMALL
+from yawbench.cli import main
+from yawbench.ranking.ranking import load_ranking
+from yawbench.ranking.ranking_page import result_of_threats
 
 from .browser import DESK, HELD, PHONE, Browser
 from .flaws import flaws_in_print, inaccessible, looks

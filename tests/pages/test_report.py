@@ -14,14 +14,14 @@ from types import SimpleNamespace
 import pytest
 from lxml import html
 
-from orchestrator.cli import main
-from orchestrator.errors import ScenarioError
-from orchestrator.experiments.load_experiment import found_studies, load_experiment
-from orchestrator.experiments.result_tables import share
-from orchestrator.pages.page_parts import with_minus
 from tests.commands import status_of
 from tests.orchestrator.recorded import record_text
 from tests.refusals import each_mentions, mentions, refused
+from yawbench.cli import main
+from yawbench.foundation.errors import ScenarioError
+from yawbench.reports.page_parts import with_minus
+from yawbench.studies.load_experiment import found_studies, load_experiment
+from yawbench.studies.result_tables import share
 
 from .browser import DESK, PHONE
 from .flaws import SCREENS, check_budgets, check_first_screen, flaws, inaccessible, looks, open_all

@@ -20,19 +20,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.experiments.jobs import Job, planned
-from orchestrator.interrupts import StopFlag
-from orchestrator.pages.server import ResultsServer
-from orchestrator.pages.sliders import Bench, Superseded, Wanted, knobs_of, shown_first
-from orchestrator.pages.viewer import page
-from orchestrator.planner import Planner
-from orchestrator.scenario import loader
-from orchestrator.scenario.loader import find
-from orchestrator.scenario.overrides import read_changes
-from orchestrator.scenario.quantities import convert
 from tests.orchestrator.recorded import write
 from tests.refusals import each_mentions
-from vocabulary.vehicle import CAR
+from yawbench.bench.server import ResultsServer
+from yawbench.bench.sliders import Bench, Superseded, Wanted, knobs_of, shown_first
+from yawbench.foundation.interrupts import StopFlag
+from yawbench.orchestrator.scenario import loader
+from yawbench.orchestrator.scenario.loader import find
+from yawbench.orchestrator.scenario.overrides import read_changes
+from yawbench.orchestrator.scenario.quantities import convert
+from yawbench.planner import Planner
+from yawbench.reports.viewer import page
+from yawbench.studies.jobs import Job, planned
+from yawbench.vocabulary.vehicle import CAR
 
 from .browser import PHONE, Browser
 from .flaws import inaccessible

@@ -11,10 +11,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orchestrator.cli import main
-from orchestrator.pages.server import ResultsServer
-from orchestrator.pages.sliders import Bench
-from orchestrator.results.reader import load_results
+from yawbench.bench.server import ResultsServer
+from yawbench.bench.sliders import Bench
+from yawbench.cli import main
+from yawbench.orchestrator.results.reader import load_results
 
 from .browser import DESK, HELD, PHONE, Browser
 from .flaws import SCREENS, check_first_screen, flaws_in_print, inaccessible, looks

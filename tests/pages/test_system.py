@@ -7,11 +7,11 @@ from pathlib import Path
 
 from lxml import etree
 
-from orchestrator.fmu.fmu import Fmu
-from orchestrator.pages.diagram import diagram, system_of, systems_of
-from orchestrator.plan import Instance, Plan, Wire
 from tests.refusals import each_mentions
-from vocabulary.wheels import WHEELS
+from yawbench.fmus.fmu import Fmu
+from yawbench.orchestrator.plan import Instance, Plan, Wire
+from yawbench.reports.diagram import diagram, system_of, systems_of
+from yawbench.vocabulary.wheels import WHEELS
 
 
 def plan(controller: str = "controller_off", *, extra: bool = False) -> Plan:

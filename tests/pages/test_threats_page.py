@@ -8,11 +8,11 @@ import pytest
 from lxml import html
 
 from docs.generate.threat_tables import FILE
-from orchestrator.experiments.threat_runs import published_result
-from orchestrator.experiments.threat_scores import scored
-from orchestrator.experiments.threats import load_threats
-from orchestrator.pages.page_parts import save_page
-from orchestrator.pages.threats_page import compared_settings, threats_page
+from yawbench.ranking.threat_runs import published_result
+from yawbench.ranking.threat_scores import scored
+from yawbench.ranking.threats import load_threats
+from yawbench.ranking.threats_page import compared_settings, threats_page
+from yawbench.reports.page_parts import save_page
 
 from .browser import DESK, Browser
 from .flaws import flaws_in_print, inaccessible, looks, open_all

@@ -12,16 +12,16 @@ from lxml import html
 from matplotlib.path import Path as Line
 
 import yawbench as yb
-from orchestrator.evaluation.validation import CrossPlot
-from orchestrator.experiments.experiment_result import judge_results
-from orchestrator.experiments.load_experiment import load_experiment
-from orchestrator.metrics.verdict import apart
-from orchestrator.pages.evaluation_page import validation_page, validation_sentence
-from orchestrator.pages.page_parts import save_page
-from orchestrator.pages.study_page import chapter, study_page
 from tests.commands import status_of
 from tests.orchestrator.recorded import write as write_run
 from tests.orchestrator.test_validation import line, write, write_study
+from yawbench.measured_cars.validation import CrossPlot
+from yawbench.metrics.verdict import apart
+from yawbench.reports.evaluation_page import validation_page, validation_sentence
+from yawbench.reports.page_parts import save_page
+from yawbench.reports.study_page import chapter, study_page
+from yawbench.studies.experiment_result import judge_results
+from yawbench.studies.load_experiment import load_experiment
 
 from .browser import DESK, PHONE, Browser
 from .flaws import check_whole, flaws, inaccessible, looks

@@ -10,12 +10,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from components.driving.track import LaneChangeParameters, Track
-from orchestrator.cli import main
-from orchestrator.errors import ResultsError
-from orchestrator.figures.panels import LabelledRun
-from orchestrator.figures.style import LINES, digits_of, shown_unit
-from orchestrator.pages.viewer import (
+from tests.checkout import ROOT
+from tests.orchestrator.recorded import car, noted, write
+from tests.refusals import each_mentions, mentions
+from yawbench.cli import main
+from yawbench.components.driving.track import LaneChangeParameters, Track
+from yawbench.figures.panels import LabelledRun
+from yawbench.figures.style import LINES, digits_of, shown_unit
+from yawbench.foundation.errors import ResultsError
+from yawbench.orchestrator.results.measurement_results import MeasuredResults
+from yawbench.orchestrator.results.reader import Results
+from yawbench.orchestrator.results.run_record import RunRecord
+from yawbench.reports.viewer import (
     MOST,
     PANELS,
     Settings,
@@ -27,15 +33,9 @@ from orchestrator.pages.viewer import (
     viewer,
     without_comments,
 )
-from orchestrator.pages.viewer_data import pack
-from orchestrator.results.measurement_results import MeasuredResults
-from orchestrator.results.reader import Results
-from orchestrator.results.run_record import RunRecord
-from tests.checkout import ROOT
-from tests.orchestrator.recorded import car, noted, write
-from tests.refusals import each_mentions, mentions
-from vocabulary.lane_change import lanes_of
-from vocabulary.wheels import WHEELS
+from yawbench.reports.viewer_data import pack
+from yawbench.vocabulary.lane_change import lanes_of
+from yawbench.vocabulary.wheels import WHEELS
 
 from .browser import DESK, PHONE, Browser
 from .flaws import inaccessible, looks, size_without_samples
@@ -853,7 +853,7 @@ def contrast(one: str, other: str) -> float:
 def test_scripts_lose_comments_and_indentation_alone():
     script = "  // why\n\n  let a = 'b // c';  // d\n/* e */\n"
     assert without_comments(script) == "let a = 'b // c';\n/* e */\n"
-    for file in (ROOT / "orchestrator/pages/static").glob("*.js"):
+    for file in (ROOT / "yawbench/reports/static").glob("*.js"):
         for line in file.read_text(encoding="utf-8").splitlines():
             assert line.count("`") % 2 == 0  # no text goes over several lines
 

@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orchestrator.pages.viewer_data import CLOSE, LEVELS, PackedRun, pack
-from orchestrator.results.reader import Results
 from tests.orchestrator.recorded import results
+from yawbench.orchestrator.results.reader import Results
+from yawbench.reports.viewer_data import CLOSE, LEVELS, PackedRun, pack
 
 from .made_up import whole_car
 

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.figures.panels import LabelledRun
-from orchestrator.pages.viewer import Settings, View, page
-from orchestrator.pages.viewer_data import LEVELS
+from yawbench.figures.panels import LabelledRun
+from yawbench.reports.viewer import Settings, View, page
+from yawbench.reports.viewer_data import LEVELS
 
 from .browser import Browser
 from .made_up import whole_car

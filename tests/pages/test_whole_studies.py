@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cli import main
-from orchestrator.scenario.loader import files
+from yawbench.cli import main
+from yawbench.orchestrator.scenario.loader import files
 
 from .flaws import SCREENS, check_budgets, check_first_screen
 

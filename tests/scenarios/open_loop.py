@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 
 import yawbench as yb
-from components.estimators.kinematic import Kinematic
-from components.estimators.observer import Observer
-from components.fmi.component import Component
-from components.sensors.production import Production
 from tests.components.stand import Stand
-from vocabulary.wheels import wheels
+from yawbench.components.estimators.kinematic import Kinematic
+from yawbench.components.estimators.observer import Observer
+from yawbench.components.fmi.component import Component
+from yawbench.components.sensors.production import Production
+from yawbench.vocabulary.wheels import wheels
 
 MESSAGE = 0.01
 GYRO, ACCELEROMETER = math.radians(0.3), 0.2

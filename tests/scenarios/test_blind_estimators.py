@@ -12,9 +12,9 @@ import yaml
 
 import yawbench as yb
 from docs.generate import blind_tables
-from orchestrator.experiments.load_experiment import load_experiment
 from tests.commands import status_of
 from tests.refusals import sentence_has
+from yawbench.studies.load_experiment import load_experiment
 
 SWEEP = blind_tables.RUNS.parent / "blind_estimators.yaml"
 FACTORS = {"+ 20 %": 1.2, "- 20 %": 0.8, "+ 15 %": 1.15, "- 15 %": 0.85}

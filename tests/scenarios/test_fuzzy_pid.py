@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.experiments.experiment_result import derive
-from orchestrator.experiments.jobs import Job, execute
-from orchestrator.experiments.load_experiment import load_experiment
-from orchestrator.figures.style import shown
-from orchestrator.metrics.expressions import MetricValue
-from orchestrator.results.reader import load_results
 from tests.changed import changed
 from tests.commands import status_of
 from tests.refusals import sentence_has
 from tests.studies import check_figures, judge_all, judge_some, verdicts
+from yawbench.figures.style import shown
+from yawbench.metrics.expressions import MetricValue
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.studies.experiment_result import derive
+from yawbench.studies.jobs import Job, execute
+from yawbench.studies.load_experiment import load_experiment
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "fuzzy_pid"
 SCENARIOS = ("double_lane_change", "sine", "ramp")

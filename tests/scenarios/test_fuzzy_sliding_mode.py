@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from components.control_laws.slip_control import SlipControlParameters
-from orchestrator.cli import main
-from orchestrator.experiments.jobs import Job, execute
-from orchestrator.figures.style import shown
-from orchestrator.results.reader import load_results
 from tests.changed import changed
 from tests.refusals import sentence_has
 from tests.studies import check_figures, judge_all, judge_some, verdicts
+from yawbench.cli import main
+from yawbench.components.control_laws.slip_control import SlipControlParameters
+from yawbench.figures.style import shown
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.studies.jobs import Job, execute
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "fuzzy_sliding_mode"
 SCENARIOS = ("high_friction", "low_friction", "beyond_paper", "beyond_grip", "side_share")

@@ -13,11 +13,11 @@ import yaml
 import yawbench as yb
 from docs.generate import monitor_tables
 from docs.generate.monitor_tables import GYRO, WHEEL, Outcome
-from orchestrator.experiments.confidence import share_bounds
-from orchestrator.experiments.load_experiment import load_experiment
-from orchestrator.scenario import yaml_lines
 from tests.commands import status_of
 from tests.refusals import sentence_has
+from yawbench.orchestrator.scenario import yaml_lines
+from yawbench.studies.confidence import share_bounds
+from yawbench.studies.load_experiment import load_experiment
 
 STUDY = monitor_tables.RUNS.parent / "faults.yaml"
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 import yawbench as yb
-from fmus.build import HERE as FMUS
-from fmus.build import build_all, find_components
-from orchestrator.fmu.archive import runs_as
-from orchestrator.fmu.fmu import RunsAs
-from orchestrator.scenario.loader import names
+from yawbench.fmus.archive import runs_as
+from yawbench.fmus.build import HERE as FMUS
+from yawbench.fmus.build import build_all, find_components
+from yawbench.fmus.fmu import RunsAs
+from yawbench.orchestrator.scenario.loader import names
 
 pytestmark = pytest.mark.filterwarnings("ignore::yawbench.YawbenchWarning")
 

@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 import yawbench as yb
-from orchestrator.experiments.experiment_result import judge_results
-from orchestrator.experiments.load_experiment import load_experiment
-from orchestrator.experiments.result_tables import run_tables
-from orchestrator.figures.style import shown
 from tests.refusals import sentence_has
 from tests.studies import check_figures, judge_all, judge_some, verdicts
 from tests.verdicts import recorded
+from yawbench.figures.style import shown
+from yawbench.studies.experiment_result import judge_results
+from yawbench.studies.load_experiment import load_experiment
+from yawbench.studies.result_tables import run_tables
 
 STUDY = Path(__file__).parents[2] / "scenarios" / "fnn_sideslip" / "study.yaml"
 SPEEDS = (15, 25, 40)

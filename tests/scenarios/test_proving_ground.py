@@ -7,14 +7,14 @@ from math import degrees, radians
 import pytest
 
 import yawbench as yb
-from orchestrator.evaluation.sine_with_dwell import evaluate_dwell
-from orchestrator.evaluation.standard_tests import Evaluation
-from orchestrator.evaluation.steering_tests import evaluate_lane_change, evaluate_slow_steer
-from orchestrator.evaluation.trace import trace_of
-from orchestrator.metrics.verdict import Status
-from orchestrator.plan import Override
-from orchestrator.scenario.loader import SHIPPED
 from yawbench._scenario import Scenario
+from yawbench.metrics.verdict import Status
+from yawbench.orchestrator.plan import Override
+from yawbench.orchestrator.scenario.loader import SHIPPED
+from yawbench.proving_ground.sine_with_dwell import evaluate_dwell
+from yawbench.proving_ground.standard_tests import Evaluation
+from yawbench.proving_ground.steering_tests import evaluate_lane_change, evaluate_slow_steer
+from yawbench.proving_ground.trace import trace_of
 
 pytestmark = pytest.mark.exhaustive
 

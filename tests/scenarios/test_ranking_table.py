@@ -9,11 +9,11 @@ from dataclasses import replace
 import pytest
 
 from docs.generate import matrix_tables
-from orchestrator.experiments.executor import Executor, runner_of
-from orchestrator.experiments.ranking import ConditionSpec, load_ranking
-from orchestrator.experiments.ranking_scores import EntryScore, RankedState, RankingResult, run_ranking
 from tests.commands import status_of
 from tests.refusals import sentence_has
+from yawbench.ranking.ranking import ConditionSpec, load_ranking
+from yawbench.ranking.ranking_scores import EntryScore, RankedState, RankingResult, run_ranking
+from yawbench.studies.executor import Executor, runner_of
 
 RANKING = load_ranking(matrix_tables.FILE)
 MODES = ("sliding_mode", "fuzzy_sliding_mode", "sliding_mode_tuned", "fuzzy_sliding_mode_tuned")

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build_component
-from orchestrator.cli import COMMANDS, main
 from tests.fmu_copies import put_fmus
+from yawbench.cli import main
+from yawbench.fmus.build import build_component
+from yawbench.foundation import plugins
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -43,7 +44,7 @@ def test_the_first_screen_has_python_that_prints_what_it_says_beside_the_command
 def test_the_controller_of_the_readme_runs_and_follows_the_yaw_rate(tmp_path, capsys):
     code = python_after("Put this into `components/controllers/yaw_rate.py`")
     file = tmp_path / "yaw_rate.py"
-    file.write_text(code.replace("from ..fmi", "from components.fmi"), encoding="utf-8")
+    file.write_text(code.replace("from ..fmi", "from yawbench.components.fmi"), encoding="utf-8")
     put_fmus(tmp_path, components=UNITS)
     build_component(file, tmp_path, role="controllers")
     with pytest.raises(SystemExit) as exit_:
@@ -61,7 +62,7 @@ def test_the_controller_of_the_readme_runs_and_follows_the_yaw_rate(tmp_path, ca
 def test_the_page_on_running_things_names_every_command():
     page = (ROOT / "docs" / "running.md").read_text(encoding="utf-8")
     table = re.findall(r"^\| `([\w-]+)` \|", page, re.MULTILINE)
-    assert set(table) == set(COMMANDS)
+    assert set(table) == set(plugins.names("command"))
 
 
 def test_every_file_that_the_readme_names_exists():

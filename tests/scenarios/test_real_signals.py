@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import yawbench as yb
-from orchestrator.cli import main
-from orchestrator.experiments.load_experiment import load_experiment
 from tests.refusals import sentence_has
 from tests.verdicts import table_in
+from yawbench.cli import main
+from yawbench.studies.load_experiment import load_experiment
 
 from .open_loop import MANOEUVRES, SPEED, missed, row
 from .real_signals_tables import kept, late, step_by_step

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.experiments.tables import runs_table
-from orchestrator.master.simulate import simulate_in_memory
-from orchestrator.results.reader import found_runs, load_results
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.fmu_copies import put_fmus
+from yawbench.orchestrator.master.simulate import simulate_in_memory
+from yawbench.orchestrator.results.reader import found_runs, load_results
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.wiring.make_plan import make_plan
+from yawbench.studies.tables import runs_table
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "road"
 UNITS = (

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from orchestrator.scenario.loader import SHIPPED, files, load_scenario
 from tests.components.test_conformance import COMPONENTS
+from yawbench.orchestrator.scenario.loader import SHIPPED, files, load_scenario
 
 SCENARIOS = [path for path, _ in files(SHIPPED, ["a scenario"])]
 

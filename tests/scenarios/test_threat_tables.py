@@ -12,20 +12,20 @@ from statistics import median
 import pytest
 
 from docs.generate import threat_tables
-from orchestrator.experiments.executor import Executor, runner_of
-from orchestrator.experiments.ranking import angle_experiment, angles_of
-from orchestrator.experiments.threat_runs import Survived, ThreatResult, published_result, survivals
-from orchestrator.experiments.threat_scores import (
+from tests.commands import status_of
+from tests.refusals import sentence_has
+from yawbench.ranking import threats_page
+from yawbench.ranking.ranking import angle_experiment, angles_of
+from yawbench.ranking.threat_runs import Survived, ThreatResult, published_result, survivals
+from yawbench.ranking.threat_scores import (
     compared_gains,
     compared_setting,
     moves_between,
     scored,
     scores_without,
 )
-from orchestrator.experiments.threats import REFERENCE, SearchPlace, load_threats
-from orchestrator.pages import threats_page
-from tests.commands import status_of
-from tests.refusals import sentence_has
+from yawbench.ranking.threats import REFERENCE, SearchPlace, load_threats
+from yawbench.studies.executor import Executor, runner_of
 
 FILE, LANE_CHANGE = threat_tables.FILE, "lane_change"
 WITHOUT_MODEL = [

@@ -9,12 +9,12 @@ import pytest
 from ruamel.yaml import YAML
 
 import yawbench as yb
-from orchestrator.cli import main
-from orchestrator.experiments.axes import level_at
-from orchestrator.experiments.load_experiment import load_experiment
-from orchestrator.experiments.tuning import DIGITS, tuning_of
-from orchestrator.scenario.loader import SHIPPED
 from tests.checkout import ROOT
+from yawbench.cli import main
+from yawbench.orchestrator.scenario.loader import SHIPPED
+from yawbench.studies.axes import level_at
+from yawbench.studies.load_experiment import load_experiment
+from yawbench.studies.tuning import DIGITS, tuning_of
 
 HERE = SHIPPED / "proving_ground"
 TUNING = tuning_of(load_experiment(HERE / "tuning.yaml"))

@@ -11,12 +11,21 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
-from orchestrator import handling
-from orchestrator.cli import main
-from orchestrator.commands.check import show
-from orchestrator.errors import WiringError, warnings_in
-from orchestrator.handling import (
+from tests.changed import changed
+from tests.components.magic import forces_and_moment
+from tests.fmu_copies import put_fmus
+from yawbench.cli import main
+from yawbench.commands.check import show
+from yawbench.components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
+from yawbench.foundation.errors import WiringError, warnings_in
+from yawbench.orchestrator.master.simulate import simulate_in_memory
+from yawbench.orchestrator.scenario import yaml_lines
+from yawbench.orchestrator.scenario.loader import load_scenario
+from yawbench.orchestrator.wiring.derivations import car_of
+from yawbench.orchestrator.wiring.make_plan import make_plan
+from yawbench.planner import Planner
+from yawbench.proving_ground import handling
+from yawbench.proving_ground.handling import (
     SAMPLE,
     STEP,
     TURN_SPEED,
@@ -28,17 +37,8 @@ from orchestrator.handling import (
     modes_of,
     plants_in,
 )
-from orchestrator.master.simulate import simulate_in_memory
-from orchestrator.planner import Planner
-from orchestrator.scenario import yaml_lines
-from orchestrator.scenario.loader import load_scenario
-from orchestrator.tyre_stand import cornering_stiffness
-from orchestrator.wiring.derivations import car_of
-from orchestrator.wiring.make_plan import make_plan
-from tests.changed import changed
-from tests.components.magic import forces_and_moment
-from tests.fmu_copies import put_fmus
-from vocabulary.vehicle import CAR
+from yawbench.tyre_stand import cornering_stiffness
+from yawbench.vocabulary.vehicle import CAR
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "vehicles"
 STEADY_TURN = FOLDER.parent / "one_car" / "steady_turn.yaml"

@@ -7,15 +7,15 @@ import shutil
 
 import pytest
 
-from orchestrator.experiments.journal import FILE as JOURNAL
-from orchestrator.experiments.load_experiment import load_experiment
-from orchestrator.experiments.result_tables import FAILS, HOLDS
-from orchestrator.results.run_folder import default_folder
 from tests.checkout import ROOT
 from tests.evidence import RECORD
 from tests.refusals import sentence_has
 from tests.studies import judge_all
 from tests.verdicts import FILE, KINDS, page, recorded, rows_of, studies, summary, table_in
+from yawbench.orchestrator.results.run_folder import default_folder
+from yawbench.studies.journal import FILE as JOURNAL
+from yawbench.studies.load_experiment import load_experiment
+from yawbench.studies.result_tables import FAILS, HOLDS
 
 FILES = (
     "fnn_sideslip/study", "fuzzy_sliding_mode/study", "fuzzy_sliding_mode/distribution", "fuzzy_pid/study",

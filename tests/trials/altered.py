@@ -40,13 +40,13 @@ from typing import Any
 import numpy as np
 from ruamel.yaml import YAML
 
-from orchestrator.cache import KEY, with_checksums
-from orchestrator.cli import main as yawbench
-from orchestrator.errors import RecordWarning
 from tests.orchestrator.test_batch_commands import SCENARIO as HALF
 from tests.orchestrator.test_batch_commands import STUDY
 from tests.orchestrator.test_fit import FIT, MEASURED
 from tests.orchestrator.test_fit import SCENARIO as OF_FIT
+from yawbench.cli import main as yawbench
+from yawbench.foundation.cache import KEY, with_checksums
+from yawbench.foundation.errors import RecordWarning
 
 from .kills import SWEEP
 
@@ -131,7 +131,7 @@ def base(place: Path) -> Folder:
     (place / "truth.yaml").write_text(OF_FIT.format(vehicle=car, stop=4, file="steer.csv"))
     with contextlib.chdir(place) if hasattr(contextlib, "chdir") else _in(place):
         assert call("run", "truth.yaml", *FMUS, "--out", "out/truth") == 0
-        from orchestrator.results.reader import load_results
+        from yawbench.orchestrator.results.reader import load_results
 
         results = load_results(Path("out/truth"))
         names = ("velocity_x", "sideslip", "yaw_rate", "acceleration_y")
@@ -355,8 +355,8 @@ def command_of(group: str, file: Path, place: Path, r: random.Random) -> tuple[o
 
 def served(run: Path) -> None:
     """Ask a server for its first page, the view of a run and the runs' files."""
-    from orchestrator.pages.server import ResultsServer
-    from orchestrator.pages.sliders import Bench
+    from yawbench.bench.server import ResultsServer
+    from yawbench.bench.sliders import Bench
 
     warnings.simplefilter("ignore", RecordWarning)  # the command line makes notes of them
     bench = Bench()

@@ -15,7 +15,7 @@ import tempfile
 from collections import Counter
 from pathlib import Path
 
-from fmus.build import build_all
+from yawbench.fmus.build import build_all
 
 from .kills import COMMANDS, NOISE, UNITS, Trial
 

@@ -29,11 +29,11 @@ from pathlib import Path
 
 import fmpy
 
-from orchestrator.cli import main
-from orchestrator.commands import run as _run_command  # noqa: F401  imported once, before the forks
-from orchestrator.master import isolation  # noqa: F401
-from orchestrator.master.simulate import simulate  # noqa: F401
-from orchestrator.wiring.make_plan import make_plan  # noqa: F401
+from yawbench.cli import main
+from yawbench.commands import run as _run_command  # noqa: F401  imported once, before the forks
+from yawbench.orchestrator.master import isolation  # noqa: F401
+from yawbench.orchestrator.master.simulate import simulate  # noqa: F401
+from yawbench.orchestrator.wiring.make_plan import make_plan  # noqa: F401
 
 SOURCE = Path(__file__).parents[1] / "orchestrator" / "hostile.c"
 INCLUDE = Path(__file__).parents[2] / "fmus"

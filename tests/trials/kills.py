@@ -23,15 +23,15 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
-from fmus.build import build_all
-from orchestrator.errors import ResultsError
-from orchestrator.results.reader import load_results
-from orchestrator.results.run_folder import PART, RUN_FILE
-from orchestrator.safe_files import LOCK_FILE, NEW
 from tests.orchestrator.test_batch_commands import SCENARIO, STUDY, UNITS
 from tests.orchestrator.test_ranking import SMALL
 from tests.orchestrator.test_tuning import SCENARIO as WHEEL
 from tests.orchestrator.test_tuning import TUNING
+from yawbench.fmus.build import build_all
+from yawbench.foundation.errors import ResultsError
+from yawbench.foundation.safe_files import LOCK_FILE, NEW
+from yawbench.orchestrator.results.reader import load_results
+from yawbench.orchestrator.results.run_folder import PART, RUN_FILE
 
 SWEEP = """
 title: Half a sweep
@@ -82,7 +82,7 @@ class Trial:
 
     def start(self, command: str, largest: int | None = None) -> subprocess.Popen[str]:
         """Start a command in a group of its own; no file that it writes may exceed `largest` [bytes]."""
-        arguments = [sys.executable, "-m", "orchestrator.cli", *COMMANDS[command]]
+        arguments = [sys.executable, "-m", "yawbench", *COMMANDS[command]]
         if command not in ("build", "rank"):  # which has the cars of this checkout
             arguments += ["--fmus", str(self._fmus)]
         environment = {**os.environ, "TMPDIR": str(self.place / "tmp")}

@@ -12,7 +12,7 @@ from typing import Any
 
 from ruamel.yaml import YAML as RUAMEL
 
-from orchestrator.scenario import yaml_lines
+from yawbench.orchestrator.scenario import yaml_lines
 
 NASTY = (
     "", "~", "null", "true", "yes", "no", "off", "0", "-1", "1", "1e999", "-1e999", "1e-999", ".nan",

@@ -134,12 +134,12 @@ def case_of(group: str, number: int, seed: int, box: Sandbox) -> tuple[Path, str
 
 def load(file: Path, kind: str, planner: Any) -> None:
     """Read a file as the commands do, up to where runs would begin."""
-    from orchestrator.experiments.load_experiment import load_experiment
-    from orchestrator.metrics.expressions import evaluate_all
-    from orchestrator.plan import Override
-    from orchestrator.results.reader import load_results
-    from orchestrator.scenario.loader import load_scenario
-    from orchestrator.wiring.make_plan import make_plan
+    from yawbench.metrics.expressions import evaluate_all
+    from yawbench.orchestrator.plan import Override
+    from yawbench.orchestrator.results.reader import load_results
+    from yawbench.orchestrator.scenario.loader import load_scenario
+    from yawbench.orchestrator.wiring.make_plan import make_plan
+    from yawbench.studies.load_experiment import load_experiment
 
     fmus, opener = ROOT / "fmus", planner.opener
     if kind == "study":
@@ -172,7 +172,7 @@ def _uses(scenario: Path, vehicle: str) -> bool:
 
 def outcome_of(function: Callable[[], None]) -> tuple[str, str]:
     """Return what became of reading a file, and what was said."""
-    from orchestrator.errors import YawbenchError
+    from yawbench.foundation.errors import YawbenchError
 
     try:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
@@ -195,7 +195,7 @@ def work(pipe: Connection, group: str, numbers: list[int], seed: int, folder: Pa
     os.environ.update(box.environment())
     tempfile.tempdir = None
     os.chdir(box.work)
-    from orchestrator.planner import Planner
+    from yawbench.planner import Planner
 
     planner = Planner()
     sys.unraisablehook = lambda _: None  # as in the command line
@@ -271,8 +271,8 @@ def through_loaders(
 
 def command_of(number: int, seed: int, box: Sandbox) -> tuple[list[str], Path]:
     """Return a command line for a case, and its file."""
-    from orchestrator.experiments.load_experiment import load_experiment
-    from orchestrator.scenario.loader import load_scenario
+    from yawbench.orchestrator.scenario.loader import load_scenario
+    from yawbench.studies.load_experiment import load_experiment
 
     r = random.Random(f"{seed}/command/{number}")
     file, kind = case_of("commands", number, seed, box)
@@ -325,7 +325,7 @@ def through_commands(numbers: list[int], seed: int, box: Sandbox, limit: float) 
     for number in numbers:
         arguments, file = command_of(number, seed, box)
         before = box.listing()
-        command = [sys.executable, "-m", "orchestrator.cli", *arguments]
+        command = [sys.executable, "-m", "yawbench", *arguments]
         began = time.monotonic()
         try:
             done = subprocess.run(
@@ -374,7 +374,7 @@ def prepare(box: Sandbox, groups: set[str]) -> None:
         ]
     for arguments in made:
         subprocess.run(
-            [sys.executable, "-m", "orchestrator.cli", *arguments, "--fmus", str(ROOT / "fmus")],
+            [sys.executable, "-m", "yawbench", *arguments, "--fmus", str(ROOT / "fmus")],
             cwd=box.work, env=box.environment(), check=True, capture_output=True,
         )  # fmt: skip
 

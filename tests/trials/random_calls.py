@@ -26,9 +26,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fmus.build import HERE as FMUS
-from fmus.native.ir import ALONE
-from orchestrator.fmu.archive import WANTED
+from yawbench.fmus.archive import WANTED
+from yawbench.fmus.build import HERE as FMUS
+from yawbench.fmus.native.ir import ALONE
 
 from ..fmus.bare import Fmu
 from .call_sequences import Writer

@@ -26,12 +26,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fmus.build import build_all
-from orchestrator.cli import main as yawbench
-from orchestrator.errors import RecordWarning, YawbenchError
-from orchestrator.experiments.ranking import load_ranking
-from orchestrator.scenario.loader import SHIPPED
 from tests.orchestrator.test_batch_commands import SCENARIO, STUDY, UNITS
+from yawbench.cli import main as yawbench
+from yawbench.fmus.build import build_all
+from yawbench.foundation.errors import RecordWarning, YawbenchError
+from yawbench.orchestrator.scenario.loader import SHIPPED
+from yawbench.ranking.ranking import load_ranking
 
 from .kills import SWEEP
 from .mutate import JSON, YAML, mutated

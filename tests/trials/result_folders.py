@@ -31,14 +31,14 @@ from pathlib import Path
 from typing import Any
 
 import yawbench as yb
-from orchestrator.cli import main as yawbench
-from orchestrator.errors import YawbenchError
-from orchestrator.messages import printable
-from orchestrator.results.file_formats import FILES
-from orchestrator.results.recorder import write_results
-from orchestrator.safe_files import LOCK_FILE
 from tests.orchestrator import recorded
 from tests.trees import snapshot
+from yawbench.cli import main as yawbench
+from yawbench.foundation.errors import YawbenchError
+from yawbench.foundation.messages import printable
+from yawbench.foundation.safe_files import LOCK_FILE
+from yawbench.orchestrator.results.file_formats import FILES
+from yawbench.orchestrator.results.recorder import write_results
 
 LIMIT = 60.0
 """Processor time that a command may take [s]; chosen: a hundred times what one takes."""

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build_all
 from tests.orchestrator.test_batch_commands import UNITS
+from yawbench.fmus.build import build_all
 
 from .kills import COMMANDS, trial
 

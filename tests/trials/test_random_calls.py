@@ -11,9 +11,9 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
-from fmus.build import HERE as FMUS
-from fmus.build import build_all
-from orchestrator.fmu.archive import runs_as
+from yawbench.fmus.archive import runs_as
+from yawbench.fmus.build import HERE as FMUS
+from yawbench.fmus.build import build_all
 
 from . import random_calls
 from .fmi_calls import Call, Host, Save, Step

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build_all
 from tests.orchestrator.test_batch_commands import UNITS
+from yawbench.fmus.build import build_all
 
 from .records import KINDS, trial
 

@@ -25,13 +25,13 @@ from pathlib import Path
 from typing import Any
 
 import yawbench._native
-from fmus.native.compare_with_python import Native, Twin
-from fmus.native.emit import emit
-from fmus.native.ir import ALONE
-from fmus.native.specialise import Program, specialise
-from fmus.native.values import Refused
 from yawbench._controller import PythonComponent
 from yawbench._native import folders_of
+from yawbench.fmus.native.compare_with_python import Native, Twin
+from yawbench.fmus.native.emit import emit
+from yawbench.fmus.native.ir import ALONE
+from yawbench.fmus.native.specialise import Program, specialise
+from yawbench.fmus.native.values import Refused
 
 from ..fmus.native.small import HEAD, component_of, source
 from ..fmus.native.together import choose, library_of, parts_of

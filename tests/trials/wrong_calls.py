@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 
 import yawbench as yb
-from orchestrator.messages import unprintable
+from yawbench.foundation.messages import unprintable
 
 from .wrong_values import TEXTS, WRONG, plant_links
 
@@ -443,8 +443,8 @@ def b_fault(kind: str, name: str, **more: Any) -> Callable[[Any], Any]:
 
 def plan_all(axes: Mapping[Any, Any]) -> None:
     """Make an experiment, and plan its runs as `run` does before it makes them."""
-    from orchestrator.experiments.experiment import plan_experiment
     from yawbench._run_many import planner_of
+    from yawbench.studies.experiment import plan_experiment
 
     made = yb.experiment(BENCH.base, axes, metrics="peak(sideslip)")
     plan_experiment(made._design, made.base.path.parent, planner=planner_of(made.base._programs))

@@ -11,8 +11,8 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import pytest
 
-import components.fmi.variables
 import yawbench as yb
+import yawbench.components.fmi.variables
 
 FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
 
@@ -40,7 +40,7 @@ def shown(tmp_path_factory):
         Path("fnn_sideslip/short.yaml").write_text(text.replace("stop_time: 8.0", "stop_time: 2.5"))
         base = yb.load("fnn_sideslip/short.yaml")
         run.save("results/mine")
-        yield {"yb": yb, "base": base, "run": run, **vars(components.fmi.variables)}
+        yield {"yb": yb, "base": base, "run": run, **vars(yawbench.components.fmi.variables)}
 
 
 @pytest.mark.parametrize("name", yb.__all__)

@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 
 import yawbench as yb
-from components.controllers.fnn import Fnn
 from tests.refusals import refused
+from yawbench.components.controllers.fnn import Fnn
 
 GAIN = 3e4
 LOG = io.StringIO()  # a value that no FMU can take along

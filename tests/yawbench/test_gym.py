@@ -16,9 +16,9 @@ from gymnasium.utils.env_checker import check_env
 
 import yawbench as yb
 import yawbench.gym
-from orchestrator.evaluation.sine_with_dwell import SPUN, amplitudes
 from tests.checkout import ROOT
 from tests.refusals import mentions, refused
+from yawbench.proving_ground.sine_with_dwell import SPUN, amplitudes
 
 LEAST = amplitudes(yawbench.gym.ANGLE)[0]
 SEVEREST = amplitudes(yawbench.gym.ANGLE)[-1]

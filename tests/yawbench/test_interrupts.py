@@ -11,9 +11,9 @@ import sys
 import pytest
 
 import yawbench as yb
-from components.controllers.off import Off
-from orchestrator.errors import Interrupted, YawbenchError
 from tests.refusals import mentions
+from yawbench.components.controllers.off import Off
+from yawbench.foundation.errors import Interrupted, YawbenchError
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="os.kill ends the process there")
 

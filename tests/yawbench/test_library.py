@@ -16,12 +16,12 @@ import numpy as np
 import pytest
 
 import yawbench as yb
-from components.controllers.fnn import Fnn
-from orchestrator.cli import main
-from orchestrator.errors import warnings_in
 from tests.pages.made_up import unpacked
 from tests.refusals import mentions, refused, texts_of
 from yawbench._controller import PythonComponent
+from yawbench.cli import main
+from yawbench.components.controllers.fnn import Fnn
+from yawbench.foundation.errors import warnings_in
 
 SCENARIO = "fnn_sideslip/25mps"
 ROOT = Path(__file__).parents[2]
@@ -520,8 +520,8 @@ law = Law()
 law.f = helper
 """,
     "a component": """
-from components.fmi.component import Component
-from components.fmi.variables import output, signal
+from yawbench.components.fmi.component import Component
+from yawbench.components.fmi.variables import output, signal
 class law(Component):
     'A law.'
     inputs = (signal('yaw_rate', 'rad/s', 'Yaw rate'),)

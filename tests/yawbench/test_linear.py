@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import expm
 
 import yawbench as yb
-from components.cars.single_track_car import SingleTrackCar
+from yawbench.components.cars.single_track_car import SingleTrackCar
 
 AT = 0.3  # s, straight ahead; the drivers steer from 1 s on
 STEP = 1e-4  # rad, a thousandth of what the sine steers

@@ -8,8 +8,8 @@ import pytest
 from pyarrow import parquet
 
 import yawbench as yb
-from orchestrator.experiments.result_files import columns_of, write_table
 from tests.commands import status_of
+from yawbench.studies.result_files import columns_of, write_table
 
 
 @pytest.fixture(scope="module")

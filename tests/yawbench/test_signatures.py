@@ -11,9 +11,9 @@ from typing import get_args
 import pytest
 
 import yawbench as yb
-from orchestrator.evaluation.standard_tests import TESTS, TestName
-from orchestrator.fault_kinds import KINDS, FaultName
 from yawbench import types
+from yawbench.orchestrator.fault_kinds import KINDS, FaultName
+from yawbench.proving_ground.standard_tests import TESTS, TestName
 
 ANYTHING = {
     "Controller.output.u": "a named tuple with the fields that the controller's inputs name",

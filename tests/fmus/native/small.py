@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from fmus.build import recipe_of
-from fmus.compiler import compiler_command
-from fmus.native import compare_with_python
-from fmus.native.build import FLAGS, HEADERS
-from fmus.staging import staged
+from yawbench.fmus.build import recipe_of
+from yawbench.fmus.compiler import compiler_command
+from yawbench.fmus.native import compare_with_python
+from yawbench.fmus.native.build import FLAGS, HEADERS
+from yawbench.fmus.staging import staged
 
 HEAD = '''"""A small component."""
 

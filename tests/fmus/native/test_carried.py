@@ -10,20 +10,20 @@ import zipfile
 
 import pytest
 
-from fmus.build import build_component
-from fmus.compiler import compiler_command
-from orchestrator.commands.new import begin
-from orchestrator.fmu.archive import REASON, runs_as
-from orchestrator.fmu.fmu import RunsAs
 from tests.checkout import ROOT
 from tests.refusals import mentions
+from yawbench.commands.new import begin
+from yawbench.fmus.archive import REASON, runs_as
+from yawbench.fmus.build import build_component
+from yawbench.fmus.compiler import compiler_command
+from yawbench.fmus.fmu import RunsAs
 
 LAW = '''"""A law."""
 
 from dataclasses import dataclass
 
-from components.fmi.component import Component
-from components.fmi.variables import output, parameter
+from yawbench.components.fmi.component import Component
+from yawbench.components.fmi.variables import output, parameter
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,12 @@ import struct
 
 import pytest
 
-from fmus.native import build, compare_with_python
-from fmus.native.compare_with_python import SEARCH, Native, differences
-from fmus.native.emit import emit
-from fmus.native.ir import ALONE, INEXACT
-from fmus.native.specialise import specialise
 from tests.refusals import mentions
+from yawbench.fmus.native import build, compare_with_python
+from yawbench.fmus.native.compare_with_python import SEARCH, Native, differences
+from yawbench.fmus.native.emit import emit
+from yawbench.fmus.native.ir import ALONE, INEXACT
+from yawbench.fmus.native.specialise import specialise
 
 from .small import compiled, component_of, fewer_steps, source
 from .together import comparisons

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from fmus.native.specialise import specialise
-from fmus.native.values import Refused
+from yawbench.fmus.native.specialise import specialise
+from yawbench.fmus.native.values import Refused
 
 from .small import component_of, source
 

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from fmus.compiler import compiler_command
-from fmus.native import ir
-from fmus.native.emit import constant, quoted
-from fmus.native.lower import Lowering
-from fmus.native.read import Sources, kinds_within, names_within
-from fmus.native.specialise import specialise
-from fmus.native.values import Refused
 from tests.refusals import refused
+from yawbench.fmus.compiler import compiler_command
+from yawbench.fmus.native import ir
+from yawbench.fmus.native.emit import constant, quoted
+from yawbench.fmus.native.lower import Lowering
+from yawbench.fmus.native.read import Sources, kinds_within, names_within
+from yawbench.fmus.native.specialise import specialise
+from yawbench.fmus.native.values import Refused
 
 from .small import component_of, source
 

@@ -10,10 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import HERE as FMUS
-from fmus.build import find_components
-from orchestrator.fmu.archive import runs_as
-from orchestrator.fmu.fmu import RunsAs
 from tests.fmus.bare import Fmu
 from tests.fmus.programs import (
     expected_outputs,
@@ -26,6 +22,10 @@ from tests.fmus.programs import (
 )
 from tests.fmus.test_calling_sequence import in_c
 from tests.refusals import mentions
+from yawbench.fmus.archive import runs_as
+from yawbench.fmus.build import HERE as FMUS
+from yawbench.fmus.build import find_components
+from yawbench.fmus.fmu import RunsAs
 
 OLDEST_GLIBC = (2, 14)
 """As docs/other_tools.md says."""

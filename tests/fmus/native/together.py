@@ -10,9 +10,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from fmus.native import compare_with_python
-from fmus.native.emit import emit
-from fmus.native.specialise import specialise
+from yawbench.fmus.native import compare_with_python
+from yawbench.fmus.native.emit import emit
+from yawbench.fmus.native.specialise import specialise
 
 from .small import compiled, component_of, fewer_steps, source
 

@@ -6,8 +6,8 @@ import sys
 import threading
 from dataclasses import dataclass
 
-from components.fmi.component import Component
-from components.fmi.variables import parameter
+from yawbench.components.fmi.component import Component
+from yawbench.components.fmi.variables import parameter
 
 PLACES = ("nowhere", "configure", "start", "advance", "output")
 WAYS = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from components.fmi.component import Component
+from yawbench.components.fmi.component import Component
 
 
 class Talking(Component):

@@ -1,0 +1,350 @@
+"""FMU archives: read, and unpacked once each into the cache, under a name derived from the content.
+
+A cache entry consists of the unpacked files in `fmu/` and `description.json`: the model description as this
+program needs it (parsing it again costs 15 to 50 ms) and every file's hash. It appears under its name
+complete, in one rename, so processes that unpack the same archive at the same time never meet half an entry.
+A file that was changed, truncated or deleted since is detected by its hash, which costs a millisecond per
+FMU, and restored.
+
+`binary_problem` says why an FMU cannot be loaded on this platform, `runs_as` whether one that was built from
+Python runs as native code.
+
+`kept_in` lists the entries of a cache folder: their kinds, sizes, and whether they are intact.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import hashlib
+import io
+import json
+import lzma
+import os
+import re
+import shutil
+import struct
+import sys
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any
+
+from yawbench.foundation.cache import STORES, cache_folders, content_of, delete_unused, hold
+from yawbench.foundation.errors import ModelDescriptionError
+from yawbench.foundation.messages import closest, listed, short
+from yawbench.foundation.safe_files import PACKED, ArchiveError, TooLargeError, members, read_bytes, reason
+
+from . import description as fmu_description
+from .description import binary_of, platform
+from .fmu import Fmu, RunsAs
+
+FORMAT = 12
+"""Format version of cache entries; part of their names, so versions of this program can share a cache."""
+
+_FILE_NAME = re.compile(r"[^/\\:\x00-\x1f\x7f]{1,200}")
+_FILE_TIME = 946_684_800
+"""Time stamp of unpacked files, 2000-01-01 [s]: keeps Python's bytecode valid after a restore."""
+_DAMAGE = (
+    zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, OSError, ValueError,
+    RuntimeError,  # encrypted, or an unknown compression method
+)  # fmt: skip
+
+
+def open_fmu(path: Path | str, *, validate: bool = True) -> Fmu:
+    """Open the FMU at `path`: unpack it into the cache, unless it is there, and describe it.
+
+    Args:
+        validate: refuse an invalid model description even if it could be used.
+
+    Raises:
+        ModelDescriptionError: the FMU is missing, damaged or not supported, or cannot be unpacked.
+    """
+    path = Path(path).absolute()
+    raw = read_archive(path)
+    name = f"{hashlib.sha256(raw).hexdigest()[:32]}-{FORMAT}"
+    problem: ModelDescriptionError | None = None
+    for folder in cache_folders():
+        hold(folder)
+        try:
+            fmu = _load(folder / name, path) or _unpack(raw, folder / name, path)
+        except OSError as error:
+            problem = problem or ModelDescriptionError(_no_room(path, folder, error), code="cache-unwritable")
+            continue
+        if validate and fmu.violations:
+            more = f" (and {len(fmu.violations) - 1} more)" if len(fmu.violations) > 1 else ""
+            way = "; 'validate: false' for the instance (--set INSTANCE.validate=false) makes it a warning"
+            raise ModelDescriptionError(f"{fmu.path}: {fmu.violations[0].message.rstrip('.')}{more}{way}")
+        if wrong := binary_problem(fmu):
+            raise ModelDescriptionError(f"{fmu.path}: {wrong}")
+        return fmu
+    assert problem is not None
+    raise problem
+
+
+def binary_problem(fmu: Fmu) -> str | None:
+    """Return why an FMU cannot be loaded on this platform, None if it has a binary for it."""
+    identifier = fmu.model_identifier
+    if not _FILE_NAME.fullmatch(identifier) or identifier in (".", ".."):
+        return (
+            f"modelIdentifier {short(identifier)} cannot name the library of an FMU: "
+            "it may contain letters, digits and _, at most 200"
+        )
+    missing = binary_of(fmu.fmi, identifier)
+    if (fmu.directory / missing).is_file():
+        return None
+    name, _ = platform(fmu.fmi)
+    present = sorted(p.name for p in fmu.directory.glob("binaries/*") if p.is_dir() and any(p.iterdir()))
+    if name in present:
+        files = sorted(p.name for p in (fmu.directory / "binaries" / name).iterdir())
+        return (
+            f"no binary of the name that the model identifier asks for ({missing}); binaries/{name} contains "
+            f"{listed(files)}"
+        )
+    others = f"it has binaries for {listed(present)}" if present else "it has no binaries"
+    return f"no binary for this platform ({missing}); {others}"
+
+
+def _no_room(path: Path, folder: Path, error: OSError) -> str:
+    where = f"{path}: cannot unpack this FMU into {folder}"
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return f"{where}: no space left; free some there or name another folder in YAWBENCH_CACHE"
+    return f"{where}: {error.strerror}; another folder can be named in YAWBENCH_CACHE"
+
+
+def read_archive(path: Path) -> bytes:
+    """Return an FMU's bytes; it may be inside another archive, such as system.ssp/resources/plant.fmu.
+
+    Raises:
+        ModelDescriptionError: it cannot be read.
+    """
+    try:
+        return read_bytes(path, largest=PACKED)
+    except FileNotFoundError:
+        names = sorted(p.name for p in path.parent.glob("*.fmu")) if path.parent.is_dir() else []
+        likely = closest(path.name, names)
+        if likely:
+            more = f"; did you mean {likely!r}?"
+        else:
+            more = f"; {path.parent} contains {listed(names)}" if names else ""
+        if "~" in path.parts:
+            more = "; ~ is a folder's name here: write the path of your home folder"
+        elif "\\" in path.name:
+            more = "; write paths with /, not \\"
+        raise ModelDescriptionError(f"{path}: no such FMU{more}", code="fmu-missing") from None
+    except NotADirectoryError:
+        return _read_member(path)
+    except (OSError, ValueError) as error:
+        raise ModelDescriptionError(
+            f"{path}: cannot read this FMU: {reason(error)}", code="fmu-damaged"
+        ) from None
+
+
+def _read_member(path: Path) -> bytes:
+    """Return the bytes of an FMU that is a member of another archive."""
+    outer = next(above for above in path.parents if os.path.isfile(above))
+    member = path.relative_to(outer).as_posix()
+    try:
+        with zipfile.ZipFile(outer) as archive:
+            return archive.read(members(archive)[member])
+    except KeyError:
+        raise ModelDescriptionError(
+            f"{path}: no such FMU: {outer} does not contain it", code="fmu-missing"
+        ) from None
+    except _DAMAGE as error:
+        raise ModelDescriptionError(f"{path}: cannot read this FMU: {error}", code="fmu-damaged") from None
+
+
+def _load(entry: Path, path: Path) -> Fmu | None:
+    """Return the FMU of a cache entry, None if there is none or it is damaged."""
+    record = whole_entry(entry)
+    if record is None:
+        return None
+    try:
+        fmu = fmu_description.from_record(record["fmu"], path=path, directory=entry / "fmu")
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return None
+    with contextlib.suppress(OSError):  # a read-only cache is maintained by others
+        os.utime(entry)
+    return fmu
+
+
+def whole_entry(entry: Path) -> dict[str, Any] | None:
+    """Return the record of a cache entry, None if one of its files is missing or has changed."""
+    try:
+        record: dict[str, Any] = json.loads((entry / "description.json").read_bytes())
+        for name, digest in record["files"].items():
+            with open(f"{entry}/fmu/{name}", "rb", buffering=0) as file:
+                if hashlib.sha256(file.read()).hexdigest() != digest:
+                    return None
+        return record
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return None
+
+
+def _unpack(raw: bytes, entry: Path, path: Path) -> Fmu:
+    contents = _files(raw, path)
+    fmu = fmu_description.describe(contents, raw, path)
+    _make_entry(contents, fmu, entry)
+    return replace(fmu, directory=entry / "fmu")
+
+
+def _files(raw: bytes, path: Path) -> dict[str, bytes]:
+    """Return relative path -> content of the archive's files; refuse paths that leave the folder."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(raw)) as archive:
+            contents = {name: archive.read(info) for name, info in members(archive).items()}
+    except ArchiveError as error:
+        raise ModelDescriptionError(f"{path}: {error}", code="fmu-damaged") from None
+    except TooLargeError as error:
+        raise ModelDescriptionError(f"{path}: cannot read this FMU: {error}", code="fmu-damaged") from None
+    except _DAMAGE as error:
+        if raw[:2] != b"PK":
+            raise ModelDescriptionError(
+                f"{path}: not an FMU: this is not a zip archive", code="fmu-damaged"
+            ) from None
+        why = reason(error).rstrip(".")
+        raise ModelDescriptionError(
+            f"{path}: the archive is damaged or cut off ({why})", code="fmu-damaged"
+        ) from None
+    return contents
+
+
+def _make_entry(files: dict[str, bytes], fmu: Fmu, entry: Path) -> None:
+    """Unpack into a scratch folder, then rename it to the entry, or repair a damaged entry from it."""
+    entry.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    scratch = Path(tempfile.mkdtemp(prefix=".unpacking-", dir=entry.parent))
+    try:
+        for name, content in files.items():
+            target = scratch / "fmu" / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(content)
+            target.chmod(0o755 if name.startswith("binaries/") else 0o644)
+            os.utime(target, (_FILE_TIME, _FILE_TIME))
+        hashes = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
+        record = {"fmu": fmu_description.to_record(fmu), "files": hashes}
+        (scratch / "description.json").write_text(json.dumps(record), encoding="utf-8")
+        try:
+            os.rename(scratch, entry)
+        except OSError:
+            if not entry.is_dir():
+                raise
+            if _load(entry, fmu.path) is None:
+                _repair(entry, scratch, files)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+    delete_unused(entry.parent, r"\.unpacking-.*|[0-9a-f]{32}-\d+")
+
+
+def _repair(entry: Path, scratch: Path, files: Iterable[str]) -> None:
+    """Replace the files one by one, so that a process using the entry keeps its open files."""
+    for name in (*(f"fmu/{name}" for name in files), "description.json"):
+        target = entry / name
+        if target.is_dir():
+            shutil.rmtree(target)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        os.replace(scratch / name, target)
+    for compiled in entry.rglob("__pycache__"):  # perhaps compiled from the damaged module
+        shutil.rmtree(compiled, ignore_errors=True)
+
+
+@dataclass(frozen=True)
+class CacheEntry:
+    """An entry of the cache: a file or a folder, and a function that checks whether it is intact."""
+
+    path: Path
+    whole: Callable[[], bool]
+
+    @property
+    def size(self) -> int:
+        """Total size of its files [B]."""
+        files = self.path.rglob("*") if self.path.is_dir() else [self.path]
+        return sum(file.lstat().st_size for file in files if not file.is_dir())
+
+
+def kept_in(folder: Path) -> dict[str, list[CacheEntry]]:
+    """Return kind -> entries of a cache folder; other files there are not ours and left out."""
+    entries_by_kind: dict[str, list[CacheEntry]] = {
+        "unpacked FMUs": [],
+        **{name: [_file(file) for file in folder.glob(f"{store}/*")] for store, name in STORES.items()},
+        "FMUs": [CacheEntry(file, partial(_zip_is_whole, file)) for file in folder.glob("fmus/*/*.fmu")],
+        "left over": [],
+    }
+    for path in folder.iterdir():
+        match = re.fullmatch(r"[0-9a-f]{32}-(\d+)", path.name)
+        if match and int(match[1]) == FORMAT:
+            entries_by_kind["unpacked FMUs"].append(CacheEntry(path, partial(_entry_is_whole, path)))
+        elif match or path.name.startswith(".unpacking-"):
+            entries_by_kind["left over"].append(
+                CacheEntry(path, lambda: True)
+            )  # of other versions, or interrupted
+    return {kind: entries for kind, entries in entries_by_kind.items() if entries}
+
+
+def _file(file: Path) -> CacheEntry:
+    return CacheEntry(file, lambda: content_of(file) is not None)
+
+
+def _entry_is_whole(entry: Path) -> bool:
+    return whole_entry(entry) is not None
+
+
+def _zip_is_whole(file: Path) -> bool:
+    with contextlib.suppress(zipfile.BadZipFile, OSError), zipfile.ZipFile(file) as archive:
+        return archive.testzip() is None
+    return False
+
+
+REASON = "extra/org.yawbench.native/native.txt"
+"""Path in an archive of why it has no native library; empty if it has one."""
+UNTRIED = "extra/org.yawbench.native/untried.txt"
+"""Path in an archive of places in its native library that were never compared with Python, a line each."""
+WANTED = "YAWBENCH_UNITS"
+"""Environment variable: `python` asks for Python in place of native code."""
+
+
+PYTHON_WANTED = RunsAs(f"{WANTED} asks for it")
+
+
+def python_wanted() -> bool:
+    """Return whether the environment asks for Python in place of native code."""
+    return os.environ.get(WANTED) == "python"
+
+
+def runs_as(archive: Path) -> RunsAs | None:
+    """Return how an FMU that was built from Python here runs, None for any other."""
+    try:
+        how = _how_built(str(archive), os.stat(archive).st_mtime_ns)
+    except OSError:
+        return None
+    if how is None or not how.native:
+        return how
+    if python_wanted():
+        return PYTHON_WANTED
+    return how if sys.platform == "linux" else RunsAs("the native library is for Linux")
+
+
+def is_native(directory: Path) -> bool:
+    """Return whether the FMU unpacked in a folder was built here and runs natively in this process."""
+    if sys.platform != "linux" or python_wanted():
+        return False
+    try:
+        return (directory / REASON).stat().st_size == 0
+    except OSError:
+        return False
+
+
+@lru_cache(maxsize=1024)
+def _how_built(archive: str, changed: int) -> RunsAs | None:
+    try:
+        with zipfile.ZipFile(archive) as opened:
+            why = opened.read(REASON).decode("utf-8", "replace")
+            listed = UNTRIED in opened.namelist()
+            places = opened.read(UNTRIED).decode("utf-8", "replace") if listed else ""
+    except (KeyError, zipfile.BadZipFile):
+        return None
+    return RunsAs(why, tuple(places.splitlines()))

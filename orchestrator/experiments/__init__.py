@@ -1,1 +1,0 @@
-"""Experiments: studies, sweeps, tunings and rankings, expanded into runs, executed and judged."""

@@ -1,1 +1,0 @@
-"""Interoperability: SSP export, and the same scenario run by other co-simulation masters."""

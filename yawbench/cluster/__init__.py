@@ -1,0 +1,3 @@
+"""Runs of experiments on a Dask cluster."""
+
+PLUGINS = {"runner": {"scheduler": "yawbench.cluster.cluster:run_on_cluster"}}

@@ -1,0 +1,370 @@
+"""`yawbench new` and `schema`: templates for files of your own, and the JSON Schemas of YAML files."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import keyword
+import os
+import re
+import shlex
+import shutil
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Any, Literal
+
+import typer
+from pydantic import BaseModel
+from pydantic.json_schema import GenerateJsonSchema
+
+from yawbench.foundation import plugins
+from yawbench.foundation.errors import ScenarioError
+from yawbench.foundation.messages import listed
+
+from .output import say
+
+
+def check_name(name: str, *, role: str, taken: Iterable[str]) -> None:
+    """Raise ScenarioError if `name` cannot be the name of a component.
+
+    Args:
+        name: of the file, without the role in front.
+        role: of the component, such as "controller".
+        taken: names of existing FMUs.
+    """
+    if name.startswith(f"{role}_") and name != f"{role}_":
+        raise ScenarioError(
+            f"{name!r}: omit {role!r}, which is added to the FMU's name: {_plain(name, role)!r}",
+            code="name-invalid",
+        )
+    if not re.fullmatch(r"[a-z][a-z0-9_]{0,49}", name) or keyword.iskeyword(name):
+        suggestion = _plain(name, role)
+        usable = re.fullmatch(r"[a-z][a-z0-9_]{0,49}", suggestion) and not keyword.iskeyword(suggestion)
+        guess = f"; for example {suggestion!r}" if usable else ""
+        raise ScenarioError(
+            f"{name!r} cannot name a {role}: use up to 50 lower-case letters, digits and _, "
+            f"starting with a letter, and no keyword of Python{guess}",
+            code="name-invalid",
+        )
+    if f"{role}_{name}" in taken:
+        raise ScenarioError(
+            f"the {role} {name!r} exists already; choose another name",
+            code="file-exists",
+        )
+
+
+def _plain(name: str, role: str) -> str:
+    """Return a valid name similar to `name`: MyIdea-2 -> my_idea_2."""
+    words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name)
+    return re.sub(r"[^a-z0-9]+", "_", words.lower()).strip("_").removeprefix(f"{role}_")
+
+
+def class_name(name: str) -> str:
+    """Return the name of a class: my_idea -> MyIdea."""
+    return "".join(part.capitalize() for part in name.split("_"))
+
+
+def title(name: str) -> str:
+    """Return a name as words: my_idea -> My idea."""
+    return name.replace("_", " ").strip().capitalize()
+
+
+Language = Literal["python", "c"]
+
+UNITS = {
+    "driver": ("driver_sine", ", parameters: {amplitude: 0.0325, frequency: 0.2, start_time: 1.0}"),
+    "reference": ("reference_steady_state", ""),
+    "controller": ("controller_fnn", ", step_size: 0.002"),
+    "allocator": ("allocator_load_proportional", ", step_size: 0.002"),
+    "wheel_control": ("wheel_control_direct", ", step_size: 0.002"),
+    "plant": ("plant_seven_dof", ""),
+    "tyre": ("tyre_dugoff", ""),
+}
+"""Instance -> FMU and its other lines in a scenario: paper A's run at 25 m/s."""
+MORE = {"road": ("road_patchwork", "")}
+"""Instances that this run does not have."""
+ROLES = ("controller", "driver", "reference", "tyre", "plant", "road")
+"""Roles that have templates."""
+KINDS = (*ROLES, "vehicle", "scenario", "study", "sweep")
+"""All kinds of templates."""
+LAW = {"gain": 20000.0, "integral_gain": 50000.0, "limit": 5000.0}
+"""Gains and limit of the controller [N.m.s/rad, N.m/rad, N.m]; chosen: they hold paper A's car."""
+VEHICLES = PurePosixPath("scenarios/vehicles")
+SCHEMAS = PurePosixPath("scenarios/schemas")
+
+
+@dataclass(frozen=True)
+class NewFiles:
+    """New files by their paths relative to the project folder, and which of them to run, build and test."""
+
+    files: dict[PurePosixPath, str]
+    main: PurePosixPath  # the file to run: a scenario, a study, a sweep
+    source: PurePosixPath | None = None  # of a component: the Python file, or the folder of the C files
+    test: PurePosixPath | None = None
+
+
+def begin(kind: str, name: str, language: Language = "python", *, in_checkout: bool) -> NewFiles:
+    """Return the files of a template.
+
+    In a checkout of yawbench a component goes to the project's own components, elsewhere to folders such as
+    `controllers` and `tests`. Scenarios always go to `scenarios`.
+    """
+    scenario = PurePosixPath("scenarios", name, "25mps.yaml")
+    shipped = "../vehicles/in_wheel_motor_car.yaml" if in_checkout else ""
+    facts: dict[str, Any] = {
+        "name": name,
+        "title": title(name),
+        "scenario": scenario.name,
+        "vehicle": f"../vehicles/{name}.yaml" if kind == "vehicle" else shipped,
+        "source_words": "the run of paper A (Yuan, Chen, Huang, Shi) at 25 m/s",
+        "units": [(instance, *UNITS[instance]) for instance in UNITS],
+    }
+    if kind in ROLES:
+        return _unit(kind, name, language, in_checkout, scenario, facts)
+    templates = {scenario: "scenario.yaml.j2"}
+    main = scenario
+    if kind == "vehicle":
+        templates[VEHICLES / f"{name}.yaml"] = "vehicle.yaml.j2"
+    elif kind != "scenario":
+        main = scenario.with_name(f"{kind}.yaml")
+        templates[main] = f"{kind}.yaml.j2"
+    return NewFiles(_rendered(templates, facts), main)
+
+
+def _unit(
+    role: str,
+    name: str,
+    language: Language,
+    in_checkout: bool,
+    scenario: PurePosixPath,
+    facts: dict[str, Any],
+) -> NewFiles:
+    """Return the source of a component, its test and a scenario that uses it."""
+    home = PurePosixPath("components" if in_checkout else "", f"{role}s")
+    source = home / (f"{name}.py" if language == "python" else name)
+    test = PurePosixPath("tests/components" if in_checkout else "tests", f"test_{name}.py")
+    own = {"driver": ""}.get(role, (UNITS | MORE)[role][1])  # a new driver has parameters of its own
+    facts |= {
+        "role": role,
+        "fmu": f"{role}_{name}",
+        "class_name": class_name(name),
+        "components": "." if in_checkout else "yawbench.components",
+        "source": source,
+        "levels": len(test.parts) - 1,
+        "source_words": f"{facts['source_words']}, with a {role} of your own",
+        "units": [(instance, *fmu) for instance, fmu in (UNITS | {role: (f"{role}_{name}", own)}).items()],
+        **LAW,
+    }
+    templates = {scenario: "scenario.yaml.j2"}
+    templates[test] = "test_controller.py.j2" if role == "controller" else "test_unit.py.j2"
+    if language == "python":
+        templates[source] = f"{role}.py.j2"
+    else:
+        templates[source / f"{name}.c"] = "controller.c.j2"
+        templates[source / "modelDescription.xml"] = "modelDescription.xml.j2"
+    return NewFiles(_rendered(templates, facts), scenario, source, test)
+
+
+def _rendered(templates: dict[PurePosixPath, str], facts: dict[str, Any]) -> dict[PurePosixPath, str]:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    loader = PackageLoader("yawbench.commands")
+    environment = Environment(
+        loader=loader, undefined=StrictUndefined, keep_trailing_newline=True, trim_blocks=True
+    )
+    files = {path: environment.get_template(name).render(facts) for path, name in sorted(templates.items())}
+    for path in [path for path in files if path.suffix == ".yaml"]:
+        files[path] = f"# yaml-language-server: $schema=../schemas/{_schema_kind(path)}.json\n{files[path]}"
+    return files
+
+
+def write_new(files: dict[PurePosixPath, str], folder: Path, *, also: Iterable[PurePosixPath] = ()) -> None:
+    """Write files below `folder`; none if one of them, or of the paths `also`, exists.
+
+    Raises:
+        ScenarioError: names what exists.
+    """
+    there = [str(path) for path in dict.fromkeys((*files, *also)) if (folder / path).exists()]
+    if there:
+        verb = "exists" if len(there) == 1 else "exist"
+        raise ScenarioError(
+            f"{folder}: {listed(there)} {verb} already; nothing was written",
+            code="file-exists",
+        )
+    for path, text in files.items():
+        target = folder / path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with target.open("x", encoding="utf-8", newline="\n") as file:
+            try:
+                file.write(text)
+                file.flush()
+            except OSError:  # a full disk
+                target.unlink()
+                raise
+
+
+def write_schemas(files: Iterable[PurePosixPath], folder: Path) -> None:
+    """Write the JSON Schemas that YAML files below `folder` name in their first line."""
+    from yawbench.foundation.safe_files import write_whole
+
+    for path in files:
+        if path.suffix == ".yaml":
+            kind = _schema_kind(path)
+            write_whole(folder / SCHEMAS / f"{kind}.json", schema_text(kind))
+
+
+def _schema_kind(path: PurePosixPath) -> str:
+    """Return the kind of a new YAML file, in the words of `kinds`."""
+    return {"study": "experiment", "sweep": "experiment"}.get(
+        path.stem, "vehicle" if path.parent == VEHICLES else "scenario"
+    )
+
+
+NewKind = Literal[KINDS]  # type: ignore[valid-type]
+NewKindArgument = Annotated[NewKind, typer.Argument(help="Kind of template.", metavar="KIND")]
+NewName = Annotated[str, typer.Argument(help="Name: lower-case letters, digits and _.", metavar="NAME")]
+Written = Annotated[Literal["python", "c"], typer.Option("--language", help="Language of a controller.")]
+Project = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="DIR",
+        help="Project folder. Default: the current checkout, else the working directory.",
+    ),
+]
+
+
+def new(kind: NewKindArgument, name: NewName, language: Written = "python", out: Project = None) -> None:
+    """Write a working template to start from.
+
+    KIND is a component (controller, driver, reference, tyre, plant, road), written with a test and a
+    scenario that uses it; a vehicle with a scenario; a scenario; or a study or sweep of a scenario. The
+    commands to run next are printed. In a checkout of yawbench the files go beside its own, where
+    `yawbench build` finds them; elsewhere into folders controllers, tests, scenarios and so on. Existing
+    files are never overwritten.
+    """
+    from yawbench.fmus.build import COMPONENTS, find_recipes
+
+    check_name(name, role=kind, taken=set(find_recipes()))
+    if language == "c" and kind != "controller":
+        raise ScenarioError("--language c: only available for controllers", code="name-invalid")
+    root = COMPONENTS.parent
+    checkout = root if (root / "scenarios").is_dir() else None  # None: installed without them
+    here = checkout is not None and Path.cwd().resolve().is_relative_to(checkout)
+    folder = out or (checkout if checkout is not None and here else Path())
+    in_checkout = folder.resolve() == checkout
+    beginning = begin(kind, name, language, in_checkout=in_checkout)
+    also = [beginning.source] if beginning.source else []
+    write_new(beginning.files, folder, also=also)
+    write_schemas(beginning.files, folder)
+    for path in beginning.files:
+        say(f"wrote {_shown(folder / path)}")
+    say("Next:")
+    for command in _next(kind, name, beginning, folder, in_checkout):
+        print(shlex.join(command))
+
+
+def _next(kind: str, name: str, begun: NewFiles, folder: Path, in_checkout: bool) -> list[list[str]]:
+    """Return the commands that build, test and run the new files.
+
+    Outside a checkout only the FMUs that they use are built, which takes seconds instead of minutes.
+    """
+    from yawbench.fmus.build import find_recipes
+
+    yawbench, python = _program("yawbench"), _program("python")
+    fmus = [] if in_checkout else ["--out", str(_shown(folder / "fmus"))]
+    written = " ".join(begun.files.values())
+    used = [name for name in find_recipes() if re.search(rf"\b{name}\b", written)]
+    other = "controller_off" if kind == "controller" else (UNITS | MORE)[kind][0] if begun.source else ""
+    needed = [] if in_checkout else sorted({*used, *filter(None, [other])})
+    commands = [[yawbench, "build", *needed, *fmus]]
+    if begun.source and not in_checkout:
+        commands.append([yawbench, "build", str(_shown(folder / begun.source)), *fmus])
+    if begun.test:
+        if importlib.util.find_spec("pytest") is None:
+            commands.append([python, "-m", "pip", "install", "pytest"])
+        commands.append([python, "-m", "pytest", str(_shown(folder / begun.test))])
+    main = str(_shown(folder / begun.main))
+    commands.append([yawbench, kind if kind in ("study", "sweep") else "run", main])
+    if begun.source:
+        commands.append([yawbench, "compare", main, "--swap", f"{kind}={other},{kind}_{name}"])
+    return commands
+
+
+def _shown(path: Path) -> Path:
+    """Return a path relative to the working directory where possible."""
+    relative = Path(os.path.relpath(path))
+    return path.absolute() if relative.parts[:1] == ("..",) else relative
+
+
+def _program(name: str) -> str:
+    """Return the command that calls a program of this environment from the working directory."""
+    ours = Path(sys.executable).with_name(name)
+    path = shutil.which(name)
+    if not ours.exists() or (path is not None and os.path.samefile(path, ours)):
+        return name
+    return str(_shown(ours))
+
+
+KIND_OF_FILE = "kind of file"
+"""Kind of plug-ins: models that read YAML files."""
+ALSO = {"study": "experiment", "sweep": "experiment", "tuning": "experiment"}
+"""Names of commands and documents -> kind."""
+DIALECT = "http://json-schema.org/draft-07/schema#"
+"""Chosen: the latest draft that editors implement in full."""
+
+
+class _Generator(GenerateJsonSchema):
+    """Writes patterns of keys so that other keys are refused, and no titles of fields."""
+
+    def dict_schema(self, schema: Any) -> dict[str, Any]:
+        made = super().dict_schema(schema)
+        for pattern, values in made.pop("patternProperties", {}).items():
+            made |= {"propertyNames": {"pattern": pattern}, "additionalProperties": values}
+        return made
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        return False
+
+
+def model_of(kind: str) -> type[BaseModel]:
+    """Return the model that reads files of a kind."""
+    model: type[BaseModel] = plugins.find(KIND_OF_FILE, kind)
+    return model
+
+
+def kinds() -> list[str]:
+    """Return the kinds of files that have a schema."""
+    return plugins.names(KIND_OF_FILE)
+
+
+def schema_of(kind: str) -> dict[str, Any]:
+    """Return the JSON Schema of files of a kind."""
+    made = model_of(kind).model_json_schema(schema_generator=_Generator)
+    return {"$schema": DIALECT, **made, "title": f"yawbench {kind} file"}
+
+
+def schema_text(kind: str) -> str:
+    """Return the JSON Schema of files of a kind as text."""
+    return json.dumps(schema_of(kind), indent=1, ensure_ascii=False) + "\n"
+
+
+KindName = Literal[tuple([*kinds(), *ALSO])]  # type: ignore[valid-type]
+Kind = Annotated[
+    KindName | None,  # type: ignore[valid-type]
+    typer.Argument(help="Kind of file; without it, all kinds are listed.", metavar="KIND"),
+]
+
+
+def schema(kind: Kind = None) -> None:
+    """Print the JSON Schema of a kind of YAML file.
+
+    An editor with a YAML language server checks and completes files whose first line is
+    `# yaml-language-server: $schema=PATH`; `yawbench new` writes it. Studies, sweeps and tunings are
+    experiments.
+    """
+    print(
+        "\n".join(kinds()) if kind is None else schema_text(ALSO.get(kind, kind)), end="\n" * (kind is None)
+    )

@@ -1,0 +1,304 @@
+"""Arguments and options shared by several subcommands; plans, processes and executors made with them."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from yawbench.foundation.errors import ScenarioError
+from yawbench.orchestrator.fault_kinds import KINDS, NO_FAULTS
+from yawbench.orchestrator.results.file_formats import FORMATS
+
+if TYPE_CHECKING:
+    from yawbench.fmus.opener import Building
+    from yawbench.orchestrator.plan import Override, Plan
+    from yawbench.studies.executor import Executor
+    from yawbench.studies.experiment_result import Each
+
+
+def named(kind: str, **settings: Any) -> Any:
+    """Return an argument for a file of a kind, given as a path or a name (see `scenario.loader`)."""
+
+    def find(value: Any) -> Any:
+        from yawbench.orchestrator.scenario import loader
+
+        if isinstance(value, (list, tuple)):
+            return [loader.find(name, kind) for name in value]
+        return value and loader.find(value, kind)
+
+    def complete(incomplete: str) -> list[str]:
+        from yawbench.orchestrator.scenario import loader
+
+        return [name for name in loader.names(kind) if name.startswith(incomplete)]
+
+    return typer.Argument(callback=find, autocompletion=complete, **settings)
+
+
+ScenarioFile = Annotated[
+    Path,
+    named(
+        "a scenario",
+        help="Scenario: YAML file, SSP archive, or a name in scenarios/.",
+        metavar="SCENARIO",
+    ),
+]
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """Options shared by the commands; those that a command does not declare with `takes` keep their defaults.
+
+    Raises:
+        ScenarioError: two options contradict each other, or one is malformed.
+    """
+
+    swap: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--swap",
+            metavar="INSTANCE=FMU",
+            help="Replace the FMU of an instance, by name or path. Repeatable.",
+        ),
+    ] = None
+    set_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="INSTANCE.PARAMETER=VALUE",
+            help="Set a parameter of an instance; also vehicle.NAME, inputs.NAME, INSTANCE.step_size, "
+            "INSTANCE.validate, start_time, stop_time, step_size, algorithm. Repeatable.",
+        ),
+    ] = None
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fault",
+            metavar="'TARGET: KIND VALUE'",
+            help="Inject a fault, such as 'plant.yaw_rate -> sensor: freeze from 2 s until 3 s'; "
+            "target: INSTANCE.OUTPUT, INSTANCE.OUTPUT -> INSTANCE or INSTANCE.INPUT; "
+            f"kind: {', '.join(KINDS)}; {NO_FAULTS} removes the scenario's own. Repeatable.",
+        ),
+    ] = None
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Folder for the results and pages."),
+    ] = None
+    fmus: Annotated[
+        Path | None,
+        typer.Option("--fmus", metavar="DIR", help="Folder of the FMUs. Default: the nearest fmus/ folder."),
+    ] = None
+    no_build: Annotated[
+        bool,
+        typer.Option(
+            "--no-build",
+            envvar="YAWBENCH_NO_BUILD",
+            help="Do not rebuild FMUs whose sources have changed.",
+        ),
+    ] = False
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            "--jobs",
+            metavar="N",
+            min=1,
+            help="Number of parallel runs. Default: the number of processor cores.",
+        ),
+    ] = None
+    scheduler: Annotated[
+        str | None,
+        typer.Option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster: tcp://host:port."),
+    ] = None
+    keep: Annotated[
+        bool, typer.Option("--keep", help="Keep the results of every run, in runs/<its key in the table>.")
+    ] = False
+    format_: Annotated[
+        str,
+        typer.Option(
+            "--format",
+            metavar="FORMAT",
+            help=f"Format of the results: {', '.join(f'{k} ({x.says})' for k, x in FORMATS.items())}.",
+        ),
+    ] = "csv"
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick", help="Judge claims at the nominal point only, not over the region of open values."
+        ),
+    ] = False
+    fresh: Annotated[
+        bool,
+        typer.Option("--fresh", "--again", help="Repeat all runs, including finished ones."),
+    ] = False
+    no_run: Annotated[
+        bool,
+        typer.Option(
+            "--no-run", help="Only judge and draw what is in the results folder; build and run nothing."
+        ),
+    ] = False
+    dry_run: Annotated[
+        bool,
+        typer.Option(
+            "--dry-run",
+            help="Only tell how many runs would be made, how long they would take and how much disk space; "
+            "run and write nothing, and build FMUs only if there are none yet.",
+        ),
+    ] = False
+    isolate: Annotated[
+        bool,
+        typer.Option(
+            "--isolate",
+            help="Run each instance in its own process: if its FMU crashes or hangs, the run ends with "
+            "an error and the results so far. Same numbers; 30 to 70 µs more per instance and step.",
+        ),
+    ] = False
+    call_limit: Annotated[
+        str | None,
+        typer.Option(
+            "--call-limit",
+            metavar="TIME",
+            help="With --isolate: time limit of an FMU call, such as '500 ms'. Default: 10 s.",
+        ),
+    ] = None
+    no_validate: Annotated[
+        bool,
+        typer.Option(
+            "--no-validate",
+            help="Accept FMUs with invalid model descriptions, with a warning.",
+        ),
+    ] = False
+
+    def __post_init__(self) -> None:
+
+        if self.fresh and self.no_run:
+            raise ScenarioError("--fresh and --no-run are mutually exclusive", code="option-invalid")
+        if self.dry_run and self.no_run:
+            raise ScenarioError("--dry-run and --no-run are mutually exclusive", code="option-invalid")
+        if self.format_ != "csv":  # importing the other formats takes time
+            from yawbench.orchestrator.results.file_formats import check_format
+
+            check_format(self.format_)
+        _ = self.limit, self.changes  # raises now if they are invalid
+
+    @property
+    def build(self) -> Building:
+        """Whether FMUs that are out of date are built; for a dry run, only those that do not exist."""
+        return not (self.no_build or self.no_run) and (not self.dry_run or "missing")
+
+    @functools.cached_property
+    def changes(self) -> tuple[Override, ...]:
+        """The overrides for all runs."""
+        from yawbench.orchestrator.scenario.overrides import read_changes
+
+        return read_changes(self.swap or (), self.set_ or (), self.fault or ())
+
+    @property
+    def changing(self) -> dict[str, Any]:
+        """The options that change all runs, as they were given."""
+        return {"swap": self.swap, "set": self.set_, "fault": self.fault}
+
+    @functools.cached_property
+    def limit(self) -> float | None:
+        """Time limit of an FMU call [s]; None if instances are not isolated."""
+        limit = self.call_limit
+        if not self.isolate:
+            if limit is not None:
+                raise ScenarioError(
+                    "--call-limit requires --isolate: a call in this process cannot be ended",
+                    code="option-invalid",
+                )
+            return None
+        from yawbench.orchestrator.master.isolation import CALL_LIMIT
+        from yawbench.orchestrator.scenario.quantities import seconds
+
+        if limit is None:
+            return CALL_LIMIT
+        try:
+            return float(seconds(int(limit) if limit.isdecimal() else limit))
+        except ValueError as error:
+            raise ScenarioError(f"--call-limit: {error}") from None
+
+    @property
+    def of_jobs(self) -> dict[str, Any]:
+        """The fields of jobs that the options set."""
+        return {"fmus": self.fmus, "call_limit": self.limit, "format": self.format_}
+
+
+def takes(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Decorate a command with options of `RunOptions`, passed as `options` and listed after its own."""
+    shared = inspect.signature(RunOptions, eval_str=True).parameters
+
+    def taking(command: Callable[..., None]) -> Callable[..., None]:
+        own = inspect.signature(command, eval_str=True).parameters
+
+        @functools.wraps(command)
+        def called(**arguments: Any) -> None:
+            options = RunOptions(**{name: arguments.pop(name) for name in names})
+            command(**arguments, options=options)
+
+        every = [parameter for name, parameter in own.items() if name != "options"]
+        every += [parameter for name, parameter in shared.items() if name in names]
+        called.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
+        return called
+
+    return taking
+
+
+CHANGES = ("swap", "set_", "fault")
+"""Options of commands that change a scenario."""
+MAKING = ("out", "fmus", "no_build", "isolate", "call_limit")
+"""Options of commands that make runs."""
+
+
+def plan_of_scenario(scenario: Path, options: RunOptions) -> Plan:
+    """Return the plan of a scenario with the overrides of the options, building its FMUs if necessary.
+
+    Raises:
+        YawbenchError: the scenario, an option or an FMU is invalid, or a component cannot be built.
+    """
+    from yawbench.planner import Planner
+
+    planner = Planner(build=options.build)
+    loaded = planner.load(scenario, options.changes, validate=not options.no_validate)
+    return planner.plan(loaded, fmus=options.fmus, isolated=options.isolate)
+
+
+def pooled(context: typer.Context, options: RunOptions) -> Each:
+    """Return a `map` that distributes work over processes until this command ends.
+
+    Raises:
+        YawbenchError: this process may not open as many files as that needs.
+    """
+    from yawbench.foundation.workers import Pool
+
+    return context.with_resource(Pool(options.jobs)).map
+
+
+def executor_of(
+    folder: Path, identity: str, options: RunOptions, each: Each = map, **of_jobs: Any
+) -> Executor:
+    """Return the executor of experiments in a results folder, which shows their progress on the terminal.
+
+    Args:
+        folder: locked results folder.
+        identity: of the experiments in it.
+        options: the options of the command.
+        each: `map` used to read results.
+        of_jobs: fields of all jobs in place of the options'.
+    """
+    from yawbench.planner import Planner
+    from yawbench.studies.executor import Executor, runner_of
+
+    from .output import Terminal
+
+    runner = None if options.no_run else runner_of(options.jobs, options.scheduler)
+    planner = Planner(build=options.build)
+    fields = options.of_jobs | of_jobs
+    return Executor(
+        folder, identity, runner, planner, options.fresh, fields, each, Terminal(making=not options.no_run)
+    )

@@ -1,0 +1,182 @@
+"""`yawbench vehicle` and `yawbench tyre`: handling figures of a car, characteristics of a tyre."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from .options import RunOptions, takes
+from .output import print_tables, save_figure, say
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from yawbench.proving_ground.handling import Handling
+    from yawbench.studies.tables import Cell, Table
+
+
+VehicleAction = Annotated[Literal["show"], typer.Argument(help="show: drive the car and show its handling.")]
+VehicleSource = Annotated[
+    Path, typer.Argument(metavar="FILE", help="Vehicle file, or a name that `yawbench list vehicles` gives.")
+]
+Plants = Annotated[
+    str | None,
+    typer.Option(
+        "--plant",
+        metavar="FMU,FMU,...",
+        help="Plants to drive. Default: the most detailed that the file has values for.",
+    ),
+]
+TyreOption = Annotated[
+    str,
+    typer.Option(metavar="FMU", help="Tyre FMU. Default: the tyres that the file is made for."),
+]
+VehicleFriction = Annotated[float, typer.Option(min=0.05, help="Friction coefficient of the road.")]
+VehicleOutput = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="FILE",
+        help="Figure to write, as .svg and .png. Default: results/vehicles/<name>.",
+    ),
+]
+
+
+@takes("fmus", "no_build")
+def vehicle(
+    action: VehicleAction,
+    file: VehicleSource,
+    options: RunOptions,
+    plant: Plants = None,
+    tyre: TyreOption = "",
+    friction: VehicleFriction = 1.0,
+    out: VehicleOutput = None,
+) -> None:
+    """Show the handling and braking of a car.
+
+    Drives the plant FMU and shows, in tables and a figure, static loads, characteristic speed, roll
+    gradient, body modes, stopping distance; understeer over lateral acceleration; yaw gain, natural
+    frequency and damping over speed.
+    """
+    from yawbench.orchestrator.results.run_folder import below_results
+    from yawbench.orchestrator.scenario import loader, yaml_lines
+    from yawbench.orchestrator.scenario.schema import Vehicle
+    from yawbench.orchestrator.scenario.schema_validation import validated
+    from yawbench.orchestrator.wiring.suspicious_values import suspicious_vehicle
+    from yawbench.planner import Planner
+    from yawbench.proving_ground.handling import TestTrack, draw_cars, fitting_plant, handling_of
+
+    file = loader.find(file, "a vehicle file")
+    document = yaml_lines.read(file, what="vehicle file")
+    spec = validated(Vehicle, document)
+    for warning in suspicious_vehicle(spec.parameters):
+        say(f"note: {warning}")
+    planner = Planner(build=options.build)
+    names = plant.split(",") if plant else [fitting_plant(file, tyre, options.fmus, planner)]
+    tracks = [TestTrack(file, name.strip(), tyre, friction, options.fmus, planner) for name in names]
+    cars = [handling_of(track) for track in tracks]
+    print_tables(_tables(cars))
+    for car in cars:
+        for why in car.failed:
+            say(f"note: {car.plant}: {why}")
+    note = f"on {tracks[0].tyres}, friction {friction:g}"
+    save_figure(draw_cars(cars, file.stem, note), out, below_results("vehicles", file.stem))
+
+
+def _tables(cars: list[Handling]) -> list[Table]:
+    """Return the tables, with a column for each plant."""
+    import math
+
+    from yawbench.proving_ground.handling import SPEEDS
+    from yawbench.proving_ground.steering_tests import ACCELERATIONS, G
+    from yawbench.studies.tables import Table
+    from yawbench.vocabulary.roles import without_role
+
+    names = [without_role(car.plant) for car in cars]
+    numbers = set(range(1, len(names) + 1))
+    whole = Table("The car", ["", *names], numbers=numbers)
+    per_g = math.degrees(G)  # of rad s2/m
+    for label, values in (
+        ("load of a front wheel at rest", [_with_unit(car.loads[0], 1e-3, "kN") for car in cars]),
+        ("load of a rear wheel at rest", [_with_unit(car.loads[2], 1e-3, "kN") for car in cars]),
+        ("characteristic speed", [_with_unit(car.characteristic_speed, 3.6, "km/h") for car in cars]),
+        ("roll gradient", [_with_unit(car.roll_gradient, per_g, "°/g") for car in cars]),
+        ("roll mode at 80 km/h: natural frequency", [_mode(car.roll_mode, "frequency") for car in cars]),
+        ("roll mode at 80 km/h: damping ratio", [_mode(car.roll_mode, "damping") for car in cars]),
+        ("heave: natural frequency", [_mode(car.heave, "frequency") for car in cars]),
+        ("heave: damping ratio", [_mode(car.heave, "damping") for car in cars]),
+        ("stopping distance from 100 km/h", [_with_unit(car.stopping_distance, 1.0, "m") for car in cars]),
+    ):
+        whole.rows.append([label, *values])
+    turn = Table("Understeer gradient at 80 km/h", ["lateral acceleration", *names], numbers=numbers)
+    for a_y in (0.0, *ACCELERATIONS):
+        label = f"{a_y:g} m/s²" if a_y else "linear range"
+        turn.rows.append([label, *(_with_unit(car.steering.get(a_y), per_g, "°/g") for car in cars)])
+    over_speed: list[tuple[str, Callable[[Handling, float], Cell]]] = [
+        ("Steady yaw gain", lambda car, v: _with_unit(car.gains.get(v), 1.0, "1/s")),
+        ("Yaw mode: natural frequency", lambda car, v: _mode(car.yaw.get(v), "frequency")),
+        ("Yaw mode: damping ratio", lambda car, v: _mode(car.yaw.get(v), "damping")),
+    ]
+    of_yaw = []
+    for title, text in over_speed:
+        rows = [[f"{3.6 * speed:.0f} km/h", *(text(car, speed) for car in cars)] for speed in SPEEDS]
+        of_yaw.append(Table(title, ["speed", *names], [*rows], numbers=numbers))
+    return [whole, turn, *of_yaw]
+
+
+def _with_unit(value: float | None, factor: float, unit: str) -> str:
+    return "-" if value is None else f"{factor * value:.3g}{f' {unit}' if unit else ''}"
+
+
+def _mode(mode: object, what: str) -> str:
+    value = getattr(mode, what, None)
+    return _with_unit(value, 1.0, "Hz" if what == "frequency" else "")
+
+
+TyreAction = Annotated[
+    Literal["show"], typer.Argument(help="show: draw forces, moments, stiffnesses and relaxation lengths.")
+]
+TyreSource = Annotated[
+    str,
+    typer.Argument(metavar="FILE|FMU", help="Tyre property file (.tir), or name or path of a tyre FMU."),
+]
+TyreOutput = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="FILE",
+        help="Figure to write, as .svg and .png. Default: results/tyres/<name>.",
+    ),
+]
+TyreFriction = Annotated[float, typer.Option(min=0.0, help="Friction coefficient of the road.")]
+
+
+@takes("fmus", "no_build")
+def tyre(
+    action: TyreAction,
+    source: TyreSource,
+    options: RunOptions,
+    out: TyreOutput = None,
+    friction: TyreFriction = 1.0,
+) -> None:
+    """Show the characteristics of a tyre.
+
+    Steps the tyre FMU and draws a figure: lateral force and aligning moment over slip angle and
+    longitudinal force over slip at four loads, forces in combined slip at five slip angles, stiffnesses
+    and relaxation lengths over load.
+    """
+    from yawbench.orchestrator.results.run_folder import below_results
+    from yawbench.tyre_stand import draw_tyre, put_on_stand
+
+    stand = put_on_stand(source, friction=friction, fmus=options.fmus, build=options.build)
+    name, fmu = Path(source).name, stand.instance.fmu
+    kind, side = "", ""
+    if file := stand.plan.scenario.get("tyre_files", {}).get("front"):
+        kind, side = f", {file['kind']}", f", {file['side'].lower()} side"
+        for warning in file["warnings"]:
+            say(f"warning: {warning}")
+    note = f"front left wheel, friction {friction:g}, no camber · {fmu.name} ({fmu.sha256[:8]})"
+    default = below_results("tyres", Path(source).stem)
+    save_figure(draw_tyre(stand, f"{name}{kind}{side}", note), out, default)

@@ -1,0 +1,177 @@
+"""`yawbench second-opinion` and `yawbench export-ssp`: run a scenario in other masters; export it as SSP."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from yawbench.commands.options import CHANGES, RunOptions, ScenarioFile, plan_of_scenario, takes
+from yawbench.commands.output import print_tables, say
+from yawbench.foundation.errors import ScenarioError, SimulationError
+from yawbench.foundation.messages import counted, fold, hint, listed, printable
+
+if TYPE_CHECKING:
+    from yawbench.orchestrator.plan import Plan
+
+    from .second_opinion import SecondOpinion
+
+
+Masters = Annotated[
+    list[str] | None,
+    typer.Option("--master", metavar="NAME", help="libcosim, Ecos or fmpy; repeatable. Default: all."),
+]
+Pinned = Annotated[
+    bool,
+    typer.Option("--one-core/--no-one-core", help="Also measure every master on a single processor core."),
+]
+
+
+@takes(*CHANGES, "fmus", "no_build")
+def second_opinion(
+    scenario: ScenarioFile, options: RunOptions, master: Masters = None, one_core: Pinned = True
+) -> None:
+    """Run a scenario in libcosim, Ecos and fmpy, and compare.
+
+    Compares every signal, and the time per step. Exit status 1 if libcosim or Ecos disagrees: their
+    algorithm is `jacobi`.
+    """
+    from yawbench.orchestrator.scenario.overrides import changed
+
+    from .second_opinion import MASTERS, second_opinion
+
+    known = {program.title.lower(): program for program in MASTERS}
+    for name in master or ():
+        if name.lower() not in known:
+            raise ScenarioError(
+                f"--master {name}: unknown master{hint(name, known, lead='known')}",
+                code="master-unknown",
+            )
+    chosen = [known[name.lower()] for name in master or known]
+    plan = plan_of_scenario(scenario, options)
+    if plan.faults:
+        raise ScenarioError(
+            f"{scenario}: faults are not supported by other masters; omit {_faults_of(plan)}",
+            code="faults-unsupported",
+        )
+    if plan.changes:
+        say(f"changed: {changed(plan.changes)}")
+    with tempfile.TemporaryDirectory(prefix="yawbench-") as folder:
+        try:
+            opinions = second_opinion(
+                plan,
+                Path(folder),
+                masters=chosen,
+                pinned=one_core,
+                progress=lambda text: say(f"running in {text}"),
+            )
+        except RuntimeError as error:
+            raise SimulationError(str(error), instance=None, time=0.0) from None
+    show(opinions)
+    if all(opinion.problem for opinion in opinions):
+        raise SimulationError(
+            f"{scenario}: nothing was compared, no other master has a result",
+            instance=None,
+            time=0.0,
+            code="nothing-to-compare",
+        )
+    wrong = [opinion for opinion in opinions if not opinion.agrees and opinion.master.title != "fmpy"]
+    if wrong:
+        names = " and ".join(opinion.master.title for opinion in wrong)
+        raise SimulationError(
+            f"{scenario}: the results disagree with {names}, see above",
+            instance=None,
+            time=0.0,
+            code="masters-disagree",
+        )
+
+
+def _faults_of(plan: Plan) -> str:
+    """Return the faults of a plan in words."""
+    return "; ".join(dict.fromkeys(f"{signal.fault.on}: {signal.fault}" for signal in plan.faults))
+
+
+def show(opinions: list[SecondOpinion]) -> None:
+    """Print the differences by signal, the times per step, and notes."""
+    from yawbench.studies.tables import Table
+
+    comparable = [opinion for opinion in opinions if not opinion.problem]
+    if comparable:
+        names = [opinion.master.title for opinion in comparable]
+        columns = set(range(1, len(comparable) + 1))
+        apart = Table("Largest difference / range", ["signal", *names], numbers=columns)
+        for signal in comparable[0].differences:
+            apart.rows.append([signal, *(f"{opinion.differences[signal]:.1e}" for opinion in comparable)])
+        apart.rows.append(["largest", *(f"{opinion.largest:.1e}" for opinion in comparable)])
+        keys = list(comparable[0].seconds)
+        times = Table("us per communication step", ["master", *keys], numbers=set(range(1, len(keys) + 1)))
+        for opinion in comparable:
+            times.rows.append([opinion.master.title, *(f"{1e6 * opinion.seconds[key]:.0f}" for key in keys)])
+        print_tables([apart, times])
+        _show_still(comparable[0])
+    for opinion in opinions:
+        if opinion.problem:
+            print(printable(f"{opinion.master.title}: {opinion.problem}"))
+        elif opinion.one_step or opinion.master.note:
+            step = "compared with a common step size for all instances: " if opinion.one_step else ""
+            print(printable(f"{opinion.master.title}: {step}{opinion.master.note}"))
+
+
+def _show_still(opinion: SecondOpinion) -> None:
+    """Print which signals are constant during the run: their agreement is not evidence."""
+    if opinion.differences and len(opinion.still) == len(opinion.differences):
+        print("No signal changes during the run, so its agreement is not evidence: let it last longer.")
+    elif opinion.still:
+        share = f"{len(opinion.still)} of {counted(len(opinion.differences), 'signal')}"
+        names = listed(fold(list(opinion.still)))
+        print(printable(f"Constant during the run, so their agreement is not evidence: {share}, {names}."))
+
+
+ArchiveOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", metavar="FILE", help="Archive to write. Default: <scenario>.ssp in the working directory."
+    ),
+]
+
+
+Standard = Annotated[
+    Literal["1.0", "2.0"] | None,
+    typer.Option("--standard", help="Version of SSP. Default: 1.0, or 2.0 for FMUs of FMI 3.0."),
+]
+For = Annotated[
+    Literal["all", "omsimulator"],
+    typer.Option("--for", help="Omit what OMSimulator does not support, and list it."),
+]
+
+
+@takes(*CHANGES, "fmus", "no_build")
+def export_ssp(
+    scenario: ScenarioFile,
+    options: RunOptions,
+    out: ArchiveOption = None,
+    for_: For = "all",
+    standard: Standard = None,
+) -> None:
+    """Write a scenario and its FMUs as an SSP archive.
+
+    SSP: System Structure and Parameterization. `yawbench run` accepts the archive and gives the same numbers.
+    """
+    from .ssp_write import for_omsimulator, write_ssp
+
+    plan = plan_of_scenario(scenario, options)
+    notes = list(map(str, plan.diagnostics))
+    if plan.faults:
+        notes.append(f"faults are not part of the archive: {_faults_of(plan)}")
+    if for_ == "omsimulator":
+        plan, more = for_omsimulator(plan)
+        notes += more
+    for note in notes:
+        say(f"note: {note}")
+    path = out or Path(f"{scenario.stem}.ssp")
+    if for_ == "omsimulator":
+        standard = standard or "1.0"  # which alone it reads
+    write_ssp(plan, path, standard, named=out is not None)
+    say(f"{path}: {len(plan.instances)} instances, {len(plan.wires)} connections")

@@ -1,0 +1,1 @@
+"""Linear models of a scenario around an operating point."""

@@ -1,0 +1,13 @@
+"""Measured cars: flaws of recordings, fits of parameters, validation."""
+
+PLUGINS = {
+    "command": {
+        "measured": "yawbench.measured_cars.command:measured",
+        "fit": "yawbench.measured_cars.command:fit",
+        "validate": "yawbench.measured_cars.command:validate",
+    },
+    "kind of file": {
+        "bands": "yawbench.measured_cars.validation:BandsSpec",
+        "fit": "yawbench.measured_cars.fit:FitSpec",
+    },
+}

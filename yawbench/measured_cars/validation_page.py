@@ -1,0 +1,117 @@
+"""Validations on pages and in tables: verdicts on signals, cross plots with the band that is judged."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from yawbench.figures.style import LabelledRun, shown
+from yawbench.foundation.messages import listed
+from yawbench.measured_cars.validation import Validation
+from yawbench.metrics.measures import words
+from yawbench.metrics.verdict import SYMBOLS, apart
+from yawbench.orchestrator.results.measurement_results import MeasuredResults
+from yawbench.orchestrator.results.reader import Results
+from yawbench.reports.evaluation_page import drawn
+from yawbench.reports.page_parts import document
+from yawbench.reports.viewer import LARGEST, Settings, View, assets, viewer
+from yawbench.studies.tables import Table
+
+
+def validation_table(validation: Validation) -> Table:
+    """Return the table of a validation: a row per signal, then per condition of such a comparison."""
+    title = f"{validation.title}, against {validation.measured}"
+    table = Table(title, ["signal", "verdict", "largest distance"])
+    for name, verdict in validation.verdicts.items():
+        table.rows.append([name, verdict.status.value, verdict.why])
+    table.notes = [f"{validation.bands}: {validation.source}"]
+    return table
+
+
+def conditions_table(validation: Validation) -> Table:
+    """Return the table of what a validation asks for."""
+    table = Table("Conditions", ["condition", "verdict", "value", "asked"], numbers={2, 3})
+    for name, verdict in validation.conditions.items():
+        assert verdict.value is not None and verdict.bound is not None and verdict.relation
+        ends = (verdict.value, verdict.bound)
+        value, bound = (f"{x:g}" if verdict.shown_in == "1" else shown(x, verdict.shown_in) for x in ends)
+        limit = f"{SYMBOLS[verdict.relation]} {bound}"
+        table.rows.append([name, verdict.status.value, value, limit])
+    return table
+
+
+def validation_page(validation: Validation) -> str:
+    """Return the page of a run compared with measurements."""
+    facts = validation_facts(validation)
+    return document(
+        f"Validation: {validation.title}",
+        sentence=facts["sentence"],
+        warnings=facts["warnings"],
+        below=facts["below"],
+        first=[facts["verdicts"]],
+        viewer=facts["viewer"],
+        sections=[("", [facts["conditions"]])],
+        assets=assets(),
+    )
+
+
+def validation_facts(validation: Validation, name: str = "validation") -> dict[str, Any]:
+    """Return the template data of a validation; `name`: anchor of its viewer."""
+    return {
+        "title": f"{validation.title}, against {validation.measured}",
+        "sentence": validation_sentence(validation),
+        "warnings": [str(diagnostic) for diagnostic in validation.diagnostics],
+        "below": " · ".join(filter(None, [validation.measured, validation.origin])),
+        "verdicts": validation_table(validation),
+        "conditions": conditions_table(validation),
+        "viewer": viewer(*_cross_plots(validation), name=name) if validation.plots else Markup(""),
+    }
+
+
+def validation_sentence(validation: Validation) -> str:
+    """Return the result of a validation in a sentence."""
+    judged = [verdict for verdict in validation.verdicts.values() if verdict.holds is not None]
+    if not judged:
+        return "No signal could be judged."
+    largest = max(float(verdict.value or 0.0) for verdict in judged)
+    sides = {
+        side: [words(name).lower() for name, verdict in validation.verdicts.items() if verdict.holds is holds]
+        for side, holds in (("within", True), ("outside", False))
+    }
+    parts = [f"{side} the band: {listed(names, last='and')}" for side, names in sides.items() if names]
+    furthest = f"The furthest point lies at {apart(largest, 1.0, decimals=2)} of the tolerance."
+    text = f"{'; '.join(parts)}. {furthest}"
+    return f"{text[:1].upper()}{text[1:]}"
+
+
+DISTANCE = "distance"
+"""Name of the signal that tells how far points lie from the run, over the tolerance."""
+
+
+def _cross_plots(validation: Validation) -> tuple[list[LabelledRun], Settings]:
+    """Return band, run and tests of all cross plots as runs of a viewer, with a view of each plot."""
+    runs: list[LabelledRun] = []
+    views, bands = [], []
+    over = f"plant.{validation.horizontal}"
+    for plot in validation.plots:
+        signal, distance = f"plant.{plot.signal}", f"{plot.signal}.{DISTANCE}"
+        first = len(runs)
+        columns = {over: plot.over, signal: plot.values}
+        runs.append(LabelledRun(validation.title, drawn(Results, plot.time, columns)))
+        for test in plot.tests:
+            columns = {over: test.over, signal: test.values, distance: test.distance}
+            runs.append(LabelledRun(test.name, drawn(MeasuredResults, test.time, columns)))
+        x, y = plot.outline
+        band = {over: x, signal: y}
+        bands.append(len(runs))
+        times = np.linspace(plot.time[0], plot.time[-1], x.size)  # it has none: those of the run
+        runs.append(LabelledRun("tolerance", drawn(Results, times, band)))
+        title = f"{words(plot.signal)} over {words(validation.horizontal).lower()}"
+        views.append(View(title, [signal, distance], range(first, len(runs)), over))
+        views.append(
+            View(f"{words(plot.signal)} over time", [signal, over, distance], range(first, len(runs) - 1))
+        )
+    limits = [(f"{plot.signal}.{DISTANCE}", 1.0, "tolerance") for plot in validation.plots]
+    return runs, Settings(views, metrics=(), limits=limits, bands=bands, largest=LARGEST)

@@ -1,0 +1,11 @@
+"""Rankings of controllers under many conditions, and by threats that are turned up."""
+
+PLUGINS = {
+    "command": {"rank": "yawbench.ranking.command:rank"},
+    "kind of file": {
+        "ranking": "yawbench.ranking.ranking:RankingSpec",
+        "entries": "yawbench.ranking.ranking:EntriesSpec",
+        "threats": "yawbench.ranking.threats:ThreatsSpec",
+    },
+    "use of a tuning": {"entries": "yawbench.ranking.tuned_entries:write_entries"},
+}

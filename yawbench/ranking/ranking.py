@@ -1,0 +1,418 @@
+"""Ranking files: controllers compared under conditions of sine with dwell; schema, loading and runs.
+
+    title: Where controllers stand
+    step_size: 0.0025
+    stop_time: 5.5
+    every: 2                           # of the regulation's amplitudes, from the last one down
+    cars:
+      hard: {title: hard, vehicle: ../vehicles/hard.yaml, slow_steer: slowly_increasing_steer.yaml}
+    conditions:
+      hard: {title: "hard, dry", car: hard, scenario: sine_with_dwell.yaml}
+      noise:
+        {title: "hard, sensors", car: hard, scenario: sensors.yaml, repeats: {sensor.seed: [1, 2, 3]}}
+    entries:
+      pid: {title: PID, fmu: controller_pid, source: paper C}
+    more_entries: [tuned.yaml]         # files of entries alone
+
+A condition overrides its scenario like a run of a study. An entry swaps its FMU in for the instance
+`controller` and sets its parameters, the same in all conditions.
+
+A ranking is two experiments. The first determines the steering angle A of every car, on a dry road without
+control, so that all controllers drive the same amplitudes. In the second, conditions are named runs; entry,
+repeats and amplitude (positive: left first) are axes. `ranking_scores` computes scores from its result.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import ConfigDict, Field, field_validator, model_validator
+
+from yawbench.fmus.fmu import is_path
+from yawbench.foundation.cache import warn_of_record, what_changed
+from yawbench.foundation.errors import ResultsError, ScenarioError
+from yawbench.foundation.messages import hint
+from yawbench.foundation.safe_files import reads
+from yawbench.metrics.expressions import TimeWindow
+from yawbench.metrics.verdict import NotJudged
+from yawbench.orchestrator.plan import Override, Plan
+from yawbench.orchestrator.scenario import yaml_lines
+from yawbench.orchestrator.scenario.schema import Scalar
+from yawbench.orchestrator.scenario.schema_validation import StrictModel, Time, validated
+from yawbench.orchestrator.signal_names import Target
+from yawbench.proving_ground.sine_with_dwell import AMPLITUDE, SIDES, amplitudes
+from yawbench.proving_ground.standard_tests import Evaluation
+from yawbench.proving_ground.steering_tests import characteristic_angle, slow_steer_amplitude
+from yawbench.studies.axes import (
+    DesignAxisSpec,
+    Level,
+    OverrideSpec,
+    VariantSpec,
+    axis_of_levels,
+    changes_of_file,
+)
+from yawbench.studies.claim_schema import text_of
+from yawbench.studies.executor import Executor
+from yawbench.studies.experiment import LoadedExperiment, LoadedFile, NamedRun, experiment_of
+from yawbench.studies.experiment_result import ExperimentResult
+
+CONTROLLER = "controller"
+"""The instance that all entries swap."""
+
+
+class CarSpec(OverrideSpec):
+    """A car, with the scenario that determines its characteristic angle A."""
+
+    title: str = Field(min_length=1, description="Its words")
+    slow_steer: str = Field(min_length=1, description="Scenario of slowly increasing steer, for A")
+
+
+class ConditionSpec(OverrideSpec):
+    """A condition for all controllers: a car, a scenario of sine with dwell, and overrides."""
+
+    title: str = Field(min_length=1, description="Its words")
+    short: str = Field("", description="Words for the head of a column; default: all of them")
+    car: str = Field(min_length=1, description="Key of `cars`")
+    scenario: str = Field(min_length=1, description="Scenario of one run, relative to this file")
+    dry: bool = Field(True, description="Responsiveness counts, which the regulation asks of dry roads")
+    mirrored: bool = Field(True, description="Left and right are alike: left first stands for both")
+    every: int | None = Field(None, ge=1, description="In place of the ranking's")
+    repeats: dict[str, list[Scalar]] = Field({}, description="instance.parameter -> values, such as seeds")
+    seen: bool = Field(False, description="By the search that tuned gains")
+    quick: bool = Field(False, description="Driven by --quick, with the last amplitude alone")
+
+    @property
+    def heading(self) -> str:
+        """Heading of the condition's column."""
+        return (self.short or self.title) + (" *" if self.seen else "")
+
+    @field_validator("repeats")
+    @classmethod
+    def _one_target(cls, levels: dict[str, list[Scalar]]) -> dict[str, list[Scalar]]:
+        if len(levels) > 1 or not all(levels.values()):
+            raise ValueError("repeats: one instance.parameter with its values")
+        return levels
+
+
+class EntrySpec(StrictModel):
+    """A controller to be ranked."""
+
+    title: str = Field(min_length=1, description="Title in tables")
+    fmu: str = Field(min_length=1, description="Name of the FMU, or a path relative to the file")
+    parameters: dict[str, Scalar] = Field(
+        {}, description="Parameter, or step_size, -> value; default: those of the FMU"
+    )
+    source: str = Field(min_length=1, description="Source of the controller and its gains")
+    gains: Literal["authors", "tuned"] = Field("authors", description="Who chose the gains")
+
+
+class EntriesSpec(StrictModel):
+    """A file of entries only: written by hand, or with checksums by `yawbench tune`."""
+
+    entries: dict[str, EntrySpec] = Field(min_length=1, description="Name -> controller")
+    checksums: dict[str, str] = Field({}, description="Of entries that `yawbench tune` has written")
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """The entries as plain data, which the checksums are of."""
+        return {name: entry.model_dump(exclude_defaults=True) for name, entry in self.entries.items()}
+
+    @property
+    def edited(self) -> str:
+        """Note on edits since `yawbench tune` wrote the file; "" if there are none."""
+        if self.checksums:
+            words = what_changed(self.content, self.checksums)
+            return f"{words} since `yawbench tune` wrote it" if words else ""
+        if any(entry.gains == "tuned" for entry in self.entries.values()):
+            return "has no checksums, so its tuned gains are taken as they are"
+        return ""
+
+
+class RankingSpec(StrictModel):
+    """A ranking file."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"anyOf": [{"required": ["entries"]}, {"required": ["more_entries"]}]}
+    )
+
+    title: str = Field(min_length=1)
+    source: str = Field("", description="Of the test that everything is judged by")
+    notes: list[str] = Field([], description="Note for readers of the page")
+    step_size: Time | None = Field(None, description="In place of the scenarios'")
+    stop_time: Time | None = Field(None, description="In place of the scenarios'")
+    every: int = Field(1, ge=1, description="Take every n-th amplitude, counted from the last")
+    cars: dict[str, CarSpec] = Field(min_length=1, description="Name -> car")
+    conditions: dict[str, ConditionSpec] = Field(min_length=1, description="Name -> condition")
+    entries: dict[str, EntrySpec] = Field({}, description="Name -> controller")
+    more_entries: list[str] = Field([], description="Files of entries, relative to this one")
+    threat_file: str = Field(
+        "", description="Threats whose published levels the page quotes, if the file is there"
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> RankingSpec:
+        for name, condition in self.conditions.items():
+            if condition.car not in self.cars:
+                known = ", ".join(self.cars)
+                raise ValueError(
+                    f"conditions.{name}.car: there is no car {condition.car!r}; there are {known}"
+                )
+        if not self.entries and not self.more_entries:
+            raise ValueError("has no entries")
+        return self
+
+
+SERIES, SLOW = "sine-with-dwell", "slowly-increasing-steer"
+METRICS = {
+    "intervention": "effort(wheel_torque_*)",
+    "effort": "effort(yaw_moment)",
+    "chatter": "total_variation_rate(yaw_moment)",
+}
+"""Metrics besides the test's; the intervention begins with steering: before, wheel torque is the driver's."""
+STEERING_BEGINS = "start_time"
+"""Parameter of the driver: beginning of steer [s]."""
+RECORDED = (
+    "steering_wheel_angle*", "yaw_rate*", "sideslip*", "acceleration_y*", "velocity_x*", "velocity_y*",
+    "yaw_moment*", "wheel_torque*", "torque_request*", "position_x*", "position_y*", "yaw_angle*",
+    "steer_angle*",
+)  # fmt: skip
+"""The recorded signals: those of the test, the metrics and the car on the road; others would take space."""
+
+
+@dataclass(frozen=True)
+class LoadedRanking(LoadedFile):
+    """A loaded ranking file, and the selected part of its conditions."""
+
+    spec: RankingSpec
+    entries: dict[str, tuple[EntrySpec, Path]]  # name -> controller, base folder of its path
+    quick: bool = False  # only the last amplitude, and only quick conditions
+    chosen: tuple[str, ...] = ()  # selected conditions; empty: all
+    edited: tuple[str, ...] = ()  # files edited since `yawbench tune` wrote them
+
+    @cached_property
+    def conditions(self) -> dict[str, ConditionSpec]:
+        """The selected conditions."""
+        return {
+            name: condition
+            for name, condition in self.spec.conditions.items()
+            if (name in self.chosen if self.chosen else condition.quick or not self.quick)
+        }
+
+    @cached_property
+    def cars(self) -> list[str]:
+        """Names of the cars of the selected conditions."""
+        return list(dict.fromkeys(condition.car for condition in self.conditions.values()))
+
+    def changes(self, *parts: OverrideSpec, stop: bool = True) -> tuple[Override, ...]:
+        """Return the overrides of the ranking and of parts of its file; the last one of a target counts."""
+        own = [
+            Override.of(name, float(value), "ranking")
+            for name, value in (("step_size", self.spec.step_size), ("stop_time", self.spec.stop_time))
+            if value is not None and (stop or name != "stop_time")
+        ]
+        return (
+            *own,
+            *(change for part in parts for change in changes_of_file(part, self.path.parent, "ranking")),
+        )
+
+    def variant(self, name: str) -> VariantSpec:
+        """Return an entry as a level of an axis: its controller is put into a scenario."""
+        spec, folder = self.entries[name]
+        elsewhere = is_path(spec.fmu) and folder != self.path.parent
+        fmu = str((folder / spec.fmu).absolute()) if elsewhere else spec.fmu
+        settings = {f"{CONTROLLER}.{parameter}": value for parameter, value in spec.parameters.items()}
+        return VariantSpec.model_validate({"swap": {CONTROLLER: fmu}, "set": settings})
+
+    def axis_of(self, entries: Iterable[str]) -> DesignAxisSpec:
+        """Return the axis of entries, one level each."""
+        return DesignAxisSpec.model_construct(variants={name: self.variant(name) for name in entries})
+
+    def changes_of_entry(self, name: str) -> list[Override]:
+        """Return the overrides that put an entry's controller into a scenario."""
+        return changes_of_file(self.variant(name), self.path.parent, "ranking")
+
+    def changes_of_condition(self, name: str) -> tuple[Override, ...]:
+        """Return the overrides that a condition makes in its scenario."""
+        condition = self.spec.conditions[name]
+        return self.changes(self.spec.cars[condition.car], condition)
+
+
+@reads("ranking file", ScenarioError)
+def load_ranking(
+    path: Path | str,
+    *,
+    more: Mapping[str, EntrySpec] | None = None,
+    quick: bool = False,
+    chosen: Sequence[str] = (),
+) -> LoadedRanking:
+    """Load a ranking file.
+
+    Args:
+        path: the file.
+        more: further entries; paths of their FMUs are relative to the working directory.
+        quick: drive only the last amplitude of the conditions marked `quick`.
+        chosen: conditions to drive; empty: all.
+
+    Raises:
+        ScenarioError: the file is invalid; lists all errors.
+    """
+    path = Path(path)
+    spec = validated(RankingSpec, yaml_lines.read(path, what="ranking file"))
+    entries = {name: (entry, path.parent) for name, entry in spec.entries.items()}
+    edited: list[str] = []
+    for name in spec.more_entries:
+        file = path.parent / name
+        listed = validated(EntriesSpec, yaml_lines.read(file, what="file of entries"))
+        if words := listed.edited:
+            edited.append(f"{file}: {words}")
+            warn_of_record(edited[-1])
+        for key, entry in listed.entries.items():
+            if key in entries:
+                raise ScenarioError(
+                    f"{file}: entries.{key}: there is already an entry {key!r}", code="name-duplicate"
+                )
+            entries[key] = (entry, file.parent)
+    for key, entry in (more or {}).items():
+        if key in entries:
+            raise ScenarioError(
+                f"there is already an entry {key!r}: give the controller another name", code="name-duplicate"
+            )
+        entries[key] = (entry, Path())
+    for name in chosen:
+        if name not in spec.conditions:
+            raise ScenarioError(
+                f"{path}: there is no condition {name!r}{hint(name, spec.conditions, lead='known')}",
+                code="condition-unknown",
+            )
+    return LoadedRanking(path, spec, entries, quick, tuple(chosen), tuple(edited))
+
+
+def angle_experiment(
+    ranking: LoadedRanking, execute: Executor, cars: Sequence[str] | None = None
+) -> LoadedExperiment:
+    """Return the runs of slowly increasing steer to both sides that determine A, a named run per car.
+
+    Args:
+        ranking: as loaded.
+        execute: makes plans.
+        cars: names of cars; default: those of the conditions.
+
+    Raises:
+        ScenarioError: a scenario is wrong, or its driver has no amplitude.
+    """
+    runs = []
+    for name in ranking.cars if cars is None else cars:
+        car = ranking.spec.cars[name]
+        scenario, changes = ranking.path.parent / car.slow_steer, ranking.changes(car, stop=False)
+        runs.append(NamedRun(name, car.title, car.title, scenario, changes, (SLOW, None)))
+    steer_amplitudes = [
+        slow_steer_amplitude(plan, run.scenario) for run, plan in zip(runs, execute.plans(runs), strict=True)
+    ]
+    design = [
+        (run.name, (Level(side * amplitude, words),))
+        for run, amplitude in zip(runs, steer_amplitudes, strict=True)
+        for words, side in SIDES
+    ]
+    axes = {"side": axis_of_levels(AMPLITUDE, [level for _, (level,) in design])}
+    title = "A, the angle at 0.3 g"
+    return experiment_of(ranking.path, runs, title=title, axes=axes, design=design, origin="ranking")
+
+
+def angles_of(
+    ranking: LoadedRanking, result: ExperimentResult, cars: Sequence[str] | None = None
+) -> dict[str, float]:
+    """Return car -> angle A [rad], from the result of `angle_experiment` for the same cars.
+
+    Raises:
+        ResultsError: the runs do not yield it.
+    """
+    angles = {}
+    for car in ranking.cars if cars is None else cars:
+        judged = []
+        for case, record in zip(result.experiment.cases, result.records, strict=True):
+            if case.run.name == car:
+                measured = record.values.get("angle")
+                judged.append(Evaluation(car))
+                judged[-1].report("test-not-judged", record.reason or "0.375 g is not reached")
+                judged[-1].add("angle", "", measured[0] if measured else None, "rad")
+        try:
+            angles[car] = characteristic_angle(judged)
+        except NotJudged as why:
+            raise ResultsError(str(why), code="test-not-applicable") from None
+    return angles
+
+
+def dwell_experiment(
+    ranking: LoadedRanking, angles: Mapping[str, float], execute: Executor
+) -> LoadedExperiment:
+    """Return the runs of sine with dwell: a named run per condition; axes: entry, repeats, amplitude.
+
+    Args:
+        ranking: as loaded.
+        angles: car -> A [rad], of which the amplitudes are multiples.
+        execute: makes plans.
+
+    Raises:
+        ScenarioError: a scenario is wrong.
+    """
+    runs, repeated = [], dict[str, dict[Any, str]]()
+    for name, condition in ranking.conditions.items():
+        scenario, test = ranking.path.parent / condition.scenario, (SERIES, angles[condition.car])
+        changes = ranking.changes_of_condition(name)
+        runs.append(NamedRun(name, condition.title, condition.title, scenario, changes, test))
+        for place, values in condition.repeats.items():
+            repeated.setdefault(place, {}).update((value, text_of(value)) for value in values)
+    runs = [
+        replace(run, windows={"intervention": window} if (window := _since_steering(plan)) else {})
+        for run, plan in zip(runs, execute.plans(runs), strict=True)
+    ]
+    design = [
+        (run.name, (Level(entry, entry), *repeat, amplitude))
+        for run in runs
+        for entry in ranking.entries
+        for repeat, amplitude in _levels(ranking, run.name, repeated, angles)
+    ]
+    axes = {"entry": ranking.axis_of(ranking.entries)}
+    for place, levels in repeated.items():
+        of = [name for name, condition in ranking.conditions.items() if place in condition.repeats]
+        axes[place] = axis_of_levels(
+            place, [Level(*level) for level in levels.items()], runs=of, repeats=True
+        )
+    axes["amplitude"] = axis_of_levels(AMPLITUDE, [point[-1] for _, point in design])
+    return experiment_of(
+        ranking.path, runs, title=ranking.spec.title, axes=axes, design=design, origin="ranking",
+        metrics={key: {"metric": name} for key, name in METRICS.items()},
+    )  # fmt: skip
+
+
+def _levels(
+    ranking: LoadedRanking, name: str, repeated: Mapping[str, Mapping[Any, str]], angles: Mapping[str, float]
+) -> Iterator[tuple[list[Level], Level]]:
+    """Yield the levels of repeats and amplitude of a condition; `repeated`: all levels of repeats."""
+    condition = ranking.spec.conditions[name]
+    rungs = amplitudes(angles[condition.car])[:: -(condition.every or ranking.spec.every)][::-1]
+    sides = SIDES[:1] if condition.mirrored else SIDES
+    repeats = [
+        [Level(value, values[value]) for value in condition.repeats.get(place, [*values][:1])]
+        for place, values in repeated.items()
+    ]
+    for _, sign in sides:
+        for repeat in product(*repeats):
+            for rung in rungs[-1:] if ranking.quick else rungs:
+                yield [*repeat], Level(sign * rung, f"{math.degrees(sign * rung):.1f} deg")
+
+
+def _since_steering(plan: Plan) -> TimeWindow | None:
+    """Return the time from the beginning of steer to the end of a run; None if there is none between."""
+    driver = Target.parse(AMPLITUDE).instance
+    begins = next(
+        instance.parameter(STEERING_BEGINS) for instance in plan.instances if instance.name == driver
+    )
+    first, last = float(begins or 0.0), plan.time(plan.n_steps)
+    return (first, last) if first < last else None

@@ -1,0 +1,306 @@
+"""The HTML page of a ranking: the matrix, and beside it the chosen cell with its worst run."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections import Counter
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from yawbench.figures.style import LabelledRun
+from yawbench.foundation.errors import ResultsError, ScenarioError
+from yawbench.foundation.messages import counted, in_text, listed
+from yawbench.metrics.verdict import NotJudged
+from yawbench.orchestrator.results.reader import Results, load_results
+from yawbench.orchestrator.scenario.overrides import changed
+from yawbench.proving_ground.sine_with_dwell import RATIOS, SPUN, course_of
+from yawbench.proving_ground.trace import trace_of
+from yawbench.reports.page_parts import FigureImage, anchor, image_of, option_of, render
+from yawbench.reports.viewer import DATA, Settings, View, assets, carried, embedded, tidy_sides, write_side
+from yawbench.studies.experiment import FIGURES
+from yawbench.studies.experiment_result import Each
+from yawbench.studies.jobs import STEP_TIME
+from yawbench.studies.tables import Table
+
+from .ranking import SERIES, EntrySpec
+from .ranking_scores import (
+    Digits,
+    EntryScore,
+    RankedState,
+    RankingCell,
+    RankingResult,
+    deciding_digits,
+    told_apart,
+)
+from .ranking_tables import (
+    RULE,
+    UNITS,
+    degrees,
+    interval_words,
+    place_words,
+    row_of,
+    runs_table,
+    sign_of,
+    spread,
+    state_words,
+    table_of,
+    words_of,
+)
+from .threat_runs import published_result
+from .threat_scores import scored
+from .threats import load_threats
+
+STATES = {
+    RankedState.PASSED: "passed",
+    RankedState.SPUN: "criteria met, but the car spun",
+    RankedState.FAILED: "failed",
+    RankedState.MISSING: "runs are missing in this build",
+}
+SHOWN = ("yaw_rate", "sideslip", "steering_wheel_angle", "yaw_moment", "acceleration_y")
+"""Signals of a cell's worst run; chosen: what the test judges and what the controller does."""
+IDLE = "controller_off"
+"""FMU of the car without control."""
+OTHERS = ("speed_lost", "intervention", "chatter")
+"""Numbers of a cell shown in addition to headroom and sideslip."""
+
+
+def ranking_page(ranked: RankingResult, folder: Path, command: str, each: Each = map) -> str:
+    """Return the page as HTML, and write a side file for every cell: its numbers and its worst run.
+
+    Args:
+        ranked: the result of the ranking.
+        folder: its results folder, which also holds the page.
+        command: command line that repeats it.
+        each: `map`, or a parallel equivalent.
+    """
+    ranking = ranked.ranking
+    digits = deciding_digits(ranked.scores)
+    cells = [(score, cell) for score in ranked.scores for cell in score.cells.values()]
+    wanted = [_side(ranked, score, cell, folder) for score, cell in cells]
+    list(each(_write_side, *zip(*wanted, strict=True)))
+    tidy_sides(folder, {_id(cell) for _, cell in cells})
+    lost = next(
+        (cell for _, cell in cells if cell.state in (RankedState.FAILED, RankedState.SPUN)), cells[0][1]
+    )
+    table = table_of(ranked)
+    return render(
+        "ranking.html.j2",
+        title=ranking.spec.title,
+        answer=answer(ranked),
+        source=ranking.spec.source,
+        rule=RULE,
+        notes=[*ranking.spec.notes, *ranking.edited],
+        quick=ranking.quick,
+        missing=[score.spec.title for score in ranked.scores if score.missing],
+        first=["place", "controller", "passed", "95 %", "runs"],
+        conditions=[
+            {"short": condition.heading, "title": condition.title}
+            for condition in ranking.conditions.values()
+        ],
+        rows=_rows(ranked, digits),
+        first_cell=_id(lost),
+        sides=DATA,
+        frame=embedded(None, "run"),
+        pareto=_image(folder / FIGURES / "pareto.svg", "Stability over intervention"),
+        table=Table("", table.columns, table.rows),
+        described=_conditions(ranked),
+        entries=_entries(ranked),
+        command=command,
+        folder=str(folder),
+        assets=assets("chooser.js"),
+    )
+
+
+def answer(ranked: RankingResult) -> str:
+    """Return the result in sentences: who can be told apart, and what the first and no control pass."""
+    number = len(ranked.ranking.conditions)
+    placed = [score for score in ranked.scores if score.place]
+    if not placed:
+        return f"No controller has all of its runs under {counted(number, 'condition')}."
+    sharing = sum(score.place == 1 for score in placed)
+    first = [score for score in placed if score.rank == 1]
+    others = [score for score in placed if score.rank != 1][:1]
+    others += [score for score in placed if score.spec.fmu == IDLE and score not in (*first, *others)]
+    names = listed(in_text(score.spec.title) for score in first)
+    rest = "".join(f", {in_text(score.spec.title)} {score.count(RankedState.PASSED)}" for score in others)
+    apart, pairs = told_apart(placed)
+    best, whole = f"{first[0].count(RankedState.PASSED)} of {counted(number, 'condition')}", len(placed)
+    if sharing > len(first):
+        result = (
+            f"By the conditions passed, {sharing} of {counted(whole, 'controller')} cannot be told apart: "
+            f"their intervals overlap, so they share the first place. In the order, {names} "
+            f"{'comes' if len(first) == 1 else 'come'} first with {best} passed{rest}."
+        )
+    else:
+        is_best = "is best" if len(first) == 1 else "are best"
+        result = f"Of {counted(whole, 'controller')}, {names} {is_best}: {best} passed{rest}."
+    surely = f"The difference of two is clear in {apart} of {counted(pairs, 'pair')}." if pairs else ""
+    quoted = ranked.ranking.spec.threat_file
+    threats = result_of_threats(ranked.ranking.path.parent / quoted) if quoted else ""
+    return " ".join(filter(None, (result, surely, threats)))
+
+
+def result_of_threats(file: Path) -> str:
+    """Return how many the published levels of a threat file tell apart; "" without any."""
+    if not file.is_file():
+        return ""
+    try:
+        result = published_result(load_threats(file))
+    except ScenarioError as error:  # the runs are made: the page is written without them
+        return f"How many are told apart by threats is not known: {error}."
+    if not result.complete[result.threats.main]:
+        return ""
+    table = scored(result)
+    sharing = sum(score.place == 1 for score in table.scores)
+    return (
+        f"By threats turned up until the car is lost (published levels) it is clear in {table.told_apart} of "
+        f"{counted(table.pairs, 'pair')}, and {counted(sharing, 'controller')} "
+        f"{'is first' if sharing == 1 else 'share the first place'}."
+    )
+
+
+def _image(file: Path, title: str) -> FigureImage | None:
+    return image_of(file, title) if file.is_file() else None
+
+
+def _rows(ranked: RankingResult, digits: Digits) -> list[dict[str, Any]]:
+    """Return the rows of the matrix; `together`: rows that share a place, 0 below the first of them."""
+    sharing = Counter(score.place for score in ranked.scores)
+    rows = []
+    for number, score in enumerate(ranked.scores):
+        first = number == 0 or not score.place or ranked.scores[number - 1].place != score.place
+        rows.append({
+            "place": place_words(score),
+            "together": (sharing[score.place] if score.place else 1) if first else 0,
+            "title": score.spec.title,
+            "passed": f"{score.count(RankedState.PASSED)}/{len(score.cells)}"
+            if score.place
+            else f"{score.missing} missing",
+            "interval": interval_words(score) or "–",
+            "share": row_of(score, digits)["runs"] if score.place else "–",
+            "cells": [
+                {
+                    "id": _id(cell),
+                    "state": cell.state.value,
+                    "words": sign_of(cell),
+                }
+                for cell in score.cells.values()
+            ],
+        })  # fmt: skip
+    return rows
+
+
+def _id(cell: RankingCell) -> str:
+    return anchor(f"{cell.entry} in {cell.condition}")
+
+
+def _side(
+    ranked: RankingResult, score: EntryScore, cell: RankingCell, folder: Path
+) -> tuple[str, str, Path | None, str, Path]:
+    """Return the arguments of `_write_side` for a cell."""
+    condition, worst = ranked.ranking.conditions[cell.condition], cell.worst
+    sums = {
+        "runs that pass": "{} of {}".format(*cell.counts),
+        "headroom below the limits": spread(cell.headroom, lambda x: f"{x:.1f} points"),
+        "peak sideslip": spread(cell.sideslip, lambda x: f"{math.degrees(x):.1f}°"),
+        "displacement": _text(cell.displacement, "m"),
+        **{key.replace("_", " "): _text(cell.number(key), UNITS[key]) for key in OTHERS},
+        "time per step": _text(cell.number(STEP_TIME), "s"),
+    }
+    label = (
+        f"{score.spec.title}, {'right' if worst.amplitude < 0 else 'left'} first, {degrees(worst.amplitude)}"
+    )
+    shows = worst.results is not None and worst.results.is_dir()
+    details = {
+        "title": f"{score.spec.title}: {condition.title}",
+        "state": cell.state.value,
+        "says": STATES[cell.state],
+        "sums": [(name, text) for name, text in sums.items() if text is not None],
+        "repeats": len({run.repeat for run in cell.runs}),
+        "table": runs_table(cell),
+        "command": series_command(ranked, cell),
+        "again": again_command(ranked, cell, folder),
+        "worst": f"Its worst run: {label}, {state_words(worst)}." if shows else "Its runs kept no results.",
+    }  # fmt: skip
+    html = render("ranking_cell.html.j2", cell=details)
+    return _id(cell), label, worst.results if shows else None, html, folder
+
+
+def _write_side(key: str, label: str, results: Path | None, html: str, folder: Path) -> None:
+    """Write the side file of a cell; without results, or unreadable ones, it has no run."""
+    content = None
+    if results is not None:
+        with suppress(ResultsError):
+            run = load_results(results)
+            limits = [("sideslip", side * SPUN, "20° of sideslip") for side in (1.0, -1.0)]
+            settings = Settings(
+                [View(panels=SHOWN)], marks=_instants(run), limits=limits, dashed_of=0, largest=1
+            )
+            content = carried([LabelledRun(label, run)], settings)
+    write_side(folder, key, content, html=html)
+
+
+def _instants(run: Results) -> list[tuple[float, str]]:
+    """Return the instants of the test: completion of steer, and those at which the yaw rate is judged."""
+    try:
+        course = course_of(trace_of(run, SERIES))
+    except (NotJudged, ResultsError):
+        return []
+    return [(course.end, "COS"), *((course.end + late, f"COS + {late:g} s") for late, _ in RATIOS)]
+
+
+def _text(number: float | None, unit: str) -> str | None:
+    return None if number is None else Table("", [""], [[words_of(number, unit)]]).text()[0][0]
+
+
+def again_command(ranked: RankingResult, cell: RankingCell, folder: Path) -> str:
+    """Return the command that repeats the runs of a cell, in another folder."""
+    chosen = ["--only", cell.entry, "--condition", cell.condition, "--out", str(folder / "again")]
+    return shlex.join(["yawbench", "rank", str(ranked.ranking.path), *chosen])
+
+
+def series_command(ranked: RankingResult, cell: RankingCell) -> str:
+    """Return the command that drives the regulation's whole series for a cell, with a figure of every run."""
+    ranking = ranked.ranking
+    condition = ranking.spec.conditions[cell.condition]
+    words = ["yawbench", "drive", "sine-with-dwell", "--figures"]
+    words += ["--scenario", str(ranking.path.parent / condition.scenario)]
+    words += ["--angle", f"{math.degrees(ranked.angles[condition.car]):.1f} deg"]
+    changes = {
+        change.target: change
+        for change in (*ranking.changes_of_condition(cell.condition), *ranking.changes_of_entry(cell.entry))
+    }
+    for change in changes.values():
+        words += option_of(change)
+    return shlex.join(words)
+
+
+def _conditions(ranked: RankingResult) -> Table:
+    """Return the table of conditions."""
+    ranking = ranked.ranking
+    headings = ["condition", "car", "A", "scenario", "changed", "runs of a controller", "responsiveness"]
+    table = Table("", headings)
+    for name, condition in ranking.conditions.items():
+        runs = sum(run.condition == name for run in ranked.runs) // max(1, len(ranking.entries))
+        own = ranking.changes_of_condition(name)
+        changes = [
+            change for change in own if str(change.target) not in ("vehicle", "step_size", "stop_time")
+        ]
+        table.rows.append([
+            condition.title, ranking.spec.cars[condition.car].title, degrees(ranked.angles[condition.car]),
+            condition.scenario, changed(changes) or None, str(runs),
+            "judged" if condition.dry else "not judged: the road is not dry",
+        ])  # fmt: skip
+    return table
+
+
+def _entries(ranked: RankingResult) -> Table:
+    """Return the table of controllers."""
+    table = Table("", ["controller", "name", "FMU", "parameters", "gains", "source"])
+    for score in ranked.scores:
+        spec: EntrySpec = score.spec
+        parameters = ", ".join(f"{name} {number}" for name, number in spec.parameters.items())
+        table.rows.append([spec.title, score.entry, spec.fmu, parameters or None, spec.gains, spec.source])
+    return table

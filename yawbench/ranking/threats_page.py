@@ -1,0 +1,451 @@
+"""The HTML page of a threat file: scores first, then levels, orders, other settings and disciplines."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from yawbench.figures.style import digits_of, shown_unit
+from yawbench.foundation.messages import counted, in_text
+from yawbench.reports.page_parts import PAGE, RANKING, render
+from yawbench.studies.confidence import Bounds
+from yawbench.studies.tables import Table
+
+from .ranking_tables import gains_sentence, gains_table, seeds_table
+from .threat_runs import ThreatResult
+from .threat_scores import (
+    Moves,
+    ScoreTable,
+    compared_gains,
+    compared_setting,
+    moves_between,
+    score_table,
+    scored,
+    scores_without,
+)
+from .threats import LANE_CHANGE, REFERENCE, LoadedThreats, SearchPlace, ThreatSpec
+
+RULE = (
+    "Score: the geometric mean of the highest levels survived, over threats and cars, each threat's range "
+    "taken as one unit; no control has 0, the best 100. Interval: 95 %, threats and cars drawn in blocks; "
+    "best: draws in which it has the best score. Place: one more than the entries whose whole interval lies "
+    "above, never better than that of a higher score. Order by rank: by the mean rank."
+)
+GROUPS = 8
+"""Intervals that lie apart, from which on scores are said to tell entries apart; chosen."""
+
+
+def titles_of(result: ThreatResult) -> dict[str, str]:
+    """Return entry -> title."""
+    return {name: spec.title for name, (spec, _) in result.threats.ranking.entries.items()}
+
+
+def interval_text(bounds: Bounds) -> str:
+    """Return an interval of scores."""
+    return f"{bounds.low:.0f} to {bounds.high:.0f}"
+
+
+def main_table(result: ThreatResult, table: ScoreTable) -> Table:
+    """Return the table of scores, the best first; published entries are marked where others are not."""
+    titles = titles_of(result)
+    published = result.published if any(score.entry not in result.published for score in table.scores) else ()
+    rows = [
+        [
+            str(score.place), titles[score.entry] + (" (published)" if score.entry in published else ""),
+            f"{score.score:.1f}", interval_text(score.bounds), f"{100 * score.best:.0f}",
+            f"{score.mean_rank:.1f}", str(score.by_rank),
+        ]
+        for score in table.scores
+    ]  # fmt: skip
+    return Table(
+        f"Scores: {result.threats.spec.settings[result.threats.main].title}",
+        ["place", "controller", "score", "95 % interval", "best [% of draws]", "mean rank", "order by rank"],
+        [*rows], [RULE, _other_order(titles, table), told_apart(table)], {0, 2, 4, 5, 6},
+    )  # fmt: skip
+
+
+def _other_order(titles: Mapping[str, str], table: ScoreTable) -> str:
+    """Describe how far the order by the mean rank differs from that by the score."""
+    by_rank = {score.entry: -score.mean_rank for score in table.scores}
+    moves = moves_between(table.by_entry(), by_rank, REFERENCE)
+    return (
+        f"The order by the mean rank differs for {counted(moves.moved, 'entry', 'entries')}"
+        f"{f', most for {_moved(titles, moves)}' if moves.moved else ''} (Spearman's rank correlation "
+        f"{moves.correlation:.2f})."
+    )
+
+
+def _moved(titles: Mapping[str, str], moves: Moves) -> str:
+    return f"{in_text(titles[moves.farthest])}: {moves.before} to {moves.after}" if moves.moved else "none"
+
+
+def answer(result: ThreatResult, table: ScoreTable) -> str:
+    """Return the result in sentences: who shares the first place, and how far scores tell entries apart."""
+    titles = titles_of(result)
+    first = [score for score in table.scores if score.place == 1]
+    if len(first) == 1:
+        who = f"{in_text(titles[first[0].entry])} is first"
+    else:
+        best = in_text(titles[first[0].entry])
+        who = (
+            f"{len(first)} share the first place with scores from {first[-1].score:.0f} to "
+            f"{first[0].score:.0f}, as their intervals overlap; {best} has the best score"
+        )
+    apart = f"{table.groups} of their 95 % intervals lie apart from each other"
+    if table.groups < GROUPS:
+        width = float(np.median([score.bounds.high - score.bounds.low for score in table.scores]))
+        apart = (
+            f"Scores alone hardly tell them apart: an interval is {width:.0f} points wide (median), and no "
+            f"more than {apart}"
+        )
+    return (
+        f"Of {counted(len(table.scores), 'controller')}, {who}. {apart}. As all face the same threats, the "
+        f"difference of two is surer: its sign is clear in {table.told_apart} of {table.pairs} pairs."
+    )
+
+
+def _published(result: ThreatResult, order: Sequence[str]) -> str:
+    """Return a sentence on the entries with published levels; "" without any."""
+    titles = [titles_of(result)[entry] for entry in order if entry in result.published]
+    if len(titles) == len(order):
+        return "All levels of the main setting are the published ones; none was searched in these runs."
+    return f"Published levels, not searched in these runs: {'; '.join(titles)}." if titles else ""
+
+
+def told_apart(table: ScoreTable) -> str:
+    """Return how many entries can be told apart, in a sentence."""
+    return (
+        f"{table.groups} of {len(table.scores)} intervals do not overlap. Of {table.pairs} pairs, "
+        f"{table.told_apart} differ by the interval of their difference."
+    )
+
+
+def level_text(spec: ThreatSpec, position: float, end: str = "") -> str:
+    """Return a level with its unit; a range that ended is marked."""
+    level = spec.level(position)
+    mark = {"hard": "≥ " if spec.hard > spec.easy else "≤ ", "easy": "fails at "}.get(end, "")
+    digits = 2 if abs(level) < 10 else 0
+    return f"{mark}{level:.{digits}f}"
+
+
+def levels_table(result: ThreatResult, entries: Sequence[str]) -> Table:
+    """Return the table of levels survived, geometric means over cars, an entry per row."""
+    threats, titles = result.threats, titles_of(result)
+    specs = {name: threats.spec.threats[name] for name in threats.threats_in(threats.main)}
+    headings = ["controller", *(_heading(spec) for spec in specs.values())]
+    table = Table("", headings, numbers=range(1, len(headings)))
+    for entry in entries:
+        row = [titles[entry]]
+        for name, spec in specs.items():
+            levels = _of_threat(result, threats.main, name, entry)
+            ends = {level.end for level in levels}
+            mean = sum(level.position for level in levels) / len(levels)
+            row.append(
+                "fails" if ends == {"easy"} else level_text(spec, mean, "hard" if ends == {"hard"} else "")
+            )
+        table.rows.append(row)
+    table.notes.append(
+        "Geometric means over cars of the highest level survived. Fails: on every car at the easy end of the "
+        "range, which then counts. ≥, ≤: survived to the hard end on every car."
+    )
+    return table
+
+
+def _heading(spec: ThreatSpec) -> str:
+    return (spec.short or spec.title) + (f" [{spec.unit}]" if spec.unit else "")
+
+
+def _of_threat(result: ThreatResult, setting: str, threat: str, entry: str) -> list[Any]:
+    cars = result.threats.cars_facing(setting, threat)
+    places = (SearchPlace(setting, threat, car, entry) for car in cars)
+    return [result.survived[place] for place in places if place in result.survived]
+
+
+def _levels_on_cars(result: ThreatResult, setting: str, threat: str, entry: str) -> list[str]:
+    """Return the levels that an entry survives, a car each."""
+    spec = result.threats.spec.threats[threat]
+    levels = _of_threat(result, setting, threat, entry)
+    return [level_text(spec, level.position, level.end) for level in levels]
+
+
+def car_tables(result: ThreatResult, entries: Sequence[str]) -> list[Table]:
+    """Return a table of levels per threat: an entry per row, a car per column."""
+    threats, titles, tables = result.threats, titles_of(result), []
+    for name in threats.threats_in(threats.main):
+        spec = threats.spec.threats[name]
+        cars = threats.cars_facing(threats.main, name)
+        heading = f"{spec.title}{f' [{spec.unit}]' if spec.unit else ''}"
+        table = Table(heading, ["controller", *cars], numbers=range(1, len(cars) + 1))
+        for entry in entries:
+            table.rows.append([titles[entry], *_levels_on_cars(result, threats.main, name, entry)])
+        tables.append(table)
+    return tables
+
+
+def threats_table(result: ThreatResult) -> Table:
+    """Return the table of threats: range, cars, source."""
+    table = Table("", ["threat", "from", "to", "cars", "scenario", "changes", "source of the range"])
+    for spec in result.threats.spec.threats.values():
+        unit = f" {spec.unit}" if spec.unit else ""
+        changes = [*(f"{target} = {value}" for target, value in spec.set.items())]
+        changes += [f"{target} × level" for target in spec.factor] + [
+            f"{target} + level" for target in spec.add
+        ]
+        cars = "all" if not spec.cars else ", ".join(spec.cars)
+        ends = f"{spec.easy:g}{unit}", f"{spec.hard:g}{unit}"
+        table.rows.append([spec.title, *ends, cars, spec.scenario, "\n".join(changes), spec.source])
+    return table
+
+
+def orders_tables(result: ThreatResult, table: ScoreTable) -> tuple[Table, Table]:
+    """Return how the order changes without each threat and car, and each entry's place in every order."""
+    threats, titles, entries = result.threats, titles_of(result), result.complete[result.threats.main]
+    names = {"threat": threats.threats_in(threats.main), "car": threats.cars_in(threats.main)}
+    of_changes = ["without", "first", "rank correlation", "entries that move", "farthest move"]
+    changes = Table("", of_changes, numbers={2, 3})
+    without = scores_without(entries, result.positions(threats.main, entries), REFERENCE)
+    for (word, k), scores in without.items():
+        moves = moves_between(table.by_entry(), scores, REFERENCE)
+        changes.rows.append([
+            f"{word} {names[word][k]}", titles[next(iter(scores))], f"{moves.correlation:.2f}",
+            str(moves.moved), _moved(titles, moves),
+        ])  # fmt: skip
+    orders = [table.order(), *([*scores] for scores in without.values())]
+    headings = ["controller", "all", *(names[word][k] for word, k in without)]
+    rows = [[titles[entry], *(str(order.index(entry) + 1) for order in orders)] for entry in table.order()]
+    notes = ["Places by the score; every column but the first leaves out its threat or car."]
+    return changes, Table("", headings, [*rows], notes, {*range(1, len(headings))})
+
+
+def settings_table(result: ThreatResult, settings: Sequence[str]) -> Table:
+    """Return what each setting changes in levels and order against the main one."""
+    threats, titles = result.threats, titles_of(result)
+    headings = [
+        "setting", "threats", "cars", "entries", "levels move [% of a range]", "rank correlation",
+        "entries that move", "farthest move", "first", "first in main",
+    ]  # fmt: skip
+    table = Table("", headings, numbers={3, 4, 5, 6})
+    for setting in settings:
+        compared = compared_setting(result, setting)
+        if compared.main is None:
+            continue
+        moved = round(100 * compared.moved, 1) + 0.0  # no -0.0
+        before, after = compared.main.by_entry(), compared.table.by_entry()
+        moves = moves_between(before, after, REFERENCE)
+        table.rows.append([
+            threats.spec.settings[setting].title, ", ".join(threats.threats_in(setting)),
+            ", ".join(threats.cars_in(setting)), str(len(before)), f"{moved:+.1f}",
+            f"{moves.correlation:.2f}", str(moves.moved), _moved(titles, moves),
+            titles[next(iter(after))], titles[next(iter(before))],
+        ])  # fmt: skip
+    table.notes.append(
+        "Each setting against the main one on the same threats, cars and entries. Levels move: mean "
+        "difference; above 0, more is survived. Rank correlation: Spearman's, without no control; "
+        "equal scores share a place."
+    )
+    return table
+
+
+def setting_table(result: ThreatResult, setting: str) -> Table:
+    """Return the scores of another setting, beside those of the main one on the same threats and cars."""
+    threats, titles = result.threats, titles_of(result)
+    compared = compared_setting(result, setting)
+    of_main, order = {}, []
+    if compared.main:
+        of_main, order = {score.entry: score for score in compared.main.scores}, compared.main.order()
+    rows = [
+        [
+            str(score.place), titles[score.entry], f"{score.score:.1f}", interval_text(score.bounds),
+            f"{of_main[score.entry].score:.1f}" if score.entry in of_main else None,
+            str(order.index(score.entry) + 1) if score.entry in of_main else None,
+        ]
+        for score in compared.table.scores
+    ]  # fmt: skip
+    about = (
+        f"Threats: {', '.join(threats.threats_in(setting))}; cars: {', '.join(threats.cars_in(setting))}. "
+        f"{told_apart(compared.table)}"
+    )
+    headings = ["place", "controller", "score", "95 % interval", "main score, same threats", "main order"]
+    return Table(threats.spec.settings[setting].title, headings, [*rows], [about], {0, 2, 4, 5})
+
+
+@dataclass(frozen=True)
+class Discipline:
+    """A discipline as driven, with columns of its own."""
+
+    title: str
+    scores: ScoreTable
+    cells: dict[str, list[str]]  # entry -> texts of its own columns
+    headings: list[str]  # of these columns
+    about: str  # what is driven, and what the columns are
+
+
+def disciplines(result: ThreatResult) -> list[Discipline]:
+    """Return the disciplines: settings whose threats are all judged by a lane change, then standard tests."""
+    threats = result.threats
+    names = [name for name in threats.spec.settings if _of_lane_changes(threats, name)]
+    of_changes = [_of_lane_change(result, name) for name in names if result.complete[name]]
+    driven = {name for name, _, entry in result.quantities if entry == REFERENCE}
+    return of_changes + [
+        _of_standard_test(result, name) for name in threats.spec.disciplines if name in driven
+    ]
+
+
+def _of_lane_change(result: ThreatResult, setting: str) -> Discipline:
+    threats = result.threats
+    name, cars = threats.threats_in(setting)[0], threats.cars_in(setting)
+    spec = threats.spec.threats[name]
+    cells = {entry: _levels_on_cars(result, setting, name, entry) for entry in result.complete[setting]}
+    headings, title = [f"{car} [{spec.unit}]" for car in cars], threats.spec.settings[setting].title
+    return Discipline(title, scored(result, setting), cells, headings, "More is better.")
+
+
+def _of_standard_test(result: ThreatResult, name: str) -> Discipline:
+    spec = result.threats.spec.disciplines[name]
+    cars = spec.cars or result.threats.spec.cars
+    entries = [
+        entry
+        for entry in result.threats.entries_in(result.threats.main)
+        if all((name, car, entry) in result.quantities for car in cars)
+    ]
+    positions = np.array([
+        [
+            [quantity.position(result.quantities[name, car, entry].get(key)) for car in cars]
+            for key, quantity in spec.quantities.items()
+        ]
+        for entry in entries
+    ])  # fmt: skip
+    cells = {
+        entry: [
+            _median_text(
+                [result.quantities[name, car, entry].get(key) for car in cars],
+                result.units.get((name, key), ""),
+            )
+            for key in spec.quantities
+        ]
+        for entry in entries
+    }
+    headings, ranges = [], []
+    for key, quantity in spec.quantities.items():
+        unit, scale = shown_unit(result.units.get((name, key), ""))
+        headings.append(f"{quantity.title}{f' [{unit}]' if unit else ''}")
+        ends = (f"{x * scale:.3g}" for x in (quantity.best, quantity.worst))
+        ranges.append(f"{quantity.title} {' to '.join(ends)}{f' {unit}' if unit else ''}")
+    about = (
+        f"{spec.source}. Medians over {', '.join(cars)}; less is better. Each range counts as one unit: "
+        f"{'; '.join(ranges)}."
+    )
+    return Discipline(spec.title, score_table(entries, positions, REFERENCE), cells, headings, about)
+
+
+def _median_text(magnitudes: Sequence[float | None], unit: str) -> str:
+    """Return the median over the cars that were not lost, in the unit shown."""
+    known = [x for x in magnitudes if x is not None]
+    if not known:
+        return "lost"
+    lost = f", lost on {len(magnitudes) - len(known)}" if len(known) < len(magnitudes) else ""
+    return f"{digits_of(shown_unit(unit)[1] * float(np.median(known)), 3)}{lost}"
+
+
+def discipline_table(result: ThreatResult, discipline: Discipline) -> Table:
+    """Return the table of a discipline: scores with intervals, the best first, and its own columns."""
+    titles = titles_of(result)
+    rows = [
+        [
+            str(score.place), titles[score.entry], f"{score.score:.0f}", interval_text(score.bounds),
+            *discipline.cells[score.entry],
+        ]
+        for score in discipline.scores.scores
+    ]  # fmt: skip
+    headings = ["place", "controller", "score", "95 % interval", *discipline.headings]
+    notes = [f"{discipline.about} {told_apart(discipline.scores)}"]
+    return Table(discipline.title, headings, [*rows], notes, {0, 2, *range(4, len(headings))})
+
+
+def overview(result: ThreatResult, table: ScoreTable) -> Table:
+    """Return the table with all disciplines beside each other: the matrix, the threats, the other tests."""
+    titles = titles_of(result)
+    driven = disciplines(result)
+    columns = [("threats", table), *((discipline.title, discipline.scores) for discipline in driven)]
+    rows = []
+    for score in table.scores:
+        passed = result.passed.get(score.entry)
+        cells = [f"{passed[0]} of {passed[1]}" if passed else None]
+        for _, scores in columns:
+            own = next((other for other in scores.scores if other.entry == score.entry), None)
+            cells.append(f"{own.score:.0f} ({own.place})" if own else None)
+        rows.append([titles[score.entry], *cells])
+    notes = [
+        "Conditions of the matrix passed, as published; then scores, in brackets places, shared where "
+        "intervals overlap. No control has 0, the best 100; below 0 is worse than no control."
+    ]
+    if driven:
+        agreements = (
+            f"{d.title} {moves_between(table.by_entry(), d.scores.by_entry(), REFERENCE).correlation:.2f}"
+            for d in driven
+        )
+        notes.append(f"Rank correlation with the order by threats (Spearman): {', '.join(agreements)}.")
+    headings = ["controller", "matrix", *(title for title, _ in columns)]
+    return Table("", headings, [*rows], notes, {*range(1, len(headings))})
+
+
+def compared_settings(result: ThreatResult) -> list[str]:
+    """Return the settings with all levels that are compared with main: no disciplines, no further seeds."""
+    threats = result.threats
+    return [
+        name
+        for name, spec in threats.spec.settings.items()
+        if name != threats.main and result.complete[name] and not spec.seeds
+        and not _of_lane_changes(threats, name)
+    ]  # fmt: skip
+
+
+def _of_lane_changes(threats: LoadedThreats, setting: str) -> bool:
+    return all(threats.spec.threats[name].test == LANE_CHANGE for name in threats.threats_in(setting))
+
+
+def threats_page(result: ThreatResult, table: ScoreTable, folder: Path, command: str) -> str:
+    """Return the page as HTML.
+
+    Args:
+        result: levels and quantities.
+        table: scores of the main setting.
+        folder: its results folder, which also holds the page.
+        command: command line that repeats it.
+    """
+    threats = result.threats
+    order = table.order()
+    orders, places = orders_tables(result, table)
+    gains = compared_gains(result)
+    others = compared_settings(result)
+    matrix = folder.parent / RANKING.parent.name / PAGE
+    page: str = render(
+        "threats.html.j2",
+        title=threats.spec.title,
+        source=threats.spec.source,
+        notes=[*threats.spec.notes, *threats.ranking.edited],
+        matrix=Path(os.path.relpath(matrix, folder)).as_posix() if matrix.is_file() else "",
+        quick=threats.quick,
+        answer=answer(result, table),
+        published=_published(result, order),
+        main=main_table(result, table),
+        levels=levels_table(result, order),
+        orders=orders,
+        places=places,
+        moves=settings_table(result, others),
+        settings=[setting_table(result, name) for name in others],
+        gains=[gains_table(result, gains), seeds_table(result, gains)] if gains else [],
+        sentence=gains_sentence(gains) if gains else "",
+        overview=overview(result, table),
+        disciplines=[discipline_table(result, discipline) for discipline in disciplines(result)],
+        cars=car_tables(result, order),
+        described=threats_table(result),
+        command=command,
+        folder=str(folder),
+    )
+    return page

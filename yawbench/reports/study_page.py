@@ -1,0 +1,449 @@
+"""The page of an experiment, a single HTML file, and the overview of several, with a link to each page.
+
+A page has the verdicts, runs, system, tables and parameters of the experiment, and how to repeat it; the
+overview has the verdicts of all. A click on a claim there loads its runs from a side file.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+from yawbench.figures.panels import signals_of
+from yawbench.figures.style import LabelledRun
+from yawbench.foundation.errors import ResultsError
+from yawbench.foundation.messages import counted, listed
+from yawbench.metrics.expressions import evaluate, metric
+from yawbench.orchestrator.plan import Plan
+from yawbench.orchestrator.results.freshness import run_record
+from yawbench.orchestrator.results.measurement_results import filtered_alike
+from yawbench.orchestrator.results.reader import Results
+from yawbench.orchestrator.results.run_folder import RunStatus
+from yawbench.orchestrator.results.run_record import RunRecord, load_record
+from yawbench.orchestrator.scenario.loader import LoadedScenario
+from yawbench.orchestrator.scenario.overrides import changed
+from yawbench.planner import Planner
+from yawbench.studies.claims import ClaimResult
+from yawbench.studies.confidence import CONFIDENCE
+from yawbench.studies.experiment import FIGURES, LoadedExperiment
+from yawbench.studies.experiment_result import Each, ExperimentResult
+from yawbench.studies.jobs import Job
+from yawbench.studies.open_value_regions import runs_of as runs_of_claim
+from yawbench.studies.result_files import runs_of, title_of
+from yawbench.studies.result_tables import (
+    FAILS,
+    HOLDS,
+    NOT_JUDGED,
+    SENSITIVE,
+    UNDECIDED,
+    counts_of,
+    derived_tables,
+    heading,
+    limit_tables,
+    line_table,
+    margin_words,
+    reach,
+    region_table,
+    region_words,
+    run_tables,
+    verdict,
+)
+from yawbench.studies.schema import FigureSpec
+from yawbench.studies.tables import Cell, Table
+
+from .diagram import diagram, systems_of
+from .evaluation_page import validation_facts
+from .page_parts import FigureImage, anchor, count_kinds, fmus_of, groups_of, image_of, programs_of, render
+from .sweep_view import sweep_sentence, sweep_view, write_sides
+from .viewer import (
+    DATA,
+    LARGEST,
+    MOST,
+    PANELS,
+    Carried,
+    Settings,
+    View,
+    answer_of,
+    assets,
+    carried,
+    embedded,
+    tidy_sides,
+    write_side,
+)
+
+
+def chapter(
+    findings: ExperimentResult,
+    *,
+    command: str,
+    stale: dict[str, str],
+    folder: Path,
+    views: Sequence[View] = (),
+    measured: Sequence[LabelledRun] = (),
+    each: Each = map,
+) -> dict[str, Any]:
+    """Return the template data of an experiment's page; write the side files of its runs along axes.
+
+    Args:
+        findings: the experiment and its results.
+        command: command line that repeats it.
+        stale: run -> why its results are not those of its plan.
+        folder: of its results, figures and page.
+        views: of the viewer, before those of the figures.
+        measured: recordings that the viewer shows beside the runs.
+        each: `map`, or a parallel equivalent, to write side files with.
+    """
+    experiment, spec = findings.experiment, findings.spec
+    name = anchor(f"{experiment.path.absolute().parent.name} {experiment.path.stem}")
+    plans = plans_of(findings)
+    groups = groups_of([(record_of(job, plan), plan) for job, (_, plan) in plans])
+    runs = runs_made(findings)
+    kinds = [kind for kind, _ in runs]
+    failed = findings.failed
+    content, numbers = viewer_of(findings, views, measured)
+    sweep = None
+    if spec.axes and findings.planned and len(findings.records) > 1:
+        sweep = sweep_view(findings, "sweep", write_sides(findings, folder, each))
+
+    def with_link(results: Sequence[ClaimResult]) -> list[dict[str, Any]]:
+        return [judged(result) | {"link": link_to_runs(experiment, result, numbers)} for result in results]
+
+    return {
+        "id": name,
+        "title": spec.title,
+        "source": spec.source,
+        "changed": changed(experiment.by_options),
+        "counts": counts_of(findings.claims),
+        "reach": reach(findings),
+        "answer": " ".join(filter(None, (answer(findings), sweep and sweep_sentence(findings)))),
+        "claims": with_link(findings.claims),
+        "checks": with_link(findings.checks),
+        "region": region_table(findings) if findings.regions else None,
+        "limits": limit_tables(findings),
+        "systems": systems(plans, spec.title),
+        "content": content,
+        "sweep": sweep,
+        "figures": figure_files(findings),
+        "charts": charts(findings, folder / FIGURES),
+        "tables": [*run_tables(findings), *derived_tables(findings, apart=True)],
+        "definitions": definitions(findings),
+        "groups": groups,
+        "kinds": count_kinds(groups),
+        "failed": failed,
+        "stale": stale,
+        "remarkable": findings.remarkable() if spec.axes else "",
+        "repeats": repeats(findings),
+        "quick": experiment.quick,
+        "command": command,
+        "folder": str(folder),
+        "settings": settings(findings),
+        "grid": grid_of_times(runs),
+        "runs": len(findings.records),
+        "not_made": findings.not_made,
+        "comparison": None,
+        "results": [],
+        "validations": [
+            validation_facts(validation, f"validation-{number}")
+            for number, validation in enumerate(findings.validations, start=1)
+        ],
+        "fmus": fmus_of(kinds),
+        "programs": programs_of(kinds),
+    }
+
+
+def link_to_runs(experiment: LoadedExperiment, result: ClaimResult, numbers: Mapping[str, int]) -> str:
+    """Return the state of the viewer that shows a claim's runs; "" if it has none of them.
+
+    Args:
+        experiment: of the claim.
+        result: the judged claim.
+        numbers: run -> its number in the viewer.
+    """
+    shown = [numbers[run] for run in runs_of_claim(experiment, result.claim) if run in numbers]
+    return f"{VIEW}?shown={shown}&baseline={shown[0]}".replace(" ", "") if shown else ""
+
+
+def runs_made(findings: ExperimentResult) -> Sequence[tuple[Results | Plan, int]]:
+    """Return the results of all runs; along axes, a plan of each kind that was made; with their numbers."""
+    if not findings.spec.axes or findings.planned is None:
+        return [(results, 1) for results in findings.results.values()]
+    return findings.kinds_made
+
+
+def repeats(findings: ExperimentResult) -> str:
+    """Return a sentence that explains numbers over repeats; "" without repeats."""
+    spec = findings.spec
+    if not spec.repeats:
+        return ""
+    names = " and ".join(spec.axes[name].says or name for name in spec.repeats)
+    sure = f"the interval that contains the true mean with {100 * CONFIDENCE:.0f} % confidence (Student)"
+    return (
+        f"Numbers with ± are means over {findings.experiment.repeats} repeats ({names}), with {sure}. "
+        "A verdict whose threshold lies inside reads undecided."
+    )
+
+
+def record_of(job: Job, plan: Plan) -> RunRecord:
+    """Return the record of a job's run, or as it would be if the run has kept none."""
+    try:
+        return load_record(job.out)
+    except ResultsError:
+        return run_record(plan, status=RunStatus.UNKNOWN, started=datetime.now(timezone.utc))
+
+
+def plans_of(findings: ExperimentResult) -> list[tuple[Job, tuple[LoadedScenario, Plan]]]:
+    """Return jobs with scenario and plan: all named runs; along axes the first with each set of FMUs."""
+    jobs: dict[Any, Job] = {}
+    for job in findings.planned.jobs if findings.planned else ():
+        fmus = tuple(instance.fmu.sha256 for instance in job.plan.instances) if job.plan else ()
+        jobs.setdefault((job.scenario, fmus) if findings.spec.axes else job.label, job)
+    planner = Planner()
+    return [
+        (job, (planner.load(job.scenario, job.changes), job.plan))
+        for job in jobs.values()
+        if job.plan is not None
+    ]
+
+
+def answer(findings: ExperimentResult) -> str:
+    """Return the result in one sentence: how many claims (or checks) hold, and where they were judged.
+
+    Without claims and checks, what the named runs came to.
+    """
+    kind, results = ("claims", findings.claims) if findings.claims else ("checks", findings.checks)
+    if not results:
+        runs = findings.experiment.runs
+        named = [
+            LabelledRun(runs[name].label, run) for name, run in findings.results.items() if run.time.size
+        ]
+        return answer_of(named) if named else ""
+    where = reach(findings)
+    return f"Of {len(results)} {kind}, {in_sentence(counts_of(results))}{f', {where}' if where else ''}."
+
+
+def in_sentence(counts: Mapping[str, int]) -> str:
+    """Return how many verdicts are of each kind: `1 holds, 2 do not reproduce and 3 are undecided`."""
+    parts = []
+    for word, count in counts.items():
+        if word in (UNDECIDED, NOT_JUDGED):
+            word = f"{'is' if count == 1 else 'are'} {word}"
+        parts.append(f"{count} {word if count == 1 else SEVERAL.get(word, word)}")
+    return listed(parts, last="and")
+
+
+def judged(result: ClaimResult) -> dict[str, Any]:
+    """Return a claim with its measured values and verdict."""
+    return {
+        "says": result.claim.says,
+        "source": result.claim.source,
+        "measured": result.measured,
+        "conditions": [str(condition) for condition in result.claim.holds_if],
+        "verdict": verdict(result),
+        "margin": margin_words(result.verdict),
+        "region": region_words(result),
+        "agreeing": result.region and 100 * result.region.agreeing,
+        "robust": result.region is not None and result.region.robust,
+        "lines": line_table(result) if result.region else None,
+        "note": result.claim.note,
+    }
+
+
+def systems(plans: Sequence[tuple[Job, tuple[LoadedScenario, Plan]]], title: str) -> list[dict[str, Any]]:
+    """Return a diagram for each set of instances, with the scenarios that it applies to."""
+    drawn = []
+    for system, numbers in systems_of([plan for _, (_, plan) in plans]):
+        files = dict.fromkeys(plans[k][0].scenario.name for k in numbers)
+        drawn.append({"drawing": diagram(system, title), "runs": ", ".join(files)})
+    return drawn
+
+
+LIVELY = tuple(map(metric, ("peak(sideslip)", "peak(yaw_rate)")))
+"""Metrics of how lively a run is; the first that all runs have is used."""
+SEVERAL = {
+    HOLDS: "hold",
+    SENSITIVE: "depend on open values",
+    **{word: word.replace("does", "do", 1) for word in FAILS.values()},
+}
+"""Verdict -> its plural."""
+LONG = 16
+"""Rows of tables; further tables are folded. Chosen: with the claims, a page stays below 2,000 elements."""
+VIEW = "view"
+"""Anchor of the viewer."""
+
+
+def viewer_of(
+    findings: ExperimentResult, views: Sequence[View] = (), measured: Sequence[LabelledRun] = ()
+) -> tuple[Carried | None, dict[str, int]]:
+    """Return the content of a viewer of all runs of figures and claims, and the number of each run in it.
+
+    Args:
+        findings: the experiment and its results.
+        views: of all runs, before those of the figures, of which the liveliest comes first.
+        measured: recordings that all views show; their filter acts on the runs, too.
+    """
+    overlays = [spec for spec in findings.spec.figures if spec.what.shows == "runs"]
+    named: dict[str, LabelledRun] = {}
+    wanted = [run.name for spec in overlays for run in findings.experiment.matching(spec.runs)]
+    wanted += [
+        name for result in findings.judgements for name in runs_of_claim(findings.experiment, result.claim)
+    ]
+    for run in (findings.experiment.runs[name] for name in wanted):
+        results = findings.results.get(run.name)
+        if results is not None and results.time.size and len(named) < MOST:
+            named.setdefault(run.name, LabelledRun(run.row or run.label, results))
+    if not named:
+        return None, {}
+    numbers = {name: number for number, name in enumerate(named)}
+    beside = range(len(named), len(named) + len(measured))
+    drawn: list[tuple[float, View]] = []
+    for spec in overlays:
+        shown = [numbers[run.name] for run in findings.experiment.matching(spec.runs) if run.name in numbers]
+        lively = _liveliest([run for number, run in enumerate(named.values()) if number in shown])
+        drawn += [
+            (lively, view) for view in _views(spec, title_of(findings, spec), [*shown, *beside]) if shown
+        ]
+    ordered = [view for _, view in sorted(drawn, key=lambda item: -item[0])]
+    settings = Settings([*views, *ordered], largest=LARGEST)
+    runs = [*named.values(), *measured]
+    alike = filtered_alike([run.results for run in runs])
+    runs = [LabelledRun(run.label, results) for run, results in zip(runs, alike, strict=True)]
+    return carried(runs, settings), numbers
+
+
+def _views(spec: FigureSpec, title: str, shown: Sequence[int]) -> Iterator[View]:
+    """Yield the views of a figure: its signals over time, and each portrait."""
+    portraits = [(name, pair) for name in spec.panels if (pair := signals_of(name))]
+    over_time = tuple(name for name in spec.panels if name != "path" and not signals_of(name))
+    if over_time or not portraits:
+        yield View(title, over_time or PANELS, shown)
+    for name, (x, y) in portraits:
+        yield View(f"{title}: {name}", (y,), shown, x)
+
+
+def _liveliest(runs: Sequence[LabelledRun]) -> float:
+    """Return the largest sideslip of any run, or the largest yaw rate; 0 if neither is known."""
+    for signal in LIVELY:
+        values = [value.number for run in runs if (value := evaluate(run.results, signal))]
+        if values:
+            return max(values)
+    return 0.0
+
+
+def figure_files(findings: ExperimentResult) -> list[dict[str, str]]:
+    """Return title and path, without suffix, of the figures that the page shows in another form."""
+    return [
+        {"title": title_of(findings, spec), "file": f"{FIGURES}/{spec.name}"}
+        for spec in findings.spec.figures
+        if spec.what.over_axes or (spec.what.shows == "runs" and runs_of(findings, spec))
+    ]
+
+
+def charts(findings: ExperimentResult, folder: Path) -> list[FigureImage]:
+    """Return the drawn figures of grids as images; the view of the sweep shows those over axes."""
+    drawn = []
+    for spec in findings.spec.figures:
+        file = folder / f"{spec.name}.svg"
+        if spec.what.shows == "grid" and file.is_file():
+            drawn.append(image_of(file, title_of(findings, spec)))
+    return drawn
+
+
+def definitions(findings: ExperimentResult) -> list[dict[str, str]]:
+    """Return the definition of every metric of the study."""
+    every = [(spec, metric(spec.metric)) for spec in findings.spec.metrics.values()]
+    return [
+        {
+            "heading": heading(spec),
+            "definition": f"{chosen.definition}{spec.during('from ')}",
+            "formula": chosen.formula,
+        }
+        for spec, chosen in every
+    ]
+
+
+def settings(findings: ExperimentResult) -> Table:
+    """Return the table of every run's overrides; along axes, of how many runs ended with each status."""
+    statuses = list(dict.fromkeys(record.status for record in findings.records)) if findings.spec.axes else []
+    headings = ["run", "scenario", "changed", "faults", *statuses]
+    rows: list[list[Cell]] = []
+    for run in findings.experiment.runs.values():
+        results = findings.results.get(run.name)
+        faults = "; ".join(fault.words for fault in results.record.faults) if results else ""
+        ended = Counter(findings.record(case).status for case in findings.experiment.cases if case.run == run)
+        rows.append([
+            run.name or None, run.scenario.name, changed(run.changes) or None, faults or None,
+            *(str(ended[status]) for status in statuses),
+        ])  # fmt: skip
+    kept = [k for k in range(len(headings)) if any(row[k] is not None for row in rows)]
+    numbers = {place for place, k in enumerate(kept) if headings[k] in statuses}
+    return Table("", [headings[k] for k in kept], [[row[k] for k in kept] for row in rows], [], numbers)
+
+
+def grid_of_times(runs: Iterable[tuple[Results | Plan, int]]) -> list[str]:
+    """Return each combination of algorithm, step size and stop time that occurs in plans or records."""
+    counts: Counter[str] = Counter()
+    for run, number in runs:
+        algorithm: str
+        if isinstance(run, Plan):
+            algorithm, step, end = run.algorithm, float(run.step), run.time(run.n_steps)
+        else:
+            algorithm, step, end = run.record.algorithm, run.record.step_size, run.record.stop_time
+        counts[f"{algorithm}, {1000 * step:g} ms, until {end:g} s"] += number
+    return [f"{text} ({counted(count, 'run')})" for text, count in counts.items()]
+
+
+def study_page(facts: dict[str, Any]) -> str:
+    """Return the page of an experiment."""
+    content, scripts = facts["content"], ["sweep.js"] if facts["sweep"] else []
+    return render(
+        "study.html.j2",
+        facts,
+        viewer=embedded(content, VIEW) if content else None,
+        long=LONG,
+        assets=assets(*scripts) if content or scripts or facts["validations"] else "",
+    )
+
+
+OVERVIEW = "Yaw-stability control: what papers say, and what comes out"
+"""Title of the overview."""
+
+
+def _answer_of_all(chapters: Sequence[dict[str, Any]]) -> str:
+    """Return in a sentence how many claims of all studies hold; "" without claims."""
+    counts: Counter[str] = Counter()
+    for facts in chapters:
+        counts.update(facts["counts"])
+    if not counts:
+        return ""
+    with_claims = [facts for facts in chapters if facts["counts"]]
+    alone = sum(not facts["region"] for facts in with_claims)
+    where = f", {'all' if alone == len(with_claims) else f'{alone} of the studies'} at the chosen point only"
+    return (
+        f"Of {sum(counts.values())} claims in {counted(len(with_claims), 'study', 'studies')}, "
+        f"{in_sentence(counts)}{where if alone else ''}."
+    )
+
+
+def overview_page(
+    chapters: Sequence[dict[str, Any]], pages: Sequence[str], folder: Path, ranking: str = ""
+) -> str:
+    """Return the page on several experiments; write side files with their runs.
+
+    Args:
+        chapters: of the experiments.
+        pages: their addresses.
+        folder: of the overview.
+        ranking: address of the ranking's page; "": there is none.
+    """
+    shown = {facts["id"]: facts["content"] for facts in chapters if facts["content"]}
+    for key, content in shown.items():
+        write_side(folder, key, content)
+    tidy_sides(folder, shown.keys())
+    return render(
+        "overview.html.j2", title=OVERVIEW, chapters=[*zip(chapters, pages, strict=True)], ranking=ranking,
+        answer=_answer_of_all(chapters), folder=DATA, first=next(iter(shown), ""), frame=embedded(None, VIEW),
+        assets=assets("chooser.js"),
+    )  # fmt: skip

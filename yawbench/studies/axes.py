@@ -1,0 +1,437 @@
+"""Axes of an experiment: their schema, the points of a design, and the overrides at each point.
+
+A design is a full grid, a list or a Latin hypercube. A region has axes, too: the values that a paper
+leaves open, with the range over which claims are judged again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, WithJsonSchema, model_validator
+
+from yawbench.fmus.fmu import Value
+from yawbench.foundation.messages import resolved, short
+from yawbench.orchestrator.plan import Override, OverrideOrigin
+from yawbench.orchestrator.scenario import overrides, yaml_lines
+from yawbench.orchestrator.scenario.fault_schema import FaultSpec, by_location
+from yawbench.orchestrator.scenario.quantities import parse_unit
+from yawbench.orchestrator.scenario.schema import AlgorithmName, Scalar
+from yawbench.orchestrator.scenario.schema_validation import StrictModel, Time, exactly_one
+from yawbench.orchestrator.signal_names import INPUTS, OF_RUN, VEHICLE, Target
+
+from .claim_schema import LEVELS as VALUES
+from .claim_schema import Number, Patterns, is_finite, text_of
+from .on_demand import OnDemand
+
+MOST = 100_000
+"""Largest number of runs in an experiment; chosen: more is a typo, and planning them takes minutes."""
+
+AxisKind = Literal["setting", "fmu", "file", "variant"]
+
+
+def _targets(value: object) -> list[Target]:
+    texts = [value] if isinstance(value, str) else value
+    if not isinstance(texts, list) or not texts or not all(isinstance(text, str) and text for text in texts):
+        raise ValueError(
+            "must be instance.parameter, vehicle.parameter, inputs.pattern, an instance, vehicle or tyres "
+            f"(got {short(value)})"
+        )
+    return [Target.parse(text) for text in texts]
+
+
+def _target(value: object) -> Target:
+    if isinstance(value, Target):  # in data that another specification holds
+        return value
+    if not isinstance(value, str):
+        raise ValueError(
+            f"must be instance.parameter, vehicle.parameter or inputs.pattern (got {short(value)})"
+        )
+    return Target.parse(value)
+
+
+def _levels(value: object) -> dict[Any, str]:
+    """Return the values of an axis with their labels."""
+    if isinstance(value, dict) and value and all(isinstance(words, str) for words in value.values()):
+        return dict(value)
+    if not isinstance(value, list) or not all(_is_plain(v) for v in value):
+        raise ValueError("must be a list of values, or a mapping of values to words")
+    if not value:
+        raise ValueError("has no values")
+    if len({text_of(v) for v in value}) < len(value):
+        again = next(text_of(v) for i, v in enumerate(value) if text_of(v) in map(text_of, value[:i]))
+        raise ValueError(f"names {again} twice")
+    return {v: text_of(v) for v in value}
+
+
+def _is_plain(value: object) -> bool:
+    return isinstance(value, (str, bool)) or is_finite(value)
+
+
+_TARGET = {"type": "string", "pattern": r"^[^.]+(\..+)?$"}
+_TARGETS = {"anyOf": [_TARGET, {"type": "array", "items": _TARGET, "minItems": 1}]}
+
+TargetText = Annotated[Target, PlainValidator(_target), PlainSerializer(str), WithJsonSchema(_TARGET)]
+TargetList = Annotated[
+    list[Target],
+    PlainValidator(_targets),
+    PlainSerializer(lambda targets: [*map(str, targets)]),
+    WithJsonSchema(_TARGETS),
+]
+Levels = Annotated[dict[Any, str], PlainValidator(_levels), WithJsonSchema(VALUES)]
+
+
+class OverrideSpec(StrictModel):
+    """Overrides of a scenario."""
+
+    swap: dict[str, str] = Field({}, description="Instance -> FMU, a name or a path")
+    set: dict[TargetText, Scalar] = Field({}, description="instance.parameter -> value")
+    vehicle: str | None = Field(None, description="Vehicle file, relative to this file")
+    faults: list[FaultSpec] = Field([], description="In place of the scenario's at these locations")
+    stop_time: Time | None = Field(None, description="In place of the scenario's")
+    step_size: Time | None = Field(None, description="In place of the scenario's")
+    algorithm: AlgorithmName | None = Field(None, description="In place of the scenario's")
+
+    @property
+    def targets(self) -> list[Target]:
+        """The targets of these overrides."""
+        own = [Target.parse(name) for name in (VEHICLE, *OF_RUN) if getattr(self, name, None) is not None]
+        faults = [Target("faults", variable=str(fault.on)) for fault in self.faults]
+        return [*map(Target.of_instance, self.swap), *self.set, *faults, *own]
+
+
+class VariantSpec(OverrideSpec):
+    """A named group of overrides."""
+
+
+class AxisSpec(StrictModel):
+    """An axis: targets with their values, listed or as a range; or variants that change several targets."""
+
+    model_config = ConfigDict(json_schema_extra=exactly_one("vary", "variants"))
+
+    vary: TargetList = Field(
+        [], description="instance.parameter, inputs.pattern, an instance (its FMU), vehicle or tyres (files)"
+    )
+    variants: dict[str, VariantSpec] = Field({}, description="Words -> changes that belong together")
+    values: Levels | None = Field(None, description="A list, or a mapping of values to words")
+    start: Number | None = Field(None, alias="from", description="The first of `count` values")
+    end: Number | None = Field(None, alias="to", description="The last")
+    count: int | None = Field(None, ge=2, le=MOST, description="Number of values; not for a Latin hypercube")
+    spacing: Literal["linear", "log"] = Field("linear", description="Equal steps or equal factors")
+    unit: str | None = Field(None, description="Unit of the numbers; default: that of the parameter")
+    says: str = Field("", description="Label in figures; default: the parameter in words")
+
+    @property
+    def kind(self) -> AxisKind:
+        """Kind of its targets: a value, an FMU, a file, or several at once."""
+        if self.variants:
+            return "variant"
+        target = self.vary[0]
+        return "fmu" if target.kind == "fmu" else "file" if target.names_file else "setting"
+
+    @property
+    def targets(self) -> list[Target]:
+        """The targets that the axis overrides."""
+        return self.vary or list(dict.fromkeys(t for spec in self.variants.values() for t in spec.targets))
+
+    @property
+    def length(self) -> int | None:
+        """The number of values; None for a range without a count."""
+        levels = self.variants or self.values
+        return self.count if levels is None else len(levels)
+
+    @property
+    def numeric(self) -> bool:
+        """Whether all values are numbers."""
+        if self.kind != "setting":
+            return False
+        return self.values is None or all(
+            isinstance(v, (int, float)) and not isinstance(v, bool) for v in self.values
+        )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> AxisSpec:
+        if bool(self.vary) == bool(self.variants):
+            raise ValueError("needs either vary or variants")
+        if self.variants:
+            bounds = (self.values, self.start, self.end, self.count, self.unit)
+            if any(bound is not None for bound in bounds):
+                raise ValueError("variants have no values, from, to, count or unit")
+            return self
+        if Target.of_instance(INPUTS) in self.vary:
+            raise ValueError("vary: inputs needs a name, for example inputs.friction*")
+        if len(self.vary) > 1 and any(target.names_file for target in self.vary):
+            raise ValueError("vary: only several instance.parameter may share an axis")
+        ends = (self.start, self.end)
+        if self.values is not None and (ends != (None, None) or self.count is not None):
+            raise ValueError("give either values, or from, to and count")
+        if self.values is None:
+            if None in ends:
+                raise ValueError("needs values, or from, to and count")
+            if self.kind != "setting":
+                raise ValueError(f"{self.vary[0]} takes names: give values, not from and to")
+            self._check_ends()
+        elif self.kind != "setting" and not all(isinstance(value, str) for value in self.values):
+            raise ValueError(f"values: {self.vary[0]} takes names of files or FMUs")
+        if self.unit is not None:
+            if not self.numeric:
+                raise ValueError("unit: the values must be numbers")
+            parse_unit(self.unit)
+        elif self.values is not None and self.kind == "setting":
+            quantity = next((v for v in self.values if _is_quantity(v)), None)
+            if quantity is not None:
+                raise ValueError(f"values: {quantity!r}: give plain numbers, and their unit in `unit`")
+        return self
+
+    def _check_ends(self) -> None:
+        assert self.start is not None
+        assert self.end is not None
+        if not self.start < self.end:
+            raise ValueError(f"from must be below to (got {' and '.join(resolved(self.start, self.end))})")
+        if self.spacing == "log" and self.start * self.end <= 0:
+            raise ValueError("from and to must both be above 0, or both below, for spacing log")
+
+
+class DesignAxisSpec(AxisSpec):
+    """An axis of an experiment's design."""
+
+    runs: Patterns = Field(["*"], description="Which runs it changes; the others are the same all along it")
+    repeats: bool = Field(
+        False,
+        description="Whether its values, seeds say, make repeats of one and the same: every number is then "
+        "the mean over them, with its confidence interval; listed, with at least 2 of them",
+    )
+
+    @model_validator(mode="after")
+    def _repeated(self) -> DesignAxisSpec:
+        if self.repeats and len(self.values or ()) < 2:
+            raise ValueError("repeats: needs a list of two values or more")
+        return self
+
+
+def _is_quantity(value: object) -> bool:
+    return isinstance(value, str) and value[:1].isdigit() and not value.isidentifier() and " " in value
+
+
+LEVELS = 5
+"""Levels of an open value given as a range. Chosen: enough to interpolate linearly between neighbours."""
+
+
+class OpenVariantSpec(VariantSpec):
+    """A named group of overrides; an empty one is the chosen point."""
+
+    scenario: str = Field(
+        "", description="In place of a run's own, whose name is `{scenario}`; relative to this file"
+    )
+
+
+class OpenValueSpec(AxisSpec):
+    """A value that the paper leaves open: an axis on which every run already has its chosen value."""
+
+    variants: dict[str, OpenVariantSpec] = Field(  # type: ignore[assignment]
+        {}, description="Words -> changes that belong together"
+    )
+    times: bool = Field(False, description="Whether the values are factors on what each run has")
+    runs: Patterns = Field(["*"], description="Which runs it may touch; those that set it themselves keep it")
+    because: str = Field(description="Why this range: a source, or `chosen:` and why", min_length=1)
+
+    @model_validator(mode="after")
+    def _complete(self) -> OpenValueSpec:
+        if self.times and (not self.numeric or self.unit is not None):
+            raise ValueError("times: factors are plain numbers")
+        return self
+
+    @property
+    def stepped(self) -> OpenValueSpec:
+        """The axis with discrete levels, for a scan along it."""
+        return (
+            self if self.values or self.variants else self.model_copy(update={"count": self.count or LEVELS})
+        )
+
+    @property
+    def continuous(self) -> OpenValueSpec:
+        """The axis as a continuous range, for a Latin hypercube."""
+        return self.model_copy(update={"count": None})
+
+
+class RegionSpec(StrictModel):
+    """Region over which claims are judged again: along each open value, and over all of them together."""
+
+    points: int = Field(
+        16,
+        ge=10,
+        le=10_000,
+        description="Of a Latin hypercube over all open values; the number that is added at once",
+    )
+    most: int = Field(128, ge=10, le=10_000, description="Points after which a claim stays undecided")
+    seed: int = Field(1, ge=0, description="Of the Latin hypercube")
+    open_values: dict[str, OpenValueSpec] = Field(description="Name -> range", min_length=1)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> RegionSpec:
+        if self.most < self.points:
+            raise ValueError(f"most must be at least points (got {self.most} and {self.points})")
+        return self
+
+    @property
+    def looks(self) -> tuple[int, ...]:
+        """The numbers of points after which the verdict on a claim may be decided."""
+        return (*range(self.points, self.most, self.points), self.most)
+
+
+RUN = "run"
+"""Name of the axis of named runs in figures and tables."""
+DesignPoint = tuple["Level", ...]
+"""One level per axis, in the order of the axes."""
+
+
+@dataclass(frozen=True)
+class Level:
+    """A value of an axis as written in the file, with its label in figures and tables."""
+
+    value: Value
+    words: str
+
+
+def axis_of_levels(target: str, levels: Iterable[Level], **more: Any) -> DesignAxisSpec:
+    """Return an axis over computed levels of a target; `more`: its other fields."""
+    values = {level.value: level.words for level in levels}
+    return DesignAxisSpec.model_construct(vary=[Target.parse(target)], values=values, **more)
+
+
+def levels_of(axis: AxisSpec) -> Sequence[Level]:
+    """Return the levels of an axis with listed values, variants, or a counted range."""
+    if axis.variants:
+        return [Level(words, words) for words in axis.variants]
+    if axis.values is not None:
+        return [Level(value, words) for value, words in axis.values.items()]
+    assert axis.start is not None
+    assert axis.end is not None
+    assert axis.count is not None
+    last = axis.count - 1
+    if axis.spacing == "log":
+        return OnDemand(range(axis.count), partial(_by_factors, axis.start, axis.end, last))
+    first, step = Fraction(repr(axis.start)), (Fraction(repr(axis.end)) - Fraction(repr(axis.start))) / last
+    common = math.lcm(first.denominator, step.denominator)
+    return OnDemand(range(axis.count), partial(_by_steps, int(first * common), int(step * common), common))
+
+
+def _by_factors(start: float, end: float, last: int, number: int) -> Level:
+    if number in (0, last):
+        return _level(float(end if number else start))
+    return _level(start * (end / start) ** (number / last))
+
+
+def _by_steps(first: int, step: int, common: int, number: int) -> Level:
+    """Return a level from numerators over a common denominator, which avoid 0.30000000000000004."""
+    return _level((first + number * step) / common)
+
+
+def grid(levels: Sequence[Sequence[Level]]) -> Sequence[DesignPoint]:
+    """Return all combinations of levels, of which the last varies fastest."""
+    return OnDemand(range(math.prod(map(len, levels))), partial(_in_grid, levels))
+
+
+def _in_grid(levels: Sequence[Sequence[Level]], number: int) -> DesignPoint:
+    point: list[Level] = []
+    for several in reversed(levels):
+        number, place = divmod(number, len(several))
+        point.insert(0, several[place])
+    return tuple(point)
+
+
+def names_of(axis: AxisSpec, level: Level) -> tuple[str, ...]:
+    """Return the texts that name a level in a file: its value, that with the unit of the axis, its label."""
+    value = text_of(level.value)
+    return (value, *([f"{value} {axis.unit}"] if axis.unit else []), level.words)
+
+
+def _level(number: float) -> Level:
+    return Level(number, f"{number:.6g}")
+
+
+def latin_hypercube(
+    axes: Sequence[AxisSpec], runs: int, seed: int, *, most: int = 0
+) -> Sequence[DesignPoint]:
+    """Return a Latin hypercube: on every axis, each of `runs` equal parts of the range holds one point.
+
+    It is extended to `most` points, if these are more. An axis of listed values takes each of them equally
+    often, up to the remainder of the division.
+    """
+    positions = hypercube(len(axes), runs, max(runs, most), seed)
+    return OnDemand(range(len(positions)), partial(_in_hypercube, axes, positions))
+
+
+def _in_hypercube(axes: Sequence[AxisSpec], positions: np.ndarray, number: int) -> DesignPoint:
+    pairs = zip(axes, positions[number], strict=True)
+    return tuple(level_at(axis, float(position)) for axis, position in pairs)
+
+
+def hypercube(axes: int, runs: int, most: int, seed: int) -> np.ndarray:
+    """Return relative positions, 0 to 1, of a Latin hypercube that is extended: an array of (most, axes).
+
+    The first `runs` rows are a Latin hypercube, and so are the first 2, 4, 8 ... times as many: when each
+    part of a range is halved, the new points fill the halves that have none. So no point is ever given up.
+    Source: M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239-245; for the extension
+    C. J. Sallaberry, J. C. Helton, S. C. Hora, Reliability Engineering and System Safety 93 (2008) 1047-1059.
+    """
+    generator = np.random.Generator(np.random.PCG64(seed))
+    draws = [(generator.permutation(runs) + generator.random(runs)) / runs for _ in range(axes)]
+    positions = np.stack(draws, axis=1)
+    while len(positions) < most:
+        parts = 2 * len(positions)
+        free = [np.setdiff1d(np.arange(parts), (column * parts).astype(int)) for column in positions.T]
+        more = [(generator.permutation(halves) + generator.random(len(halves))) / parts for halves in free]
+        positions = np.concatenate([positions, np.stack(more, axis=1)])
+    return positions[:most]
+
+
+def level_at(axis: AxisSpec, position: float) -> Level:
+    """Return the level at a relative position, 0 to 1, along an axis."""
+    if axis.variants or axis.values is not None or axis.count is not None:
+        levels = levels_of(axis)
+        return levels[min(int(position * len(levels)), len(levels) - 1)]
+    assert axis.start is not None
+    assert axis.end is not None
+    if axis.spacing == "log":
+        size = math.exp((1 - position) * math.log(abs(axis.start)) + position * math.log(abs(axis.end)))
+        return _level(math.copysign(size, axis.start))
+    return _level((1 - position) * axis.start + position * axis.end)
+
+
+def changes_at(
+    axis: AxisSpec, level: Level, folder: Path, origin: OverrideOrigin = "sweep"
+) -> list[Override]:
+    """Return the overrides of one level of an axis; file names are relative to `folder`."""
+    if axis.kind == "file":
+        return [Override(axis.vary[0], str(folder / str(level.value)), origin)]
+    if axis.kind == "variant":
+        return changes_of_file(axis.variants[str(level.value)], folder, origin)
+    if axis.kind == "fmu":
+        return overrides.changes_of({axis.vary[0].instance: str(level.value)}, {}, folder, origin)
+    return [overrides.setting(target, _given(axis, level), origin) for target in axis.vary]
+
+
+def _given(axis: AxisSpec, level: Level) -> Value:
+    """Return the value of a level, with the axis's unit if it has one."""
+    if axis.unit:
+        return f"{text_of(level.value)} {axis.unit}"
+    return yaml_lines.scalar(level.value) if isinstance(level.value, str) else level.value
+
+
+def changes_of_file(spec: OverrideSpec, folder: Path, origin: OverrideOrigin) -> list[Override]:
+    """Return the overrides in one part of an experiment file; file names are relative to `folder`."""
+    vehicle = [Override.of(VEHICLE, str(folder / spec.vehicle), origin)] if spec.vehicle else []
+    of_run = overrides.changes_of_run(spec, origin)
+    at = by_location(entry.fault for entry in spec.faults)
+    faults = [
+        Override(Target("faults", variable=str(location)), ones, origin) for location, ones in at.items()
+    ]
+    return vehicle + of_run + overrides.changes_of(spec.swap, spec.set, folder, origin) + faults

@@ -1,0 +1,426 @@
+"""Files of an experiment's result: its table as CSV and Parquet, verdicts, record as JSON, figures.
+
+The table has one row per case, in the order of the design; equal runs give equal bytes. Figures are overlaid
+runs, or metrics, limits and grids over axes (`axis_figures`).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import textwrap
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from yawbench.figures.plots import draw
+from yawbench.figures.style import ROW, LabelledRun, frame, literal, new_figure, save
+from yawbench.foundation.cache import changed_since, warn_of_record, with_checksums
+from yawbench.foundation.errors import ResultsError
+from yawbench.foundation.messages import counted
+from yawbench.foundation.safe_files import read_bytes, reason, write_whole
+from yawbench.metrics.expressions import MetricValue, metric
+from yawbench.metrics.measures import si
+from yawbench.orchestrator.results.reader import Results
+from yawbench.orchestrator.results.run_folder import LARGEST
+from yawbench.orchestrator.scenario.overrides import changed
+
+from .axis_figures import FAILED, Drawing
+from .claim_schema import si_number, text_of
+from .claims import ClaimResult, Region
+from .experiment import FIGURES
+from .experiment_result import Each, ExperimentResult, limits_of
+from .result_tables import heading, verdict
+from .schema import FigureSpec
+from .tables import Table, column, to_csv
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+TABLE = "table.csv", "table.parquet"
+VERDICTS = "verdicts.csv"
+
+
+def columns_of(findings: ExperimentResult) -> Table:
+    """Return the columns of the table: run, axes, status, reason, warnings, metrics, key."""
+    cases, spec, planned = findings.experiment.cases, findings.spec, findings.planned
+    records = findings.records
+    if spec.runs:
+        columns = [column("run", "string", [case.run.name for case in cases], {"description": "its name"})]
+    else:
+        numbers = [case.number + 1 for case in cases]
+        columns = [column("run", "int64", numbers, {"description": "number of the run, from 1"})]
+    for i, (name, axis) in enumerate(spec.axes.items()):
+        varied = ", ".join(map(str, axis.targets))
+        about = {"description": axis.says or varied, "varies": varied}
+        if axis.numeric and planned:
+            levels = [planned.number(name, case.point[i]) for case in cases]
+            columns.append(column(name, "float64", levels, about | {"unit": planned.units[name]}))
+        else:
+            columns.append(column(name, "string", [case.point[i].words for case in cases], about))
+    codes = {"description": "codes of the warnings about the run, see docs/diagnostics.md"}
+    columns += [
+        column("status", "string", [record.status for record in records]),
+        column("reason", "string", [record.reason for record in records]),
+        column("warnings", "string", [", ".join(record.warning_codes) or None for record in records], codes),
+    ]
+    for key, metric_spec in spec.metrics.items():
+        chosen, unit = metric(metric_spec.metric), findings.unit(key)
+        about = {
+            "metric": chosen.name,
+            "description": f"{chosen.definition}{metric_spec.during()}",
+            "unit": si(unit),
+        }
+        values = [findings.value(case, key) for case in cases]
+        columns.append(column(key, "float64", [value.number if value else None for value in values], about))
+    keys = planned.keys if planned else [None] * len(cases)
+    return Table.of_columns([*columns, column("key", "string", keys)])
+
+
+def verdict_columns(findings: ExperimentResult) -> Table:
+    """Return columns with verdict, margin and region, a row per claim and check."""
+    every = findings.judgements
+    regions = [result.region for result in every]
+    bounds = [region.flip_bounds if region else None for region in regions]
+    flips = [region.flip if region else None for region in regions]
+    return Table.of_columns(
+        [
+            column("group", "string", [result.group for result in every]),
+            column("says", "string", [result.claim.says for result in every]),
+            column("verdict", "string", [verdict(result) for result in every]),
+            column("margin", "float64", [result.verdict.margin for result in every], {"unit": "1"}),
+            column("spread", "float64", [at.spread if at else None for at in regions], {"unit": "1"}),
+            column("points", "int64", [len(region.points) if region else None for region in regions]),
+            column("holds at", "int64", [region.holding if region else None for region in regions]),
+            column("flips", "int64", [region.flipping if region else None for region in regions]),
+            column(
+                "share from", "float64", [bound.low if bound else None for bound in bounds], {"unit": "1"}
+            ),
+            column("share to", "float64", [bound.high if bound else None for bound in bounds], {"unit": "1"}),
+            column("without result", "int64", [at.without_result if at else None for at in regions]),
+            column("flips by", "string", [flip.open_value if flip else None for flip in flips]),
+            column("flips at", "string", [flip.words if flip else None for flip in flips]),
+            column("chosen", "string", [(flip.chosen or None) if flip else None for flip in flips]),
+            column("robust", "string", [text_of(region.robust) if region else None for region in regions]),
+        ]
+    )
+
+
+def write_table(findings: ExperimentResult, out: Path) -> None:
+    """Write table and verdicts as CSV, and the table as Parquet with units in the fields' metadata.
+
+    Raises:
+        ResultsError: a file cannot be written.
+    """
+    table = columns_of(findings)
+    contents: dict[str, str | bytes] = {TABLE[0]: to_csv(table), TABLE[1]: _parquet(findings, table)}
+    if findings.spec.claims or findings.spec.checks:
+        contents[VERDICTS] = to_csv(verdict_columns(findings))
+    for name, content in contents.items():
+        try:
+            write_whole(out / name, content)
+        except OSError as error:  # noqa: PERF203 - two files
+            raise ResultsError(
+                f"{out / name}: cannot be written: {reason(error)}.", code="results-unwritable"
+            ) from None
+
+
+def _parquet(findings: ExperimentResult, table: Table) -> bytes:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    kinds = [getattr(pa, table.kind(k))() for k in range(len(table.columns))]
+    fields = [
+        pa.field(column.heading, kind, metadata=column.about or None)
+        for column, kind in zip(table.columns, kinds, strict=True)
+    ]
+    schema = pa.schema(fields, metadata={"experiment": _encodable(_description(findings))})
+    arrays = [_arrow_column(table.values(k), table.kind(k)) for k in range(len(table.columns))]
+    content = pa.BufferOutputStream()
+    pq.write_table(pa.Table.from_arrays(arrays, schema=schema), content, compression="zstd")
+    written: bytes = content.getvalue().to_pybytes()
+    return written
+
+
+def _arrow_column(values: Sequence[Any], kind: str) -> pa.Array:
+    """Return a column of a table for Arrow, without `pyarrow.array`, which imports pandas first."""
+    import pyarrow as pa
+
+    present = np.array([value is not None for value in values], bool)
+    if kind == "string":
+        texts = [b"" if value is None else _encodable(value).encode() for value in values]
+        ends = np.cumsum([0, *map(len, texts)]).astype(np.int32)
+        memory = [pa.py_buffer(ends), pa.py_buffer(b"".join(texts))]
+    else:
+        memory = [pa.py_buffer(np.array([0 if value is None else value for value in values], kind))]
+    validity = None if present.all() else pa.py_buffer(np.packbits(present, bitorder="little"))
+    return pa.Array.from_buffers(getattr(pa, kind)(), len(values), [validity, *memory])
+
+
+def _encodable(value: Any) -> Any:
+    """Return a value; in text, lone surrogates are escaped, as by `write_whole`."""
+    return value.encode("utf-8", "backslashreplace").decode() if isinstance(value, str) else value
+
+
+def _description(findings: ExperimentResult) -> str:
+    """Describe the experiment as JSON: the content of its file, its FMUs with their SHA-256."""
+    content = findings.spec.model_dump(by_alias=True, exclude_defaults=True)
+    about = {"experiment": content, "fmus": dict(findings.fmus)}
+    return json.dumps(about, ensure_ascii=False, default=str)
+
+
+RECORD = "experiment.json"
+
+
+def write_findings(findings: ExperimentResult, drawn: dict[str, str], out: Path) -> None:
+    """Write tables and record into a folder; `drawn`: name -> title of its figures.
+
+    Raises:
+        ResultsError: a file cannot be written.
+    """
+    write_table(findings, out)
+    _warn_if_edited(out / RECORD)
+    content = with_checksums(record_of(findings, drawn))
+    write_whole(out / RECORD, json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def _warn_if_edited(file: Path) -> None:
+    """Warn if a record that is about to be overwritten was edited since it was written."""
+    try:
+        content = json.loads(read_bytes(file, largest=LARGEST))
+        words = changed_since(content) if isinstance(content, dict) else "it is not a record"
+    except FileNotFoundError:
+        return
+    except (OSError, ValueError, RecursionError):
+        words = "it cannot be read"
+    if words:
+        warn_of_record(f"{file}: {words} since it was written; it is written anew from the runs")
+
+
+def record_of(findings: ExperimentResult, drawn: Mapping[str, str] | None = None) -> dict[str, Any]:
+    """Return the record of an experiment as JSON-ready data; `drawn`: name -> title of its figures."""
+    spec, settings = findings.spec, findings.experiment.settings
+    alone = not spec.axes or (len(settings) == 1 and bool(spec.runs))  # else see the table
+    return {
+        "title": spec.title,
+        "source": spec.source,
+        "file": str(findings.experiment.path),
+        "runs": {
+            run.name: {
+                "label": run.label,
+                "scenario": str(run.scenario),
+                "changes": [change.record for change in run.changes],
+                "status": findings.record(findings.cases_of(run, settings[0])[0]).status if alone else None,
+                "failed": (findings.failure(run, settings[0]) or None) if alone else None,
+                "fmus": _hashes(findings.results.get(run.name)),
+                "metrics": {
+                    key: _value(findings.values[run.name, key])
+                    for key in spec.metrics
+                    if alone and (run.name, key) in findings.values
+                },
+            }
+            for run in findings.experiment.runs.values()
+        },
+        "metrics": {
+            key: {
+                "metric": item.metric,
+                "heading": heading(item),
+                "formula": metric(item.metric).formula,
+                "definition": metric(item.metric).definition,
+                "window": item.window,
+            }
+            for key, item in spec.metrics.items()
+        },
+        "derived": {
+            key: {
+                "says": number.says,
+                "expression": number.expression,
+                "of": {word: [source.run, source.metric] for word, source in number.of.items()},
+                "rank_correlation": number.rank_correlation,
+                "published": None if number.published is None else si_number(number.published, number.unit),
+                **(_value(findings.derived[key]) if key in findings.derived else {"value": None}),
+            }
+            for key, number in spec.derived.items()
+        },
+        "claims": [_judgement(result) for result in findings.claims],
+        "checks": [_judgement(result) for result in findings.checks],
+        "validations": [validation.as_data() for validation in findings.validations],
+        "limits": {
+            key: [
+                {
+                    "at": {axis: level.value for axis, level in reached.others.items()},
+                    "up_to": reached.largest,
+                    "not_at": None if reached.missing else reached.beyond,
+                    **reached.verdict.as_data(),
+                }
+                for reached in limits_of(findings, limit)
+            ]
+            for key, limit in spec.limits.items()
+        },
+        "figures": dict(drawn or {}),
+    }
+
+
+def _hashes(results: Results | None) -> dict[str, str]:
+    fmus = results.record.fmus.values() if results else ()
+    return {fmu.name: fmu.sha256 for fmu in fmus if fmu.name and fmu.sha256}
+
+
+def _value(value: MetricValue) -> dict[str, Any]:
+    number = value.number if math.isfinite(value.number) else "inf"
+    half = {"half": value.half} if value.half and not value.between else {}
+    between = {"between": [*map(_finite, value.between)]} if value.between else {}
+    return {"value": number, "unit": value.unit, **half, **between}
+
+
+def _judgement(result: ClaimResult) -> dict[str, Any]:
+    deciding = result.verdict.as_data()
+    return {
+        "says": result.claim.says,
+        "source": result.claim.source,
+        "holds_if": [str(condition) for condition in result.claim.holds_if],
+        "measured": list(result.measured),
+        "holds": result.verdict.holds,
+        "verdict": verdict(result),
+        **{key: deciding[key] for key in ("value", "relation", "bound", "unit", "margin")},
+        "region": result.region and _region(result.region),
+        "note": result.claim.note,
+    }
+
+
+def _region(region: Region) -> dict[str, Any]:
+    """Return the verdicts over a region; numbers of open values are in SI units, or factors."""
+    flip = region.flip
+    return {
+        "points": len(region.points),
+        "holds_at": region.holding,
+        "without_result": region.without_result,
+        "spread": _finite(region.spread),
+        "flipping": region.flipping,
+        "flip_bounds": [*region.flip_bounds],
+        "robust": region.robust,
+        "flip": flip and {"open_value": flip.open_value, "at": flip.number, "words": flip.words,
+                          "chosen": flip.chosen or None},
+        "margins": [_finite(point.margin) for point in region.points],
+        "open_values": {
+            line.open_value: {
+                "chosen": line.chosen.number,
+                "levels": [
+                    {"at": level.words if level.number is None else level.number,
+                     "holds": level.verdict.holds, "margin": _finite(level.verdict.margin)}
+                    for level in line.levels
+                ],
+                "flip": line.flip and (line.flip.words if line.flip.number is None else line.flip.number),
+            }
+            for line in region.lines
+        },
+    }  # fmt: skip
+
+
+def _finite(number: float | None) -> float | str | None:
+    return number if number is None or math.isfinite(number) else str(number)
+
+
+PANELS_IN_A_ROW = 3
+
+
+def draw_all(findings: ExperimentResult, out: Path, each: Each = map) -> tuple[dict[str, str], list[str]]:
+    """Draw all figures as SVG and PNG below `out`; return name -> title, and problems.
+
+    Args:
+        findings: result of the experiment.
+        out: results folder of the experiment.
+        each: `map`, or a parallel equivalent.
+    """
+    wanted: list[tuple[Any, FigureSpec, str, Path]] = []
+    light = findings.light()
+    for spec in findings.spec.figures:
+        shown = runs_of(findings, spec) if spec.what.shows == "runs" else light
+        wanted.append((shown, spec, title_of(findings, spec), out / FIGURES / spec.name))
+    drawn, problems = {}, []
+    for (_, spec, title, _), problem in zip(wanted, each(_draw, wanted), strict=True):
+        if problem:
+            problems.append(f"figure {spec.name}: {problem}")
+        else:
+            drawn[spec.name] = title
+    return drawn, problems
+
+
+def title_of(findings: ExperimentResult, spec: FigureSpec) -> str:
+    """Return the title of a figure."""
+    return spec.title or f"{findings.spec.title}: {spec.name}"
+
+
+def runs_of(findings: ExperimentResult, spec: FigureSpec) -> list[LabelledRun]:
+    """Return the runs of an overlay, without those that have no results."""
+    named = findings.experiment.matching(spec.runs)
+    return [
+        LabelledRun(run.label, findings.results[run.name]) for run in named if run.name in findings.results
+    ]
+
+
+def _draw(wanted: tuple[Any, FigureSpec, str, Path]) -> str | None:
+    shown, spec, title, stem = wanted
+    if not shown:
+        return "none of its runs has results"
+    try:
+        overlay = spec.what.shows == "runs"
+        save(draw(shown, spec.panels, title=title) if overlay else draw_over_axes(shown, spec), stem)
+    except ResultsError as error:
+        return str(error)
+    return None
+
+
+def draw_over_axes(findings: ExperimentResult, spec: FigureSpec) -> Figure:
+    """Draw a figure over axes.
+
+    Raises:
+        ResultsError: there is nothing to draw.
+    """
+    drawing: Drawing = resolve_name(f"{__package__}.{spec.what.drawing}")(findings, spec)
+    panels = drawing.panels()
+    columns = min(len(panels), PANELS_IN_A_ROW)
+    rows = math.ceil(len(panels) / columns)
+    height = rows * (1.7 if columns == 1 else 1.4) * ROW
+    with new_figure() as figure:
+        grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
+        drawn = list(grid.flat[: len(panels)])
+        for axes in grid.flat[len(panels) :]:
+            axes.remove()
+        for k, (axes, (heading, runs)) in enumerate(zip(drawn, panels, strict=True)):
+            drawing.fill(axes, runs)
+            axes.set_title(literal(heading))
+            if k + columns >= len(drawn):  # the lowest panel of its column
+                axes.set_xlabel(literal(drawing.label(spec.x)) if spec.x else "")
+                axes.tick_params(labelbottom=True)
+            if k % columns == 0:
+                axes.set_ylabel(literal("\n".join(textwrap.wrap(drawing.upwards, 34))))
+        drawing.finish(figure, drawn)
+        options = changed(findings.experiment.by_options)
+        frame(figure, height, _legend(drawn), spec.title or drawing.what, _provenance(findings), options)
+    return figure
+
+
+def _legend(drawn: Sequence[Axes]) -> list[Artist]:
+    """Return one handle per label over all panels, with that of failed runs last."""
+    by_label: dict[str, Artist] = {}
+    for axes in drawn:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            by_label.setdefault(label, handle)
+    return sorted(by_label.values(), key=lambda handle: handle.get_label() == FAILED["label"])
+
+
+def _provenance(findings: ExperimentResult) -> str:
+    spec = findings.spec
+    fmus = [f"{name} {digest[:8]}" for name, digest in findings.fmus]
+    scenarios = dict.fromkeys(run.scenario.name for run in findings.experiment.runs.values())
+    made = len(findings.records) - findings.not_made
+    parts = [f"{counted(made, 'run')} of {', '.join(scenarios)}", f"FMUs: {', '.join(fmus)}"]
+    parts += [f"changed in all runs: {words}"] if (words := changed(findings.experiment.changed)) else []
+    return " · ".join([spec.source, *parts] if spec.source else parts)

@@ -1,0 +1,450 @@
+"""Schema of experiment files: studies, sweeps and tunings, with metrics, claims and figures.
+
+An experiment is a list of runs (a study, for example of a paper), or one scenario varied along axes (a
+sweep), or both. A run entry with `for` becomes one run per combination of its values; `{name}` in its texts
+is replaced by the value.
+
+    title: What a paper says
+    runs:
+      - for: {speed: [15, 25], controller: {off: no control, fnn: neural network}}
+        name: "{speed}mps/{controller}"
+        label: "{controller}"              # legends and tables show the words: "no control"
+        row: "{speed} m/s, {controller}"
+        scenario: "{speed}mps.yaml"        # relative to this file
+        swap: {controller: "controller_{controller}"}
+    metrics:
+      error: {metric: relative_peak_error(sideslip), window: [1, 6]}
+    claims:
+      - says: Without control the error exceeds 100 %.
+        source: section 3.1
+        holds_if:
+          - {run: 15mps/off, metric: error, above: 100 %}
+          - {run: 15mps/fnn, metric: error, below: {run: 15mps/off, metric: error, times: 0.5}}
+    figures:
+      - {name: overlay, runs: ["15mps/*"], panels: [sideslip, path]}
+
+Grids show one metric of many runs in rows and columns, next to the paper's numbers; `derived` are
+numbers computed from several runs, which claims may refer to (`{derived: gain, at_least: 50 %}`).
+
+    grids:
+      shares:
+        title: Mean error, rows front share left, columns front share right
+        metric: error
+        run: "shares/{left}_{right}"
+        rows: {left: [0, 0.5]}
+        columns: {right: [0, 0.5]}
+        published: [[0.3966, 0.1576], [0.1312, 0.0069]]
+    derived:
+      order: {says: Rank correlation with table 3, rank_correlation: shares}
+      gain:
+        says: Share of the error that learning removes
+        expression: (frozen - learning) / frozen
+        of: {frozen: {run: frozen, metric: error}, learning: {run: learning, metric: error}}
+        unit: "%"
+        published: 30 %                    # by the paper, in SI units or with a unit
+
+A value of a run's `for` may come with overrides, including faults; claims, checks and derived numbers may
+have a `for`, too. A grid of derived numbers with `holds` shows down to which row the claims about each
+column's cells hold.
+
+    runs:
+      - for:
+          fault:
+            none: nothing is wrong
+            frozen: {says: gyro frozen, faults: [{on: sensor.yaw_rate, kind: freeze, from: 1}]}
+        name: "{fault}"
+        scenario: measured.yaml
+    checks:
+      - says: The car is held with its {fault}.
+        for: {fault: {frozen: gyro frozen}}
+        holds_if: [{run: "{fault}", metric: sideslip, at_most: 5 deg}]
+
+A validation compares a run with measurements of the car (`docs/measured_cars.md`).
+
+    validations:
+      - {run: ramp, measured: measured.yaml, bands: steady_state}
+
+A verdict at one point may flip nearby. A region names the values that the paper leaves open, each with a
+range; claims are judged again along each of them, and at the points of a Latin hypercube over all together.
+
+    region:
+      points: 16
+      seed: 1
+      open_values:
+        amplitude: {vary: driver.amplitude, times: true, from: 0.8, to: 1.2, says: steering amplitude,
+                    because: "chosen: the figure can be read to a fifth"}
+        tyre: {vary: tyre, values: [tyre_dugoff, tyre_magic_formula], because: "the paper names neither"}
+        actuators: {variants: {none: {}, slow: {scenario: "{scenario}_slow.yaml"}}, because: "none is named"}
+
+An open value applies to the runs that have its target and do not override it themselves; with `times` it is a
+factor on each run's value. A variant may replace a run's scenario. A claim depends on all open values that
+apply to its runs, or on those listed in its `open_values`. Checks are judged over the region if the runs for
+the claims suffice. Margin, share, flip and the verdicts are defined in
+`docs/regions.md`.
+
+With axes, a limit is how far one of them may go; curves and maps show a metric over one or two of them.
+
+    title: How fast may the car enter the manoeuvre?
+    scenario: 25mps.yaml
+    set: {driver.amplitude: 0.05}          # for all runs; swap, stop_time, ... likewise
+    design: grid                           # every combination; list: first with first, second with
+    axes:                                  #   second; latin_hypercube: needs `points`, `seed`
+      friction: {vary: inputs.friction*, from: 0.1, to: 1.0, count: 10}
+      speed: {vary: plant.initial_speed, from: 36, to: 144, count: 10, unit: km/h, says: Entry speed}
+      control: {vary: controller, values: {controller_off: no control, controller_fnn: neural network}}
+      car: {vary: vehicle, values: [../vehicles/small.yaml, ../vehicles/large.yaml]}
+    metrics:
+      sideslip: {metric: peak(sideslip)}
+    limits:
+      stable: {says: Largest stable entry speed, of: speed, holds_if: [{metric: sideslip, at_most: 10 deg}]}
+    figures:
+      - {name: stable, kind: limit, limit: stable, x: friction, lines: control, panels: car}
+
+    keep: limits                           # or all, none: the runs whose results are kept
+
+Targets are written as on the command line: `instance.parameter`, `vehicle.parameter` and `inputs.pattern`
+take values, as do `stop_time`, `step_size` and `algorithm`; an instance alone takes FMUs
+(`fmu:parameter=value` also sets parameters), `vehicle` takes vehicle files, `tyres` (`tyres.front`,
+`tyres.rear`) tyre property files. Several targets may share an axis. Instead of `vary` and `values`,
+`variants` override several targets at once:
+
+    control:
+      variants:
+        no control: {swap: {controller: controller_off}}
+        with slip control: {swap: {wheel_control: wheel_control_slip}, set: {driver.amplitude: 0.04}}
+
+An axis of seeds with `repeats` gives every number as the mean over it, with a confidence interval
+(`confidence.interval`); a verdict whose bound lies inside is undecided. `runs` names the runs it applies to.
+
+    axes:
+      seed: {vary: sensor.seed, values: [1, 2, 3, 4, 5], runs: ["*/noisy"], repeats: true}
+
+A tuning searches ranges of parameters for several laws, by one objective and one budget: `yawbench tune`.
+
+    tuning:
+      objective: cost                      # a derived number, to be minimized
+      population: 8                        # trials of a generation
+      generations: 8
+      seed: 1
+      runs: ["*/tuned"]                    # those with the laws; default: all
+      laws:
+        PD:
+          swap: {controller: controller_pid}
+          axes:
+            gain: {vary: controller.sideslip_proportional_gain, from: 1e4, to: 1e6, spacing: log}
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, ConfigDict, Field, model_validator
+
+from yawbench.figures.plots import OVERVIEW
+from yawbench.foundation.messages import listed
+from yawbench.orchestrator.scenario.schema import Scalar
+from yawbench.orchestrator.scenario.schema_validation import OneOf, StrictModel, exactly_one
+from yawbench.orchestrator.scenario.yaml_lines import KeyPath
+
+from .axes import MOST, AxisSpec, DesignAxisSpec, OverrideSpec, RegionSpec
+from .claim_schema import (
+    Alternatives,
+    Assertion,
+    Claim,
+    Condition,
+    DerivedSpec,
+    GridSpec,
+    LimitSpec,
+    MetricSpec,
+    Patterns,
+    QuantityText,
+    ValidationSpec,
+    alternatives,
+)
+
+
+class ChoiceSpec(OverrideSpec):
+    """A value of a run's `for`, with its overrides."""
+
+    says: str = Field("", description="Label in texts; default: the value")
+
+
+def _choices(value: object) -> Any:
+    """Normalize the values of a run's `for`: a label alone becomes `{says: label}`."""
+    if isinstance(value, dict) and any(isinstance(entry, dict) for entry in value.values()):
+        return {str(k): {"says": entry} if isinstance(entry, str) else entry for k, entry in value.items()}
+    return {k: {"says": words} for k, words in alternatives(value).items()}
+
+
+Choices = Annotated[
+    dict[str, ChoiceSpec],
+    BeforeValidator(_choices, json_schema_input_type=Alternatives | dict[str, str | ChoiceSpec]),
+]
+
+
+class RunSpec(OverrideSpec):
+    """A run, or with `for` one run per combination of its values."""
+
+    name: str = Field(description="Name of the run and of its folder, e.g. 25mps/fnn", min_length=1)
+    scenario: str = Field(description="Scenario file, relative to this file", min_length=1)
+    for_each: dict[str, Choices] = Field(
+        {}, alias="for", description="Key -> values: a list, or each with its label, or with its overrides"
+    )
+    label: str = Field("", description="Label in legends; default: the name")
+    row: str = Field("", description="Label in tables; default: the label")
+
+
+class LawSpec(OverrideSpec):
+    """A law to be tuned: its ranges and its overrides."""
+
+    axes: dict[str, AxisSpec] = Field(description="Name -> parameter to tune, from and to", min_length=1)
+
+    @model_validator(mode="after")
+    def _ranges(self) -> LawSpec:
+        for name, axis in self.axes.items():
+            if axis.start is None or axis.count is not None:
+                raise ValueError(f"axes.{name}: needs from and to, and no count")
+        return self
+
+
+class TuningSpec(StrictModel):
+    """A search for parameters that minimize an objective, with the same budget for all laws."""
+
+    objective: str = Field(description="Key of `derived` to minimize")
+    population: int = Field(description="Trials of a generation", ge=5)
+    generations: int = Field(description="With the first", ge=1)
+    seed: int = Field(description="Of the random numbers", ge=0)
+    runs: Patterns = Field(["*"], description="Runs with the tuned laws; others are unchanged")
+    laws: dict[str, LawSpec] = Field(description="Label -> what is tuned", min_length=1)
+    entries: str = Field(
+        "", description="Unit that every law swaps; its tuned parameters are written as entries of a ranking"
+    )
+
+    @model_validator(mode="after")
+    def _of_one_unit(self) -> TuningSpec:
+        for name, law in self.laws.items() if self.entries else ():
+            sought = [target for axis in law.axes.values() for target in axis.vary]
+            other = [target for target in (*law.targets, *sought) if target.instance != self.entries]
+            if self.entries not in law.swap or other:
+                why = f"also changes {other[0]}" if other else "names no FMU for it"
+                raise ValueError(f"entries: an entry is one FMU and its parameters; {name!r} {why}")
+        return self
+
+
+class TableSpec(StrictModel):
+    """A table of metrics, one row per run."""
+
+    title: str = ""
+    runs: Patterns
+    metrics: list[str] = Field(description="Keys of `metrics`, one column each", min_length=1)
+
+
+@dataclass(frozen=True)
+class FigureKind:
+    """A kind of figure: the key that it shows, and its drawing function."""
+
+    shows: Literal["runs", "metric", "limit", "grid"]  # the key that it needs
+    drawing: str = ""  # "module:class" in this package, an `axis_figures.Drawing`; "": runs are overlaid
+    upwards: bool = False  # whether a second axis points upwards (y), in place of lines
+
+    @property
+    def over_axes(self) -> bool:
+        """Whether it is drawn over axes of the experiment."""
+        return self.shows in ("metric", "limit")
+
+
+FIGURE_KINDS = {
+    "overlay": FigureKind("runs"),
+    "curve": FigureKind("metric", "axis_figures:CurveDrawing"),
+    "map": FigureKind("metric", "axis_figures:MapDrawing", upwards=True),
+    "limit": FigureKind("limit", "axis_figures:LimitDrawing"),
+    "grid": FigureKind("grid", "axis_figures:GridDrawing"),
+}
+"""Name -> kind of figure."""
+
+
+Chosen = Annotated[
+    list[Scalar],
+    BeforeValidator(
+        lambda value: value if isinstance(value, list) else [value],
+        json_schema_input_type=list[Scalar] | Scalar,
+    ),
+]
+
+
+class FigureSpec(StrictModel):
+    """A figure: overlaid runs, a metric or a limit over one or two axes, or a grid."""
+
+    name: str = Field(description="Name of its files", pattern=r"^[\w.+-]+$")
+    title: str = ""
+    kind: Annotated[str, OneOf(FIGURE_KINDS)] = Field("overlay", description=listed(FIGURE_KINDS, last="or"))
+    runs: list[str] = Field([], description="Of an overlay: names of runs, with `*` and `?` for many")
+    panels: list[str] | str = Field(
+        list(OVERVIEW),
+        description="Of an overlay, in order: a signal, its error (`x_error`), one over another (`y(x)`) or "
+        "`path`; of others: axis with a panel per value",
+    )
+    metric: str = Field("", description="Key of `metrics`, for curves and maps")
+    limit: str = Field("", description="Key of `limits`, for a limit")
+    grid: str = Field(
+        "", description="Key of `grids`, for a line (with `holds`) or markers per column over the rows"
+    )
+    x: str = Field("", description="Horizontal axis")
+    y: str = Field("", description="Vertical axis, of a map")
+    lines: str = Field("", description="Axis with a line per value, of curves and limits")
+    only: dict[str, Chosen] = Field({}, description="Axis -> that of its values, or those, which are drawn")
+    scale: Literal["linear", "log"] = Field("linear", description="Of the metric")
+    largest: QuantityText | None = Field(None, description="Upper end of the metric's scale")
+    mark: QuantityText | None = Field(None, description="A value of the metric to draw a line at")
+
+    @property
+    def what(self) -> FigureKind:
+        """The kind."""
+        return FIGURE_KINDS[self.kind]
+
+    @property
+    def panel_axis(self) -> str:
+        """The axis with one panel per value; "" if there is none."""
+        return self.panels if isinstance(self.panels, str) else ""
+
+    @property
+    def axes(self) -> dict[str, str]:
+        """Key -> axis, of the axes used."""
+        axes = {"x": self.x, "y": self.y, "lines": self.lines, "panels": self.panel_axis}
+        return {key: axis for key, axis in axes.items() if axis}
+
+    @model_validator(mode="after")
+    def _complete(self) -> FigureSpec:
+        shows, upwards = self.what.shows, self.what.upwards
+        if shows == "runs":
+            extra = self.model_fields_set - {"name", "title", "kind", "runs", "panels"}
+            if not self.runs or not isinstance(self.panels, list) or not self.panels or extra:
+                also = f", no {min(extra)}" if extra else ""
+                raise ValueError(f"an overlay needs runs and a list of panels{also}; else give its kind")
+            return self
+        if shows == "grid":
+            extra = self.model_fields_set - {"name", "title", "kind", "grid", "scale", "largest", "mark"}
+            if not self.grid or extra:
+                raise ValueError(f"a grid needs grid{f' and no {min(extra)}' if extra else ''}")
+            return self
+        if self.runs or ("panels" in self.model_fields_set and not self.panel_axis):
+            raise ValueError(f"a {self.kind} has no runs; its panels are those of one axis")
+        other = "metric" if shows == "limit" else "limit"
+        if not getattr(self, shows) or getattr(self, other) or self.grid:
+            raise ValueError(f"a {self.kind} needs {shows} and no {'grid' if self.grid else other}")
+        if not self.x:
+            raise ValueError(f"a {self.kind} needs x")
+        if upwards != bool(self.y):
+            raise ValueError(f"a {self.kind} {'needs' if upwards else 'has no'} y")
+        if upwards and self.lines:
+            raise ValueError(f"a {self.kind} has no lines; use panels")
+        if len(set(self.axes.values())) < len(self.axes):
+            raise ValueError("x, y, lines and panels must be different axes")
+        if self.mark is not None and shows == "limit":
+            raise ValueError(f"a {self.kind} has no mark")
+        return self
+
+
+def _list_of_runs(value: object) -> Any:
+    if isinstance(value, int):  # former syntax of Latin hypercubes
+        raise ValueError(f"is a list of runs; a latin_hypercube has points: {value}")
+    return value
+
+
+class ExperimentSpec(OverrideSpec):
+    """An experiment file: a study, a sweep or a tuning."""
+
+    model_config = ConfigDict(json_schema_extra=exactly_one("scenario", "runs"))
+
+    title: str = Field(min_length=1)
+    source: str = Field(
+        "", description="The paper, with all that is needed to find it, or whose question it is"
+    )
+    scenario: str = Field("", description="Scenario of the only run, relative to this file")
+    runs: Annotated[list[RunSpec], BeforeValidator(_list_of_runs)] = Field(
+        [], description="In place of a scenario"
+    )
+    axes: dict[str, DesignAxisSpec] = Field({}, description="Name -> what varies")
+    design: Literal["grid", "list", "latin_hypercube"] = Field("grid", description="Which points of the axes")
+    points: int | None = Field(None, ge=1, description="Of a Latin hypercube")
+    seed: int | None = Field(None, ge=0, description="Of a Latin hypercube")
+    metrics: dict[str, MetricSpec] = {}
+    tables: list[TableSpec] = []
+    grids: dict[str, GridSpec] = {}
+    derived: dict[str, DerivedSpec] = {}
+    claims: list[Claim] = Field([], description="Claims of the paper")
+    checks: list[Claim] = Field([], description="Checks of this project on its results")
+    region: RegionSpec | None = Field(None, description="Open values over which claims are judged again")
+    validations: list[ValidationSpec] = Field([], description="Runs to be compared with measured cars")
+    limits: dict[str, LimitSpec] = {}
+    figures: list[FigureSpec] = []
+    keep: Literal["limits", "all", "none"] = Field(
+        "limits",
+        description="Runs along axes whose results are kept, for the page to show: `limits` are the last run "
+        "within each limit, the first beyond it, and those that failed",
+    )
+    tuning: TuningSpec | None = Field(None, description="What `yawbench tune` tunes")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> ExperimentSpec:
+        if bool(self.scenario) == bool(self.runs):
+            raise ValueError("needs either a scenario or runs")
+        if self.scenario and not self.axes and not self.tuning:
+            raise ValueError("a single run needs axes")
+        if self.validations and self.axes:
+            raise ValueError("validations: of named runs, not of runs along axes")
+        if self.region and self.axes:
+            raise ValueError("region: runs along axes have none; it is for named runs at one point")
+        if self.tuning and (self.axes or self.region):
+            raise ValueError("tuning has axes of its own, law by law, and no region")
+        if self.design == "latin_hypercube":
+            if self.points is None or self.seed is None:
+                raise ValueError("a latin_hypercube needs points and seed")
+        elif self.points is not None or self.seed is not None:
+            raise ValueError(f"points and seed belong to a latin_hypercube; the design is {self.design}")
+        else:
+            self._check_lengths()
+        if self.repeats and self.design != "grid":
+            raise ValueError(f"axes.{self.repeats[0]}: repeats need a grid")
+        number = self.number_of_points() * max(1, len(self.runs))
+        if number > MOST:
+            raise ValueError(f"{number} runs; at most {MOST} are allowed")
+        return self
+
+    def assertions(self) -> Iterator[tuple[str, int, Claim]]:
+        """Yield every claim and check as (group, index in the file, claim)."""
+        for group, claims in (("claims", self.claims), ("checks", self.checks)):
+            for i, claim in enumerate(claims):
+                yield group, claim.number(i), claim
+
+    def conditions(self) -> Iterator[tuple[KeyPath, Condition]]:
+        """Yield every condition of claims, checks and limits, with its key in the file."""
+        judged: list[tuple[str, str | int, Assertion]] = [*self.assertions()]
+        judged += [("limits", name, limit) for name, limit in self.limits.items()]
+        for group, which, assertion in judged:
+            for k, condition in enumerate(assertion.holds_if):
+                yield (group, which, "holds_if", k), condition
+
+    @property
+    def repeats(self) -> list[str]:
+        """The axes with `repeats`."""
+        return [name for name, axis in self.axes.items() if axis.repeats]
+
+    def number_of_points(self) -> int:
+        """Return the number of points of the design."""
+        if self.design == "latin_hypercube":
+            return self.points or 0
+        lengths = [axis.length or 0 for axis in self.axes.values()]
+        return max(lengths, default=1) if self.design == "list" else math.prod(lengths)
+
+    def _check_lengths(self) -> None:
+        lengths = {name: axis.length for name, axis in self.axes.items()}
+        for name, length in lengths.items():
+            if length is None:
+                raise ValueError(f"axes.{name}: needs count")
+        if self.design == "list" and len(set(lengths.values())) > 1:
+            counted = ", ".join(f"{name} has {n}" for name, n in lengths.items())
+            raise ValueError(f"axes of a list must have the same number of values ({counted})")

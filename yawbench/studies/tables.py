@@ -1,0 +1,615 @@
+"""Tables, shown on the terminal and on pages and written to files; listings of runs, files, FMUs, signals."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from itertools import chain, zip_longest
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from yawbench.figures.style import shown
+from yawbench.fmus.archive import open_fmu, runs_as
+from yawbench.fmus.fmu import Fmu
+from yawbench.foundation.errors import Diagnostic, ModelDescriptionError, ResultsError, ScenarioError, text_of
+from yawbench.foundation.messages import printable, star
+from yawbench.metrics.expressions import (
+    STANDARD,
+    MetricValue,
+    angles_in,
+    columns_for,
+    columns_of,
+    evaluate,
+    evaluate_all,
+    metric,
+    motion_of,
+)
+from yawbench.metrics.measures import catalogue as measures
+from yawbench.metrics.measures import si_of, symbol
+from yawbench.orchestrator.plan import Plan
+from yawbench.orchestrator.recordings.motion import LEAST_SPEED
+from yawbench.orchestrator.results.reader import FoundRun, Results, load_results
+from yawbench.orchestrator.scenario import loader
+from yawbench.orchestrator.scenario.overrides import changed, with_changes
+from yawbench.vocabulary.wheels import WHEELS
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import rich.console
+    import rich.segment
+
+    from yawbench.orchestrator.results.reader import Results
+
+
+MARK = "†"
+"""Mark after the name of a run with plausibility warnings."""
+MIN_HEADING = 12
+"""Characters after which a heading over numbers is wrapped."""
+NAME = 32
+"""Widest text on the terminal that is not broken over lines without need. Chosen: most names."""
+WORDS = 20
+"""Widest text that is not broken at all, and the narrowest column of longer ones. Chosen: all verdicts."""
+GAP = 3
+"""Distance between columns on the terminal."""
+RULE = "─"
+"""The line below headings on the terminal."""
+
+Cell = str | MetricValue | float | None
+"""A table cell: text, a number with its unit or in that of its column, or None if empty."""
+Kind = Literal["int64", "float64", "string"]
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table, without its cells."""
+
+    heading: str
+    kind: Kind | None = None  # of all cells; None: as they are
+    about: dict[str, str] = field(default_factory=dict)  # for programs; `unit`: SI unit of plain numbers
+    number: bool = False  # numbers formatted as text, aligned right
+
+
+class Table:
+    """A table, shown on the terminal and on pages, and written as CSV, Parquet and data frames.
+
+    Args:
+        title: above it.
+        columns: columns, or headings of columns of any cells.
+        rows: a cell per column.
+        notes: below it.
+        numbers: indices of the headings over numbers that are formatted as text.
+    """
+
+    def __init__(
+        self,
+        title: str,
+        columns: Iterable[str | Column],
+        rows: Iterable[Sequence[Cell]] = (),
+        notes: Iterable[str] = (),
+        numbers: Collection[int] = (),
+    ) -> None:
+        self.title = title
+        self.columns = [
+            entry if isinstance(entry, Column) else Column(entry, number=k in numbers)
+            for k, entry in enumerate(columns)
+        ]
+        self.rows = list(rows)
+        self.notes = list(notes)
+
+    @classmethod
+    def of_columns(cls, columns: Iterable[tuple[Column, Sequence[Cell]]]) -> Table:
+        """Return a table of columns with their cells."""
+        listed = list(columns)
+        return cls("", [about for about, _ in listed], zip(*(cells for _, cells in listed), strict=True))
+
+    @property
+    def headings(self) -> list[str]:
+        """The headings of all columns."""
+        return [column.heading for column in self.columns]
+
+    def text(self) -> list[list[str]]:
+        """Return the cells of all rows as text."""
+        units = [column.about.get("unit", "") for column in self.columns]
+        return [[_shown(cell, unit) for cell, unit in zip(row, units, strict=True)] for row in self.rows]
+
+    def is_number(self, column: int) -> bool:
+        """Return whether a column has numbers, and so is aligned right."""
+        return self.columns[column].number or any(
+            isinstance(row[column], (MetricValue, float, int)) for row in self.rows
+        )
+
+    def unit(self, column: int) -> str | None:
+        """Return the SI unit of a column's numbers; None if it has none, or several."""
+        if unit := self.columns[column].about.get("unit"):
+            return unit
+        cells = [row[column] for row in self.rows if row[column] is not None]
+        units = {cell.unit if isinstance(cell, MetricValue) else None for cell in cells}
+        return units.pop() if len(units) == 1 else None
+
+    def values(self, column: int) -> list[str | float | None]:
+        """Return a column for programs: numbers in SI units if all have the same, else text."""
+        cells = [row[column] for row in self.rows]
+        if self.unit(column) is None:
+            return [_shown(cell) if isinstance(cell, MetricValue) else cell for cell in cells]
+        return [cell.number if isinstance(cell, MetricValue) else cell for cell in cells]
+
+    def kind(self, column: int) -> Kind:
+        """Return the kind of a column's values."""
+        known = [value for value in self.values(column) if value is not None]
+        numbers = bool(known) and not any(isinstance(value, str) for value in known)
+        return self.columns[column].kind or ("float64" if numbers else "string")
+
+
+def column(
+    heading: str, kind: Kind, cells: Sequence[Cell], about: dict[str, str] | None = None
+) -> tuple[Column, Sequence[Cell]]:
+    """Return a column of one kind with its cells, for `Table.of_columns`."""
+    return Column(heading, kind, about or {}), cells
+
+
+def _shown(cell: Cell, unit: str = "") -> str:
+    if cell is None:
+        return "-"
+    if isinstance(cell, str):
+        return printable(cell)
+    if isinstance(cell, int):
+        return str(cell)
+    value = cell if isinstance(cell, MetricValue) else MetricValue(cell, unit or "1")
+    return shown(value.number, value.shown_in, half=value.half, between=value.between)
+
+
+def for_terminal(table: Table) -> TerminalTable:
+    """Return the table for a rich console, which lays it out for its width."""
+    return TerminalTable(table)
+
+
+@dataclass(frozen=True)
+class TerminalTable:
+    """A table on a console of any width, on which no word and no number with its unit is cut or broken.
+
+    Long texts are broken between words. If the columns still do not fit beside each other, they follow in
+    several grids, each of which begins with the columns that tell the rows apart. If these are long texts
+    themselves, each row becomes a list of headings and cells. A word longer than a line runs beyond it.
+    """
+
+    table: Table
+
+    def __rich_console__(
+        self, console: rich.console.Console, options: rich.console.ConsoleOptions
+    ) -> Iterator[rich.segment.Segment]:
+        from rich.segment import Segment
+        from rich.style import Style
+
+        width, table = options.max_width, self.table
+        title = _wrapped(printable(table.title), width) if table.title else []
+        notes = [line for note in table.notes for line in _wrapped(printable(note), width)]
+        for line in title:
+            yield Segment(line, Style(bold=True))
+            yield Segment.line()
+        for line in [*[""][: len(title)], *_laid_out(table, width), *[""][: len(notes)], *notes]:
+            yield Segment(line.rstrip().replace(RULE, "-") if options.ascii_only else line.rstrip())
+            yield Segment.line()
+
+
+@dataclass(frozen=True)
+class _Strip:
+    """A column on the terminal: its cells, its narrowest widths, tight and not, and its preferred one."""
+
+    heading: str
+    cells: Sequence[str]
+    number: bool
+    tight: int
+    least: int
+    most: int
+
+    @classmethod
+    def of(cls, heading: str, cells: Sequence[str], *, number: bool, whole: int) -> _Strip:
+        """Return the column of a heading and its cells; a long heading does not widen one of numbers.
+
+        `whole`: the widest text that is not broken even if the room is needed.
+        """
+        lines = [line for cell in cells for line in cell.splitlines()]
+        widest = _widest(lines)
+
+        def narrowest(whole: int) -> int:
+            parts = (([line] if _width(line) <= whole else _words(line)) for line in lines)
+            return max(_widest([*chain.from_iterable(parts), *_words(heading)]), min(widest, whole))
+
+        tight, least = narrowest(whole), narrowest(max(whole, NAME))
+        broken = _wrapped(heading, max(MIN_HEADING, widest)) if number else [heading]
+        return cls(heading, cells, number, tight, least, max(least, widest, _widest(broken)))
+
+    def lines(self, text: str, width: int) -> list[str]:
+        """Return the lines of a cell or of the heading, each as wide as the column."""
+        filled = [(line, " " * (width - _width(line))) for line in _wrapped(text, width)]
+        return [fill + line if self.number else line + fill for line, fill in filled]
+
+
+def _laid_out(table: Table, width: int) -> list[str]:
+    """Return the lines of a table's grids, or of its lists."""
+    cells = [*zip(*table.text(), strict=True)] or [()] * len(table.columns)
+    numbers, half = [*map(table.is_number, range(len(table.columns)))], width // 2
+    strips = [
+        _Strip.of(printable(heading), cells[k], number=number, whole=NAME if number else WORDS if k else half)
+        for k, (heading, number) in enumerate(zip(table.headings, numbers, strict=True))
+    ]
+    if _across(strip.tight for strip in strips) <= width:
+        return _grid(strips, width)
+    counts = range(1, len(strips))
+    count = next((n for n in counts if len({*zip(*cells[:n], strict=True)}) == len(table.rows)), 0)
+    names, others = strips[:count], strips[count:]
+    short = names and _across(strip.tight for strip in names) <= half + 1
+    short = short and _across(strip.most for strip in names) <= width
+    blocks: list[list[_Strip]] = []
+    for strip in others:
+        if not blocks or _across(strip.tight for strip in [*blocks[-1], strip]) > width:
+            blocks.append(names)
+        blocks[-1] = [*blocks[-1], strip]
+    if not short or any(_across(strip.tight for strip in block) > width for block in blocks):
+        return _lists(strips, width)
+    return [line for block in blocks for line in ["", *_grid(block, width)]][1:]
+
+
+def _across(widths: Iterable[int]) -> int:
+    """Return the width of columns beside each other."""
+    listed = [*widths]
+    return 1 + sum(listed) + GAP * (len(listed) - 1)
+
+
+def _grid(strips: Sequence[_Strip], width: int) -> list[str]:
+    """Return the lines of columns beside each other, the widest of them narrowed until they fit."""
+    roomy = _across(strip.least for strip in strips) <= width
+    level = max((strip.most for strip in strips), default=0)
+    while level >= 0:
+        widths = [max(s.least if roomy else s.tight, min(s.most, level)) for s in strips]
+        if _across(widths) <= width:
+            break
+        level -= 1
+
+    def row(texts: Iterable[str], *, bottom: bool = False) -> list[str]:
+        columns = [strip.lines(text, of) for strip, text, of in zip(strips, texts, widths, strict=True)]
+        tallest = max(map(len, columns), default=0)
+        for lines, of in zip(columns, widths, strict=True):
+            missing = [" " * of] * (tallest - len(lines))
+            lines[:] = [*missing, *lines] if bottom else [*lines, *missing]
+        return [" " + (" " * GAP).join(pieces) for pieces in zip(*columns, strict=True)]
+
+    head = row((strip.heading for strip in strips), bottom=True)
+    rows = zip(*(strip.cells for strip in strips), strict=True)
+    return [*head, " " + RULE * (_across(widths) - 1), *(line for cells in rows for line in row(cells))]
+
+
+def _lists(strips: Sequence[_Strip], width: int) -> list[str]:
+    """Return the lines of every row as a list of headings and cells, with an empty line after each."""
+    labels = min(_widest(strip.heading for strip in strips), width // 3)
+    made: list[str] = []
+    for cells in zip(*(strip.cells for strip in strips), strict=True):
+        for strip, cell in zip(strips, cells, strict=True):
+            label, lines = _wrapped(strip.heading, labels), _wrapped(cell, width - labels - GAP - 1)
+            if _widest(label) <= labels and _widest(lines) <= width - labels - GAP - 1:
+                pairs = zip_longest(label, lines, fillvalue="")
+                made += [f" {left}{' ' * (labels - _width(left) + GAP)}{right}" for left, right in pairs]
+            else:
+                made += [f" {line}" for line in _wrapped(strip.heading, width - 1)]
+                made += [f"    {line}" for line in _wrapped(cell, width - 4)]
+        made.append("")
+    return made[:-1]
+
+
+def _wrapped(text: str, width: int) -> list[str]:
+    """Return the lines of a text, broken between words; a longer word has a line of its own."""
+    lines: list[str] = []
+    for line in text.replace("\t", "    ").splitlines() or [""]:
+        if _width(line) <= width:
+            lines.append(line)
+            continue
+        begun = ""
+        for word in _words(line):
+            if begun and _width(begun) + 1 + _width(word) > width:
+                lines.append(begun)
+                begun = word
+            else:
+                begun = f"{begun} {word}" if begun else word
+        lines.append(begun)
+    return lines
+
+
+_NUMBER = re.compile(r"[^\w\s]*(\d+([.,]\d+)*(e[-+]?\d+)?[)\]]*)?")
+"""What stays with the word after it: a number with its unit, a sign with its number."""
+
+
+def _words(line: str) -> list[str]:
+    """Return the words of a line, between which it may be broken."""
+    words: list[str] = []
+    for word in line.split():
+        after = words and _NUMBER.fullmatch(words[-1].rpartition(" ")[2]) and words[-1].count(" ") < 3
+        if after or (words and word == MARK):
+            words[-1] += f" {word}"
+        else:
+            words.append(word)
+    return words
+
+
+def _widest(texts: Iterable[str]) -> int:
+    return max(map(_width, texts), default=0)
+
+
+def _width(text: str) -> int:
+    """Return how many columns of the terminal a text takes: two for a wide character, none for an accent."""
+    if text.isascii():
+        return len(text)
+    from rich.cells import cell_len
+
+    return cell_len(text)
+
+
+def to_pandas(table: Table) -> pd.DataFrame:
+    """Return a table as a data frame; `attrs["units"]` has the units of its numbers."""
+    import pandas as pd
+
+    kinds = {"string": "object"}
+    series = {
+        heading: pd.Series(table.values(k), dtype=kinds.get(table.kind(k), table.kind(k)))
+        for k, heading in enumerate(table.headings)
+    }
+    frame = pd.DataFrame(series)
+    units = {heading: table.unit(k) for k, heading in enumerate(table.headings)}
+    frame.attrs["units"] = {heading: unit for heading, unit in units.items() if unit}
+    return frame
+
+
+def records_in(table: Table) -> list[dict[str, str | float | None]]:
+    """Return the rows of a table as heading -> value, numbers in SI units."""
+    columns = [table.values(k) for k in range(len(table.columns))]
+    return [dict(zip(table.headings, row, strict=True)) for row in zip(*columns, strict=True)]
+
+
+def to_csv(table: Table) -> str:
+    """Return a table as CSV, with units in the headings."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    units = [table.unit(k) for k in range(len(table.columns))]
+    writer.writerow(
+        f"{heading} [{unit}]" if unit else heading
+        for heading, unit in zip(table.headings, units, strict=True)
+    )
+    writer.writerows(map(_plain, zip(*map(table.values, range(len(table.columns))), strict=True)))
+    return text.getvalue()
+
+
+def to_latex(table: Table) -> str:
+    """Return a table for LaTeX with the package booktabs; its notes as a paragraph below."""
+    shape = "".join("r" if table.is_number(k) else "l" for k in range(len(table.columns)))
+    rows = [" & ".join(map(_latex, row)) + r" \\" for row in table.text()]
+    lines = [
+        *([rf"\caption{{{_latex(table.title)}}}"] if table.title else []),
+        rf"\begin{{tabular}}{{{shape}}}", r"\toprule",
+        " & ".join(map(_latex, table.headings)) + r" \\", r"\midrule",
+        *rows, r"\bottomrule", r"\end{tabular}",
+        *(rf"\par {_latex(note)}" for note in table.notes),
+    ]  # fmt: skip
+    return "\n".join([r"\begin{table}", r"\centering", *lines, r"\end{table}", ""])
+
+
+_LATEX = str.maketrans({
+    "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "\n": r" \newline ",
+    **{sign: f"\\{sign}" for sign in "&%$#_{}"},
+})  # fmt: skip
+
+
+def _latex(text: str) -> str:
+    """Return text with the characters escaped that mean something to LaTeX."""
+    return text.translate(_LATEX)
+
+
+def _plain(row: Sequence[Any]) -> list[str]:
+    """Return a row as text: numbers with all digits, "" for None."""
+    return [
+        "" if x is None else repr(x) if isinstance(x, float) and math.isfinite(x) else str(x) for x in row
+    ]
+
+
+def marked(label: str, results: Results) -> str:
+    """Return the label of a run, with a mark if it has plausibility warnings."""
+    return f"{label} {MARK}" if _remarkable(results) else label
+
+
+def remarks(runs: Iterable[tuple[str, Results]]) -> list[str]:
+    """Return a note for each marked run of (label, results)."""
+    return [f"{MARK} {label}: {says}" for label, results in runs if (says := _remarkable(results))]
+
+
+def _remarkable(results: Results) -> str:
+    return text_of(results.record.course_warnings)
+
+
+def metrics_of_run(results: Results, names: Sequence[str]) -> Table:
+    """Return a table of a run's metrics, one row each, without those whose signals it lacks."""
+    values = evaluate_all(results, names)
+    rows: list[Sequence[Cell]] = [
+        [metric(name).title, metric(name).formula, value] for name, value in values.items()
+    ]
+    title = with_changes(results.record.title or str(results.folder), results.record.overrides)
+    missing = [name for name in names if name not in values]
+    notes = [f"No number for {', '.join(missing)}."] if missing else []
+    return Table(title, ["metric", "", "value"], rows, notes)
+
+
+PEAKS = ("sideslip", "yaw_rate", "acceleration_y")
+"""Signals whose peaks summarise a run in a list."""
+
+
+def runs_table(runs: Sequence[FoundRun]) -> Table:
+    """Return a table of runs: start, scenario, overrides, status, a few peaks."""
+    peaks = [metric(f"peak({signal})") for signal in PEAKS]
+    headings = ["run", "begun", "scenario", "changed", "status", *(measure.formula for measure in peaks)]
+    table = Table("", headings)
+    for run in runs:
+        file = Path(run.record.scenario_file)
+        scenario = "/".join([*file.parts[-2:-1], file.stem])
+        cells: list[Cell] = [
+            str(run.folder), _local(run.record.started), scenario or None,
+            changed(run.record.overrides) or None, run.status.value, *(_peak(run, s) for s in PEAKS),
+        ]  # fmt: skip
+        table.rows.append(cells)
+    table.notes = [f"{run.folder}: {_one_line(run.problem)}" for run in runs if run.problem]
+    return table
+
+
+def _local(started: Any) -> str | None:
+    """Return an ISO timestamp in local time; None if it is invalid."""
+    try:
+        return datetime.fromisoformat(str(started)).astimezone().strftime("%Y-%m-%d %H:%M")
+    except ValueError:
+        return None
+
+
+def _peak(run: FoundRun, signal: str) -> MetricValue | None:
+    """Return the peak of a signal from the run record; from the results if the car stood meanwhile."""
+    record = run.record
+    units = {name: unit or "" for name, unit in record.units.items()}
+    columns = {name: np.empty(0) for name in units if name != "time"}
+    known = Results(Path(), np.empty(0), columns, units, record)
+    names = columns_of(known, signal)
+    ends = [of_column.get(name) for name in names for of_column in (record.smallest, record.largest)]
+    numbers = [float(end) for end in ends if end is not None]
+    if not numbers or any(map(math.isnan, numbers)):
+        return None
+    if names[0] in angles_in(known) and _may_stand(known, names[0]):
+        chosen = metric(f"peak({signal})")
+        try:
+            return evaluate(
+                load_results(run.folder, only=lambda one: columns_for(one, [chosen.name])), chosen
+            )
+        except ResultsError:
+            return None
+    return MetricValue(max(map(abs, numbers)), units[names[0]] or "1")
+
+
+def _may_stand(run: Results, column: str) -> bool:
+    """Return whether the longitudinal velocity alone leaves open that the car stood, from the run record."""
+    speed = motion_of(run, column).get("velocity_x")
+    ends = [of_column.get(speed or "") for of_column in (run.record.smallest, run.record.largest)]
+    low, high = (
+        si_of(run.units[speed])[1] * float(end) if speed and end is not None else 0.0 for end in ends
+    )
+    return speed is not None and low < LEAST_SPEED and high > -LEAST_SPEED
+
+
+def files_table(folder: Path | None, kinds: Sequence[str]) -> Table:
+    """Return a table of YAML files of some kinds (`validation.KINDS`) and SSP archives.
+
+    Files below a folder are listed by path; without a folder, the catalogue's by name.
+
+    Raises:
+        ScenarioError: the folder does not exist, or has no such files.
+    """
+    if folder is not None and not folder.is_dir():
+        raise ScenarioError(f"{folder}: there is no such folder", code="file-missing")
+    table = Table("", ["name" if folder is None else "file", "kind", "title"])
+    rows: dict[str, Sequence[Cell]] = {}
+    for base in loader.folders() if folder is None else [folder]:
+        for path, kind in loader.files(base, kinds):
+            archive = path.suffix == ".ssp"
+            title = "" if archive else loader.title_of(path)
+            by_name = folder is None and kind in loader.COMMANDS
+            name = path.relative_to(base).with_suffix("").as_posix() if by_name else str(path)
+            rows.setdefault(name, [name, "SSP archive" if archive else kind.partition(" ")[2], title or None])
+    table.rows = [*rows.values()]
+    if not table.rows:
+        where = folder or " and ".join(map(str, loader.folders()))
+        raise ScenarioError(f"{where}: holds no file that is {' or '.join(kinds)}", code="file-wrong-kind")
+    return table
+
+
+def fmus_in(*folders: Path) -> tuple[list[Fmu], list[Diagnostic]]:
+    """Return the FMUs in folders, and the errors of those that cannot be used; of a name, the first."""
+    opened: list[Fmu] = []
+    errors: list[Diagnostic] = []
+    archives = {path.name: path for folder in reversed(folders) for path in sorted(folder.glob("*.fmu"))}
+    for _, path in sorted(archives.items()):
+        try:
+            opened.append(open_fmu(path))
+        except ModelDescriptionError as error:  # noqa: PERF203 - the others are listed all the same
+            errors += error.diagnostics
+    return opened, errors
+
+
+def fmus_table(fmus: Sequence[Fmu], errors: Sequence[Diagnostic]) -> Table:
+    """Return a table of FMUs."""
+    table = Table(
+        "", ["FMU", "description", "parameters", "made by"], notes=list(map(str, errors)), numbers={2}
+    )
+    for fmu in fmus:
+        count = str(len(fmu.of("parameter")))
+        table.rows.append([fmu.name, _one_line(fmu.description) or None, count, fmu.generation_tool or None])
+    return table
+
+
+def units_table(fmus: Sequence[Fmu]) -> Table:
+    """Return a table of how FMUs that were built here run: natively, or in Python and why."""
+    table = Table("", ["FMU", "runs as"])
+    for fmu in fmus:
+        how = runs_as(fmu.path)
+        table.rows.append([fmu.name, f"{how}; {how.note}" if how and how.note else str(how) if how else None])
+    return table
+
+
+def signals_table(fmus: Sequence[Fmu]) -> Table:
+    """Return a table of the signals that FMUs exchange, with sources and users; wheels share a row."""
+    producers: dict[str, list[str]] = {}
+    consumers: dict[str, list[str]] = {}
+    about: dict[str, tuple[str, str]] = {}
+    for fmu in fmus:
+        for users, causality in ((producers, "output"), (consumers, "input")):
+            for variable in fmu.of(causality):
+                name = star(variable.name) if variable.name.endswith(WHEELS) else variable.name
+                about.setdefault(name, (variable.unit or "", star(_one_line(variable.description))))
+                users.setdefault(name, []).append(fmu.name)
+    table = Table("", ["signal", "", "unit", "given by", "taken by", "description"])
+    for name in sorted(about):
+        unit, text = about[name]
+        users_of = [_some(dict.fromkeys(users.get(name, ()))) for users in (producers, consumers)]
+        sign = symbol(name)
+        table.rows.append([name, sign if sign != name else None, unit or None, *users_of, text or None])
+    return table
+
+
+def recorded_table(plan: Plan) -> Table:
+    """Return a table of the signals that a run of a plan records."""
+    table = Table(plan.title, ["signal", "", "unit", "description"])
+    instances = {instance.name: instance for instance in plan.instances}
+    for instance, name in plan.record:
+        variable, sign = instances[instance].fmu.variables[name], symbol(name)
+        text = _one_line(variable.description) or None
+        table.rows.append([f"{instance}.{name}", sign if sign != name else None, variable.unit, text])
+    return table
+
+
+def metrics_table() -> Table:
+    """Return a table of all measures of a signal x."""
+    table = Table("", ["metric", "meaning", "", "unit", "needs"])
+    for measure in measures():
+        table.rows.append(
+            [f"{measure.name}(x)", measure.definition, measure.formula, measure.unit, measure.needs or None]
+        )
+    table.notes = [f"'standard' stands for {', '.join(STANDARD)}."]
+    return table
+
+
+def _some(names: Sequence[str] | dict[str, None]) -> str | None:
+    """Return names as a list in words, the first two of more than three."""
+    listed = list(names)
+    more = f" and {len(listed) - 2} more" if len(listed) > 3 else ""
+    return ", ".join(listed[:2] if more else listed) + more or None
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
