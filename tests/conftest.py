@@ -66,7 +66,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def place_in_order(file: Path) -> int:
     """Return how early the tests of a file begin."""
     path = file.relative_to(TESTS).as_posix()
-    return next(k for k, start in enumerate(LONGEST_FIRST) if path.startswith(start))
+    before = (k for k, start in enumerate(LONGEST_FIRST) if path.startswith(start))
+    return next(before, len(LONGEST_FIRST))
 
 
 @pytest.fixture(scope="module")

@@ -113,34 +113,47 @@ __all__ = [
 ]
 
 _MODULES = {
+    "yawbench.foundation.errors": (
+        "BuildError",
+        "Diagnostic",
+        "Location",
+        "ModelDescriptionError",
+        "RecordWarning",
+        "ResultsError",
+        "ScenarioError",
+        "SimulationError",
+        "WiringError",
+        "YawbenchError",
+        "YawbenchWarning",
+    ),
     "yawbench.components.fmi.variables": ("output", "parameter", "signal"),
     "yawbench.proving_ground.standard_tests": ("Evaluation", "TestQuantity"),
-    "yawbench.measured_cars.validation": ("Validation",),
     "yawbench.metrics.expressions": ("MetricValue",),
     "yawbench.metrics.verdict": ("Verdict",),
     "yawbench.orchestrator.plan": ("Override", "Plan"),
     "yawbench._controller": ("Controller",),
     "yawbench._experiment": ("Experiment", "Runs", "experiment"),
     "yawbench._export": ("export_fmu",),
-    "yawbench.measured_cars.library_fit": ("Fit", "fit"),
-    "yawbench.linear.linear_model": ("LinearModel", "linearize"),
-    "yawbench.ranking.library": ("Ranking", "rank"),
     "yawbench._open": ("RecordedRuns", "open"),
     "yawbench._run": ("Run", "measured"),
     "yawbench._scenario": ("Scenario", "load"),
     "yawbench._tuning": ("Tuning", "tune"),
-    "yawbench.measured_cars.library_validate": ("validate",),
     "yawbench._view": ("View", "view"),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
-"""Public name -> module; names not listed are in `foundation.errors`."""
+"""Public name -> module; the others are registered by wings, see `parts`."""
 
 
 def __getattr__(name: str) -> object:
     """Import a public name at its first use, so that `import yawbench` itself is fast."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(_MODULE_OF.get(name, "yawbench.foundation.errors")), name)
+    if name in _MODULE_OF:
+        value = getattr(import_module(_MODULE_OF[name]), name)
+    else:
+        value = import_module("yawbench.foundation.plugins").find("library", name)
+        if value is None:
+            raise AttributeError(f"yawbench.{name} is in a part of yawbench that is not installed")
     globals()[name] = value
     return value
 

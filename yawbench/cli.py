@@ -93,7 +93,7 @@ def _application(arguments: Sequence[str] = ()) -> typer.Typer:
     app.callback()(_options)
     for name in called:
         command = plugins.find("command", name)
-        app.command(name)(output.with_forms(command) if name in output.COMMANDS else command)
+        app.command(name)(output.with_forms(command) if hasattr(command, "tabular") else command)
     return app
 
 

@@ -21,7 +21,6 @@ from yawbench.fmus.fmu import (
     VariableType,
 )
 from yawbench.foundation.errors import Messages, Severity
-from yawbench.measured_cars.validation import ComparedTest, CrossPlot
 from yawbench.metrics.verdict import Relation, Status
 from yawbench.orchestrator.fault_kinds import Fault, FaultList, FaultLocation, FaultName, FaultySignal
 from yawbench.orchestrator.plan import (
@@ -44,9 +43,7 @@ from ._controller import ControllerLike, Numbers
 __all__ = [
     "BuildInfo",
     "Causality",
-    "ComparedTest",
     "ControllerLike",
-    "CrossPlot",
     "Fault",
     "FaultList",
     "FaultLocation",

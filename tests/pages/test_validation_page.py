@@ -16,8 +16,8 @@ from tests.commands import status_of
 from tests.orchestrator.recorded import write as write_run
 from tests.orchestrator.test_validation import line, write, write_study
 from yawbench.measured_cars.validation import CrossPlot
+from yawbench.measured_cars.validation_page import validation_page, validation_sentence
 from yawbench.metrics.verdict import apart
-from yawbench.reports.evaluation_page import validation_page, validation_sentence
 from yawbench.reports.page_parts import save_page
 from yawbench.reports.study_page import chapter, study_page
 from yawbench.studies.experiment_result import judge_results

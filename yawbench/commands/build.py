@@ -16,7 +16,7 @@ from yawbench.fmus.opener import Building, PackagedComponent
 from yawbench.foundation.errors import ModelDescriptionError
 
 from .options import RunOptions, plan_of_scenario, takes
-from .output import print_tables, say
+from .output import print_tables, say, tabular
 
 Components = Annotated[
     list[str] | None,
@@ -169,6 +169,7 @@ Units = Annotated[
 ]
 
 
+@tabular
 @takes("fmus")
 def list(options: RunOptions, what: Wanted = None, place: ListedFolder = None, units: Units = False) -> None:
     """List runs, scenarios, FMUs, vehicles, signals or metrics.

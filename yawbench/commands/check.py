@@ -16,7 +16,7 @@ from yawbench.orchestrator.plan import DEFAULT, ValueOrigin
 from yawbench.vocabulary.wheels import WHEELS, wheels
 
 from .options import CHANGES, RunOptions, ScenarioFile, plan_of_scenario, takes
-from .output import print_tables, say
+from .output import print_tables, say, tabular
 
 if TYPE_CHECKING:
     from yawbench.fmus.fmu import Value
@@ -29,6 +29,7 @@ CAMBER = wheels("inclination_angle_*")
 """Inclination angles, which plants output from their roll camber."""
 
 
+@tabular
 @takes(*CHANGES, "fmus", "no_build", "no_validate")
 def check(scenario: ScenarioFile, options: RunOptions, all_: All = False) -> None:
     """Validate a scenario; show its instances, values and wires.

@@ -16,7 +16,7 @@ from yawbench.foundation.errors import ScenarioError, YawbenchError
 from yawbench.foundation.messages import counted, listed
 
 from .options import CHANGES, MAKING, RunOptions, executor_of, named, pooled, takes
-from .output import hold, print_tables, say, say_failed, stoppable
+from .output import hold, print_tables, say, say_failed, stoppable, tabular
 
 if TYPE_CHECKING:
     from yawbench.figures.style import LabelledRun
@@ -290,6 +290,7 @@ StudyFile = Annotated[
 ]
 
 
+@tabular
 @takes(*CHANGES, *MAKING, "jobs", "scheduler", "format_", "quick", "fresh", "no_run", "dry_run")
 def study(context: typer.Context, file: StudyFile, options: RunOptions) -> None:
     """Run a study: tables, figures, a verdict per claim.
@@ -307,6 +308,7 @@ SweepFile = Annotated[
 ]
 
 
+@tabular
 @takes(*CHANGES, *MAKING, "jobs", "scheduler", "keep", "format_", "fresh", "no_run", "dry_run")
 def sweep(context: typer.Context, file: SweepFile, options: RunOptions) -> None:
     """Run a scenario over a grid, list or Latin hypercube.
@@ -324,6 +326,7 @@ Studies = Annotated[
 ]
 
 
+@tabular
 @takes(*MAKING, "jobs", "format_", "quick", "fresh", "no_run", "dry_run")
 def report(context: typer.Context, options: RunOptions, studies: Studies = None) -> None:
     """Write the pages that reproduce the papers.
@@ -349,6 +352,7 @@ TuningSeed = Annotated[
 ]
 
 
+@tabular
 @takes(*CHANGES, *MAKING, "jobs", "scheduler", "fresh", "dry_run")
 def tune(context: typer.Context, file: TuningFile, options: RunOptions, seed: TuningSeed = None) -> None:
     """Find the parameters that minimize an objective.

@@ -39,11 +39,6 @@ if TYPE_CHECKING:
 VERSION = 1
 """Version of the JSON object; increased when a field changes its meaning or is removed."""
 Form = Literal["text", "json", "latex"]
-COMMANDS = (
-    "check", "run", "compare", "converge", "study", "report", "sweep", "evaluate", "drive", "fit", "validate",
-    "tune", "rank", "list", "diff", "second-opinion", "vehicle", "measured",
-)  # fmt: skip
-"""Commands that print tables, and so take `--json` and `--latex`."""
 
 
 @dataclass
@@ -143,6 +138,12 @@ Json = Annotated[
     bool, typer.Option("--json", help="Print one JSON object to standard output, see docs/editors.md.")
 ]
 Latex = Annotated[bool, typer.Option("--latex", help="Print tables for LaTeX, with the package booktabs.")]
+
+
+def tabular(command: Callable[..., None]) -> Callable[..., None]:
+    """Mark a command that prints tables, and so takes `--json` and `--latex`."""
+    command.tabular = True  # type: ignore[attr-defined]
+    return command
 
 
 def with_forms(command: Callable[..., None]) -> Callable[..., None]:

@@ -17,7 +17,7 @@ from yawbench.orchestrator.coupling_algorithms import ALGORITHMS
 
 from .experiments import chapter_of, command_of, conduct, data_of, say_page, write_page
 from .options import CHANGES, MAKING, RunOptions, ScenarioFile, plan_of_scenario, pooled, takes
-from .output import hold, print_tables, say, shows_bars
+from .output import hold, print_tables, say, shows_bars, tabular
 from .results import MeasuredFrom, MeasuredRuns, distinct, start_of, with_segments
 
 if TYPE_CHECKING:
@@ -45,6 +45,7 @@ BESIDE = 36
 """Columns of the terminal reserved for the bar and its numbers."""
 
 
+@tabular
 @takes(*CHANGES, *MAKING, "format_", "no_validate")
 def run(
     scenario: ScenarioFile, options: RunOptions, name: RunName = None, metric: MetricsOption = None
@@ -177,6 +178,7 @@ Swaps = Annotated[
 ]
 
 
+@tabular
 @takes("set_", "fault", *MAKING, "jobs", "format_", "fresh")
 def compare(
     context: typer.Context,
@@ -243,6 +245,7 @@ Algorithms = Annotated[
 ]
 
 
+@tabular
 @takes(*CHANGES, *MAKING)
 def converge(
     context: typer.Context,
@@ -321,6 +324,7 @@ SecondRun = Annotated[
 ]
 
 
+@tabular
 def diff(first_run: FirstRun, second_run: SecondRun, begin: MeasuredFrom = "0 s") -> None:
     """Show the differences between two runs.
 

@@ -20,7 +20,7 @@ from yawbench.orchestrator.results.run_folder import RUN_FILE
 from yawbench.proving_ground.standard_tests import DRIVEN, TESTS, Evaluation, StandardTest, TestSeries
 
 from .options import CHANGES, MAKING, RunOptions, executor_of, takes
-from .output import hold, print_tables, say, stoppable
+from .output import hold, print_tables, say, stoppable, tabular
 
 if TYPE_CHECKING:
     from yawbench.orchestrator.plan import Override
@@ -66,6 +66,7 @@ StartAngle = Annotated[
 DriveFigures = Annotated[bool, typer.Option("--figures", help="Also draw every run.")]
 
 
+@tabular
 @takes(*CHANGES, *MAKING, "jobs", "fresh")
 def drive(
     context: typer.Context,
@@ -193,6 +194,7 @@ BESIDE = "evaluated"
 """Folder of an evaluation below a folder that has one of another command already."""
 
 
+@tabular
 def evaluate(
     test: TestToEvaluate,
     sources: EvaluatedSources,

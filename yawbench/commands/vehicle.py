@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from .options import RunOptions, takes
-from .output import print_tables, save_figure, say
+from .output import print_tables, save_figure, say, tabular
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -44,6 +44,7 @@ VehicleOutput = Annotated[
 ]
 
 
+@tabular
 @takes("fmus", "no_build")
 def vehicle(
     action: VehicleAction,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from yawbench.commands.options import CHANGES, RunOptions, ScenarioFile, plan_of_scenario, takes
-from yawbench.commands.output import print_tables, say
+from yawbench.commands.output import print_tables, say, tabular
 from yawbench.foundation.errors import ScenarioError, SimulationError
 from yawbench.foundation.messages import counted, fold, hint, listed, printable
 
@@ -29,6 +29,7 @@ Pinned = Annotated[
 ]
 
 
+@tabular
 @takes(*CHANGES, "fmus", "no_build")
 def second_opinion(
     scenario: ScenarioFile, options: RunOptions, master: Masters = None, one_core: Pinned = True

@@ -10,4 +10,11 @@ PLUGINS = {
         "bands": "yawbench.measured_cars.validation:BandsSpec",
         "fit": "yawbench.measured_cars.fit:FitSpec",
     },
+    "judge of a study": {"validations": "yawbench.measured_cars.of_studies"},
+    "library": {
+        "Fit": "yawbench.measured_cars.library_fit:Fit",
+        "fit": "yawbench.measured_cars.library_fit:fit",
+        "Validation": "yawbench.measured_cars.validation:Validation",
+        "validate": "yawbench.measured_cars.library_validate:validate",
+    },
 }

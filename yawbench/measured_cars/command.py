@@ -10,7 +10,7 @@ import typer
 
 from yawbench.commands import output
 from yawbench.commands.options import CHANGES, MAKING, RunOptions, takes
-from yawbench.commands.output import hold, print_tables, say, stoppable
+from yawbench.commands.output import hold, print_tables, say, stoppable, tabular
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import resolved, span
 
@@ -42,6 +42,7 @@ SETS = "sets"
 """Subfolder with the simulated signals of each set of values, until the fit has ended."""
 
 
+@tabular
 def measured(action: MeasuredAction, file: MeasurementFile, out: FigureFile = None) -> None:
     """Examine a recording: signals, flaws, what a fit can find.
 
@@ -155,6 +156,7 @@ def draw_measurement(file: Path, measurement: Measurement, out: Path) -> None:
     say(str(written))
 
 
+@tabular
 @takes("out", "fmus", "no_build", "jobs")
 def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
     """Fit parameters of a scenario to a measured car.
@@ -170,10 +172,10 @@ def fit(context: typer.Context, file: FitFile, options: RunOptions) -> None:
     from yawbench.foundation.safe_files import write_whole
     from yawbench.orchestrator.results.run_folder import default_folder
     from yawbench.planner import Planner
-    from yawbench.reports.evaluation_page import fit_page, parameter_table, score_table
     from yawbench.reports.page_parts import save_page
 
     from .fit import load_fit
+    from .fit_page import fit_page, parameter_table, score_table
     from .fit_result import make_fit
     from .least_squares import CONVERGED
 
@@ -241,6 +243,7 @@ def vehicle_text(result: FitResult, folder: Path, planner: Planner) -> str:
     return "\n".join(lines) + "\n"
 
 
+@tabular
 @takes(*CHANGES, *MAKING)
 def validate(
     scenario: Validated,
@@ -263,11 +266,10 @@ def validate(
     from yawbench.foundation.safe_files import write_whole
     from yawbench.orchestrator.recordings.measurement import load_measurement
     from yawbench.orchestrator.results.measurement_results import load_run
-    from yawbench.reports.evaluation_page import validation_page
     from yawbench.reports.page_parts import save_page
-    from yawbench.studies.result_tables import conditions_table, validation_table
 
     from .validation import compare_run, load_bands
+    from .validation_page import conditions_table, validation_page, validation_table
 
     tolerances = load_bands(bands)
     measurement = load_measurement(measured)

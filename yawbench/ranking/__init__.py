@@ -7,5 +7,6 @@ PLUGINS = {
         "entries": "yawbench.ranking.ranking:EntriesSpec",
         "threats": "yawbench.ranking.threats:ThreatsSpec",
     },
+    "library": {"Ranking": "yawbench.ranking.library:Ranking", "rank": "yawbench.ranking.library:rank"},
     "use of a tuning": {"entries": "yawbench.ranking.tuned_entries:write_entries"},
 }

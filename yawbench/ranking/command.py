@@ -10,7 +10,7 @@ import typer
 from yawbench.commands import output
 from yawbench.commands.experiments import command_of, print_forecasts
 from yawbench.commands.options import MAKING, RunOptions, executor_of, named, pooled, takes
-from yawbench.commands.output import hold, print_tables, say, stoppable
+from yawbench.commands.output import hold, print_tables, say, stoppable, tabular
 from yawbench.foundation.errors import ResultsError, ScenarioError
 from yawbench.foundation.messages import hint
 
@@ -52,6 +52,7 @@ Quick = Annotated[
 ]
 
 
+@tabular
 @takes(*MAKING, "jobs", "scheduler", "fresh", "no_run", "dry_run")
 def rank(
     context: typer.Context,

@@ -28,7 +28,7 @@ from yawbench.orchestrator.scenario.overrides import changed
 from yawbench.planner import Planner
 from yawbench.studies.claims import ClaimResult
 from yawbench.studies.confidence import CONFIDENCE
-from yawbench.studies.experiment import FIGURES, LoadedExperiment
+from yawbench.studies.experiment import FIGURES, LoadedExperiment, validating
 from yawbench.studies.experiment_result import Each, ExperimentResult
 from yawbench.studies.jobs import Job
 from yawbench.studies.open_value_regions import runs_of as runs_of_claim
@@ -55,7 +55,6 @@ from yawbench.studies.schema import FigureSpec
 from yawbench.studies.tables import Cell, Table
 
 from .diagram import diagram, systems_of
-from .evaluation_page import validation_facts
 from .page_parts import FigureImage, anchor, count_kinds, fmus_of, groups_of, image_of, programs_of, render
 from .sweep_view import sweep_sentence, sweep_view, write_sides
 from .viewer import (
@@ -146,7 +145,7 @@ def chapter(
         "comparison": None,
         "results": [],
         "validations": [
-            validation_facts(validation, f"validation-{number}")
+            validating().facts(validation, f"validation-{number}")
             for number, validation in enumerate(findings.validations, start=1)
         ],
         "fmus": fmus_of(kinds),

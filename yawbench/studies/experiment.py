@@ -9,9 +9,10 @@ from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from yawbench.fmus.fmu import Fmu
+from yawbench.foundation import plugins
 from yawbench.foundation.errors import Diagnostic, Location, ScenarioError
 from yawbench.metrics.expressions import STANDARD, TimeWindow, metric, results_to_be, unit_in
 from yawbench.orchestrator.plan import Override, OverrideOrigin, Plan
@@ -23,14 +24,10 @@ from yawbench.orchestrator.wiring.context import FACTS, reached
 from yawbench.planner import Planner
 
 from .axes import AxisSpec, DesignAxisSpec, DesignPoint, Level, changes_at, grid, latin_hypercube, levels_of
-from .claim_schema import MetricReference, MetricSpec, ValidationSpec, si_number
+from .claim_schema import MetricReference, MetricSpec, si_number
 from .jobs import Job, MetricRequests, TestRequest, key_of, plans_of
 from .on_demand import OnDemand
 from .schema import ExperimentSpec
-
-if TYPE_CHECKING:
-    from yawbench.measured_cars.validation import Bands
-    from yawbench.orchestrator.recordings.measurement import Measurement
 
 FIGURES = "figures"
 """Folder of the figures, next to the folders of named runs."""
@@ -196,22 +193,10 @@ class LoadedExperiment(LoadedFile):
         return next(((name, target) for name, axis in axes if target in axis.targets), None)
 
     @cached_property
-    def recordings(self) -> list[tuple[ValidationSpec, Measurement, Bands]]:
-        """The validations with their measurements and bands."""
-        if not self.spec.validations:
-            return []
-        from yawbench.measured_cars.validation import load_bands
-        from yawbench.orchestrator.recordings.measurement import load_measurement
-
-        beside = self.path.parent
-        return [
-            (
-                spec,
-                load_measurement(beside / spec.measured),
-                load_bands(beside / spec.bands if (beside / spec.bands).is_file() else spec.bands),
-            )
-            for spec in self.spec.validations
-        ]
+    def recordings(self) -> Any:
+        """The validations with their measurements and bands, as `validating` loads them."""
+        validations = self.spec.validations
+        return validating().load(validations, self.path.parent) if validations else []
 
     def _at(self, point: DesignPoint, run: NamedRun | None = None) -> list[Override]:
         """Return the overrides at a point; with `run`, only those of axes that apply to it."""
@@ -422,3 +407,17 @@ def _unit(axis: AxisSpec, plan: Plan) -> str | None:
     if target.kind == "fact":
         return FACTS[target.variable].unit
     return next((variable.unit for _, variable in reached(plan, target)), None)
+
+
+def validating() -> Any:
+    """Return what compares runs with measured cars: a module that loads, compares, tabulates and shows.
+
+    Raises:
+        ScenarioError: it is not installed.
+    """
+    judge = plugins.find("judge of a study", "validations")
+    if judge is None:
+        raise ScenarioError(
+            "validations: no part of yawbench is installed that makes them", code="part-missing"
+        )
+    return judge

@@ -13,7 +13,6 @@ from typing import Any, TypeVar
 from yawbench.figures.style import digits_of
 from yawbench.foundation.errors import Diagnostic, ResultsError
 from yawbench.foundation.messages import counted
-from yawbench.measured_cars.validation import Validation, compare_run
 from yawbench.metrics.expressions import MetricValue
 from yawbench.metrics.verdict import PERCENT, Status, Verdict, not_judged, worst
 from yawbench.orchestrator.plan import Plan
@@ -24,7 +23,7 @@ from .axes import RUN, DesignPoint, Level
 from .claim_schema import Claim, LimitSpec, calculate
 from .claims import ClaimResult, Judgement, MetricTable, Region, correlation, judge
 from .confidence import interval, share_bounds
-from .experiment import Case, LoadedExperiment, NamedRun, PlannedExperiment, metrics_of
+from .experiment import Case, LoadedExperiment, NamedRun, PlannedExperiment, metrics_of, validating
 from .jobs import NOT_MADE, MeasuredRun, Outcome, measured, read_back
 from .schema import ExperimentSpec
 from .tables import Cell, Table
@@ -238,13 +237,10 @@ class ExperimentResult:
         return self._judged("checks", self.spec.checks)
 
     @cached_property
-    def validations(self) -> list[Validation]:
+    def validations(self) -> list[Any]:
         """The comparisons with measured cars, of the runs that have results."""
-        return [
-            compare_run(self.results[spec.run], measurement, bands)
-            for spec, measurement, bands in self.experiment.recordings
-            if spec.run in self.results
-        ]
+        recordings = self.experiment.recordings
+        return validating().compare(self.results, recordings) if recordings else []
 
     @property
     def judgements(self) -> list[ClaimResult]:

@@ -20,7 +20,7 @@ from .axes import levels_of
 from .claim_schema import GridSpec, MetricReference, MetricSpec, si_number
 from .claims import ClaimResult, GridCell, cells, correlation, ranked
 from .confidence import Bounds
-from .experiment import NamedRun
+from .experiment import NamedRun, validating
 from .experiment_result import ExperimentResult, limit_table
 from .jobs import NOT_MADE
 from .schema import TableSpec
@@ -43,7 +43,7 @@ def all_tables(findings: ExperimentResult) -> list[Table]:
         *run_tables(findings),
         *derived_tables(findings),
         *claim_tables(findings),
-        *map(validation_table, findings.validations),
+        *(validating().table(validation) for validation in findings.validations),
         *limit_tables(findings),
     ]
 
