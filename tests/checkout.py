@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-CODE = ("components", "vocabulary", "fmus", "orchestrator", "scenarios", "yawbench")
+CODE = ("components", "vocabulary", "foundation", "fmus", "orchestrator", "scenarios", "yawbench")
 PARTS = (*CODE, "docs", "tests")
 FILES = ("README.md", "CHANGELOG.md", "LICENSE", "Makefile", "mkdocs.yml", "pyproject.toml")
 
@@ -21,7 +21,7 @@ def copy_checkout(folder: Path, parts: tuple[str, ...] = PARTS) -> Path:
     """
     forgotten = shutil.ignore_patterns(".*", "*.draft")
     for part in parts:
-        shutil.copytree(ROOT / part, folder / part, ignore=forgotten)
+        shutil.copytree(ROOT / part, folder / part, ignore=forgotten, symlinks=True)
     for file in FILES:
         if (ROOT / file).exists():
             shutil.copy(ROOT / file, folder / file)

@@ -7,10 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 import yawbench as yb
-from tests.refusals import mentions, refused
+from tests.refusals import refused
 
 HEAVY = (
     "numpy",
@@ -20,8 +18,8 @@ HEAVY = (
     "matplotlib",
     "pydantic",
     "fmpy",
-    "orchestrator",
-    "components",
+    "yawbench.orchestrator",
+    "yawbench.components",
 )
 
 
@@ -29,25 +27,12 @@ def python(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, *arguments], cwd=cwd, capture_output=True, text=True)
 
 
-@pytest.mark.parametrize("name", ["components", "fmus", "orchestrator", "scenarios", "vocabulary"])
-@pytest.mark.parametrize("form", ["package", "module"])
-def test_a_foreign_package_in_the_way_is_named(name, form, tmp_path):
-    hiding = tmp_path / name if form == "package" else tmp_path / f"{name}.py"
-    if form == "package":
-        hiding.mkdir()
-        (hiding / "__init__.py").touch()
-    else:
-        hiding.touch()
-    for command in (["-c", "import yawbench"], ["-m", "yawbench"]):
-        ended = python(*command, cwd=tmp_path)
-        assert ended.returncode
-        assert mentions(ended.stderr, "yawbench", "package", f"'{name}'", hiding.name)
-
-
-def test_folders_of_these_names_that_are_no_packages_hide_nothing(tmp_path):
-    for name in ("components", "fmus", "scenarios"):
+def test_packages_of_others_hide_nothing(tmp_path):
+    for name in ("components", "fmus", "orchestrator", "scenarios", "vocabulary"):
         (tmp_path / name).mkdir()
-    assert python("-c", "import yawbench; yawbench.load", cwd=tmp_path).returncode == 0
+        (tmp_path / name / "__init__.py").write_text("raise ImportError('of another project')")
+    for command in (["-c", "import yawbench; yawbench.load"], ["-m", "yawbench", "list", "metrics"]):
+        assert python(*command, cwd=tmp_path).returncode == 0
 
 
 def test_the_import_alone_loads_nothing_else(tmp_path):
@@ -61,8 +46,7 @@ def test_dir_shows_the_public_names_alone():
         _ = yb.laod
 
 
-def test_public_classes_say_where_they_are_imported_from():
+def test_public_classes_can_be_pickled():
     classes = [value for name in yb.__all__ if isinstance(value := getattr(yb, name), type)]
     assert len(classes) >= 14
-    assert {one.__module__ for one in classes} == {"yawbench"}
     assert all(pickle.loads(pickle.dumps(one)) is one for one in classes)
