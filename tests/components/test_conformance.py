@@ -21,7 +21,7 @@ from .stand import Stand
 
 def component_of(module: tuple[str, ...]) -> type[Component]:
     """Return the component class that a file of a role defines."""
-    loaded = import_module(f"components.{'.'.join(module)}")
+    loaded = import_module(f"yawbench.components.{'.'.join(module)}")
     (found,) = (
         value
         for value in vars(loaded).values()

@@ -36,7 +36,8 @@ def test_the_citation_has_what_its_format_requires():
 
 def test_files_that_the_contributing_guide_names_exist():
     named = re.findall(
-        r"`((?:components|vocabulary|orchestrator|scenarios|tests|docs)/[\w/]+\.?\w*)", CONTRIBUTING
+        r"`((?:components|foundation|fmus|vocabulary|orchestrator|scenarios|tests|docs|yawbench)/[\w/]+\.?\w*)",
+        CONTRIBUTING,
     )
     named += re.findall(r"\]\(([\w/.]+\.md)", CONTRIBUTING)
     written = [path for path in named if "NAME" not in path]

@@ -143,7 +143,8 @@ def test_plain_text_is_not_read_as_markup():
 def test_the_docs_name_nothing_that_is_not_in_the_repository():
     for file in [*(ROOT / "docs").rglob("*.md"), ROOT / "README.md"]:
         for path in re.findall(
-            r"`((?:components|orchestrator|scenarios|tests|fmus)/[\w/.]+?\.\w+)`", file.read_text("utf-8")
+            r"`((?:components|foundation|fmus|orchestrator|scenarios|tests|yawbench)/[\w/.]+?\.\w+)`",
+            file.read_text("utf-8"),
         ):
             made_by_reader = ("yaw_follow", "slip_guard", "how_fast", "how_gentle", "yaw_rate.py")
             if not any(word in path for word in made_by_reader) and not path.endswith(".fmu"):

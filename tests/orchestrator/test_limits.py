@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -21,8 +22,12 @@ from ..trials.large import write_ring
 pytestmark = pytest.mark.usefixtures("common_cache")
 
 
+OURS = f"{os.sep}yawbench{os.sep}"
+"""In the path of all code of the program, also of the folders beside the package, which are links in it."""
+
+
 def lines_run(function: Callable[[], object]) -> int:
-    """Return how many lines of the orchestrator a call executes, rounds of loops and comprehensions too."""
+    """Return how many lines of the program a call executes, rounds of loops and comprehensions too."""
     count = 0
 
     def local(frame: FrameType, event: str, argument: Any) -> Any:
@@ -31,7 +36,7 @@ def lines_run(function: Callable[[], object]) -> int:
         return local
 
     def trace(frame: FrameType, event: str, argument: Any) -> Any:
-        return local if "/orchestrator/" in frame.f_code.co_filename else None
+        return local if OURS in frame.f_code.co_filename else None
 
     before = sys.gettrace()
     sys.settrace(trace)

@@ -38,7 +38,9 @@ from yawbench.foundation.messages import unprintable
 from .wrong_values import TEXTS, WRONG, plant_links
 
 ROOT = Path(__file__).resolve().parents[2]
-OURS = [ROOT / name for name in ("yawbench", "orchestrator", "components", "vocabulary")]
+OURS = [
+    ROOT / name for name in ("yawbench", "orchestrator", "foundation", "fmus", "components", "vocabulary")
+]
 LIMIT = 120.0
 """Time that a call may take by the clock [s]: none takes two seconds of the processor's."""
 MEMORY = 12_000_000_000
