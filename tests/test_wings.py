@@ -1,0 +1,85 @@
+"""Each wing can be taken off: without its folder and its line in `yawbench/parts.py` the rest works."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.checkout import ROOT, copy_checkout, run_in
+from yawbench.parts import PARTS
+
+WINGS = [
+    part for part in PARTS if part not in ("yawbench.commands", "yawbench.orchestrator", "yawbench.studies")
+]
+CORE = (
+    "tests/orchestrator/test_scenario.py",
+    "tests/orchestrator/test_wiring.py",
+    "tests/orchestrator/test_master.py",
+    "tests/orchestrator/test_results.py",
+    "tests/orchestrator/test_metrics.py",
+    "tests/orchestrator/test_study.py",
+    "tests/orchestrator/test_compare.py",
+    "tests/pages/test_compare_page.py",
+)
+"""Files of tests of the core; chosen: one or more of each room."""
+
+
+def checkout_without(wings: list[str], folder: Path) -> Path:
+    """Copy the checkout and take wings off it."""
+    checkout = copy_checkout(folder)
+    parts = checkout / "yawbench" / "parts.py"
+    lines = parts.read_text().splitlines(keepends=True)
+    for wing in wings:
+        shutil.rmtree(checkout / wing.replace(".", "/"))
+        lines = [line for line in lines if f'"{wing}"' not in line]
+    parts.write_text("".join(lines))
+    return checkout
+
+
+def works(checkout: Path) -> None:
+    """Build, check, run, compare, and make a quick study with its page."""
+    scenario = "fnn_sideslip/25mps"
+    short = ("--set", "stop_time=0.5")
+    for command in (
+        ("build", "driver_sine"),
+        ("check", scenario),
+        ("run", scenario, *short, "--metric", "peak(sideslip)", "--out", "run"),
+        (
+            "compare",
+            scenario,
+            "--swap",
+            "controller=controller_off,controller_fnn",
+            *short,
+            "--out",
+            "compare",
+        ),
+        ("report", "--quick", "scenarios/fuzzy_pid/study.yaml"),
+    ):
+        done = run_in(checkout, "yawbench", *command)
+        assert done.returncode == 0, (command, done.stdout, done.stderr)
+    assert (checkout / "run/results.csv").is_file()
+    assert (checkout / "results/fuzzy_pid/study/report.html").is_file()
+
+
+def test_without_any_wing_the_core_builds_checks_runs_compares_and_studies(tmp_path):
+    checkout = checkout_without(WINGS, tmp_path / "checkout")
+    works(checkout)
+    names = run_in(checkout, "yawbench", "--help").stdout
+    assert "  run " in names and "  rank " not in names
+    missing = run_in(checkout, "python", "-c", "import yawbench; yawbench.rank")
+    assert "not installed" in missing.stderr
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("wing", WINGS)
+def test_without_one_wing_the_rest_works_and_the_tests_of_the_core_pass(wing, tmp_path):
+    checkout = checkout_without([wing], tmp_path / "checkout")
+    works(checkout)
+    done = run_in(checkout, "python", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *CORE)
+    assert done.returncode == 0, done.stdout[-3000:]
+
+
+def test_what_is_listed_is_there():
+    assert all((ROOT / part.replace("yawbench.", "yawbench/") / "__init__.py").is_file() for part in PARTS)
