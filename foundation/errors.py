@@ -194,7 +194,7 @@ class YawbenchWarning(UserWarning):
     ...     warnings.simplefilter("error", yb.YawbenchWarning)
     ...     base.set({"speed": 300}).run()
     Traceback (most recent call last):
-    yawbench.YawbenchWarning: ...300 m/s is 1080 km/h; did you mean '300 km/h'?...
+    yawbench.foundation.errors.YawbenchWarning: ...300 m/s is 1080 km/h; did you mean '300 km/h'?...
     """
 
 
@@ -203,7 +203,7 @@ class ScenarioError(YawbenchError):
 
     >>> base.set({"stop_time": -1})
     Traceback (most recent call last):
-    yawbench.ScenarioError: set stop_time=-1: must be a time above 0 s (got -1)
+    yawbench.foundation.errors.ScenarioError: set stop_time=-1: must be a time above 0 s (got -1)
     """
 
     default_code = "value-invalid"
@@ -214,7 +214,7 @@ class ModelDescriptionError(YawbenchError):
 
     >>> base.swap(tyre="tyre_pacejka").run()
     Traceback (most recent call last):
-    yawbench.ModelDescriptionError: swap tyre=tyre_pacejka: no FMU 'tyre_pacejka' in ...
+    yawbench.foundation.errors.ModelDescriptionError: swap tyre=tyre_pacejka: no FMU 'tyre_pacejka' in ...
     """
 
     default_code = "fmu-invalid"
@@ -225,7 +225,7 @@ class WiringError(YawbenchError):
 
     >>> base.swap(controller=lambda roll_angle: -1e5 * roll_angle).run()
     Traceback (most recent call last):
-    yawbench.WiringError: ...controller.roll_angle ...
+    yawbench.foundation.errors.WiringError: ...controller.roll_angle ...
     """
 
     default_code = "wiring-invalid"
@@ -236,16 +236,13 @@ class ResultsError(YawbenchError):
 
     >>> yb.open("results/nothing")
     Traceback (most recent call last):
-    yawbench.ResultsError: results/nothing: no results here, run.json is missing; ...
+    yawbench.foundation.errors.ResultsError: results/nothing: no results here, run.json is missing; ...
     """
 
     default_code = "results-unreadable"
 
 
-_OWN = tuple(
-    str(Path(__file__).resolve().parents[1] / name) + os.sep
-    for name in ("orchestrator", "yawbench", "components", "vocabulary", "fmus")
-)
+_OWN = str(Path(__file__).parents[1]) + os.sep
 _LIBRARIES = re.compile(r"^<|[/\\\\](?:site|dist)-packages[/\\\\]|[/\\\\]lib[/\\\\]python3")
 
 
@@ -355,14 +352,3 @@ def rebuilt(record: dict[str, Any]) -> YawbenchError | Interrupted:
     kind = kinds.get(record["kind"], YawbenchError)
     error: YawbenchError | Interrupted = kind(map(Diagnostic.of, record["diagnostics"]), **record["where"])
     return error
-
-
-for _public in (
-    Diagnostic,
-    Location,
-    YawbenchError,
-    *YawbenchError.__subclasses__(),
-    YawbenchWarning,
-    RecordWarning,
-):
-    _public.__module__ = "yawbench"  # where users import them from, and what tracebacks shall say
