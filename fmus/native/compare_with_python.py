@@ -46,9 +46,6 @@ SEARCH, EPISODE, LONGEST_EPISODE = 120_000, 150, 50_000
 takes half a second, as long as the comparison, and a controller is followed for 50,000 samples."""
 PATIENCE = 200
 """Tries in a row that reach nothing new, after which the search ends; chosen: some fifth of a second."""
-LEAST_PARAMETER = 0.05
-"""Least size of a parameter that is tried but for 0, relative to its start value; chosen: a sensor whose
-messages come a million times as often does not come to an end."""
 MOST_FOUND = 25
 """Largest number of tries that are compared; chosen: a start of the slowest component takes half a second."""
 AFTER = 60
@@ -569,8 +566,7 @@ def _parameter(v: Any, chance: random.Random, near: list[float]) -> Any:
     low, high = v.minimum, v.maximum
     values = [v.start, 0.0, 0.1 * v.start, 10.0 * v.start, *(x for x in (low, high) if x is not None)]
     value = chance.choice((*values, chance.choice(near)))
-    inside = (low is None or value >= low) and (high is None or value <= high) and abs(value) <= 1e9
-    if not inside or 0.0 < abs(value) < LEAST_PARAMETER * abs(v.start):
+    if not (low is None or value >= low) or not (high is None or value <= high) or abs(value) > 1e9:
         value = v.start
     return int(value) if v.type == "Integer" else float(value)
 
