@@ -45,7 +45,7 @@ SEARCH, EPISODE, LONGEST_EPISODE = 120_000, 150, 50_000
 """Steps of the search for branches that were not reached, of one try, and at most of one; chosen: the search
 takes half a second, as long as the comparison, and a controller is followed for 50,000 samples."""
 PATIENCE = 200
-"""Tries in a row that reach nothing new, after which the search ends; chosen: some fifth of a second."""
+"""Tries in a row that reach nothing new, after which the search ends; chosen: it takes a fifth of a second."""
 MOST_FOUND = 25
 """Largest number of tries that are compared; chosen: a start of the slowest component takes half a second."""
 AFTER = 60

@@ -228,13 +228,19 @@ def raises(body: Sequence[Statement]) -> bool:
     return isinstance(last, Raise) or (isinstance(last, If) and raises(last.then) and raises(last.orelse))
 
 
-def thresholds(body: Sequence[Statement]) -> Iterator[float]:
-    """Yield the constants with which statements, and the functions that they call, compare numbers."""
-    for s in every(body):
-        if isinstance(s, Let) and s.op in ("lt", "le", "gt", "ge", "eq", "ne"):
-            yield from (float(x) for x in s.operands if isinstance(x, (int, float)) and abs(x) < 1e12)
-        elif isinstance(s, Invoke):
-            yield from thresholds(s.function.body)
+def thresholds(body: Sequence[Statement]) -> set[float]:
+    """Return the constants with which statements, and the functions that they call, compare numbers."""
+    found: set[float] = set()
+    known: set[Outlined] = set()
+    waiting = [body]
+    while waiting:
+        for s in every(waiting.pop()):
+            if isinstance(s, Let) and s.op in ("lt", "le", "gt", "ge", "eq", "ne"):
+                found |= {float(x) for x in s.operands if isinstance(x, (int, float)) and abs(x) < 1e12}
+            elif isinstance(s, Invoke) and s.function not in known:
+                known.add(s.function)
+                waiting.append(s.function.body)
+    return found
 
 
 def arrays_of(body: Sequence[Statement]) -> list[Array]:
