@@ -45,7 +45,9 @@ SEARCH, EPISODE, LONGEST_EPISODE = 120_000, 150, 50_000
 """Steps of the search for branches that were not reached, of one try, and at most of one; chosen: the search
 takes half a second, as long as the comparison, and a controller is followed for 50,000 samples."""
 PATIENCE = 200
-"""Tries in a row that reach nothing new, after which the search ends; chosen: it takes a fifth of a second."""
+"""Tries in a row that reach nothing new, after which the search ends; chosen: a fifth of a second."""
+SEARCH_SECONDS = 15
+"""Processor time [s] after which a search is given up: with odd parameters a unit may sample without end."""
 MOST_FOUND = 25
 """Largest number of tries that are compared; chosen: a start of the slowest component takes half a second."""
 AFTER = 60
@@ -361,6 +363,7 @@ def compare(
     resources: Path,
     thresholds: Sequence[float] = (),
     steps: int = STEPS,
+    usual: Callable[[Branches], None] = lambda branches: None,
 ) -> Branches:
     """Compare a native library with its Python component in all cases, and return its branches.
 
@@ -369,6 +372,7 @@ def compare(
         component, resources: of the Python component.
         thresholds: numbers with which it compares others.
         steps: number of steps at each step size.
+        usual: called after the comparison with usual inputs, before others are searched.
 
     Raises:
         Difference: the first difference.
@@ -379,6 +383,7 @@ def compare(
     _compare_usual(beside, component, steps)
     branches.keep()
     if 0 in branches.compared:
+        usual(branches)
         _search(beside, branches, component, thresholds)
     return branches
 
@@ -526,13 +531,12 @@ def _near(thresholds: Sequence[float]) -> list[float]:
 
 def _attempt(beside: _Beside, chance: random.Random, near: list[float], count: int) -> _Try:
     variables = beside.variables
-    moved = beside.of["parameter"] if chance.random() < 0.5 else ()
-    settings = [
-        (variables[i].type, i, _parameter(variables[i], chance, near)) for i in moved if chance.random() < 0.5
-    ]
+    parameters = beside.of["parameter"]
+    moved = chance.sample(parameters, min(len(parameters), chance.choice((0, 0, 1, 2))))
+    settings = [(variables[i].type, i, _parameter(variables[i], chance, near)) for i in moved]
     ranges = [usual_range(variables[i].name) for i in beside.of["input"]]
     modes, now = [""] * len(ranges), [0.5 * (low + high) for low, high in ranges]
-    h = chance.choice((*LENGTHS, *LENGTHS, 1e-4, 0.1, 1.0))
+    h = chance.choice((*LENGTHS, *LENGTHS, 1e-4, 0.1))
     times = [*near, *(float(x) for kind, _, x in settings if kind in ("Real", "Integer"))]
     start = chance.choice((0.0, 0.0, *STARTS, *[x - 10.3 * h for x in times if 0.0 < x < 1e6]))
     short = [1e-9, 0.37 * h, *(x for x in near if 0.0 < x < 1.0)]  # as hosts make at events and at the end
@@ -564,8 +568,9 @@ def _parameter(v: Any, chance: random.Random, near: list[float]) -> Any:
     if v.type == "Boolean":
         return chance.random() < 0.5
     low, high = v.minimum, v.maximum
-    values = [v.start, 0.0, 0.1 * v.start, 10.0 * v.start, *(x for x in (low, high) if x is not None)]
-    value = chance.choice((*values, chance.choice(near)))
+    values = [0.0, 0.6 * v.start, 1.25 * v.start, *(x for x in (low, high) if x is not None)]
+    values += [x for x in near if abs(x) >= 0.1 * abs(v.start)]  # far less may mean very many samples
+    value = chance.choice(values)
     if not (low is None or value >= low) or not (high is None or value <= high) or abs(value) > 1e9:
         value = v.start
     return int(value) if v.type == "Integer" else float(value)
@@ -648,34 +653,46 @@ def differences(
     reading, writing = os.pipe()
     child = os.fork()
     if child == 0:
-        made: tuple[Any, ...] = ("the comparison ends",)
+        answers = open(writing, "w", encoding="utf-8", buffering=1)  # noqa: SIM115 - until the process ends
+
+        def tell(*made: Any) -> None:
+            answers.write(json.dumps(made) + "\n")
+
+        def before_search(branches: Branches) -> None:
+            tell("", branches.compared.hex(), branches.places)
+            most = int(sum(os.times()[:2])) + SEARCH_SECONDS
+            resource.setrlimit(resource.RLIMIT_CPU, (min(most, limit), limit + 1))
+
         try:
             os.close(reading)
             resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 1))
-            branches = compare(library, guid, component, resources, thresholds)
-            made = "", branches.compared.hex(), branches.places
+            branches = compare(library, guid, component, resources, thresholds, usual=before_search)
+            tell("", branches.compared.hex(), branches.places)
         except Difference as difference:
-            made = (str(difference)[:4000],)
+            tell(str(difference)[:4000])
         except BaseException as error:
-            made = (f"{type(error).__name__}: {error}"[:4000],)
+            tell(f"{type(error).__name__}: {error}"[:4000])
         finally:
-            with open(writing, "w", encoding="utf-8") as answers:
-                answers.write(json.dumps(made))
             os._exit(0)
     os.close(writing)
     with open(reading, encoding="utf-8") as answers:
         content = answers.read()
     _, status = os.waitpid(child, 0)
-    if content:
-        said, *rest = json.loads(content)
+    died = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
+    if content and died in (
+        0,
+        signal.SIGXCPU,
+        signal.SIGKILL,
+    ):  # the last line; that before the search, if the search does not end
+        said, *rest = json.loads(content.splitlines()[-1])
         if said or not rest:
             return Compared(said)
         reached = bytes.fromhex(rest[0])
         untried = [place for place, compared in zip(rest[1], reached, strict=True) if place and not compared]
         return Compared("", reached, tuple(dict.fromkeys(untried)))
-    if os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL):
+    if died in (signal.SIGXCPU, signal.SIGKILL):
         raise TimeoutError(f"the comparison with Python takes more than {limit} s of processor time")
-    return Compared(f"it dies of signal {os.WTERMSIG(status)}")
+    return Compared(f"it dies of signal {died}")
 
 
 __all__ = ["Compared", "Difference", "compare", "differences", "random_inputs"]
