@@ -114,7 +114,7 @@ class RunsAs:
             file, _, line = place.rpartition(":")
             lines.setdefault(file, []).append(line)
         places = ", ".join(f"{file}:{', '.join(sorted(some, key=int))}" for file, some in lines.items())
-        text = "natively it ends with an error in branches that were never compared with Python"
+        text = "its native code has branches that were never compared with Python"
         return f"{text} ({places})" if places else ""
 
     @property

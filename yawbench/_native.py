@@ -163,6 +163,7 @@ def in_native_code(
             resources=Path(folder),
             translated=translated,
             unnamed=Path(__file__),
+            closed=True,  # a run that ends there is repeated in Python
             limit=LIMIT,
         )
         if made.why_not:

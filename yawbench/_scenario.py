@@ -330,7 +330,7 @@ class Scenario:
 def _how_it_runs(fmu: Fmu) -> str:
     if fmu.runs_as is None or fmu.runs_as.native:
         note = fmu.runs_as.note if fmu.runs_as else ""
-        return f"runs natively; {note}, and the run is repeated in Python" if note else "runs natively"
+        return f"runs natively; {note}, in which the run is repeated in Python" if note else "runs natively"
     return f"runs in Python: {fmu.runs_as.why}"
 
 

@@ -16,7 +16,7 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -65,7 +65,7 @@ class Native:
     Attributes:
         files: path in the archive -> content.
         why_not: reason if there are none, else "".
-        untried: files and lines of branches that were never compared with Python: there, a call fails.
+        untried: files and lines of branches that were never compared with Python.
         new: whether they were compiled, and not in the cache.
     """
 
@@ -118,6 +118,7 @@ def native(
     unnamed: Path | None = None,
     read: Sequence[tuple[str, str]] = (),
     hurry: bool = False,
+    closed: bool = False,
     limit: int = compare_with_python.LIMIT,
 ) -> Native:
     """Return the native libraries of a component, or the reason why there are none.
@@ -132,6 +133,8 @@ def native(
         unnamed: a file whose lines are not mentioned in the reason.
         read: files that its modules read when they are imported, with file and line.
         hurry: postpone the build if the last one took longer than `LONGEST`, or this one will.
+        closed: end calls with an error in branches that were never compared with Python; for whoever can
+            then go on in Python. Others are told of these branches.
         limit: largest processor time [s] of the comparison.
     """
     if sys.platform != "linux" or platform.machine() != "x86_64":
@@ -155,7 +158,7 @@ def native(
         made = _let_through(text, component, guid, resources, limit, hurry, thresholds)
         if made.new:
             keep(EFFORTS, entry, str(_processor_time() - began).encode())
-        return made
+        return made if closed else _opened(made)
     except Refused as refused:
         return Native(why_not=str(refused))
     except BuildError as error:
@@ -238,6 +241,13 @@ def _made(
         return Native(why_not=f"the translation is not the same as Python: {compared.difference}", new=True)
     files = {path: _closed(data, compared.reached) for path, data in files.items()}
     return Native(files, untried=compared.untried, new=True)
+
+
+def _opened(made: Native) -> Native:
+    """Return libraries that compute in all branches."""
+    return replace(
+        made, files={path: data.replace(MARK + b"\1", MARK + b"\0", 1) for path, data in made.files.items()}
+    )
 
 
 def _closed(library: bytes, reached: bytes) -> bytes:

@@ -215,11 +215,14 @@ def output(self, t, u):
 """
 
 
-def test_a_branch_that_was_never_compared_ends_the_call_with_its_line(tmp_path, monkeypatch):
+def test_a_branch_that_was_never_compared_is_told_and_ends_the_call_where_python_can_go_on(
+    tmp_path, monkeypatch
+):
     monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "cache"))
     with component_of(source(NARROW), tmp_path) as (component, home):
         given = {"source": "small.py", "guid": "{a}", "resources": home.parent}
-        made, again = (build.native(component, home, **given) for _ in range(2))
+        made, again = (build.native(component, home, closed=True, **given) for _ in range(2))
+        computing = build.native(component, home, **given)
     line = source(NARROW).splitlines().index("        if abs(math.sin(1234.5 * u[0]) - 0.77) < 1e-9:") + 1
     assert made == again and f"controllers/small.py:{line}" in made.untried
     library = tmp_path / "closed.so"
@@ -231,3 +234,10 @@ def test_a_branch_that_was_never_compared_ends_the_call_with_its_line(tmp_path, 
     unit.set("Real", [0, 1], [math.asin(0.77) / 1234.5, 0.25])
     done, (said,), _ = unit.step(0.01, 0.01)
     assert not done and ALONE in said and f"(controllers/small.py:{line})" in said
+    assert computing.untried == made.untried
+    library = tmp_path / "computing.so"
+    library.write_bytes(computing.files["binaries/linux64/native.so"])
+    unit = Native(library, "{a}")
+    unit.set("Real", [0, 1], [math.asin(0.77) / 1234.5, 0.25])
+    assert unit.begin(0.0)[0] and unit.end_initialization()[0] and unit.step(0.0, 0.01)[0]
+    assert struct.unpack("d", unit.get([2])[2]) == (5.0,)
