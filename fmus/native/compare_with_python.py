@@ -679,11 +679,8 @@ def differences(
         content = answers.read()
     _, status = os.waitpid(child, 0)
     died = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
-    if content and died in (
-        0,
-        signal.SIGXCPU,
-        signal.SIGKILL,
-    ):  # the last line; that before the search, if the search does not end
+    if content and died in (0, signal.SIGXCPU, signal.SIGKILL):
+        # the last line: that before the search, if the search does not end
         said, *rest = json.loads(content.splitlines()[-1])
         if said or not rest:
             return Compared(said)

@@ -10,7 +10,16 @@ from typing import Any
 from . import ir
 from .loops import Looping
 from .lower import COMPENSATED, complaint
-from .values import List, Refused, Union, is_mixed, is_number, is_plain, is_real
+from .values import (
+    UNSET,
+    List,
+    Refused,
+    Union,
+    is_mixed,
+    is_number,
+    is_plain,
+    is_real,
+)
 
 MOST_DIGITS = 15
 """Largest number of digits to which numbers are rounded."""
@@ -46,6 +55,8 @@ class OfNumbers(Looping):
     def _converted(self, name: str, of: Sequence[str], usual: Any, value: Any) -> Any:
         """Return a number, or that of an object whose class has a special method that returns one."""
         result = self.narrowed(self.unary(name, usual, value))
+        if self.special(value, name) is UNSET:
+            return result
         if not is_number(result) or ir.type_of(result) not in of:
             raise Refused(f"{name} that returns something other than Python wants")
         return result

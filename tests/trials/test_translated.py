@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 import pytest
 
+from . import classes
+from .class_programs import program as program_of_classes
 from .random_programs import FUNCTION, KINDS, OBJECT, program
 from .translated import REFUSED, SAME, kind_of, trial, tried
 
@@ -30,6 +32,21 @@ def test_a_few_random_programs_give_the_same_bytes() -> None:
 @pytest.mark.exhaustive
 def test_random_programs_give_the_same_bytes() -> None:
     check(range(100, 400), 100)
+
+
+def check_classes(seeds: Sequence[int], same: int) -> None:
+    tally = classes.trial(seeds)
+    assert not tally.bad, "\n".join(f"{seed}: {why}\n{program_of_classes(seed)}" for seed, why in tally.bad)
+    assert tally.counts[SAME] >= same
+
+
+def test_a_few_random_programs_of_classes_give_the_same_bytes() -> None:
+    check_classes(range(2_000_000, 2_000_012), 4)
+
+
+@pytest.mark.exhaustive
+def test_random_programs_of_classes_give_the_same_bytes() -> None:
+    check_classes(range(4_000_000, 4_000_300), 100)
 
 
 LAW = """

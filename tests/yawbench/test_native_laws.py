@@ -62,9 +62,7 @@ def moment(run):
     return run["controller.yaw_moment"]
 
 
-def test_a_property_that_is_set_after_2500_samples_is_set_natively_and_in_the_fmu(
-    base, monkeypatch, tmp_path
-):
+def test_a_property_set_after_2500_samples_is_set_natively_and_in_an_fmu(base, monkeypatch, tmp_path):
     base = base.set({"stop_time": 5.6})
     native = base.swap(controller=Watchdog()).run()
     assert native.record["fmus"]["controller"]["runs_as"] == "native"
