@@ -44,11 +44,11 @@ LIMIT = 240
 SEARCH, EPISODE, LONGEST_EPISODE = 120_000, 150, 50_000
 """Steps of the search for branches that were not reached, of one try, and at most of one; chosen: the search
 takes half a second, as long as the comparison, and a controller is followed for 50,000 samples."""
-PATIENCE = 200
-"""Tries in a row that reach nothing new, after which the search ends; chosen: a fifth of a second."""
-SEARCH_SECONDS = 15
+PATIENCE = 100
+"""Tries in a row that reach nothing new, after which the search ends; chosen: a tenth of a second."""
+SEARCH_SECONDS = 5
 """Processor time [s] after which a search is given up: with odd parameters a unit may sample without end."""
-MOST_FOUND = 25
+MOST_FOUND = 15
 """Largest number of tries that are compared; chosen: a start of the slowest component takes half a second."""
 AFTER = 60
 """Steps of a comparison after the last new branch was reached, in which what the branch did shows."""

@@ -365,7 +365,8 @@ class Evaluation(Attributes):
             return self.call(own, [index], {})
         if isinstance(owner, enum.EnumMeta):
             return owner.__members__[self._key(index)]
-        if not (isinstance(owner, (List, tuple)) or type(owner) in _SUBSCRIPTED):
+        known_kind = isinstance(owner, (List, tuple)) or type(owner) in _SUBSCRIPTED
+        if not known_kind and not (is_real(index) and isinstance(owner, (Ring, Picked))):
             raise Refused(f"an item of a {type(owner).__name__}")
         items = self.read(owner) if isinstance(owner, List) else owner
         if is_real(index):

@@ -24,8 +24,6 @@ COMPLEX = f"a complex number, with which {ALONE}: set YAWBENCH_UNITS=python"
 """Error message of a native library for complex powers."""
 UNTRIED = f"no comparison with Python came here when this was built, and {ALONE}: set YAWBENCH_UNITS=python"
 """Error message of a native library for branches that were never compared with Python."""
-SAME_NAN = f"a NaN among items that are compared, with which {ALONE}: set YAWBENCH_UNITS=python"
-"""Error message of a native library for NaN in lists: Python takes one to be equal to itself."""
 
 
 class Refused(Exception):

@@ -423,10 +423,10 @@ class Operating(Evaluation):
         if all(lists) or (isinstance(a, tuple) and isinstance(b, tuple)):
             items_a, items_b = self.items(a), self.items(b)
             return len(items_a) == len(items_b) and self._all_equal(list(zip(items_a, items_b, strict=True)))
-        if isinstance(a, Dict) and isinstance(b, Dict):
-            held_a, held_b = self.read(a), self.read(b)
-            pairs = [(x, held_b.get(key)) for key, x in held_a.items()]
-            return held_a.keys() == held_b.keys() and self._all_equal(pairs)
+        if isinstance(a, Dict) or isinstance(b, Dict):
+            raise Refused("comparing dictionaries")
+        if isinstance(a, Array) or isinstance(b, Array):
+            raise Refused("comparing arrays")
         if isinstance(a, _INCOMPARABLE) or isinstance(b, _INCOMPARABLE):
             raise Refused(f"comparing a {type(a).__name__} and a {type(b).__name__}")
         if isinstance(a, Box) or isinstance(b, Box) or not (is_plain(a) and is_plain(b)):
@@ -449,10 +449,6 @@ class Operating(Evaluation):
         """Return whether items are equal, as `in` and lists compare them: NaN is the same as itself."""
         if a is b:
             return True
-        a, b = (self.real(x) if is_mixed(x) else x for x in (a, b))
-        if all(isinstance(x, ir.Var) and is_real(x) for x in (a, b)):
-            both = self.let(ir.BOOL, "both", self.function("isnan", a), self.function("isnan", b))
-            self.require(self.negation(both), "ValueError", ir.SAME_NAN)
         return self.truth_of(self._equal(a, b))
 
     def _contained(self, a: Any, b: Any) -> Any:
@@ -474,7 +470,7 @@ class Operating(Evaluation):
 
 _SIZED = (str, bytes, tuple, list, dict, set, frozenset, range, int, float)
 _WITHOUT_IDENTITY = (tuple, str, Text, bytes, Bytes, Closure, Bound, MethodType)
-_INCOMPARABLE = (Ring, Array, Span, Each, Text, Bytes, Closure, Bound, set)
+_INCOMPARABLE = (Ring, Span, Each, Text, Bytes, Closure, Bound, set)
 
 
 def _class_of(value: Any) -> type:
