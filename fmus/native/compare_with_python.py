@@ -534,6 +534,13 @@ def _attempt(beside: _Beside, chance: random.Random, near: list[float], count: i
     parameters = beside.of["parameter"]
     moved = chance.sample(parameters, min(len(parameters), chance.choice((0, 0, 1, 2))))
     settings = [(variables[i].type, i, _parameter(variables[i], chance, near)) for i in moved]
+    if chance.random() < 0.5:  # what is off by default is switched on
+        off = [i for i in parameters if variables[i].type == "Real" and variables[i].start == 0.0]
+        settings += [
+            ("Real", i, _within(variables[i], chance.choice((1.0, -1.0)) * 10.0 ** chance.uniform(-2.0, 4.0)))
+            for i in off
+            if chance.random() < 0.6
+        ]
     ranges = [usual_range(variables[i].name) for i in beside.of["input"]]
     modes, now = [""] * len(ranges), [0.5 * (low + high) for low, high in ranges]
     h = chance.choice((*LENGTHS, *LENGTHS, 1e-4, 0.1))
@@ -560,6 +567,14 @@ def _attempt(beside: _Beside, chance: random.Random, near: list[float], count: i
                 now[i] += 0.05 * (high - low) * chance.uniform(-1.0, 1.0)
         steps.append((list(now), chance.choice(short) if chance.random() < 0.03 else h))
     return _Try(settings, start, list(steps[0][0]), steps)
+
+
+def _within(v: Any, value: float) -> float:
+    low, high = (
+        (-math.inf if v.minimum is None else v.minimum),
+        (math.inf if v.maximum is None else v.maximum),
+    )
+    return float(min(max(abs(value) if low >= 0.0 else value, low), high))
 
 
 def _parameter(v: Any, chance: random.Random, near: list[float]) -> Any:
