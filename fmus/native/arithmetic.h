@@ -313,8 +313,8 @@ MAYBE_UNUSED static void begin_problem(Problem *problem, const char *kind, const
 /* ---- branches that were compared with Python ----
  *
  * The generated file has a table of its branches. In the comparison at the build, `closed` is 0 and each branch is
- * noted when it is reached. The build then writes what was reached into the library, behind MARK, and closes the
- * table: a branch that was never compared ends the call instead of computing what may be wrong. */
+ * noted when it is reached. The build then writes what was reached into the library, behind MARK. Where the table is
+ * closed, a branch that was never compared ends the call, and its caller goes on in Python. */
 
 #define MARK "branches that yawbench compared:"
 
