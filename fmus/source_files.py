@@ -188,7 +188,9 @@ class Sources:
         matches = [
             file.relative_to(self.root).with_suffix("") for file in self.root.glob(f"*/{parts[-1]}.py")
         ]
-        suggestion = "".join(f"; did you mean components.{'.'.join(file.parts)}?" for file in matches[:1])
+        suggestion = "".join(
+            f"; did you mean yawbench.components.{'.'.join(file.parts)}?" for file in matches[:1]
+        )
         return f"no module {'.'.join(parts)} in {self.root}{suggestion}"
 
     def _path(self, parts: Parts) -> str:

@@ -30,6 +30,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 """numpy and scipy, imported later, use no threads: these would wait for a small matrix in loops that cost as
 much again."""
 
+os.environ.pop("COLUMNS", None)  # pytest-xdist says 80, whatever the terminal
+
 gc.set_threshold(50_000, 20, 20)
 """Python looks for garbage less often: thousands of tests keep much, and leave little."""
 gc.disable()  # until all tests are collected

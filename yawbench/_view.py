@@ -64,7 +64,9 @@ def view(
     settings = Settings((Selection(panels=wanted),)) if wanted else SETTINGS
     title = arguments.text(title, "title", empty=True)
     names = tuple(run.label for run in labelled)
-    if names != (labelled[0].results.record.title,):  # a single run's own title is followed by its overrides
+    if (
+        len(names) != 1 or names[0] != labelled[0].results.record.title
+    ):  # a single run's own title is followed by its overrides
         title = title or listed(names, last="and")
     html = packed(page(labelled, settings, title=title))
     return View(names, html, arguments.count(height, "height", least=LEAST, most=MOST))

@@ -104,7 +104,7 @@ class Sources:
     """
 
     def __init__(self, home: Path, *others: Path, unnamed: Path | None = None) -> None:
-        self.home = home.resolve()
+        self.home = home
         self.others = others
         self.unnamed = unnamed
         self._known: dict[FunctionType, Source] = {}

@@ -120,7 +120,7 @@ def test_an_fmu_declares_its_role_whatever_its_file_is_called(archive, name, tmp
 def test_credits_of_a_users_own_component_are_those_that_it_declares(tmp_path):
     file = tmp_path / "controllers" / "idea.py"
     file.parent.mkdir()
-    text = (COMPONENTS / "controllers" / "off.py").read_text().replace("from ..", "from components.")
+    text = (COMPONENTS / "controllers" / "off.py").read_text().replace("from ..", "from yawbench.components.")
     for credits in ({}, {"author": "Ada", "license": "CC0-1.0"}):
         declared = "".join(f"    {key} = {value!r}\n" for key, value in credits.items())
         file.write_text(text.replace("    outputs =", f"{declared}    outputs ="))

@@ -28,7 +28,9 @@ def run(*arguments):
 def test_it_builds_what_is_named_and_says_so_on_stderr(tmp_path):
     done = run("controller_off", "driver_sine", "--out", tmp_path)
     assert (done.exit_code, done.stdout) == (0, "")
-    assert each_mentions(done.stderr, ("controller_off", "built"), ("driver_sine", "built"))
+    assert each_mentions(
+        done.stderr, ("controller_off", "built"), ("driver_sine", "built"), ("driver_sine", "never compared")
+    )
     assert {file.name for file in tmp_path.iterdir()} == {"controller_off.fmu", "driver_sine.fmu"}
 
 
@@ -42,13 +44,15 @@ class Backwards(Pool):
 def test_it_names_what_is_built_in_the_order_asked_for_whichever_takes_longer(tmp_path, monkeypatch):
     monkeypatch.setattr("yawbench.fmus.build.Pool", Backwards)
     done = run("controller_off", "driver_sine", "--out", tmp_path)
-    assert each_mentions(done.stderr, ("controller_off", "built"), ("driver_sine", "built"))
+    assert each_mentions(
+        done.stderr, ("controller_off", "built"), ("driver_sine", "built"), ("driver_sine", "never compared")
+    )
 
 
 def test_it_builds_nothing_twice_unless_forced(tmp_path):
     run("controller_off", "driver_sine", "--out", tmp_path)
     assert each_mentions(run("controller_off", "driver_sine", "--out", tmp_path).stderr, ("2", "date"))
-    assert each_mentions(run("driver_sine", "--out", tmp_path, "--force").stderr, ("driver_sine", "built"))
+    assert mentions(run("driver_sine", "--out", tmp_path, "--force").stderr, "driver_sine", "built")
 
 
 @pytest.mark.exhaustive

@@ -47,7 +47,7 @@ GIVEN = {
 
 
 def component_class(name: str) -> type[Component]:
-    module = importlib.import_module("components." + ".".join(COMPONENTS[name]))
+    module = importlib.import_module("yawbench.components." + ".".join(COMPONENTS[name]))
     found = [c for c in vars(module).values() if issubclass(type(c), type) and issubclass(c, Component)]
     return max((c for c in found if c.__module__ == module.__name__), key=lambda c: len(c.__mro__))
 

@@ -47,7 +47,7 @@ metrics:
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a driver that is a user's own, its FMU, and files that use it."""
     folder = tmp_path_factory.mktemp("written")
-    text = (ROOT / OURS).read_text().replace("from ..", "from components.")
+    text = (ROOT / OURS).read_text().replace("from ..", "from yawbench.components.")
     (folder / "drivers").mkdir()
     (folder / OWN).write_text(text)
     with pytest.MonkeyPatch.context() as patch:
@@ -344,7 +344,11 @@ def test_a_folder_of_fmus_may_be_opened_through_a_link(built_into, tmp_path, mon
     without_native_libraries(monkeypatch)
     source = tmp_path / "drivers" / "steady.py"
     source.parent.mkdir()
-    text = (ROOT / "components/drivers/steady_turn.py").read_text().replace("from ..", "from components.")
+    text = (
+        (ROOT / "components/drivers/steady_turn.py")
+        .read_text()
+        .replace("from ..", "from yawbench.components.")
+    )
     source.write_text(text)
     (tmp_path / "fmus").mkdir()
     (tmp_path / "linked").symlink_to("fmus")

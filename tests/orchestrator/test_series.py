@@ -275,9 +275,9 @@ def test_check_and_run_json_tell_of_a_series_and_a_changed_file_makes_results_st
             "{file: data.csv, column: 't_fl [m]'}",
             ("data.csv", "'t_fl [m]'", "'t_fl'"),
         ),
-        ("{file: data.csv, column: word}", "data.csv: column 'word': value 2 is not a number ('high')"),
-        ("{file: data.csv, column: void}", "data.csv: column 'void' has no values"),
-        ("{file: data.csv, column: far}", "data.csv: column 'far': value 2 is not finite (inf)"),
+        ("{file: data.csv, column: word}", ("data.csv", "'word'", "value 2", "'high'")),
+        ("{file: data.csv, column: void}", ("data.csv", "'void'")),
+        ("{file: data.csv, column: far}", ("data.csv", "'far'", "value 2", "inf")),
         (
             "{file: data.csv, column: mass}",
             ("data.csv", "'mass'", "'kg'", "rad"),

@@ -8,7 +8,6 @@ import yawbench as yb
 from yawbench.fmus.archive import runs_as
 from yawbench.fmus.build import HERE as FMUS
 from yawbench.fmus.build import build_all, find_components
-from yawbench.fmus.fmu import RunsAs
 from yawbench.orchestrator.scenario.loader import names
 
 pytestmark = pytest.mark.filterwarnings("ignore::yawbench.YawbenchWarning")
@@ -64,7 +63,7 @@ def test_shortened_scenarios_with_every_native_unit_give_the_same_bits():
         native |= {fmu for fmu, how in ways(one).items() if how == "native"}
         assert {how.partition(":")[0] for how in ways(other).values()} == {"Python"}
     own = {"driver_measured"}  # needs a recording: tests/components/test_measured_driver.py drives it
-    assert native | own == {name for name in find_components() if runs_as(FMUS / f"{name}.fmu") == RunsAs()}
+    assert native | own == {name for name in find_components() if runs_as(FMUS / f"{name}.fmu").native}
 
 
 @pytest.mark.parametrize("name", names("a scenario"))

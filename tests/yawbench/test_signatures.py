@@ -78,6 +78,7 @@ def test_literals_name_all_kinds_of_faults_and_all_standard_tests():
 
 FOREIGN = {
     "Any",
+    "CrossPlot",  # stands with its wing
     "Callable",
     "Collection",
     "DataFrame",

@@ -76,8 +76,11 @@ def build(components: Components = None, out: BuildFolder = None, force: Force =
         say(f"warning: {why}")
     for name, why in report.in_python.items():
         say(f"{name} runs in Python: {why}")
-    for name, note in report.notes.items():
-        say(f"{name}: {note}")
+    if len(report.notes) == 1:
+        say(*(f"{name}: {note}" for name, note in report.notes.items()))
+    elif report.notes:
+        words = "have branches in native code that were never compared with Python: yawbench list --units"
+        say(f"{len(report.notes)} FMUs {words}")
     for component in map(packaged, [] if named else packaged_components()):
         if component:
             _build_packaged(component, force=force)

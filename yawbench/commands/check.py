@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from yawbench.commands import output
-from yawbench.fmus.archive import runs_as
 from yawbench.foundation.errors import Diagnostic, YawbenchError
 from yawbench.foundation.messages import counted, cut, fold, fold_wires, printable, star
 from yawbench.orchestrator.plan import DEFAULT, ValueOrigin
@@ -45,8 +44,6 @@ def check(scenario: ScenarioFile, options: RunOptions, all_: All = False) -> Non
     for diagnostic in notes:
         say(f"note: {diagnostic}")
     for instance in plan.instances:
-        if (how := runs_as(instance.fmu.path)) and how.native and how.note:
-            say(f"note: {instance.name}: {how.note}")
         for violation in instance.fmu.violations:
             say(f"{violation.severity}: {instance.name}: {violation}")
 
