@@ -18,6 +18,8 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
+from .errors import ScenarioError
+
 PARTS = "yawbench.parts"
 """Module that lists the packages of the program, read by name: the foundation imports none of them."""
 GROUP = "yawbench.plugins"
@@ -29,10 +31,21 @@ Table = Mapping[str, Mapping[str, str]]
 
 def find(kind: str, name: str) -> Any:
     """Return what a package adds under a name; None if no package does."""
-    for table in (_ours, _of_others):
-        if place := table().get(kind, {}).get(name):
-            return _imported(place)
-    return None
+    place = _place(kind, name)
+    return _imported(place) if place else None
+
+
+def require(kind: str, name: str) -> Any:
+    """Return what a package adds under a name.
+
+    Raises:
+        ScenarioError: no package does.
+    """
+    if not (place := _place(kind, name)):
+        raise ScenarioError(
+            f"{name}: the part of yawbench that makes this ({kind}) is not installed", code="part-missing"
+        )
+    return _imported(place)
 
 
 def names(kind: str) -> list[str]:
@@ -42,8 +55,12 @@ def names(kind: str) -> list[str]:
 
 def module_of(kind: str, name: str) -> str:
     """Return the module of a plug-in, "" if there is none, without importing it."""
+    return _place(kind, name).partition(":")[0]
+
+
+def _place(kind: str, name: str) -> str:
     places = (table().get(kind, {}).get(name, "") for table in (_ours, _of_others))
-    return next(filter(None, places), "").partition(":")[0]
+    return next(filter(None, places), "")
 
 
 def _imported(place: str) -> Any:

@@ -136,13 +136,13 @@ def test_what_runs_inside_fmus_needs_the_standard_library_alone(layer):
     assert foreign - sys.stdlib_module_names <= {"yawbench", "pythonfmu"}
 
 
-def test_a_run_imports_nothing_that_draws_judges_or_makes_many_runs():
+def test_a_run_imports_nothing_that_draws_judges_or_makes_many_runs(tmp_path):
     program = (
         "import sys; from yawbench.cli import main\n"
         "try: main(['run', 'fnn_sideslip/25mps', '--set', 'stop_time=0.1', '--out', sys.argv[1]])\n"
         "except SystemExit: print(*sorted(sys.modules), file=sys.stderr)"
     )
-    command = [sys.executable, "-c", program, str(ROOT / "results/of_a_test")]
+    command = [sys.executable, "-c", program, str(tmp_path / "run")]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     loaded = {layer_of(name) for name in done.stderr.split() if name in FILES}
     assert {"orchestrator", "yawbench.metrics", "yawbench.commands"} <= loaded

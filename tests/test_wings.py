@@ -8,6 +8,9 @@ from pathlib import Path
 import pytest
 
 from tests.checkout import ROOT, copy_checkout, run_in
+from tests.refusals import refused
+from yawbench.foundation import plugins
+from yawbench.foundation.errors import ScenarioError
 from yawbench.parts import PARTS
 
 WINGS = [
@@ -83,3 +86,8 @@ def test_without_one_wing_the_rest_works_and_the_tests_of_the_core_pass(wing, tm
 
 def test_what_is_listed_is_there():
     assert all((ROOT / part.replace("yawbench.", "yawbench/") / "__init__.py").is_file() for part in PARTS)
+
+
+def test_what_a_missing_part_makes_is_refused_in_a_sentence():
+    with refused(ScenarioError, "part-missing", names=("nothing", "judge of a study")):
+        plugins.require("judge of a study", "nothing")

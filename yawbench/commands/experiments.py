@@ -407,7 +407,7 @@ def tune(context: typer.Context, file: TuningFile, options: RunOptions, seed: Tu
     print_tables([table])
     command = command_of("tune", file, **options.changing, seed=None if seed is None else [seed])
     if tuning_of(experiment).entries:
-        plugins.find("use of a tuning", "entries")(experiment, tuned, folder, command)
+        plugins.require("use of a tuning", "entries")(experiment, tuned, folder, command)
     save(history_figure(experiment, tuned, command), folder / "history")
     charts = [image_of(folder / "history.svg", experiment.spec.title)]
     facts: dict[str, Any] = {"results": [table], "charts": charts}

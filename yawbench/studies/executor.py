@@ -388,7 +388,7 @@ def runner_of(workers: int | None, scheduler: str | None) -> Runner:
     if not scheduler:
         return LocalRunner(workers)
     try:
-        run_on_cluster = plugins.find("runner", "scheduler")
+        run_on_cluster = plugins.require("runner", "scheduler")
     except ImportError:
         raise ScenarioError(
             "--scheduler needs the package distributed: pip install 'yawbench[cluster]'",

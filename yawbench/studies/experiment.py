@@ -415,9 +415,4 @@ def validating() -> Any:
     Raises:
         ScenarioError: it is not installed.
     """
-    judge = plugins.find("judge of a study", "validations")
-    if judge is None:
-        raise ScenarioError(
-            "validations: no part of yawbench is installed that makes them", code="part-missing"
-        )
-    return judge
+    return plugins.require("judge of a study", "validations")
