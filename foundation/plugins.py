@@ -53,11 +53,6 @@ def names(kind: str) -> list[str]:
     return [*dict.fromkeys(name for table in (_ours, _of_others) for name in table().get(kind, {}))]
 
 
-def module_of(kind: str, name: str) -> str:
-    """Return the module of a plug-in, "" if there is none, without importing it."""
-    return _place(kind, name).partition(":")[0]
-
-
 def _place(kind: str, name: str) -> str:
     places = (table().get(kind, {}).get(name, "") for table in (_ours, _of_others))
     return next(filter(None, places), "")

@@ -92,7 +92,7 @@ def test_a_command_imports_what_it_needs_itself():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = set(done.stderr.split())
     assert "yawbench.commands.build" in loaded
-    others = {plugins.module_of("command", name) for name in plugins.names("command")}
+    others = {plugins.find("command", name).__module__ for name in plugins.names("command")}
     assert not (others - {"yawbench.commands.build"}) & loaded
 
 
@@ -122,7 +122,7 @@ def test_a_signal_ends_every_command_with_a_word_and_the_same_status(name, numbe
     def ended() -> None:
         os.kill(os.getpid(), number)
 
-    module = importlib.import_module(plugins.module_of("command", name))
+    module = importlib.import_module(plugins.find("command", name).__module__)
     monkeypatch.setattr(module, name.replace("-", "_"), ended)
     before = signal.getsignal(signal.SIGTERM)
     with pytest.raises(SystemExit) as end:

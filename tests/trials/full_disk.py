@@ -7,17 +7,12 @@ whole; called again with room, it must give the same as if nothing had happened.
 
 from __future__ import annotations
 
-import argparse
 import random
 import shutil
-import sys
-import tempfile
 from collections import Counter
 from pathlib import Path
 
-from yawbench.fmus.build import build_all
-
-from .kills import COMMANDS, NOISE, UNITS, Trial
+from .kills import NOISE, Trial, campaign
 
 
 def trial(command: str, each: int, seed: int, folder: Path, fmus: Path) -> tuple[Counter[str], list[str]]:
@@ -61,26 +56,6 @@ def trial(command: str, each: int, seed: int, folder: Path, fmus: Path) -> tuple
     return counts, notes
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("commands", nargs="*", default=list(COMMANDS), help="default: all")
-    parser.add_argument("--each", type=int, default=20, help="calls of each command")
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
-    failed = False
-    print("| command | calls | failed | had room | held |")
-    print("|---|---:|---:|---:|---:|", flush=True)
-    with tempfile.TemporaryDirectory(prefix="full-") as folder:
-        fmus = Path(folder, "fmus")
-        build_all(fmus, components=UNITS)
-        for command in given.commands:
-            counts, notes = trial(command, given.each, given.seed, Path(folder), fmus)
-            numbers = (given.each, counts["failed"], counts["had room"], counts["held"])
-            print(f"| `{command}` | {' | '.join(map(str, numbers))} |", flush=True)
-            print("".join(f"{note}\n" for note in notes), end="", file=sys.stderr, flush=True)
-            failed = failed or bool(notes)
-    sys.exit(failed)
-
-
 if __name__ == "__main__":
-    main()
+    outcomes = {"failed": "failed", "had room": "had room", "held": "held"}
+    campaign(__doc__.partition("\n")[0], trial, "calls", outcomes)

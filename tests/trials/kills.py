@@ -19,7 +19,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 
@@ -204,26 +204,43 @@ def trial(command: str, each: int, seed: int, folder: Path, fmus: Path) -> tuple
     return counts, notes
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+def campaign(
+    title: str, trial: Callable[..., tuple[Counter[str], list[str]]], calls: str, outcomes: Mapping[str, str]
+) -> None:
+    """Try commands and print a row of a table for each; exit with 1 if something did not hold.
+
+    Args:
+        title: of the help.
+        trial: tries a command; returns its outcomes and sentences on what went wrong.
+        calls: heading of the number of trials.
+        outcomes: heading -> outcome.
+    """
+    parser = argparse.ArgumentParser(description=title)
     parser.add_argument("commands", nargs="*", default=list(COMMANDS), help="default: all")
-    parser.add_argument("--each", type=int, default=20, help="kills of each command")
+    parser.add_argument("--each", type=int, default=20, help=f"{calls} of each command")
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
     failed = False
-    print("| command | kills | by SIGKILL | by SIGTERM | had ended before | held |")
-    print("|---|---:|---:|---:|---:|---:|", flush=True)
-    with tempfile.TemporaryDirectory(prefix="kills-") as folder:
+    print(f"| command | {calls} | {' | '.join(outcomes)} |")
+    print(f"|---|---:|{'---:|' * len(outcomes)}", flush=True)
+    with tempfile.TemporaryDirectory(prefix="trials-") as folder:
         fmus = Path(folder, "fmus")
         build_all(fmus, components=UNITS)
         for command in given.commands:
             counts, notes = trial(command, given.each, given.seed, Path(folder), fmus)
-            numbers = (given.each, counts["SIGKILL"], counts["SIGTERM"], counts["had ended before"])
-            print(f"| `{command}` | {' | '.join(map(str, numbers))} | {counts['held']} |", flush=True)
+            numbers = (given.each, *(counts[outcome] for outcome in outcomes.values()))
+            print(f"| `{command}` | {' | '.join(map(str, numbers))} |", flush=True)
             print("".join(f"{note}\n" for note in notes), end="", file=sys.stderr, flush=True)
             failed = failed or bool(notes)
     sys.exit(failed)
 
 
+OUTCOMES = {
+    "by SIGKILL": "SIGKILL",
+    "by SIGTERM": "SIGTERM",
+    "had ended before": "had ended before",
+    "held": "held",
+}
+
 if __name__ == "__main__":
-    main()
+    campaign(__doc__.partition("\n")[0], trial, "kills", OUTCOMES)
