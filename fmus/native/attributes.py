@@ -11,10 +11,10 @@ import enum
 import functools
 import types
 from collections.abc import Callable, Sequence
-from typing import Any, NoReturn
+from typing import Any
 
 from . import ir
-from .places import Places
+from .paths import Paths
 from .values import (
     UNSET,
     Bound,
@@ -31,9 +31,9 @@ from .values import (
     Span,
     Text,
     Union,
-    Unreachable,
     is_number,
     is_plain,
+    read,
 )
 
 _KINDS: dict[type, type] = {List: list, Ring: list, Dict: dict, Text: str}
@@ -68,34 +68,26 @@ def _has_own(cls: type, name: str) -> bool:
     return isinstance(member(cls, name), types.FunctionType)
 
 
-class Attributes(Places):
+Caller = Callable[[Any, Sequence[Any], dict[str, Any]], Any]
+"""Evaluates a call of a function with arguments and named arguments."""
+
+
+class Attributes:
     """Attributes and special methods."""
 
-    def call(self, function: Any, args: Sequence[Any], named: dict[str, Any]) -> Any:
-        """Return the value of a call; implemented in `calls`."""
-        raise NotImplementedError
+    def __init__(self, paths: Paths, call: Caller) -> None:
+        self.lower, self.memory, self.paths, self.call = paths.lower, paths.memory, paths, call
 
-    def loaded(self, value: Picked) -> Any:
-        """Return an item of a table, with its numbers loaded; implemented in `evaluate`."""
-        raise NotImplementedError
-
-    def end(self, kind: str, message: str) -> NoReturn:
-        """Emit an exception on the current path, and stop evaluating the path."""
-        self.fail(kind, message)
-        raise Unreachable
-
-    # ---- reading ----------------------------------------------------------------------------
-
-    def attribute(self, owner: Any, name: str, missing: Callable[[], Any] | None = None) -> Any:
+    def of(self, owner: Any, name: str, missing: Callable[[], Any] | None = None) -> Any:
         """Return an attribute, or what `missing` returns if there is none.
 
         Raises:
             Refused: there is none, or Python finds it in a way that is not translated.
         """
         if isinstance(owner, Picked):
-            owner = self.loaded(owner)
+            owner = self.memory.loaded(owner)
         if isinstance(owner, Union):
-            return self.by_form(owner, lambda x: self.attribute(x, name, missing))
+            return self.paths.by_form(owner, lambda x: self.of(x, name, missing))
         if type(owner) in _KINDS:
             if hasattr(_KINDS[type(owner)], name):
                 return Bound(name, owner)
@@ -103,7 +95,7 @@ class Attributes(Places):
         if owner is None and not hasattr(None, name):
             if missing:
                 return missing()
-            self.end("AttributeError", f"'NoneType' object has no attribute '{name}'")
+            self.lower.end("AttributeError", f"'NoneType' object has no attribute '{name}'")
         if isinstance(owner, _OF_EVALUATION) or (isinstance(owner, Box) and not isinstance(owner, Instance)):
             raise Refused(f"the attribute {name} of a {type(owner).__name__}")
         if isinstance(owner, type):
@@ -154,25 +146,26 @@ class Attributes(Places):
 
         def use(x: Any) -> Any:
             if x is UNSET and nowhere:
-                self.end("AttributeError", f"'{cls.__name__}' object has no attribute '{name}'")
+                self.lower.end("AttributeError", f"'{cls.__name__}' object has no attribute '{name}'")
             return otherwise() if x is UNSET else x
 
-        return self.by_form(held, use)
+        return self.paths.by_form(held, use)
 
     def _held(self, owner: Any) -> Any:
         """Return the attributes that an object itself has."""
         if isinstance(owner, Instance):
-            return self.read(owner)
+            return read(owner)
         return vars(owner) if hasattr(type(owner), "__dict__") and hasattr(owner, "__dict__") else {}
 
     def _without_attribute_errors(self, cls: type, name: str, evaluated: Callable[[], Any]) -> Any:
         """Return a value whose evaluation must raise no AttributeError, which Python would take otherwise."""
-        start = len(self.out)
+        start = len(self.lower.out)
         try:
             return evaluated()
         finally:
             if any(
-                isinstance(s, ir.Raise) and s.kind == "AttributeError" for s in ir.every(self.out[start:])
+                isinstance(s, ir.Raise) and s.kind == "AttributeError"
+                for s in ir.every(self.lower.out[start:])
             ):
                 raise Refused(
                     f"{cls.__name__}.{name} may raise an AttributeError, with another value instead"
@@ -196,7 +189,7 @@ class Attributes(Places):
             if not isinstance(owner, Instance) or cls.__dictoffset__ == 0:
                 raise Refused(f"{cls.__name__}.{name} is computed when it is first read")
             value = self.call(raw.func, [owner], {})
-            self.write(owner, raw.attrname, value)
+            self.paths.write(owner, raw.attrname, value)
             return value
         if isinstance(raw, types.MemberDescriptorType):
             held = self._held(owner).get(name, UNSET) if isinstance(owner, Instance) else raw.__get__(owner)
@@ -268,14 +261,12 @@ class Attributes(Places):
         if isinstance(owner, Instance) and isinstance(member(owner.cls, name), property):
             raise Refused(f"hasattr of the property {name}")
         nothing = object()
-        value = self.attribute(owner, name, lambda: nothing)
-        return self.by_form(value, lambda x: x is not nothing)
+        value = self.of(owner, name, lambda: nothing)
+        return self.paths.by_form(value, lambda x: x is not nothing)
 
-    # ---- setting ----------------------------------------------------------------------------
-
-    def set_attribute(self, owner: Any, name: str, value: Any) -> None:
+    def set(self, owner: Any, name: str, value: Any) -> None:
         """Set an attribute of an instance."""
-        self.by_form(owner, lambda x: self._set(x, name, value))
+        self.paths.by_form(owner, lambda x: self._set(x, name, value))
 
     def _set(self, owner: Any, name: str, value: Any) -> None:
         if not isinstance(owner, Instance):
@@ -298,9 +289,9 @@ class Attributes(Places):
         if raw is UNSET or not _is_data(raw):
             if cls.__dictoffset__ == 0:
                 raise Refused(f"{cls.__name__} has no place for an attribute {name}")
-            self.write(owner, name, value)
+            self.paths.write(owner, name, value)
         elif isinstance(raw, types.MemberDescriptorType):
-            self.write(owner, name, value)
+            self.paths.write(owner, name, value)
         elif isinstance(raw, property) and not _has_own(type(raw), "__set__"):
             if raw.fset is None:
                 raise Refused(f"{cls.__name__}.{name} cannot be set")
@@ -309,8 +300,6 @@ class Attributes(Places):
             self.call(member(type(raw), "__set__"), [raw, owner, value], {})
         else:
             raise Refused(f"setting {cls.__name__}.{name}, which is a {type(raw).__name__}")
-
-    # ---- special methods --------------------------------------------------------------------
 
     def special(self, value: Any, name: str) -> Any:
         """Return a special method that a value's class has in Python, bound to the value; `UNSET` if none."""
@@ -335,3 +324,8 @@ class Attributes(Places):
             or isinstance(value, (*_OF_EVALUATION, Box))
             or type(value).__module__ in ("builtins", "functools", "itertools", "operator")
         )
+
+    def called(self, value: Any, name: str, *args: Any) -> Any:
+        """Return what a special method of a value's class returns; `UNSET` if the class has none."""
+        method = self.special(value, name)
+        return UNSET if method is UNSET else self.call(method, args, {})

@@ -8,13 +8,14 @@ import itertools
 import math
 import operator
 import types
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 from . import ir
 from .attributes import member
-from .loops import UNROLLED
-from .of_numbers import OfNumbers
+from .expressions import formatted
+from .loops import UNROLLED, for_each_index
+from .lower import COMPENSATED, complaint
 from .shapes import push
 from .values import (
     EITHER,
@@ -34,26 +35,66 @@ from .values import (
     Span,
     Text,
     Union,
-    Unreachable,
     is_mixed,
     is_number,
     is_plain,
     is_real,
     joined_text,
+    read,
     same,
 )
 
-_OPERATORS = {
-    operator.mul: "*", operator.add: "+", operator.sub: "-", operator.truediv: "/", operator.floordiv: "//",
-    operator.mod: "%", operator.pow: "**",
-}  # fmt: skip
+if TYPE_CHECKING:
+    from .evaluate import Evaluator
 
 MOST_IN_ARRAY = 4096
 """Largest number of numbers in an array; chosen: it is on the stack."""
-
-_OF_FORMS = ("getattr", "hasattr", "isinstance", "bool", "zip")
-"""Functions that take values of several forms."""
+MOST_DIGITS = 15
+"""Largest number of digits to which numbers are rounded."""
+MOST_SORTED = 63
+"""Largest number of numbers that are sorted natively; see `arithmetic.h`."""
 _PURE = (set, frozenset, str, repr, ord, chr, divmod, pow, format, float, int, bool, tuple, complex, range)
+
+
+def built_in(e: Evaluator, function: Any, args: list[Any], named: dict[str, Any]) -> Any:
+    """Return the value of a call of a function or class of Python."""
+    name, of_math = getattr(function, "__name__", ""), getattr(function, "__module__", "") == "math"
+    if name == "_replace" and isinstance(args[0], tuple):
+        return function(*args, **named)
+    if function is math.log and len(args) == 2:
+        return e.operators.operate("/", *[built_in(e, function, [x], {}) for x in args])
+    if of_math and name not in ("floor", "ceil", "trunc"):
+        args = [e.paths.real(x) if is_mixed(x) else x for x in args]
+    if any(isinstance(x, Union) for x in args) and not any(function is f for f in OF_FORMS):
+        k = next(i for i, x in enumerate(args) if isinstance(x, Union))
+        return e.paths.by_form(
+            args[k], lambda x: built_in(e, function, [*args[:k], x, *args[k + 1 :]], named)
+        )
+    if name == "get" and type(getattr(function, "__self__", None)) is dict:
+        return METHODS[Dict, name](e, Dict(function.__self__), *args)
+    if isinstance(function, _KINDS_OF_FUNCTIONS) and function in FUNCTIONS:
+        return FUNCTIONS[function](e, *args, **named)
+    if of_math and all(map(is_number, args)):
+        return e.lower.function(name, *args)
+    if isinstance(function, type) and issubclass(function, BaseException):
+        return Failure(function, text_of(args))
+    if getattr(function, "__module__", "") == "_operator" and name.startswith(("i", "set", "del")):
+        raise Refused(f"a call of operator.{name}")
+    plain = [tuple(e.items.of(x)) if isinstance(x, List) else x for x in args]
+    if _is_pure(function) and all(map(_is_constant, (*plain, *named.values()))):
+        try:
+            return e.items.imported(function(*plain, **named))
+        except Exception as error:
+            e.lower.end(type(error).__name__, str(error))
+    raise Refused(f"a call of {name or type(function).__name__}")
+
+
+def method_of(e: Evaluator, owner: Any, name: str, args: list[Any], named: dict[str, Any]) -> Any:
+    """Return the value of a call of a method of a list, text or dictionary."""
+    kind, what = type(owner), KINDS[type(owner)]
+    if (kind, name) not in METHODS:
+        raise Refused(f"the method {name} of a {what}")
+    return METHODS[kind, name](e, owner, *args, **named)
 
 
 def _is_pure(function: Any) -> bool:
@@ -68,6 +109,20 @@ def _is_pure(function: Any) -> bool:
     return getattr(function, "__module__", "") in ("math", "_operator", "_bisect", "itertools")
 
 
+def _is_constant(value: Any) -> bool:
+    """Return whether a value is known at build time, and none of its operators is of a component."""
+    if type(value) in (tuple, list, set, frozenset):
+        return all(map(_is_constant, value))
+    if type(value) is dict:
+        return all(map(_is_constant, (*value, *value.values())))
+    return is_plain(value) or isinstance(value, (range, slice, *_KINDS_OF_FUNCTIONS))
+
+
+def _getattr(e: Evaluator, owner: Any, name: str, *default: Any) -> Any:
+    missing = (lambda: default[0]) if default else None
+    return e.paths.by_form(owner, lambda x: e.attributes.of(x, name, missing))
+
+
 class Repeated:
     """Endless `itertools.repeat`."""
 
@@ -75,321 +130,490 @@ class Repeated:
         self.value = value
 
 
-class BuiltIn(OfNumbers):
-    """Calls of built-in functions and methods."""
+def _float(e: Evaluator, value: Any) -> Any:
+    if type(value) is str:
+        return _called(e, float, value)
+    return _converted(e, "__float__", (ir.REAL,), e.lower.as_real, value)
 
-    # ---- methods of lists, texts and dictionaries -------------------------------------------
 
-    def _method(self, owner: Any, name: str, args: list[Any], named: dict[str, Any]) -> Any:
-        if isinstance(owner, Text) and name == "encode":
-            return Bytes(owner)
-        if isinstance(owner, Ring):
-            return self._of_ring(owner, name, args)
-        if isinstance(owner, Dict):
-            return self._of_dict(owner, name, args)
-        assert isinstance(owner, List)
-        if name == "append":
-            self.promote(owner, args[0])
-            self.open(owner).append(args[0])
-            return None
-        if name == "pop":
-            return self.remove(owner, args[0] if args else -1, "pop from empty list")
-        if name in ("extend", "insert", "clear", "reverse"):
-            if owner.path is not None and name != "reverse":
-                raise Refused(f"{name} of a list of the state")
-            held = self.open(owner)
-            if name == "extend":
-                held += self.items(args[0])
-            else:
-                getattr(held, name)(*args)
-            return None
-        if name == "copy":
-            return List(self.read(owner))
-        if name in ("index", "count") and all(map(is_plain, (*self.read(owner), *args))):
-            try:
-                return getattr(self.read(owner), name)(*args)
-            except ValueError as error:
-                self.end("ValueError", str(error))
-        raise Refused(f"the method {name} of a list")
+def _int(e: Evaluator, value: Any) -> Any:
+    if type(value) is str:
+        return _called(e, int, value)
+    return _converted(e, "__int__", (ir.INT,), lambda x: e.lower.whole("trunc", x), value)
 
-    def _of_ring(self, ring: Ring, name: str, args: list[Any]) -> Any:
-        if name == "append":
-            push(ring, args[0], self.read, self)
-            return None
-        if name == "pop" and args:
-            return self.remove(ring, args[0], "pop from empty list")
-        raise Refused(f"the method {name} of a list whose length changes")
 
-    def _of_dict(self, owner: Dict, name: str, args: list[Any]) -> Any:
-        held = self.read(owner)
-        if name == "keys":
-            return tuple(held)
-        if name in ("items", "values"):
-            return self._view(owner, tuple(held), with_keys=name == "items")
-        if name == "get":
-            return held.get(self._key(args[0]), args[1] if len(args) > 1 else None)
-        if name == "copy":
-            return Dict(held)
-        raise Refused(f"the method {name} of a dictionary")
+def _called(e: Evaluator, function: Any, text: str) -> Any:
+    try:
+        return function(text)
+    except ValueError as error:
+        e.lower.end("ValueError", str(error))
 
-    def _view(self, owner: Dict, keys: tuple[Any, ...], with_keys: bool) -> Each:
-        def item(k: int) -> Any:
-            if tuple(self.read(owner)) != keys:
-                raise Refused("a dictionary whose keys change during iteration")
-            value = self.read(owner)[keys[k]]
-            return (keys[k], value) if with_keys else value
 
-        return Each(len(keys), item, once=False)
+def _converted(e: Evaluator, name: str, of: Sequence[str], usual: Any, value: Any) -> Any:
+    """Return a number, or that of an object whose class has a special method that returns one."""
+    result = e.paths.narrowed(e.operators.unary(name, usual, value))
+    if e.attributes.special(value, name) is UNSET:
+        return result
+    if not is_number(result) or ir.type_of(result) not in of:
+        raise Refused(f"{name} that returns something other than Python wants")
+    return result
 
-    # ---- built-in functions -----------------------------------------------------------------
 
-    def _built_in(self, function: Any, args: list[Any], named: dict[str, Any]) -> Any:
-        name = getattr(function, "__name__", "")
-        if function == itertools.chain.from_iterable:
-            return self._python_chain(*self.items(args[0]))
-        if name == "_replace" and isinstance(args[0], tuple):
-            return function(*args, **named)
-        if function is math.log and len(args) == 2:
-            return self.operate("/", *[self._built_in(function, [x], {}) for x in args])
-        if getattr(function, "__module__", "") == "math" and name not in ("floor", "ceil", "trunc"):
-            args = [self.real(x) if is_mixed(x) else x for x in args]
-        if any(isinstance(x, Union) for x in args) and name not in _OF_FORMS:
-            k = next(i for i, x in enumerate(args) if isinstance(x, Union))
-            return self.by_form(
-                args[k], lambda x: self._built_in(function, [*args[:k], x, *args[k + 1 :]], named)
-            )
-        if function is iter and len(args) == 1 and not named:
-            each = self.each(args[0])
-            return each if each.once else Each(each.count, each.item, each.end)
-        if name == "get" and type(getattr(function, "__self__", None)) is dict:
-            return self._of_dict(Dict(function.__self__), name, args)
-        own = getattr(self, f"_python_{name}", None)
-        if own is not None and getattr(function, "__module__", "") in (
-            "array", "builtins", "itertools", "math", "_bisect", "bisect", "functools", "_functools",
-        ):  # fmt: skip
-            return own(*args, **named)
-        if getattr(function, "__module__", "") == "math" and all(map(is_number, args)):
-            return self.function(name, *args)
-        if isinstance(function, type) and issubclass(function, BaseException):
-            return Failure(function, self._text(args))
-        for known, op in _OPERATORS.items():
-            if function is known:
-                return self.operate(op, *args)
-        if getattr(function, "__module__", "") == "_operator" and name.startswith(("i", "set", "del")):
-            raise Refused(f"a call of operator.{name}")
-        plain = [tuple(self.items(x)) if isinstance(x, List) else x for x in args]
-        if _is_pure(function) and all(map(self._is_constant, (*plain, *named.values()))):
-            try:
-                return self.imported(function(*plain, **named))
-            except Exception as error:
-                self.fail(type(error).__name__, str(error))
-                raise Unreachable from None
-        raise Refused(f"a call of {name or type(function).__name__}")
+def _round(e: Evaluator, value: Any, digits: Any = None) -> Any:
+    if digits is None:
+        return e.operators.unary("__round__", lambda x: e.lower.whole("rint", x), value)
+    if not is_number(value):
+        raise Refused(f"round of a {type(value).__name__}")
+    if not isinstance(value, ir.Var):
+        return round(value, digits)
+    if not isinstance(digits, int) or not 0 <= digits <= MOST_DIGITS:
+        raise Refused(f"round to other than 0 to {MOST_DIGITS} digits")
+    return e.lower.let(ir.REAL, "rounded", value, digits) if is_real(value) else e.lower.whole("rint", value)
 
-    def _python_setattr(self, owner: Any, name: str, value: Any) -> None:
-        self.set_attribute(owner, name, value)
 
-    def _python_hasattr(self, owner: Any, name: str) -> Any:
-        return self.by_form(owner, lambda x: self.has(x, name))
+def _divmod(e: Evaluator, a: Any, b: Any) -> Any:
+    if is_number(a) and is_number(b):
+        unit: Any = 1.0 if is_real(a) or is_real(b) else 1
+        e.lower.require(e.lower.compare("!=", b, 0), *complaint(lambda: divmod(unit, 0 * unit)))
+    return e.operators.operate("//", a, b), e.operators.operate("%", a, b)
 
-    def _python_len(self, value: Any) -> Any:
-        method = self.special(value, "__len__")
-        if method is not UNSET:
-            return self.truth_or_length(method)
-        if isinstance(value, Ring):
-            return self.ring_length(value)
-        if isinstance(value, Picked):
-            if all(isinstance(x, str) or type(x) is tuple for x in value.items):
-                return self.by_item(value, len)
-            return self.length_of_picked(value)
-        if isinstance(value, Array):
-            return value.memory.length
-        if isinstance(value, Each) and not value.once:
-            return value.count
-        if isinstance(value, (List, Dict)):
-            return len(self.read(value))
-        if isinstance(value, tuple) or type(value) in (str, bytes, range, list, dict, set, frozenset):
-            return len(value)
-        raise Refused(f"len of a {type(value).__name__}")
 
-    def truth_or_length(self, method: Any) -> Any:
-        """Return what a __len__ returns, which must be an integer that is not negative."""
-        count = self.narrowed(self.call(method, [], {}))
-        if not is_number(count) or ir.type_of(count) not in (ir.INT, ir.BOOL):
-            raise Refused("a __len__ that returns something other than an integer")
-        self.require(self.compare(">=", count, 0), "ValueError", "__len__() should return >= 0")
-        return self.binary("+", count, 0)
+def _isclose(e: Evaluator, a: Any, b: Any, *, rel_tol: Any = 1e-09, abs_tol: Any = 0.0) -> Any:
+    if not all(isinstance(x, (int, float)) and x >= 0.0 for x in (rel_tol, abs_tol)):
+        raise Refused("math.isclose with tolerances that are only known at run time, or negative")
+    a, b = e.paths.real(a), e.paths.real(b)
+    finite = [e.lower.negation(e.lower.function("isinf", x)) for x in (a, b)]
+    apart = e.lower.size(e.lower.binary("-", b, a))
+    bounds = [e.lower.size(e.lower.binary("*", float(rel_tol), x)) for x in (b, a)]
 
-    def _python_array(self, kind: Any, values: Any = ()) -> Array:
-        each = self.each(values)
-        if kind != "d" or not each.count:
-            raise Refused("an array other than one of real numbers")
-        if each.count > MOST_IN_ARRAY:
-            raise Refused(f"an array of more than {MOST_IN_ARRAY:,} numbers")
-        made = Array(ir.Array(f"a{self.new(ir.REAL).name}", each.count))
-        if isinstance(values, Array):
-            self.for_each_index(
-                each.count, lambda k: self.set_array_item(made, k, self.array_item(values, k))
-            )
-            return made
-        items = [each.item(k) for k in range(each.count)]
-        if len(items) > UNROLLED and all(same(x, items[0]) for x in items):
-            self.for_each_index(len(items), lambda k: self.set_array_item(made, k, items[0]))
-            return made
-        for k, x in enumerate(items):
-            self.set_array_item(made, k, x)
+    def near() -> Any:
+        return _one_of(e, [e.lower.compare("<=", apart, bound) for bound in (*bounds, float(abs_tol))])
+
+    def of_finite() -> Any:
+        return e.paths.branch(
+            finite[0], lambda: e.paths.branch(finite[1], near, lambda: False), lambda: False
+        )
+
+    return e.paths.branch(e.lower.compare("==", a, b), lambda: True, of_finite)
+
+
+def _one_of(e: Evaluator, conditions: list[ir.Operand]) -> ir.Operand:
+    first, *rest = conditions
+    return e.paths.branch(first, lambda: True, lambda: _one_of(e, rest)) if rest else first
+
+
+def _hypot(e: Evaluator, *values: Any) -> Any:
+    return (
+        e.lower.function("hypot", *values)
+        if any(isinstance(x, ir.Var) for x in values)
+        else math.hypot(*values)
+    )
+
+
+def _dist(e: Evaluator, first: Any, second: Any) -> Any:
+    pairs = list(zip(e.items.of(first), e.items.of(second), strict=True))
+    if not any(isinstance(x, (ir.Var, Union)) for pair in pairs for x in pair):
+        return math.dist(*zip(*pairs, strict=True))
+    return e.lower.function(
+        "dist", *[e.lower.binary("-", e.paths.real(a), e.paths.real(b)) for a, b in pairs]
+    )
+
+
+def _prod(e: Evaluator, values: Any) -> Any:
+    product: Any = 1
+    for item in e.items.of(values):
+        product = e.operators.operate("*", product, item)
+    return product
+
+
+def _sum(e: Evaluator, values: Any, start: Any = 0) -> Any:
+    """Return sum(values, start), by the summation of the Python that builds."""
+    numbers = [start, *e.items.of(values)]
+    if not all(is_number(x) or is_mixed(x) for x in numbers):
+        raise Refused("a sum of values that are not numbers")
+    if COMPENSATED:
+        return _compensated(e, numbers, 0)
+    total = numbers[0]
+    for x in numbers[1:]:
+        total = e.operators.operate("+", total, x)
+    return total
+
+
+def _compensated(e: Evaluator, numbers: list[Any], k: int) -> Any:
+    mixed = next((i for i in range(k, len(numbers)) if isinstance(numbers[i], Union)), None)
+    if mixed is not None:
+        before, after = numbers[:mixed], numbers[mixed + 1 :]
+        return e.paths.by_form(numbers[mixed], lambda x: _compensated(e, [*before, x, *after], mixed))
+    if not any(isinstance(x, ir.Var) for x in numbers):
+        return sum(numbers[1:], numbers[0])
+    first = next((i for i, x in enumerate(numbers) if is_real(x)), len(numbers))
+    whole: Any = 0
+    for x in numbers[:first]:
+        whole = e.operators.operate("+", whole, x)
+    if first == len(numbers):
+        return whole
+    return e.lower.let(ir.REAL, "compensated_sum", whole, *numbers[first:])
+
+
+def _extreme(e: Evaluator, op: str, args: Sequence[Any], key: Any = None, **default: Any) -> Any:
+    items = e.items.of(args[0]) if len(args) == 1 else list(args)
+    if not items and default:
+        return default["default"]
+    if items and key is None and all(map(_is_constant, items)):
+        return (max if op == ">" else min)(items)
+    if not items:
+        raise Refused("min or max of nothing")
+    best, *others = _keyed(e, items, key, "min or max of values that are not numbers")
+    for other in others:
+        better = _in_order(e, op, other[0], best[0])
+        best = tuple(e.paths.selected(better, x, y) for x, y in zip(other, best, strict=True))
+    return best[-1]
+
+
+def _sorted(e: Evaluator, values: Any, key: Any = None, reverse: Any = False) -> Any:
+    items = e.items.of(values)
+    if not isinstance(reverse, (bool, int)):
+        raise Refused("an order that is only known at run time")
+    if key is None and all(map(_is_constant, items)):
+        return List(sorted(items, reverse=bool(reverse)))
+    rows = _keyed(e, items, key, "sorting values that are not numbers")
+    if len(rows) > MOST_SORTED:
+        raise Refused(f"sorting more than {MOST_SORTED} numbers that are only known at run time")
+    rows = rows[::-1] if reverse else rows  # of equal ones, the first stays first
+    keys = [e.paths.real(row[0]) if is_mixed(row[0]) else row[0] for row in rows]
+    if any(ir.type_of(x) in (ir.WORD, ir.WIDE) for x in keys):
+        raise Refused("sorting integers of 64 bits")
+    places = [e.lower.let(ir.INT, "sorted_item", k, *keys) for k in range(len(keys))] if keys[1:] else [0]
+    ordered = [_numbered(e, place, [row[-1] for row in rows]) for place in places]
+    return List(ordered[::-1] if reverse else ordered)
+
+
+def _numbered(e: Evaluator, number: ir.Operand, items: Sequence[Any]) -> Any:
+    chosen = items[0]
+    for k, item in enumerate(items[1:], start=1):
+        chosen = e.paths.selected(e.lower.compare("==", number, k), item, chosen)
+    return chosen
+
+
+def _keyed(e: Evaluator, items: Sequence[Any], key: Any, text: str) -> list[tuple[Any, ...]]:
+    """Return items with their keys before them, if there are keys; refused with a text if not numbers."""
+    if not all(is_number(x) or is_mixed(x) for x in items):
+        raise Refused(text)
+    if key is None:
+        return [(x,) for x in items]
+    keys = [e.call(key, [x], {}) for x in items]
+    if not all(is_number(x) or is_mixed(x) for x in keys):
+        raise Refused("keys that are not numbers")
+    return list(zip(keys, items, strict=True))
+
+
+def _in_order(e: Evaluator, op: str, a: Any, b: Any) -> ir.Operand:
+    return e.lower.compare(op, *(e.paths.real(x) if is_mixed(x) else x for x in (a, b)))
+
+
+def _searched(e: Evaluator, method: Callable[..., int], owner: List, args: Sequence[Any]) -> int:
+    if not all(map(is_plain, (*read(owner), *args))):
+        raise Refused(f"the method {method.__name__} of a list")
+    try:
+        return method(read(owner), *args)
+    except ValueError as error:
+        e.lower.end("ValueError", str(error))
+
+
+def _view(owner: Dict, keys: tuple[Any, ...], with_keys: bool) -> Each:
+    def item(k: int) -> Any:
+        if tuple(read(owner)) != keys:
+            raise Refused("a dictionary whose keys change during iteration")
+        value = read(owner)[keys[k]]
+        return (keys[k], value) if with_keys else value
+
+    return Each(len(keys), item, once=False)
+
+
+def _iter(e: Evaluator, value: Any) -> Each:
+    each = e.items.each(value)
+    return each if each.once else Each(each.count, each.item, each.end)
+
+
+def _len(e: Evaluator, value: Any) -> Any:
+    own = e.attributes.called(value, "__len__")
+    if own is not UNSET:
+        return _length(e, e.paths.narrowed(own))
+    if isinstance(value, Ring):
+        return e.memory.ring_length(value)
+    if isinstance(value, Picked):
+        if all(isinstance(x, str) or type(x) is tuple for x in value.items):
+            return e.memory.by_item(value, len)
+        return e.memory.length_of_picked(value)
+    if isinstance(value, Array):
+        return value.memory.length
+    if isinstance(value, Each) and not value.once:
+        return value.count
+    if isinstance(value, (List, Dict)):
+        return len(read(value))
+    if isinstance(value, tuple) or type(value) in (str, bytes, range, list, dict, set, frozenset):
+        return len(value)
+    raise Refused(f"len of a {type(value).__name__}")
+
+
+def _length(e: Evaluator, count: Any) -> Any:
+    """Return what a __len__ has returned, which must be an integer that is not negative."""
+    if not is_number(count) or ir.type_of(count) not in (ir.INT, ir.BOOL):
+        raise Refused("a __len__ that returns something other than an integer")
+    e.lower.require(e.lower.compare(">=", count, 0), "ValueError", "__len__() should return >= 0")
+    return e.lower.binary("+", count, 0)
+
+
+def _array(e: Evaluator, kind: Any, values: Any = ()) -> Array:
+    each = e.items.each(values)
+    if kind != "d" or not each.count:
+        raise Refused("an array other than one of real numbers")
+    if each.count > MOST_IN_ARRAY:
+        raise Refused(f"an array of more than {MOST_IN_ARRAY:,} numbers")
+    made = Array(ir.Array(f"a{e.lower.new(ir.REAL).name}", each.count))
+    if isinstance(values, Array):
+        for_each_index(
+            e, each.count, lambda k: e.items.set_array_item(made, k, e.memory.array_item(values, k))
+        )
         return made
+    items = [each.item(k) for k in range(each.count)]
+    if len(items) > UNROLLED and all(same(x, items[0]) for x in items):
+        for_each_index(e, len(items), lambda k: e.items.set_array_item(made, k, items[0]))
+        return made
+    for k, x in enumerate(items):
+        e.items.set_array_item(made, k, x)
+    return made
 
-    def _python_bool(self, value: Any) -> Any:
-        return self.truth_of(value)
 
-    def _python_str(self, value: Any) -> Any:
-        return joined_text(self._formatted(value, "", False))
+def _dict(e: Evaluator, value: Any = (), /, **named: Any) -> Any:
+    if type(value) is dict:
+        value = Dict(value)
+    held = read(value) if isinstance(value, Dict) else dict(map(e.items.of, e.items.of(value)))
+    held = {e.items.key(k): x for k, x in held.items()}
+    return Dict({**held, **named})
 
-    def _python_list(self, value: Any = ()) -> Any:
-        return List(self.items(value))
 
-    def _python_tuple(self, value: Any = ()) -> Any:
-        return tuple(self.items(value))
+def _decided(e: Evaluator, each: Each, by: bool, k: int = 0) -> Any:
+    if k == each.count:
+        return not by
+    test = e.operators.truth_of(each.item(k))
+    on = lambda: _decided(e, each, by, k + 1)  # noqa: E731
+    return e.paths.branch(test, *((lambda: True, on) if by else (on, lambda: False)))
 
-    def _python_dict(self, value: Any = (), **named: Any) -> Any:
-        if type(value) is dict:
-            value = Dict(value)
-        held = self.read(value) if isinstance(value, Dict) else dict(map(self.items, self.items(value)))
-        held = {self._key(k): x for k, x in held.items()}
-        return Dict({**held, **named})
 
-    def _python_any(self, values: Any) -> Any:
-        return self._decided(self.each(values), True)
+def _zip(e: Evaluator, *values: Any, strict: bool = False) -> Any:
+    rows = [x if isinstance(x, Repeated) else e.items.each(x) for x in values]
+    counts = {x.count for x in rows if isinstance(x, Each)}
+    if strict and len(counts) > 1:
+        e.lower.end("ValueError", "zip() arguments differ in length")
+    return Each(min(counts), lambda k: tuple(x.item(k) if isinstance(x, Each) else x.value for x in rows))
 
-    def _python_all(self, values: Any) -> Any:
-        return self._decided(self.each(values), False)
 
-    def _decided(self, each: Each, by: bool, k: int = 0) -> Any:
-        if k == each.count:
-            return not by
-        test = self.truth_of(each.item(k))
-        on = lambda: self._decided(each, by, k + 1)  # noqa: E731
-        return self.branch(test, *((lambda: True, on) if by else (on, lambda: False)))
+def _map(e: Evaluator, function: Any, *values: Any) -> Any:
+    rows = _zip(e, *values)
+    return Each(rows.count, lambda k: e.call(function, rows.item(k), {}))
 
-    def _python_zip(self, *values: Any, strict: bool = False) -> Any:
-        rows = [x if isinstance(x, Repeated) else self.each(x) for x in values]
-        counts = {x.count for x in rows if isinstance(x, Each)}
-        if strict and len(counts) > 1:
-            self.fail("ValueError", "zip() arguments differ in length")
-            raise Unreachable
-        return Each(min(counts), lambda k: tuple(x.item(k) if isinstance(x, Each) else x.value for x in rows))
 
-    def _python_map(self, function: Any, *values: Any) -> Any:
-        rows = self._python_zip(*values)
-        return Each(rows.count, lambda k: self.call(function, rows.item(k), {}))
+def _enumerate(e: Evaluator, values: Any, start: int = 0) -> Any:
+    if isinstance(values, (Ring, Span)):
+        raise Refused("enumerate of a list whose length changes")
+    each = e.items.each(values)
+    return Each(each.count, lambda k: (start + k, each.item(k)), each.end)
 
-    def _python_enumerate(self, values: Any, start: int = 0) -> Any:
-        if isinstance(values, (Ring, Span)):
-            raise Refused("enumerate of a list whose length changes")
-        each = self.each(values)
-        return Each(each.count, lambda k: (start + k, each.item(k)), each.end)
 
-    def _python_reversed(self, values: Any) -> Any:
-        if self.special(values, "__reversed__") is not UNSET or isinstance(values, Instance):
-            raise Refused("reversed of an object")
-        each = self.each(values)
-        return Each(each.count, lambda k: each.item(each.count - 1 - k))
+def _reversed(e: Evaluator, values: Any) -> Any:
+    if e.attributes.special(values, "__reversed__") is not UNSET or isinstance(values, Instance):
+        raise Refused("reversed of an object")
+    each = e.items.each(values)
+    return Each(each.count, lambda k: each.item(each.count - 1 - k))
 
-    def _python_pairwise(self, values: Any) -> Any:
-        if isinstance(values, Ring):
-            ring = values
-            last = self.binary("-", self.ring_length(ring), 1)
 
-            def pair(k: ir.Operand) -> tuple[Any, Any]:
-                return self.ring_item(ring, k), self.ring_item(ring, self.binary("+", k, 1))
+def _pairwise(e: Evaluator, values: Any) -> Any:
+    if isinstance(values, Ring):
+        ring = values
+        last = e.lower.binary("-", e.memory.ring_length(ring), 1)
 
-            return Span(0, last, pair, ring)
-        each = self.each(values)
-        before: list[Any] = []
+        def pair(k: ir.Operand) -> tuple[Any, Any]:
+            return e.memory.ring_item(ring, k), e.memory.ring_item(ring, e.lower.binary("+", k, 1))
 
-        def following(k: int) -> tuple[Any, Any]:
-            first = before.pop() if k else each.item(0)
-            before.append(each.item(k + 1))
-            return first, before[0]
+        return Span(0, last, pair, ring)
+    each = e.items.each(values)
+    before: list[Any] = []
 
-        return Each(max(each.count - 1, 0), following)
+    def following(k: int) -> tuple[Any, Any]:
+        first = before.pop() if k else each.item(0)
+        before.append(each.item(k + 1))
+        return first, before[0]
 
-    def _python_repeat(self, value: Any, times: int | None = None) -> Any:
-        return Repeated(value) if times is None else (value,) * times
+    return Each(max(each.count - 1, 0), following)
 
-    def _python_chain(self, *values: Any) -> Any:
-        rows = [(each, k) for each in map(self.each, values) for k in range(each.count)]
-        return Each(len(rows), lambda i: rows[i][0].item(rows[i][1]))
 
-    def _python_range(self, *ends: Any) -> Any:
-        if any(map(is_real, ends)):
-            self.end("TypeError", "'float' object cannot be interpreted as an integer")
-        if not any(isinstance(x, ir.Var) for x in ends):
-            return range(*ends)
-        if len(ends) > 2:
-            raise Refused("a range whose step or ends are only known at run time")
-        return Span(ends[0] if len(ends) == 2 else 0, ends[-1], lambda k: k)
+def _repeat(e: Evaluator, value: Any, times: int | None = None) -> Any:
+    return Repeated(value) if times is None else (value,) * times
 
-    def _python_bisect_right(self, values: Any, x: Any) -> Any:
-        place: ir.Operand = 0
-        items = self.items(values)
-        if not any(isinstance(v, ir.Var) for v in (*items, x)):
-            return bisect.bisect_right(items, x)
-        low, high = 0, len(items)
 
-        def go(low: int, high: int) -> ir.Operand:  # the search order of `bisect`
-            if low == high:
-                return low
-            middle = (low + high) // 2
-            less = self.compare("<", x, items[middle])
-            return self.branch(less, lambda: go(low, middle), lambda: go(middle + 1, high))  # type: ignore
+def _chain(e: Evaluator, *values: Any) -> Any:
+    rows = [(each, k) for each in map(e.items.each, values) for k in range(each.count)]
+    return Each(len(rows), lambda i: rows[i][0].item(rows[i][1]))
 
-        place = go(low, high)
-        return place
 
-    def _python_getattr(self, owner: Any, name: str, *default: Any) -> Any:
-        missing = (lambda: default[0]) if default else None
-        return self.by_form(owner, lambda x: self.attribute(x, name, missing))
+def _chained(e: Evaluator, values: Any) -> Any:
+    return _chain(e, *e.items.of(values))
 
-    def _python_isinstance(self, value: Any, kinds: Any) -> Any:
-        value = self.narrowed(value)
-        if isinstance(value, Union):
-            return self.by_form(value, lambda x: self._python_isinstance(x, kinds))
-        if isinstance(value, ir.Var):
-            of = {ir.REAL: float, ir.BOOL: bool}.get(value.type, int)
-            if value.type == ir.EITHER and issubclass(bool, kinds) != issubclass(int, kinds):
-                raise Refused(EITHER)
-            return issubclass(of, kinds)
-        for kind in kinds if isinstance(kinds, tuple) else (kinds,):
-            check = member(type(kind), "__instancecheck__")
-            if isinstance(check, types.FunctionType) and type(kind).__module__ not in (
-                "abc",
-                "typing",
-                "enum",
-            ):
-                raise Refused(f"isinstance of {kind.__name__}, whose class has a metaclass")
-        if isinstance(value, Picked):
-            value = self.loaded(value)
-        if isinstance(value, (Closure, Bound, Bytes, Span, Each, Failure)):
-            raise Refused(f"isinstance of a {type(value).__name__}")
-        if isinstance(value, Text):
-            return issubclass(str, kinds)
-        if isinstance(value, Instance):
-            return issubclass(value.cls, kinds)
-        if isinstance(value, Array):
-            return issubclass(array.array, kinds)
-        if isinstance(value, (List, Ring, Dict)):
-            return issubclass(dict if isinstance(value, Dict) else list, kinds)
-        return isinstance(value, kinds)
 
-    def _text(self, args: Sequence[Any]) -> Text:
-        if len(args) > 1:
-            raise Refused("an exception of several values")
-        if not args:
-            return Text(())
-        if isinstance(args[0], Text):
-            return args[0]
-        if not is_plain(args[0]):
-            raise Refused("an exception of something unknown")
-        return Text((str(args[0]),))
+def _range(e: Evaluator, *ends: Any) -> Any:
+    if any(map(is_real, ends)):
+        e.lower.end("TypeError", "'float' object cannot be interpreted as an integer")
+    if not any(isinstance(x, ir.Var) for x in ends):
+        return range(*ends)
+    if len(ends) > 2:
+        raise Refused("a range whose step or ends are only known at run time")
+    return Span(ends[0] if len(ends) == 2 else 0, ends[-1], lambda k: k)
+
+
+def _bisect_right(e: Evaluator, values: Any, x: Any) -> Any:
+    place: ir.Operand = 0
+    items = e.items.of(values)
+    if not any(isinstance(v, ir.Var) for v in (*items, x)):
+        return bisect.bisect_right(items, x)
+    low, high = 0, len(items)
+
+    def go(low: int, high: int) -> ir.Operand:  # the search order of `bisect`
+        if low == high:
+            return low
+        middle = (low + high) // 2
+        less = e.lower.compare("<", x, items[middle])
+        return e.paths.branch(less, lambda: go(low, middle), lambda: go(middle + 1, high))  # type: ignore
+
+    place = go(low, high)
+    return place
+
+
+def _isinstance(e: Evaluator, value: Any, kinds: Any) -> Any:
+    value = e.paths.narrowed(value)
+    if isinstance(value, Union):
+        return e.paths.by_form(value, lambda x: _isinstance(e, x, kinds))
+    if isinstance(value, ir.Var):
+        of = {ir.REAL: float, ir.BOOL: bool}.get(value.type, int)
+        if value.type == ir.EITHER and issubclass(bool, kinds) != issubclass(int, kinds):
+            raise Refused(EITHER)
+        return issubclass(of, kinds)
+    for kind in kinds if isinstance(kinds, tuple) else (kinds,):
+        check = member(type(kind), "__instancecheck__")
+        if isinstance(check, types.FunctionType) and type(kind).__module__ not in (
+            "abc",
+            "typing",
+            "enum",
+        ):
+            raise Refused(f"isinstance of {kind.__name__}, whose class has a metaclass")
+    if isinstance(value, Picked):
+        value = e.memory.loaded(value)
+    if isinstance(value, (Closure, Bound, Bytes, Span, Each, Failure)):
+        raise Refused(f"isinstance of a {type(value).__name__}")
+    if isinstance(value, Text):
+        return issubclass(str, kinds)
+    if isinstance(value, Instance):
+        return issubclass(value.cls, kinds)
+    if isinstance(value, Array):
+        return issubclass(array.array, kinds)
+    if isinstance(value, (List, Ring, Dict)):
+        return issubclass(dict if isinstance(value, Dict) else list, kinds)
+    return isinstance(value, kinds)
+
+
+def text_of(args: Sequence[Any]) -> Text:
+    if len(args) > 1:
+        raise Refused("an exception of several values")
+    if not args:
+        return Text(())
+    if isinstance(args[0], Text):
+        return args[0]
+    if not is_plain(args[0]):
+        raise Refused("an exception of something unknown")
+    return Text((str(args[0]),))
+
+
+def _resized(e: Evaluator, owner: List, change: Callable[..., Any], *args: Any) -> None:
+    if owner.path is not None:
+        raise Refused(f"{change.__name__} of a list of the state")
+    change(e.paths.open(owner), *args)
+
+
+def _append(e: Evaluator, owner: List, item: Any) -> None:
+    e.items.promote(owner, item)
+    e.paths.open(owner).append(item)
+
+
+FUNCTIONS: dict[Any, Callable[..., Any]] = {
+    abs: lambda e, value: e.paths.by_form(value, lambda x: e.operators.unary("__abs__", e.lower.size, x)),
+    all: lambda e, values: _decided(e, e.items.each(values), False),
+    any: lambda e, values: _decided(e, e.items.each(values), True),
+    array.array: _array,
+    bisect.bisect_right: _bisect_right,
+    bool: lambda e, value: e.operators.truth_of(value),
+    dict: _dict,
+    divmod: _divmod,
+    enumerate: _enumerate,
+    float: _float,
+    getattr: _getattr,
+    hasattr: lambda e, owner, name: e.paths.by_form(owner, lambda x: e.attributes.has(x, name)),
+    int: _int,
+    isinstance: _isinstance,
+    iter: _iter,
+    itertools.chain: _chain,
+    itertools.chain.from_iterable: lambda e, values: _chain(e, *e.items.of(values)),
+    itertools.pairwise: _pairwise,
+    itertools.repeat: lambda e, value, times=None: Repeated(value) if times is None else (value,) * times,
+    len: _len,
+    list: lambda e, values=(): List(e.items.of(values)),
+    map: _map,
+    math.dist: _dist,
+    math.fabs: lambda e, value: e.lower.function("fabs", value),
+    math.hypot: _hypot,
+    math.isclose: _isclose,
+    math.prod: _prod,
+    max: lambda e, *args, **named: _extreme(e, ">", args, **named),
+    min: lambda e, *args, **named: _extreme(e, "<", args, **named),
+    range: _range,
+    reversed: _reversed,
+    round: _round,
+    setattr: lambda e, owner, name, value: e.attributes.set(owner, name, value),
+    sorted: _sorted,
+    str: lambda e, value: joined_text(formatted(value, "", False)),
+    sum: _sum,
+    tuple: lambda e, values=(): tuple(e.items.of(values)),
+    zip: _zip,
+    operator.add: lambda e, a, b: e.operators.operate("+", a, b),
+    operator.floordiv: lambda e, a, b: e.operators.operate("//", a, b),
+    operator.mod: lambda e, a, b: e.operators.operate("%", a, b),
+    operator.mul: lambda e, a, b: e.operators.operate("*", a, b),
+    operator.pow: lambda e, a, b: e.operators.operate("**", a, b),
+    operator.sub: lambda e, a, b: e.operators.operate("-", a, b),
+    operator.truediv: lambda e, a, b: e.operators.operate("/", a, b),
+}
+"""Functions and classes of Python that are understood, with what evaluates a call. Others are called at build
+time if nothing in the call is only known at run time (see `_is_pure`)."""
+OF_FORMS = (getattr, hasattr, isinstance, bool, zip)
+"""Those that take values of several forms; others are called for each form."""
+METHODS: dict[tuple[type, str], Callable[..., Any]] = {
+    (Dict, "copy"): lambda e, owner: Dict(read(owner)),
+    (Dict, "get"): lambda e, owner, key, default=None: read(owner).get(e.items.key(key), default),
+    (Dict, "items"): lambda e, owner: _view(owner, tuple(read(owner)), with_keys=True),
+    (Dict, "keys"): lambda e, owner: tuple(read(owner)),
+    (Dict, "values"): lambda e, owner: _view(owner, tuple(read(owner)), with_keys=False),
+    (List, "append"): _append,
+    (List, "clear"): lambda e, owner: _resized(e, owner, list.clear),
+    (List, "copy"): lambda e, owner: List(read(owner)),
+    (List, "count"): lambda e, owner, *args: _searched(e, list.count, owner, args),
+    (List, "extend"): lambda e, owner, values: _resized(e, owner, list.extend, e.items.of(values)),
+    (List, "index"): lambda e, owner, *args: _searched(e, list.index, owner, args),
+    (List, "insert"): lambda e, owner, *args: _resized(e, owner, list.insert, *args),
+    (List, "pop"): lambda e, owner, index=-1: e.items.remove(owner, index, "pop from empty list"),
+    (List, "reverse"): lambda e, owner: e.paths.open(owner).reverse(),
+    (Ring, "append"): lambda e, ring, item: push(ring, item, read, e.lower),
+    (Ring, "pop"): lambda e, ring, index: e.items.remove(ring, index, "pop from empty list"),
+    (Text, "encode"): lambda e, text, *_, **__: Bytes(text),
+}
+"""Methods of values that are understood, with what evaluates a call."""
+KINDS = {List: "list", Ring: "list whose length changes", Dict: "dictionary", Text: "text"}
+_KINDS_OF_FUNCTIONS = (type, types.BuiltinFunctionType)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import ir
-from .merge import items_of
 from .read import kinds_within, names_within
 from .shapes import Memo, Shape, Widening, build, numbers_of, shape_of, types_of
-from .statements import CONTINUE, EXIT, ON, OVER, RESULT, RETURN, Execution
+from .stack import CONTINUE, EXIT, ON, OVER, RESULT, RETURN
+from .statements import assign
 from .values import (
     OF_LOOP,
     RESIZED,
@@ -29,9 +29,15 @@ from .values import (
     Ring,
     Span,
     boxes_in,
+    items_of,
     now,
+    read,
     same,
 )
+
+if TYPE_CHECKING:
+    from .evaluate import Evaluator
+
 
 UNROLLED = 16
 """Number of passes up to which a loop over a range is unrolled; chosen: four wheels, seven sets."""
@@ -50,271 +56,276 @@ class Pass:
     contents: dict[Box, Any]
 
 
-class Looping(Execution):
-    """Evaluation of loops."""
+def _while(e: Evaluator, node: ast.While) -> None:
+    _loop(e, node, lambda: e.operators.truth_of(e.evaluate(node.test)), lambda: e.block(node.body))
 
-    # ---- loops ------------------------------------------------------------------------------
 
-    def _do_while(self, node: ast.While) -> None:
-        self._loop(node, lambda: self.truth_of(self.evaluate(node.test)), lambda: self.block(node.body))
+def _for(e: Evaluator, node: ast.For) -> None:
+    over = e.paths.narrowed(e.evaluate(node.iter))
+    if isinstance(over, Ring):
+        ring = over
+        over = Span(0, e.memory.ring_length(ring), lambda k: e.memory.ring_item(ring, k), ring)
+    if isinstance(over, Array) and over.memory.length > UNROLLED:
+        each = e.items.each(over)
+        over = Span(0, each.count, each.item)
+    if isinstance(over, range) and len(over) > UNROLLED and over.step == 1:
+        over = Span(over.start, over.stop, lambda k: k)
+    if isinstance(over, Bytes):
+        _for_bytes(e, node, over)
+    elif isinstance(over, Span):
+        start = len(e.lower.out)
+        _for_span(e, node, over)
+        if over.ring and any(
+            isinstance(s, (ir.Push, ir.Drop)) and s.ring == over.ring.number
+            for s in ir.every(e.lower.out[start:])
+        ):
+            raise Refused(RESIZED)
+    else:
+        _unrolled(e, node, e.items.each(over))
 
-    def _do_for(self, node: ast.For) -> None:
-        over = self.narrowed(self.evaluate(node.iter))
-        if isinstance(over, Ring):
-            ring = over
-            over = Span(0, self.ring_length(ring), lambda k: self.ring_item(ring, k), ring)
-        if isinstance(over, Array) and over.memory.length > UNROLLED:
-            each = self.each(over)
-            over = Span(0, each.count, each.item)
-        if isinstance(over, range) and len(over) > UNROLLED and over.step == 1:
-            over = Span(over.start, over.stop, lambda k: k)
-        if isinstance(over, Bytes):
-            self._for_bytes(node, over)
-        elif isinstance(over, Span):
-            start = len(self.out)
-            self._for_span(node, over)
-            if over.ring and any(
-                isinstance(s, (ir.Push, ir.Drop)) and s.ring == over.ring.number
-                for s in ir.every(self.out[start:])
-            ):
-                raise Refused(RESIZED)
-        else:
-            self._unrolled(node, self.each(over))
 
-    def _unrolled(self, node: ast.For, each: Each) -> None:
-        def go(k: int) -> None:
-            if k == each.count:
-                each.end()
-                self.leave(OVER)
-                return
-            self.assign(node.target, each.item(k))
-            self.block(node.body)
-            on = self._goes_on(self.exit)
-            self.branch(on, lambda: further(k + 1), lambda: None)
-
-        def further(k: int) -> None:
-            self.leave(ON)
-            go(k)
-
-        go(0)
-        self._after_loop(node)
-
-    def _goes_on(self, how: Any) -> ir.Operand:
-        if not isinstance(how, ir.Var):
-            return how in (ON, CONTINUE)
-        return self.branch(  # type: ignore[no-any-return]
-            self.compare("==", how, ON), lambda: True, lambda: self.compare("==", how, CONTINUE)
-        )
-
-    def _after_loop(self, node: ast.For | ast.While) -> None:
-        how = self.exit
-        after: Any = RETURN if how == RETURN else ON
-        if isinstance(how, ir.Var) and kinds_within(node)[ast.Return]:
-            back = self.compare("==", how, RETURN)
-            after = self.branch(back, lambda: RETURN, lambda: ON)
-        if node.orelse:
-            over = self.compare("==", how, OVER)  # a break in `else` leaves the loop around this one
-            self.branch(over, lambda: self._otherwise(node.orelse), lambda: self.leave(after))
-        else:
-            self.leave(after)
-
-    def _otherwise(self, statements: Sequence[ast.stmt]) -> None:
-        self.leave(ON)
-        self.block(statements)
-
-    def _for_bytes(self, node: ast.For, over: Bytes) -> None:
-        kinds = kinds_within(node)
-        if node.orelse or kinds[ast.Break] or kinds[ast.Return]:
-            raise Refused("leaving a loop over a text")
-        for part in over.text.parts:
-            if isinstance(part, str):
-                self._unrolled(node, self.each(part.encode()))
-                continue
-            value, _ = part
-            if ir.type_of(value) != ir.INT:
-                raise Refused("the bytes of a number that is not an integer")
-            count = self.new(ir.INT)
-            self.out.append(ir.Digits(count, value))
-
-            def digit(k: ir.Operand, count: ir.Var = count) -> ir.Var:
-                target = self.new(ir.INT)
-                self.out.append(ir.Digit(target, count, k))
-                return target
-
-            self._for_span(node, Span(0, count, digit))
-
-    def _for_span(self, node: ast.For, over: Span) -> None:
-        counter = List([over.first])
-
-        def test() -> ir.Operand:
-            return self.compare("<", self.read(counter)[0], over.end)
-
-        def body() -> None:
-            k = self.read(counter)[0]
-            ends = self.range_of(over.first), self.range_of(over.end)
-            if isinstance(k, ir.Var) and ends[0] and ends[1]:
-                self.ranges[k] = ends[0][0], ends[1][1] - 1
-            self.write(counter, 0, self.binary("+", k, 1))
-            self.assign(node.target, over.item(k))
-            self.block(node.body)
-
-        self._loop(node, test, body)
-
-    def _loop(
-        self,
-        node: ast.For | ast.While,
-        test: Callable[[], ir.Operand],
-        body: Callable[[], None],
-    ) -> None:
-        since = now()
-        held = self.frame.slots
-        passing = {
-            name
-            for name in _stored(node)
-            if held.get(name, UNSET) is UNSET and not self._is_read_outside(node, name)
-        }  # names that are local to a pass
-        carried: dict[tuple[Box, Any], Shape] = {}
-        for _ in range(WIDEST):
-            heads: list[tuple[ir.Var, ir.Var]] = []
-            made = self._pass(test, body, carried, heads, passing)
-            if not isinstance(made.exit, ir.Var) and made.exit not in (ON, CONTINUE):
-                break  # the loop is left at once
-            widening = Widening()
-            grew = False
-            for key, end in made.ends.items():
-                box, name = key
-                if box.age > since or name == EXIT or (box is self.frame and name in passing):
-                    continue
-                memo = Memo()
-                before = carried.get(key) or shape_of(made.starts[key], self.read)
-                after = shape_of(end, lambda b: made.contents.get(b, b.slots), "", memo)  # noqa: B023
-                wide = widening.of(before, after)
-                if key not in carried or widening.grew:
-                    grew = True
-                carried[key] = wide
-            if not grew:
-                break
-        else:
-            raise Refused("a loop in which values keep taking new forms")
-        self._finish_loop(node, made, carried, heads)
-
-    def for_each_index(self, count: int, body: Callable[[ir.Var], None]) -> None:
-        """Emit a loop over the indices below `count`; `body` changes nothing but arrays."""
-        k = self.new(ir.INT)
-        self.out.append(ir.Let(k, "copy", (0,)))
-        outer, self.out = self.out, []
-        self.out.append(ir.Leave(self.let(ir.BOOL, "ge", k, count)))
-        self.ranges[k] = 0, count - 1
-        body(k)
-        self.out.append(ir.Let(k, "copy", (self.let(ir.INT, "add", k, 1),)))
-        loop, self.out = ir.Loop(self.out), outer
-        self.out.append(loop)
-
-    def _is_read_outside(self, loop: ast.AST, name: str) -> bool:
-        read = name, ast.Load
-        everywhere = names_within(self.calls[-1].source.node)
-        return name in (EXIT, RESULT) or everywhere[read] > names_within(loop)[read]
-
-    def _pass(
-        self,
-        test: Callable[[], ir.Operand],
-        body: Callable[[], None],
-        carried: dict[tuple[Box, Any], Shape],
-        heads: list[tuple[ir.Var, ir.Var]],
-        passing: set[str],
-    ) -> Pass:
-        starts: dict[tuple[Box, Any], Any] = {}
-
-        def run() -> Any:
-            for (box, key), shape in carried.items():
-                leaves = []
-                for type in types_of(shape):
-                    kept, head = self.new(type), self.new(type)
-                    heads.append((kept, head))
-                    self.out.append(ir.Let(head, "copy", (kept,)))
-                    leaves.append(head)
-                value = build(shape, iter(leaves))
-                _replace(items_of(box.slots, key) if _has(box, key) else UNSET, value)
-                starts[box, key] = value
-                self.write(box, key, value)
-            self.branch(test(), body, lambda: self.leave(OVER))
-            how = self.exit
-            self.leave(ON)
-            for name in passing:
-                self.open(self.frame).pop(name, None)
-            return how
-
-        path = self.followed(run, self.facts.copy())
-        if path.dead:
-            raise Refused("a loop whose every pass raises")
-        ends: dict[tuple[Box, Any], Any] = {}
-        for box, slots in path.changed.items():
-            keys = range(len(slots)) if isinstance(slots, list) else list(slots)
-            for key in keys:
-                before = starts.get((box, key), items_of(box.slots, key) if _has(box, key) else UNSET)
-                if not same(before, slots[key]):
-                    starts.setdefault((box, key), before)
-                    ends[box, key] = slots[key]
-            if isinstance(slots, list) and len(slots) != len(box.slots) and not path.dead:
-                raise Refused("a list whose length changes in a loop")
-            if isinstance(box, Dict) and list(slots) != list(box.slots):
-                raise Refused("a dictionary whose keys change in a loop")
-        for key in carried:
-            box, name = key
-            held = path.changed.get(box, box.slots)
-            ends.setdefault(key, items_of(held, name))
-        return Pass(path.out, path.value, starts, ends, path.changed)
-
-    def _finish_loop(
-        self,
-        node: ast.For | ast.While,
-        made: Pass,
-        carried: dict[tuple[Box, Any], Shape],
-        heads: list[tuple[ir.Var, ir.Var]],
-    ) -> None:
-        if not isinstance(made.exit, ir.Var):
-            if made.exit in (ON, CONTINUE):
-                raise Refused("an endless loop")
-            self.out += made.out  # a single pass, which always leaves
-            for (box, name), end in made.ends.items():
-                self.write(box, name, end)
-            self.leave(made.exit)
-            self._after_loop(node)
+def _unrolled(e: Evaluator, node: ast.For, each: Each) -> None:
+    def go(k: int) -> None:
+        if k == each.count:
+            each.end()
+            e.leave(OVER)
             return
-        queue = iter(heads)
-        kept: dict[tuple[Box, Any], list[ir.Var]] = {}
-        for key, shape in carried.items():
+        assign(e, node.target, each.item(k))
+        e.block(node.body)
+        on = _goes_on(e, e.stack.exit)
+        e.paths.branch(on, lambda: further(k + 1), lambda: None)
+
+    def further(k: int) -> None:
+        e.leave(ON)
+        go(k)
+
+    go(0)
+    _after_loop(e, node)
+
+
+def _goes_on(e: Evaluator, how: Any) -> ir.Operand:
+    if not isinstance(how, ir.Var):
+        return how in (ON, CONTINUE)
+    return e.paths.branch(  # type: ignore[no-any-return]
+        e.lower.compare("==", how, ON), lambda: True, lambda: e.lower.compare("==", how, CONTINUE)
+    )
+
+
+def _after_loop(e: Evaluator, node: ast.For | ast.While) -> None:
+    how = e.stack.exit
+    after: Any = RETURN if how == RETURN else ON
+    if isinstance(how, ir.Var) and kinds_within(node)[ast.Return]:
+        back = e.lower.compare("==", how, RETURN)
+        after = e.paths.branch(back, lambda: RETURN, lambda: ON)
+    if node.orelse:
+        over = e.lower.compare("==", how, OVER)  # a break in `else` leaves the loop around this one
+        e.paths.branch(over, lambda: _otherwise(e, node.orelse), lambda: e.leave(after))
+    else:
+        e.leave(after)
+
+
+def _otherwise(e: Evaluator, statements: Sequence[ast.stmt]) -> None:
+    e.leave(ON)
+    e.block(statements)
+
+
+def _for_bytes(e: Evaluator, node: ast.For, over: Bytes) -> None:
+    kinds = kinds_within(node)
+    if node.orelse or kinds[ast.Break] or kinds[ast.Return]:
+        raise Refused("leaving a loop over a text")
+    for part in over.text.parts:
+        if isinstance(part, str):
+            _unrolled(e, node, e.items.each(part.encode()))
+            continue
+        value, _ = part
+        if ir.type_of(value) != ir.INT:
+            raise Refused("the bytes of a number that is not an integer")
+        count = e.lower.new(ir.INT)
+        e.lower.out.append(ir.Digits(count, value))
+
+        def digit(k: ir.Operand, count: ir.Var = count) -> ir.Var:
+            target = e.lower.new(ir.INT)
+            e.lower.out.append(ir.Digit(target, count, k))
+            return target
+
+        _for_span(e, node, Span(0, count, digit))
+
+
+def _for_span(e: Evaluator, node: ast.For, over: Span) -> None:
+    counter = List([over.first])
+
+    def test() -> ir.Operand:
+        return e.lower.compare("<", read(counter)[0], over.end)
+
+    def body() -> None:
+        k = read(counter)[0]
+        ends = e.lower.range_of(over.first), e.lower.range_of(over.end)
+        if isinstance(k, ir.Var) and ends[0] and ends[1]:
+            e.lower.ranges[k] = ends[0][0], ends[1][1] - 1
+        e.paths.write(counter, 0, e.lower.binary("+", k, 1))
+        assign(e, node.target, over.item(k))
+        e.block(node.body)
+
+    _loop(e, node, test, body)
+
+
+def _loop(
+    e: Evaluator,
+    node: ast.For | ast.While,
+    test: Callable[[], ir.Operand],
+    body: Callable[[], None],
+) -> None:
+    since = now()
+    held = e.stack.frame.slots
+    passing = {
+        name
+        for name in _stored(node)
+        if held.get(name, UNSET) is UNSET and not _is_read_outside(e, node, name)
+    }  # names that are local to a pass
+    carried: dict[tuple[Box, Any], Shape] = {}
+    for _ in range(WIDEST):
+        heads: list[tuple[ir.Var, ir.Var]] = []
+        made = _passed(e, test, body, carried, heads, passing)
+        if not isinstance(made.exit, ir.Var) and made.exit not in (ON, CONTINUE):
+            break  # the loop is left at once
+        widening = Widening()
+        grew = False
+        for key, end in made.ends.items():
             box, name = key
-            leaves = [next(queue)[0] for _ in types_of(shape)]
-            start = items_of(box.slots, name) if _has(box, name) else UNSET
-            for leaf, number in zip(leaves, numbers_of(shape, start, self.read, self), strict=True):
-                self.out.append(ir.Let(leaf, "copy", (number,)))
-            kept[key] = leaves
-        outer, self.out = self.out, made.out
+            if box.age > since or name == EXIT or (box is e.stack.frame and name in passing):
+                continue
+            memo = Memo()
+            before = carried.get(key) or shape_of(made.starts[key], read)
+            after = shape_of(end, lambda b: made.contents.get(b, b.slots), "", memo)  # noqa: B023
+            wide = widening.of(before, after)
+            if key not in carried or widening.grew:
+                grew = True
+            carried[key] = wide
+        if not grew:
+            break
+    else:
+        raise Refused("a loop in which values keep taking new forms")
+    _finish_loop(e, node, made, carried, heads)
 
-        def contents(box: Box) -> Any:
-            return made.contents.get(box, box.slots)
 
-        sets = []
-        for key, shape in carried.items():
-            for leaf, number in zip(
-                kept[key], numbers_of(shape, made.ends[key], contents, self), strict=True
-            ):
-                sets.append((leaf, self.let(leaf.type, "copy", number)))
-        self.out += [ir.Let(leaf, "copy", (number,)) for leaf, number in sets]
-        stays = self._goes_on(made.exit)
-        leaving = self.let(ir.BOOL, "not", stays)
-        self.out.append(ir.Leave(leaving))
-        body, self.out = self.out, outer
-        self.out.append(ir.Loop(body))
-        for (box, name), shape in carried.items():
-            leaves = [self.let(leaf.type, "copy", leaf) for leaf in kept[box, name]]
+def for_each_index(e: Evaluator, count: int, body: Callable[[ir.Var], None]) -> None:
+    """Emit a loop over the indices below `count`; `body` changes nothing but arrays."""
+    k = e.lower.new(ir.INT)
+    e.lower.out.append(ir.Let(k, "copy", (0,)))
+    outer, e.lower.out = e.lower.out, []
+    e.lower.out.append(ir.Leave(e.lower.let(ir.BOOL, "ge", k, count)))
+    e.lower.ranges[k] = 0, count - 1
+    body(k)
+    e.lower.out.append(ir.Let(k, "copy", (e.lower.let(ir.INT, "add", k, 1),)))
+    loop, e.lower.out = ir.Loop(e.lower.out), outer
+    e.lower.out.append(loop)
+
+
+def _is_read_outside(e: Evaluator, loop: ast.AST, name: str) -> bool:
+    read = name, ast.Load
+    everywhere = names_within(e.stack.call.source.node)
+    return name in (EXIT, RESULT) or everywhere[read] > names_within(loop)[read]
+
+
+def _passed(
+    e: Evaluator,
+    test: Callable[[], ir.Operand],
+    body: Callable[[], None],
+    carried: dict[tuple[Box, Any], Shape],
+    heads: list[tuple[ir.Var, ir.Var]],
+    passing: set[str],
+) -> Pass:
+    starts: dict[tuple[Box, Any], Any] = {}
+
+    def run() -> Any:
+        for (box, key), shape in carried.items():
+            leaves = []
+            for type in types_of(shape):
+                kept, head = e.lower.new(type), e.lower.new(type)
+                heads.append((kept, head))
+                e.lower.out.append(ir.Let(head, "copy", (kept,)))
+                leaves.append(head)
             value = build(shape, iter(leaves))
-            for before in (items_of(box.slots, name) if _has(box, name) else UNSET, made.ends[box, name]):
-                _replace(before, value)
-            self.write(box, name, value)
-        self.leave(made.exit)
-        self._after_loop(node)
+            _replace(items_of(box.slots, key) if _has(box, key) else UNSET, value)
+            starts[box, key] = value
+            e.paths.write(box, key, value)
+        e.paths.branch(test(), body, lambda: e.leave(OVER))
+        how = e.stack.exit
+        e.leave(ON)
+        for name in passing:
+            e.paths.open(e.stack.frame).pop(name, None)
+        return how
+
+    path = e.paths.followed(run, e.lower.facts.copy())
+    if path.dead:
+        raise Refused("a loop whose every pass raises")
+    ends: dict[tuple[Box, Any], Any] = {}
+    for box, slots in path.changed.items():
+        keys = range(len(slots)) if isinstance(slots, list) else list(slots)
+        for key in keys:
+            before = starts.get((box, key), items_of(box.slots, key) if _has(box, key) else UNSET)
+            if not same(before, slots[key]):
+                starts.setdefault((box, key), before)
+                ends[box, key] = slots[key]
+        if isinstance(slots, list) and len(slots) != len(box.slots) and not path.dead:
+            raise Refused("a list whose length changes in a loop")
+        if isinstance(box, Dict) and list(slots) != list(box.slots):
+            raise Refused("a dictionary whose keys change in a loop")
+    for key in carried:
+        box, name = key
+        held = path.changed.get(box, box.slots)
+        ends.setdefault(key, items_of(held, name))
+    return Pass(path.out, path.value, starts, ends, path.changed)
+
+
+def _finish_loop(
+    e: Evaluator,
+    node: ast.For | ast.While,
+    made: Pass,
+    carried: dict[tuple[Box, Any], Shape],
+    heads: list[tuple[ir.Var, ir.Var]],
+) -> None:
+    if not isinstance(made.exit, ir.Var):
+        if made.exit in (ON, CONTINUE):
+            raise Refused("an endless loop")
+        e.lower.out += made.out  # a single pass, which always leaves
+        for (box, name), end in made.ends.items():
+            e.paths.write(box, name, end)
+        e.leave(made.exit)
+        _after_loop(e, node)
+        return
+    queue = iter(heads)
+    kept: dict[tuple[Box, Any], list[ir.Var]] = {}
+    for key, shape in carried.items():
+        box, name = key
+        leaves = [next(queue)[0] for _ in types_of(shape)]
+        start = items_of(box.slots, name) if _has(box, name) else UNSET
+        for leaf, number in zip(leaves, numbers_of(shape, start, read, e.lower), strict=True):
+            e.lower.out.append(ir.Let(leaf, "copy", (number,)))
+        kept[key] = leaves
+    outer, e.lower.out = e.lower.out, made.out
+
+    def contents(box: Box) -> Any:
+        return made.contents.get(box, box.slots)
+
+    sets = []
+    for key, shape in carried.items():
+        for leaf, number in zip(kept[key], numbers_of(shape, made.ends[key], contents, e.lower), strict=True):
+            sets.append((leaf, e.lower.let(leaf.type, "copy", number)))
+    e.lower.out += [ir.Let(leaf, "copy", (number,)) for leaf, number in sets]
+    stays = _goes_on(e, made.exit)
+    leaving = e.lower.let(ir.BOOL, "not", stays)
+    e.lower.out.append(ir.Leave(leaving))
+    body, e.lower.out = e.lower.out, outer
+    e.lower.out.append(ir.Loop(body))
+    for (box, name), shape in carried.items():
+        leaves = [e.lower.let(leaf.type, "copy", leaf) for leaf in kept[box, name]]
+        value = build(shape, iter(leaves))
+        for before in (items_of(box.slots, name) if _has(box, name) else UNSET, made.ends[box, name]):
+            _replace(before, value)
+        e.paths.write(box, name, value)
+    e.leave(made.exit)
+    _after_loop(e, node)
 
 
 def _replace(before: Any, after: Any) -> None:
@@ -347,3 +358,7 @@ def _has(box: Box, key: Any) -> bool:
 
 def _stored(loop: ast.AST) -> set[str]:
     return {name for name, context in names_within(loop) if context is ast.Store}
+
+
+LOOPS: dict[type[ast.AST], Callable[[Evaluator, Any], None]] = {ast.For: _for, ast.While: _while}
+"""Loops that are understood, with what carries them out."""

@@ -10,9 +10,10 @@ import math
 import operator
 import sys
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NoReturn
 
 from . import ir
+from .stack import Stack
 from .values import Refused, Unreachable
 
 MASK = 2**64 - 1
@@ -123,26 +124,15 @@ def _in_double(a: ir.Operand) -> ir.Operand:
 
 
 class Lowering:
-    """Statements emitted so far, and the arithmetic that emits more."""
+    """Statements emitted so far, what is known of their variables, and the arithmetic that emits more."""
 
-    def __init__(self) -> None:
+    def __init__(self, stack: Stack) -> None:
+        self.stack = stack
         self.out: list[ir.Statement] = []
         self.facts = Facts()
         self.ranges: dict[ir.Var, tuple[int, int]] = {}  # least and largest value of integers
         self.choices: dict[ir.Var, tuple[ir.Operand, int, int]] = {}  # between constants: test, then, else
         self._count = 0
-
-    def where(self) -> str:
-        """Return the file and line that are being evaluated."""
-        raise NotImplementedError
-
-    def branch_at(self) -> str:
-        """Return the file, line and column of a branch."""
-        raise NotImplementedError
-
-    def raised_at(self) -> str:
-        """Return the file and line in the package for an exception's message."""
-        return self.where()
 
     def new(self, type: str) -> ir.Var:
         """Return a new variable."""
@@ -161,7 +151,12 @@ class Lowering:
 
     def fail(self, kind: str, *message: ir.Part) -> None:
         """Emit an exception on the current path."""
-        self.out.append(ir.Raise(kind, message, self.raised_at()))
+        self.out.append(ir.Raise(kind, message, self.stack.raised_at()))
+
+    def end(self, kind: str, *message: ir.Part) -> NoReturn:
+        """Emit an exception on the current path, and stop evaluating the path."""
+        self.fail(kind, *message)
+        raise Unreachable
 
     def require(self, condition: ir.Operand, kind: str, message: str) -> None:
         """Emit an exception for the case that a condition is false.
@@ -173,11 +168,10 @@ class Lowering:
         if known:
             return
         if known is False:
-            self.fail(kind, message)
-            raise Unreachable
+            self.end(kind, message)
         failing = self.negation(condition)
         assert isinstance(failing, ir.Var)
-        self.out.append(ir.If(failing, [ir.Raise(kind, (message,), self.raised_at())]))
+        self.out.append(ir.If(failing, [ir.Raise(kind, (message,), self.stack.raised_at())]))
         self.facts.learn(condition, True)
 
     def settled(self, value: ir.Operand, facts: Facts) -> ir.Operand:
@@ -200,6 +194,26 @@ class Lowering:
             return 0, 1
         values = self.facts.left(value)
         return (min(values), max(values)) if values else self.ranges.get(value)
+
+    def within(self, index: ir.Operand, count: int, text: str) -> ir.Operand:
+        """Return an index, counted from the beginning; raises if it is out of range."""
+        if not isinstance(index, ir.Var):
+            index = index + count if index < 0 else index
+            self.require(0 <= index < count, "IndexError", text)
+            return index
+        between = self.range_of(index)
+        if between is not None and between[0] >= 0 and between[1] < count:
+            return index
+        return self.placed(index, count, text)
+
+    def placed(self, index: ir.Var, count: ir.Operand, text: str) -> ir.Var:
+        """Return an index known at run time, counted from the beginning; raises if it is out of range."""
+        place = self.let(ir.INT, "place_in", index, count)
+        if self.range_of(index) is None:
+            fits = self.compare("!=", place, -2)
+            self.require(fits, "IndexError", "cannot fit 'int' into an index-sized integer")
+        self.require(self.compare(">=", place, 0), "IndexError", text)
+        return place
 
     # ---- conditions -------------------------------------------------------------------------
 
@@ -256,8 +270,7 @@ class Lowering:
             try:
                 result = OPERATORS[op](a, b)
             except (ArithmeticError, ValueError) as error:
-                self.fail(type(error).__name__, str(error))
-                raise Unreachable from None
+                self.end(type(error).__name__, str(error))
             if isinstance(result, complex):
                 raise Refused("a complex number")
             return result  # type: ignore[no-any-return]
@@ -340,8 +353,7 @@ class Lowering:
             try:
                 return by(a)
             except (ArithmeticError, ValueError) as error:
-                self.fail(type(error).__name__, str(error))
-                raise Unreachable from None
+                self.end(type(error).__name__, str(error))
         if a.type != ir.REAL:
             return a if a.type == ir.INT else self.let(ir.INT, "real", a)
         bad = self.let(ir.BOOL, "isnan", a)
@@ -356,8 +368,7 @@ class Lowering:
             try:
                 return getattr(math, name)(*operands)  # type: ignore[no-any-return]
             except (ArithmeticError, ValueError) as error:
-                self.fail(type(error).__name__, str(error))
-                raise Unreachable from None
+                self.end(type(error).__name__, str(error))
         if name in ("floor", "ceil", "trunc"):
             return self.whole(name, operands[0])
         if name in ("isfinite", "isnan", "isinf"):

@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import ast
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import ir
-from .calls import Calling
-from .evaluate import Call
 from .lower import Facts
-from .read import Sources, kinds_within
+from .read import kinds_within
 from .shapes import (
     Forms,
     Growing,
@@ -31,7 +29,12 @@ from .shapes import (
     shape_of,
     types_of,
 )
-from .values import Box, Frame, Picked, Refused, is_plain
+from .stack import Call
+from .values import Box, Frame, Picked, Refused, is_plain, read
+
+if TYPE_CHECKING:
+    from .evaluate import Evaluator
+
 
 SHORTEST = 40
 """Smallest number of statements of an outlined function; chosen: a call with its arguments takes a dozen."""
@@ -49,35 +52,36 @@ class Library:
         self.kept: list[Any] = []  # objects whose identity is part of a key
 
 
-class Outlining(Calling):
-    """Outlining of calls."""
+class Outlining:
+    """Outlining of the calls of an evaluator."""
 
-    def __init__(self, sources: Sources, fixed: set[ir.Var], library: Library) -> None:
-        super().__init__(sources)
-        self.fixed, self.library = fixed, library
+    def __init__(self, evaluator: Evaluator, library: Library) -> None:
+        self.e, self.library = evaluator, library
 
-    def _run(self, call: Call, node: ast.FunctionDef | ast.Lambda) -> Any:
-        if not self.calls or kinds_within(node).total() < SMALLEST:
-            return self.inside(call, node)
+    def run(self, call: Call, node: ast.FunctionDef | ast.Lambda) -> Any:
+        if not self.e.stack.calls or kinds_within(node).total() < SMALLEST:
+            return self.e.inside(call, node)
         for name, value in call.frame.slots.items():
             if isinstance(value, Picked):
-                call.frame.slots[name] = self.loaded(value)
-        chosen = {tag: left for tag in self.choosers if (left := self.facts.left(tag)) is not None}
+                call.frame.slots[name] = self.e.memory.loaded(value)
+        chosen = {
+            tag: left for tag in self.e.paths.choosers if (left := self.e.lower.facts.left(tag)) is not None
+        }
         try:
-            shape = shape_of(call.frame, self.read, "", Memo(self.fixed))
+            shape = shape_of(call.frame, read, "", Memo(self.e.fixed))
         except Refused:
-            return self.inside(call, node)  # an argument is not made of numbers
+            return self.e.inside(call, node)  # an argument is not made of numbers
         key = id(call.source), id(node), _key(shape, {}), frozenset(chosen.items())
         if key not in self.library.made:
             self.library.kept.append((call.source, shape))
             self.library.made[key] = self._tried(call, node, shape, chosen)
         outlined = self.library.made[key]
         if outlined is None:
-            return self.inside(call, node)
+            return self.e.inside(call, node)
         function, result = outlined
-        numbers = numbers_of(shape, call.frame, self.read, self)
-        targets = tuple(self.new(type) for type in types_of(result))
-        self.out.append(ir.Invoke(targets, function, tuple(numbers)))
+        numbers = numbers_of(shape, call.frame, read, self.e.lower)
+        targets = tuple(self.e.lower.new(type) for type in types_of(result))
+        self.e.lower.out.append(ir.Invoke(targets, function, tuple(numbers)))
         return build(result, iter(targets))
 
     def _tried(
@@ -87,22 +91,22 @@ class Outlining(Calling):
         shape: Shape,
         chosen: dict[ir.Var, frozenset[int]],
     ) -> tuple[ir.Outlined, Shape] | None:
-        parameters = tuple(self.new(type) for type in types_of(shape))
+        parameters = tuple(self.e.lower.new(type) for type in types_of(shape))
         copies: dict[int, Any] = {}
         frame = build(shape, iter(parameters), copies)
         assert isinstance(frame, Frame)
         facts = Facts()
-        facts.meanings, facts.domains = self.facts.meanings, self.facts.domains
+        facts.meanings, facts.domains = self.e.lower.facts.meanings, self.e.lower.facts.domains
         for tag, left in chosen.items():
             facts.others[tag] = facts.domains[tag] - left
 
         def run() -> Any:
-            value = self.inside(replace(call, frame=frame, base=frame), node)
-            form = shape_of(value, self.read, "", Memo(self.fixed))
-            return form, tuple(numbers_of(form, value, self.read, self)), value
+            value = self.e.inside(replace(call, frame=frame, base=frame), node)
+            form = shape_of(value, read, "", Memo(self.e.fixed))
+            return form, tuple(numbers_of(form, value, read, self.e.lower)), value
 
         try:
-            path = self.followed(run, facts)
+            path = self.e.paths.followed(run, facts)
         except (Refused, Promote):
             return None
         boxes = [x for x in copies.values() if isinstance(x, Box)]
@@ -115,7 +119,7 @@ class Outlining(Calling):
             sum(1 for _ in ir.every(path.out)) < SHORTEST
             or len(results) > MOST_RESULTS
             or ir.arrays_of(path.out)  # they share the stack of the method
-            or _holds(value, set(map(id, boxes)), self)
+            or _holds(value, set(map(id, boxes)))
         ):
             return None
         name = f"{getattr(node, 'name', 'lambda')}_{len(self.library.made)}"
@@ -128,20 +132,20 @@ def _is_of_list(statement: ir.Statement) -> bool:
     return isinstance(statement, (ir.Push, ir.Replace, ir.Drop))
 
 
-def _holds(value: Any, boxes: set[int], machine: Calling) -> bool:
+def _holds(value: Any, boxes: set[int]) -> bool:
     """Return whether a value is or contains an object that was passed to a function."""
     if isinstance(value, Box):
         if id(value) in boxes:
             return True
-        held = machine.read(value)
-        return any(_holds(x, boxes, machine) for x in (held if isinstance(held, list) else held.values()))
+        held = read(value)
+        return any(_holds(x, boxes) for x in (held if isinstance(held, list) else held.values()))
     if isinstance(value, tuple):
-        return any(_holds(x, boxes, machine) for x in value)
+        return any(_holds(x, boxes) for x in value)
     if hasattr(value, "alternatives"):
-        return any(_holds(x, boxes, machine) for x in value.alternatives)
+        return any(_holds(x, boxes) for x in value.alternatives)
     if hasattr(value, "frame"):
-        return _holds(value.frame, boxes, machine) or _holds(value.frame.parent, boxes, machine)
-    return hasattr(value, "owner") and _holds(value.owner, boxes, machine)
+        return _holds(value.frame, boxes) or _holds(value.frame.parent, boxes)
+    return hasattr(value, "owner") and _holds(value.owner, boxes)
 
 
 def _key(shape: Shape, seen: dict[int, int]) -> Any:

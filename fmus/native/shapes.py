@@ -13,7 +13,7 @@ from types import BuiltinFunctionType, FunctionType
 from typing import Any
 
 from . import ir
-from .merge import Merging, items_of
+from .lower import Lowering
 from .values import (
     ANY,
     SHARED,
@@ -33,6 +33,7 @@ from .values import (
     boxes_in,
     is_number,
     is_plain,
+    items_of,
     keys_of,
     like,
     same,
@@ -368,21 +369,19 @@ def build(shape: Shape, leaves: Iterator[Any], memo: dict[int, Any] | None = Non
     return memo[id(shape)]
 
 
-def numbers_of(shape: Shape, value: Any, slots: Place, machine: Merging) -> list[ir.Operand]:
+def numbers_of(shape: Shape, value: Any, slots: Place, lower: Lowering) -> list[ir.Operand]:
     """Return the numbers of a value at the leaves of a shape."""
     operands: list[ir.Operand] = []
-    _collect(shape, value, slots, machine, operands, set())
+    _collect(shape, value, slots, lower, operands, set())
     return operands
 
 
-def push(ring: Growing | Ring, item: Any, slots: Place, machine: Merging) -> None:
+def push(ring: Growing | Ring, item: Any, slots: Place, lower: Lowering) -> None:
     """Append an item to a list of the state."""
-    machine.out.append(ir.Push(ring.number, numbers_of_item(ring, item, slots, machine)))
+    lower.out.append(ir.Push(ring.number, numbers_of_item(ring, item, slots, lower)))
 
 
-def numbers_of_item(
-    ring: Growing | Ring, item: Any, slots: Place, machine: Merging
-) -> tuple[ir.Operand, ...]:
+def numbers_of_item(ring: Growing | Ring, item: Any, slots: Place, lower: Lowering) -> tuple[ir.Operand, ...]:
     """Return the numbers of an item of a list of the state.
 
     Raises:
@@ -394,11 +393,11 @@ def numbers_of_item(
         raise Promote(ring.number, shape)
     for box in boxes_in(item):
         box.pushed = True
-    return tuple(numbers_of(ring.item, item, slots, machine))
+    return tuple(numbers_of(ring.item, item, slots, lower))
 
 
 def _collect(
-    shape: Shape, value: Any, slots: Place, machine: Merging, operands: list[ir.Operand], seen: set[int]
+    shape: Shape, value: Any, slots: Place, lower: Lowering, operands: list[ir.Operand], seen: set[int]
 ) -> None:
     if value is ANY:
         operands += [0] * len(list(_types(shape, seen)))
@@ -406,24 +405,24 @@ def _collect(
         operands.append(value)
     elif isinstance(shape, Items):
         for item, x in zip(shape.items, value, strict=True):
-            _collect(item, x, slots, machine, operands, seen)
+            _collect(item, x, slots, lower, operands, seen)
     elif isinstance(shape, Held):
         if id(shape) in seen:
             return
         seen.add(id(shape))
         held = slots(value)
         for key, item in shape.items.items():
-            _collect(item, items_of(held, key), slots, machine, operands, seen)
+            _collect(item, items_of(held, key), slots, lower, operands, seen)
         if shape.parent is not None:
-            _collect(shape.parent, value.parent, slots, machine, operands, seen)
+            _collect(shape.parent, value.parent, slots, lower, operands, seen)
     elif isinstance(shape, Growing):
         if isinstance(value, List):
-            machine.out.append(ir.Drop(shape.number, every=True))
+            lower.out.append(ir.Drop(shape.number, every=True))
             for item in slots(value):
-                push(shape, item, slots, machine)
+                push(shape, item, slots, lower)
     elif isinstance(shape, Made):
         inner = value.frame if isinstance(value, Closure) else value.owner
-        _collect(shape.inner, inner, slots, machine, operands, seen)
+        _collect(shape.inner, inner, slots, lower, operands, seen)
     elif isinstance(shape, Forms):
         alternatives = list(value.alternatives) if isinstance(value, Union) else [value]
         memo = Memo()
@@ -435,12 +434,12 @@ def _collect(
         if isinstance(value, Union):
             tag = value.tag
             if places != list(range(len(places))):
-                tag = machine.new(ir.INT)
-                machine.out.append(ir.Load(tag, tuple(places), value.tag))
+                tag = lower.new(ir.INT)
+                lower.out.append(ir.Load(tag, tuple(places), value.tag))
         operands += [tag] * isinstance(shape.tag, Leaf)
         for i, mine in enumerate(shape.alternatives):
             if i in places:
-                _collect(mine, alternatives[places.index(i)], slots, machine, operands, seen)
+                _collect(mine, alternatives[places.index(i)], slots, lower, operands, seen)
             else:
                 operands += [0] * len(list(_types(mine, seen)))
 

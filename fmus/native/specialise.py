@@ -16,7 +16,8 @@ from types import FunctionType
 from typing import Any
 
 from . import ir
-from .outline import Library, Outlining
+from .evaluate import Evaluator
+from .outline import Library
 from .read import Sources
 from .shapes import Growing, Memo, Promote, Shape, Widening, build, numbers_of, shape_of, types_of
 from .values import (
@@ -31,6 +32,7 @@ from .values import (
     boxes_in,
     is_mixed,
     is_number,
+    read,
 )
 
 WIDEST = 40
@@ -189,10 +191,10 @@ class _Specialising:
         program = Program(self.component.variables, reads=dict(self.reads))
         fixed = self.fixed
         self.libraries = Library(), Library()
-        me, machine = self._run("configure", dict(self.covered))
+        me, evaluator = self._run("configure", dict(self.covered))
         configured = shape_of(me, lambda box: box.slots, "self", Memo(fixed))  # its lists are of fixed length
         program.functions["configure"] = ir.Function(
-            machine.out, _placed("c->c", self._numbers(configured, me, machine, "configure"))
+            evaluator.lower.out, _placed("c->c", self._numbers(configured, me, evaluator, "configure"))
         )
         program.configured = list(types_of(configured))
         leaves = self._leaves(program, program.configured, "c")
@@ -216,11 +218,11 @@ class _Specialising:
         else:
             raise Refused("a state that keeps taking new forms")
         program.functions["start"] = ir.Function(
-            started.out, _placed("s->s", self._numbers(state, at_start, started, "start"))
+            started.lower.out, _placed("s->s", self._numbers(state, at_start, started, "start"))
         )
         changes = _placed("s->s", self._numbers(state, me, advanced, "advance"))
         program.functions["advance"] = ir.Function(
-            advanced.out,
+            advanced.lower.out,
             [change for change, leaf in zip(changes, leaves, strict=True) if change[1] is not leaf],
         )
         program.functions["output"] = self._output(state, leaves, fixed)
@@ -235,37 +237,37 @@ class _Specialising:
         return program
 
     def _output(self, state: Shape, leaves: list[ir.Var], fixed: set[ir.Var]) -> ir.Function:
-        me, machine = self._run("output", self._attributes(state, leaves), self.t, List(self.inputs))
+        me, evaluator = self._run("output", self._attributes(state, leaves), self.t, List(self.inputs))
         widening = Widening()
         widening.of(state, self._shape(me, fixed))
-        after = self._numbers(state, me, machine, "output")
+        after = self._numbers(state, me, evaluator, "output")
         if widening.grew or any(x is not leaf for x, leaf in zip(after, leaves, strict=True)):
             raise Refused("output() changes the component's state", self._line_of("output"))
         outputs = self.returned
         if isinstance(outputs, Union) or not isinstance(outputs, (tuple, List)):
             raise Refused("output() returns a value with several forms", self._line_of("output"))
-        values = machine.items(outputs)
+        values = evaluator.items.of(outputs)
         if len(values) != self.outputs or not all(is_number(x) or is_mixed(x) for x in values):
             raise Refused("output() returns something other than all outputs", self._line_of("output"))
-        return ir.Function(machine.out, _placed("y", list(map(machine.real, values))))
+        return ir.Function(evaluator.lower.out, _placed("y", list(map(evaluator.paths.real, values))))
 
     def _line_of(self, method: str) -> str:
         source = self.sources.of(getattr(self.component, method))
         return f"{source.file}:{source.node.lineno}" if source.file else ""
 
-    def _run(self, method: str, attributes: dict[str, Any], *args: Any) -> tuple[Instance, Outlining]:
+    def _run(self, method: str, attributes: dict[str, Any], *args: Any) -> tuple[Instance, Evaluator]:
         me = Instance(self.component, {**attributes, "p": self.parameters})
         fixed = self.fixed if method == "configure" else self.all_fixed
-        machine = Outlining(self.sources, fixed, self.libraries[method == "configure"])
-        machine.facts.domains |= self.domains
-        machine.choosers |= set(self.domains)
+        evaluator = Evaluator(self.sources, fixed, self.libraries[method == "configure"])
+        evaluator.lower.facts.domains |= self.domains
+        evaluator.paths.choosers |= set(self.domains)
         try:
-            self.returned = machine.call(machine.attribute(me, method), list(args), {})
+            self.returned = evaluator.call(evaluator.attributes.of(me, method), list(args), {})
         except Unreachable:
-            where = self._line_of(method) or machine.entered
+            where = self._line_of(method) or evaluator.stack.entered
             raise Refused(f"{method}() fails for all inputs", where) from None
         finally:
-            line = self._line_of(method) or machine.entered
+            line = self._line_of(method) or evaluator.stack.entered
             self.last_line = self.last_line if line.startswith(BASE) else line or self.last_line
         values = {
             name: value
@@ -274,7 +276,7 @@ class _Specialising:
         }
         if not values.keys() <= self.covered.keys():
             raise _Covered(values)
-        return me, machine
+        return me, evaluator
 
     def _shape(self, me: Instance, fixed: set[ir.Var]) -> Shape:
         self._keep_from_change(me)
@@ -293,9 +295,9 @@ class _Specialising:
                     box.alias, merged.alias = box.alias or SHARED, merged.alias or SHARED
                 merged = merged.merged
 
-    def _numbers(self, shape: Shape, me: Instance, machine: Outlining, method: str) -> list[ir.Operand]:
+    def _numbers(self, shape: Shape, me: Instance, evaluator: Evaluator, method: str) -> list[ir.Operand]:
         try:
-            numbers = numbers_of(shape, me, machine.read, machine)
+            numbers = numbers_of(shape, me, read, evaluator.lower)
             if any(box.pushed and not box.alias for box in self._outside_lists(me)):
                 raise Refused(f"{OF_RING} has another name")
             return numbers

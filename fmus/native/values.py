@@ -351,3 +351,42 @@ def boxes_in(value: Any) -> Iterator[Box]:
 def keys_of(box: Box) -> Iterator[Any]:
     """Return the keys of the content of a box."""
     return iter(range(len(box.slots)) if isinstance(box, List) else list(box.slots))
+
+
+def items_of(slots: Any, key: Any) -> Any:
+    """Return the content of slots at a key, or `UNSET`."""
+    return slots[key] if isinstance(slots, list) else slots.get(key, UNSET)
+
+
+def alike(a: Any, b: Any) -> bool:
+    """Return whether two values can be merged into a value of the same form."""
+    if a is b or same(a, b):
+        return True
+    if is_number(a) and is_number(b):
+        return ir.are_joined((ir.type_of(a), ir.type_of(b)))
+    if isinstance(a, Picked) or isinstance(b, Picked):
+        return False
+    if isinstance(a, tuple) and isinstance(b, tuple):
+        return type(a) is type(b) and len(a) == len(b)
+    if isinstance(a, Box) and isinstance(b, Box) and type(a) is type(b):
+        if isinstance(a, List):
+            return len(a.slots) == len(b.slots)
+        if isinstance(a, Instance) and isinstance(b, Instance) and a.cls is not b.cls:
+            return False
+        if isinstance(a, Dict):
+            return list(a.slots) == list(b.slots)
+        return not isinstance(a, (Ring, Array)) and set(a.slots) == set(b.slots)
+    if isinstance(a, Closure) and isinstance(b, Closure):
+        return a.node is b.node and same(a.defaults, b.defaults)
+    if isinstance(a, Union) or isinstance(b, Union):
+        return False
+    if isinstance(a, Bound) and isinstance(b, Bound):
+        return a.function is b.function and alike(a.owner, b.owner)
+    return False
+
+
+def read(box: Box) -> Any:
+    """Return the content of a box."""
+    if box.merged is not None and box.merged.changed:
+        raise Refused(TWO_NAMES)
+    return box.slots

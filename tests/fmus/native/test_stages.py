@@ -16,6 +16,7 @@ from yawbench.fmus.native.emit import constant, quoted
 from yawbench.fmus.native.lower import Lowering
 from yawbench.fmus.native.read import Sources, kinds_within, names_within
 from yawbench.fmus.native.specialise import specialise
+from yawbench.fmus.native.stack import Stack
 from yawbench.fmus.native.values import Refused
 
 from .small import component_of, source
@@ -120,7 +121,7 @@ def test_what_hangs_on_an_input_becomes_a_statement(construct, tmp_path):
 
 
 def test_numbers_that_are_known_are_computed_and_others_let():
-    lowering = Lowering()
+    lowering = Lowering(Stack())
     assert (lowering.binary("+", 1, 2), lowering.binary("**", 2.0, 3), lowering.compare("<", 1, 2)) == (
         3,
         8.0,
@@ -133,7 +134,7 @@ def test_numbers_that_are_known_are_computed_and_others_let():
 
 
 def test_what_would_lose_the_sign_of_a_zero_is_not_left_out():
-    lowering = Lowering()
+    lowering = Lowering(Stack())
     x = lowering.new(ir.REAL)
     lowering.binary("+", x, 0.0)  # 0.0 where x is -0.0
     lowering.binary("-", 0.0, x)  # 0.0 where x is 0.0
@@ -141,8 +142,9 @@ def test_what_would_lose_the_sign_of_a_zero_is_not_left_out():
 
 
 def test_a_division_raises_where_its_divisor_is_zero():
-    lowering = Lowering()
-    lowering.where = lambda: "small.py:7"
+    stack = Stack()
+    stack.raised_at = lambda: "small.py:7"
+    lowering = Lowering(stack)
     a, b = lowering.new(ir.REAL), lowering.new(ir.REAL)
     lowering.binary("/", a, b)
     (raised,) = (s for s in ir.every(lowering.out) if isinstance(s, ir.Raise))

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from . import ir
-from .lower import Facts, Lowering
+from .lower import Facts
+from .memory import Memory
+from .stack import EXIT, RESULT, RETURN
 from .values import (
     ANY,
     OF_TABLE,
     TWO_NAMES,
-    UNSET,
-    Array,
     Bound,
     Box,
     Closure,
@@ -30,8 +30,10 @@ from .values import (
     Ring,
     Union,
     Unreachable,
+    alike,
     boxes_in,
     is_number,
+    items_of,
     keys_of,
     like,
     now,
@@ -56,59 +58,25 @@ class Path:
         return self.changed.get(box, box.slots)
 
 
-def items_of(slots: Any, key: Any) -> Any:
-    """Return the content of slots at a key, or `UNSET`."""
-    return slots[key] if isinstance(slots, list) else slots.get(key, UNSET)
-
-
 def forms(value: Any) -> tuple[Any, ...]:
     """Return the alternatives of a value."""
     return value.alternatives if isinstance(value, Union) else (value,)
 
 
-def alike(a: Any, b: Any) -> bool:
-    """Return whether two values can be merged into a value of the same form."""
-    if a is b or same(a, b):
-        return True
-    if is_number(a) and is_number(b):
-        return ir.are_joined((ir.type_of(a), ir.type_of(b)))
-    if isinstance(a, Picked) or isinstance(b, Picked):
-        return False
-    if isinstance(a, tuple) and isinstance(b, tuple):
-        return type(a) is type(b) and len(a) == len(b)
-    if isinstance(a, Box) and isinstance(b, Box) and type(a) is type(b):
-        if isinstance(a, List):
-            return len(a.slots) == len(b.slots)
-        if isinstance(a, Instance) and isinstance(b, Instance) and a.cls is not b.cls:
-            return False
-        if isinstance(a, Dict):
-            return list(a.slots) == list(b.slots)
-        return not isinstance(a, (Ring, Array)) and set(a.slots) == set(b.slots)
-    if isinstance(a, Closure) and isinstance(b, Closure):
-        return a.node is b.node and same(a.defaults, b.defaults)
-    if isinstance(a, Union) or isinstance(b, Union):
-        return False
-    if isinstance(a, Bound) and isinstance(b, Bound):
-        return a.function is b.function and alike(a.owner, b.owner)
-    return False
+class Paths:
+    """Branches, the journal of changes, and joins.
 
+    Attributes:
+        choosers: parameters with text choices.
+        maps: variables that are functions of another.
+        journals: for each path that is being followed, age at its start and previous content of boxes.
+    """
 
-class Merging(Lowering):
-    """Branches, the journal of changes, and joins."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.choosers: set[ir.Var] = set()  # parameters with text choices
-        self.maps: dict[ir.Var, tuple[ir.Var, dict[int, int]]] = {}  # variables that are functions of another
-        self.journals: list[tuple[int, dict[Box, Any]]] = []  # age at the start, previous content of boxes
-
-    # ---- boxes ------------------------------------------------------------------------------
-
-    def read(self, box: Box) -> Any:
-        """Return the content of a box."""
-        if box.merged is not None and box.merged.changed:
-            raise Refused(TWO_NAMES)
-        return box.slots
+    def __init__(self, memory: Memory) -> None:
+        self.lower, self.memory = memory.lower, memory
+        self.choosers: set[ir.Var] = set()
+        self.maps: dict[ir.Var, tuple[ir.Var, dict[int, int]]] = {}
+        self.journals: list[tuple[int, dict[Box, Any]]] = []
 
     def write(self, box: Box, key: Any, value: Any) -> None:
         """Change the content of a box at a key."""
@@ -130,8 +98,8 @@ class Merging(Lowering):
 
     def followed(self, body: Callable[[], Any], facts: Facts) -> Path:
         """Evaluate a body, undo its changes, and return its path."""
-        outer, known = self.out, self.facts
-        self.out, self.facts = [], facts
+        outer, known = self.lower.out, self.lower.facts
+        self.lower.out, self.lower.facts = [], facts
         self.journals.append((now(), {}))
         value, dead = None, False
         try:
@@ -143,16 +111,14 @@ class Merging(Lowering):
             changed = {box: box.slots for box in journal}
             for box, before in journal.items():
                 box.slots = before
-            path = Path(self.out, self.facts, value, changed, dead)
-            self.out, self.facts = outer, known
+            path = Path(self.lower.out, self.lower.facts, value, changed, dead)
+            self.lower.out, self.lower.facts = outer, known
         return path
 
     def _adopt(self, path: Path) -> None:
         for box, slots in path.changed.items():
             self.open(box)
             box.slots = slots
-
-    # ---- branches ---------------------------------------------------------------------------
 
     def branch(
         self, test: ir.Operand, then: Callable[[], Any], orelse: Callable[[], Any], form: int | None = None
@@ -163,14 +129,14 @@ class Merging(Lowering):
             test, then, orelse: condition, and what is evaluated on the two paths.
             form: the alternative of a value that the condition is about; None if it is of the component.
         """
-        known = self.facts.known(test)
+        known = self.lower.facts.known(test)
         if known is not None:
             return then() if known else orelse()
         assert isinstance(test, ir.Var)
-        where = self.branch_at() + ("" if form is None else f":{form}")
+        where = self.lower.stack.where(column=True) + ("" if form is None else f":{form}")
         paths = []
         for holds, body in ((True, then), (False, orelse)):
-            facts = self.facts.copy()
+            facts = self.lower.facts.copy()
             facts.learn(test, holds)
             paths.append(self.followed(body, facts))
         a, b = paths
@@ -179,11 +145,11 @@ class Merging(Lowering):
             rest: list[ir.Statement] = []
             if not live.dead:
                 live.out, rest = [], live.out  # later statements need not be in the arm
-            self.out.append(ir.If(test, a.out, b.out, where))
+            self.lower.out.append(ir.If(test, a.out, b.out, where))
             if live.dead:
                 raise Unreachable
-            self.out += rest
-            self.facts = live.facts
+            self.lower.out += rest
+            self.lower.facts = live.facts
             self._adopt(live)
             return live.value
         join = _Join(self, test, a, b)
@@ -195,20 +161,31 @@ class Merging(Lowering):
                 raise Refused("the length of a list changes on one path only")
             if isinstance(box, Dict) and list(slots_a) != list(slots_b):
                 raise Refused("the keys of a dictionary change on one path only")
-            slots_a, slots_b = self.relevant(box, slots_a, slots_b)
+            slots_a, slots_b = self._relevant(box, slots_a, slots_b)
             keys = range(len(slots_a)) if isinstance(slots_a, list) else dict.fromkeys((*slots_a, *slots_b))
             merged = {key: join.of(items_of(slots_a, key), items_of(slots_b, key)) for key in keys}
             changes.append((box, list(merged.values()) if isinstance(slots_a, list) else merged))
         join.finish()
         if a.out or b.out:
-            self.out.append(ir.If(test, a.out, b.out, where))
+            self.lower.out.append(ir.If(test, a.out, b.out, where))
         for box, slots in changes:
             self.open(box)
             box.slots = slots if isinstance(slots, list) else {k: v for k, v in slots.items()}
         return value
 
-    def relevant(self, box: Box, slots_a: Any, slots_b: Any) -> tuple[Any, Any]:
-        """Return the content of a box on two paths, without parts that are no longer used."""
+    def _relevant(self, box: Box, slots_a: Any, slots_b: Any) -> tuple[Any, Any]:
+        """Return the content of a box on two paths, without names that a path that returns does not use."""
+        if (
+            box is not self.lower.stack.frame
+            or not isinstance(slots_a, dict)
+            or self.lower.stack.has_closures()
+        ):
+            return slots_a, slots_b
+        exits = slots_a.get(EXIT), slots_b.get(EXIT)
+        if [x is RETURN for x in exits] == [True, False]:
+            slots_a = {**slots_b, **{k: slots_a[k] for k in (EXIT, RESULT)}}
+        elif [x is RETURN for x in exits] == [False, True]:
+            slots_b = {**slots_a, **{k: slots_b[k] for k in (EXIT, RESULT)}}
         return slots_a, slots_b
 
     def by_form(self, value: Any, use: Callable[[Any], Any]) -> Any:
@@ -220,28 +197,38 @@ class Merging(Lowering):
             k = possible[0]
             if len(possible) == 1:
                 return self.by_form(value.alternatives[k], use)
-            test = self.compare("==", value.tag, k)
+            test = self.lower.compare("==", value.tag, k)
             chosen = value.alternatives[k]
             return self.branch(test, lambda: self.by_form(chosen, use), lambda: from_(possible[1:]), k)
 
-        return from_(self._possible(value, self.facts))
+        return from_(self._possible(value, self.lower.facts))
 
     def narrowed(self, value: Any, facts: Facts | None = None) -> Any:
         """Return the active alternative of a value, if known."""
         if isinstance(value, Union):
-            left = self._possible(value, facts or self.facts)
+            left = self._possible(value, facts or self.lower.facts)
             if len(left) == 1:
                 return self.narrowed(value.alternatives[left[0]], facts)
         return value
 
     def _possible(self, value: Union, facts: Facts) -> list[int]:
-        tag = self.settled(value.tag, facts)
+        tag = self.lower.settled(value.tag, facts)
         if not isinstance(tag, ir.Var):
             return [int(tag)]
         left = facts.left(tag)
         if left is not None:
             return sorted(left)
         return [k for k in range(len(value.alternatives)) if k not in facts.others.get(tag, ())]
+
+    def real(self, value: Any) -> Any:
+        """Return a number of any form as a real one."""
+        return self.by_form(value, self.lower.as_real)
+
+    def selected(self, test: ir.Operand, a: Any, b: Any) -> Any:
+        """Return one of two values, by a condition."""
+        if is_number(a) and is_number(b) and alike(a, b) and self.lower.facts.known(test) is None:
+            return self.lower.let(ir.joined(map(ir.type_of, (a, b))), "select", test, a, b)
+        return self.branch(test, lambda: a, lambda: b)
 
 
 def _values(x: ir.Operand, facts: Facts) -> frozenset[int] | None:
@@ -253,8 +240,8 @@ def _values(x: ir.Operand, facts: Facts) -> frozenset[int] | None:
 class _Join:
     """Merge of the values of two paths."""
 
-    def __init__(self, machine: Merging, test: ir.Var, a: Path, b: Path) -> None:
-        self.machine, self.test, self.a, self.b = machine, test, a, b
+    def __init__(self, paths: Paths, test: ir.Var, a: Path, b: Path) -> None:
+        self.paths, self.lower, self.test, self.a, self.b = paths, paths.lower, test, a, b
         self.boxes: dict[tuple[Box, Box], Box] = {}
         self.numbers: dict[tuple[Any, Any], ir.Operand] = {}
 
@@ -265,7 +252,7 @@ class _Join:
 
     def of(self, a: Any, b: Any) -> Any:
         """Return the merged value of `a` on one path and `b` on the other."""
-        a, b = self.machine.narrowed(a, self.a.facts), self.machine.narrowed(b, self.b.facts)
+        a, b = self.paths.narrowed(a, self.a.facts), self.paths.narrowed(b, self.b.facts)
         if a is b or same(a, b) or b is ANY:
             return a
         if a is ANY:
@@ -290,16 +277,16 @@ class _Join:
         raise Refused(f"a value that is {type(a).__name__} on both paths")
 
     def _loaded(self, value: Picked, path: Path) -> Any:
-        outer, self.machine.out = self.machine.out, path.out
+        outer, self.lower.out = self.lower.out, path.out
         for box in boxes_in(value):
             box.alias = OF_TABLE
         try:
-            return self.machine.loaded(value)  # type: ignore[attr-defined]
+            return self.paths.memory.loaded(value)
         finally:
-            self.machine.out = outer
+            self.lower.out = outer
 
     def number(self, a: ir.Operand, b: ir.Operand) -> ir.Operand:
-        a, b = self.machine.settled(a, self.a.facts), self.machine.settled(b, self.b.facts)
+        a, b = self.lower.settled(a, self.a.facts), self.lower.settled(b, self.b.facts)
         if same(a, b):
             return a
         key = (a if isinstance(a, ir.Var) else repr(a)), (b if isinstance(b, ir.Var) else repr(b))
@@ -308,18 +295,18 @@ class _Join:
         mapped = self._mapped(a, b)
         type = ir.joined(map(ir.type_of, (a, b)))
         if mapped is not None and type != ir.EITHER and all(k == x for k, x in mapped[1].items()):
-            return self.machine.truth(mapped[0]) if type == ir.BOOL else mapped[0]
-        target = self.machine.new(type)
+            return self.lower.truth(mapped[0]) if type == ir.BOOL else mapped[0]
+        target = self.lower.new(type)
         self.a.out.append(ir.Let(target, "copy", (a,)))
         self.b.out.append(ir.Let(target, "copy", (b,)))
         if isinstance(a, int) and isinstance(b, int):
-            self.machine.choices[target] = (self.test, a, b)
+            self.lower.choices[target] = (self.test, a, b)
         if mapped is not None:
-            self.machine.maps[target] = mapped
+            self.paths.maps[target] = mapped
         if target.type == ir.INT:
             left = _values(a, self.a.facts), _values(b, self.b.facts)
             if left[0] is not None and left[1] is not None:
-                self.machine.facts.domains[target] = left[0] | left[1]
+                self.lower.facts.domains[target] = left[0] | left[1]
         if target.type == ir.BOOL:
             self._remember(target, a, b)
         self.numbers[key] = target
@@ -327,7 +314,7 @@ class _Join:
 
     def _mapped(self, a: ir.Operand, b: ir.Operand) -> tuple[ir.Var, dict[int, int]] | None:
         """Return a variable that distinguishes the two paths, and the number for each of its values."""
-        kind, *of = self.machine.facts.meanings.get(self.test, ("",))
+        kind, *of = self.lower.facts.meanings.get(self.test, ("",))
         if kind != "is" or isinstance(a, ir.Var) or not isinstance(a, int):
             return None
         source, number = of
@@ -337,8 +324,8 @@ class _Join:
         if isinstance(b, ir.Var):
             if b is source:
                 rest = {k: k for k in left}
-            elif b in self.machine.maps and self.machine.maps[b][0] is source:
-                rest = {k: x for k, x in self.machine.maps[b][1].items() if k in left}
+            elif b in self.paths.maps and self.paths.maps[b][0] is source:
+                rest = {k: x for k, x in self.paths.maps[b][1].items() if k in left}
             else:
                 return None
         elif isinstance(b, int):
@@ -348,7 +335,7 @@ class _Join:
         return source, {number: int(a), **rest}
 
     def _remember(self, target: ir.Var, a: ir.Operand, b: ir.Operand) -> None:
-        meanings = self.machine.facts.meanings
+        meanings = self.lower.facts.meanings
         if b is False or a is True:
             first: Any = self.test
             if b is False and a is True:
@@ -390,8 +377,8 @@ class _Join:
 
     def _by_choice(self, a: Any, b: Any) -> Union | None:
         """Return a union tagged by the parameter that distinguishes the two paths, if there is one."""
-        kind, *of = self.machine.facts.meanings.get(self.test, ("",))
-        if kind != "is" or of[0] not in self.machine.choosers:
+        kind, *of = self.lower.facts.meanings.get(self.test, ("",))
+        if kind != "is" or of[0] not in self.paths.choosers:
             return None
         source, number = of
         left = self.b.facts.left(source) or frozenset()
@@ -423,7 +410,7 @@ class _Join:
         if isinstance(b, Union):
             tag_b = b.tag
             if places != list(range(len(places))):
-                tag_b = self.machine.new(ir.INT)
+                tag_b = self.lower.new(ir.INT)
                 self.b.out.append(ir.Load(tag_b, tuple(places), b.tag))
         tag = self.number(tag_a, tag_b)
         if not isinstance(tag, ir.Var):
