@@ -14,30 +14,12 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from . import ir
+from . import values as v
 from .paths import Paths
-from .values import (
-    UNSET,
-    Bound,
-    Box,
-    Bytes,
-    Closure,
-    Dict,
-    Failure,
-    Instance,
-    List,
-    Picked,
-    Refused,
-    Ring,
-    Span,
-    Text,
-    Union,
-    is_number,
-    is_plain,
-    read,
-)
+from .values import UNSET, Refused, is_number, is_plain, read
 
-_KINDS: dict[type, type] = {List: list, Ring: list, Dict: dict, Text: str}
-_OF_EVALUATION = (ir.Var, Union, Picked, Closure, Bound, Text, Bytes, Span, Failure)
+_KINDS: dict[type, type] = {v.List: list, v.Ring: list, v.Dict: dict, v.Text: str}
+_OF_EVALUATION = (ir.Var, v.Union, v.Picked, v.Closure, v.Bound, v.Text, v.Bytes, v.Span, v.Failure)
 """Values of the evaluation that stand for Python's own objects."""
 _BUILT_IN = (
     types.MethodDescriptorType,
@@ -84,19 +66,21 @@ class Attributes:
         Raises:
             Refused: there is none, or Python finds it in a way that is not translated.
         """
-        if isinstance(owner, Picked):
+        if isinstance(owner, v.Picked):
             owner = self.memory.loaded(owner)
-        if isinstance(owner, Union):
+        if isinstance(owner, v.Union):
             return self.paths.by_form(owner, lambda x: self.of(x, name, missing))
         if type(owner) in _KINDS:
             if hasattr(_KINDS[type(owner)], name):
-                return Bound(name, owner)
+                return v.Bound(name, owner)
             return self._missing(type(owner).__name__.lower(), name, missing)
         if owner is None and not hasattr(None, name):
             if missing:
                 return missing()
             self.lower.end("AttributeError", f"'NoneType' object has no attribute '{name}'")
-        if isinstance(owner, _OF_EVALUATION) or (isinstance(owner, Box) and not isinstance(owner, Instance)):
+        if isinstance(owner, _OF_EVALUATION) or (
+            isinstance(owner, v.Box) and not isinstance(owner, v.Instance)
+        ):
             raise Refused(f"the attribute {name} of a {type(owner).__name__}")
         if isinstance(owner, type):
             return self._of_class(owner, name, missing)
@@ -104,7 +88,7 @@ class Attributes:
             if name in vars(owner):
                 return vars(owner)[name]
             raise Refused(f"{owner.__name__} has no attribute {name}, or computes it")
-        cls = owner.cls if isinstance(owner, Instance) else type(owner)
+        cls = owner.cls if isinstance(owner, v.Instance) else type(owner)
         if cls.__module__ == "builtins" or isinstance(owner, functools.partial):
             return (
                 getattr(owner, name) if hasattr(owner, name) else self._missing(cls.__name__, name, missing)
@@ -140,7 +124,7 @@ class Attributes:
         held = self._held(owner).get(name, UNSET)
         if held is UNSET:
             return otherwise()
-        if not (isinstance(held, Union) and UNSET in held.alternatives):
+        if not (isinstance(held, v.Union) and UNSET in held.alternatives):
             return held
         nowhere = raw is UNSET and fallback is UNSET and missing is None
 
@@ -153,7 +137,7 @@ class Attributes:
 
     def _held(self, owner: Any) -> Any:
         """Return the attributes that an object itself has."""
-        if isinstance(owner, Instance):
+        if isinstance(owner, v.Instance):
             return read(owner)
         return vars(owner) if hasattr(type(owner), "__dict__") and hasattr(owner, "__dict__") else {}
 
@@ -174,26 +158,26 @@ class Attributes:
     def _bound_to(self, raw: Any, owner: Any, cls: type, name: str) -> Any:
         """Return the value of a class's attribute for an object of the class (`descriptor.__get__`)."""
         if isinstance(raw, types.FunctionType):
-            return Bound(raw, owner)
+            return v.Bound(raw, owner)
         if isinstance(raw, staticmethod):
             return raw.__func__
         if isinstance(raw, classmethod) and isinstance(raw.__func__, types.FunctionType):
-            return Bound(raw.__func__, cls)
+            return v.Bound(raw.__func__, cls)
         if type(raw) is functools.partialmethod and isinstance(raw.func, types.FunctionType):
-            return Bound(raw, owner)
+            return v.Bound(raw, owner)
         if isinstance(raw, property) and not _has_own(type(raw), "__get__"):
             if raw.fget is None:
                 raise Refused(f"{cls.__name__}.{name} cannot be read")
             return self.call(raw.fget, [owner], {})
         if type(raw) is functools.cached_property:
-            if not isinstance(owner, Instance) or cls.__dictoffset__ == 0:
+            if not isinstance(owner, v.Instance) or cls.__dictoffset__ == 0:
                 raise Refused(f"{cls.__name__}.{name} is computed when it is first read")
             value = self.call(raw.func, [owner], {})
             self.paths.write(owner, raw.attrname, value)
             return value
         if isinstance(raw, types.MemberDescriptorType):
-            held = self._held(owner).get(name, UNSET) if isinstance(owner, Instance) else raw.__get__(owner)
-            if held is UNSET or (isinstance(held, Union) and UNSET in held.alternatives):
+            held = self._held(owner).get(name, UNSET) if isinstance(owner, v.Instance) else raw.__get__(owner)
+            if held is UNSET or (isinstance(held, v.Union) and UNSET in held.alternatives):
                 raise Refused(f"{cls.__name__}.{name} may have no value")
             return held
         if isinstance(raw, _COMPUTED) and type(raw).__module__ in ("enum", "types"):
@@ -203,7 +187,7 @@ class Attributes:
         getter = member(type(raw), "__get__")
         if getter is UNSET:
             return raw
-        if isinstance(raw, _BUILT_IN) and not isinstance(owner, Instance):
+        if isinstance(raw, _BUILT_IN) and not isinstance(owner, v.Instance):
             return getattr(owner, name)
         if isinstance(getter, types.FunctionType) and not isinstance(raw, functools.partialmethod):
             return self.call(getter, [raw, owner, cls], {})
@@ -225,7 +209,7 @@ class Attributes:
         if isinstance(raw, staticmethod):
             return raw.__func__
         if isinstance(raw, classmethod) and isinstance(raw.__func__, types.FunctionType):
-            return Bound(raw.__func__, owner)
+            return v.Bound(raw.__func__, owner)
         if isinstance(raw, _BUILT_IN):
             return getattr(owner, name)
         getter = member(type(raw), "__get__")
@@ -237,19 +221,19 @@ class Attributes:
 
     def of_base(self, me: Any, after: type, name: str) -> Any:
         """Return super(after, me).name."""
-        cls = me.cls if isinstance(me, Instance) else me if isinstance(me, type) else type(me)
-        if not (isinstance(me, (Instance, type)) and after in cls.__mro__):
+        cls = me.cls if isinstance(me, v.Instance) else me if isinstance(me, type) else type(me)
+        if not (isinstance(me, (v.Instance, type)) and after in cls.__mro__):
             raise Refused("super() outside a method")
         bases = cls.__mro__[cls.__mro__.index(after) + 1 :]
         raw = next((vars(base)[name] for base in bases if name in vars(base)), UNSET)
         if raw is UNSET or isinstance(me, type):
             if isinstance(raw, classmethod) and isinstance(raw.__func__, types.FunctionType):
-                return Bound(raw.__func__, me)
+                return v.Bound(raw.__func__, me)
             raise Refused(f"super().{name}")
         if raw is object.__init__:
             return lambda: None
         if raw is object.__setattr__:
-            return Bound(raw, me)
+            return v.Bound(raw, me)
         if isinstance(raw, _BUILT_IN):
             raise Refused(f"super().{name}")
         return self._bound_to(raw, me, cls, name)
@@ -258,7 +242,7 @@ class Attributes:
         """Return hasattr(owner, name)."""
         if is_number(owner) and not isinstance(owner, ir.Var):
             return hasattr(owner, name)
-        if isinstance(owner, Instance) and isinstance(member(owner.cls, name), property):
+        if isinstance(owner, v.Instance) and isinstance(member(owner.cls, name), property):
             raise Refused(f"hasattr of the property {name}")
         nothing = object()
         value = self.of(owner, name, lambda: nothing)
@@ -269,7 +253,7 @@ class Attributes:
         self.paths.by_form(owner, lambda x: self._set(x, name, value))
 
     def _set(self, owner: Any, name: str, value: Any) -> None:
-        if not isinstance(owner, Instance):
+        if not isinstance(owner, v.Instance):
             what = f"class {owner.__name__}" if isinstance(owner, type) else type(owner).__name__
             raise Refused(f"setting an attribute of a {what}")
         setter = member(owner.cls, "__setattr__")
@@ -282,7 +266,7 @@ class Attributes:
 
     def set_as_object(self, owner: Any, name: str, value: Any) -> None:
         """Set an attribute as object.__setattr__ does."""
-        if not isinstance(owner, Instance) or not isinstance(name, str):
+        if not isinstance(owner, v.Instance) or not isinstance(name, str):
             raise Refused("object.__setattr__ of this object")
         cls = owner.cls
         raw = member(cls, name)
@@ -305,23 +289,23 @@ class Attributes:
         """Return a special method that a value's class has in Python, bound to the value; `UNSET` if none."""
         if is_number(value) or isinstance(value, _OF_EVALUATION):
             return UNSET
-        if isinstance(value, Box) and not isinstance(value, Instance):
+        if isinstance(value, v.Box) and not isinstance(value, v.Instance):
             return UNSET
-        cls = value.cls if isinstance(value, Instance) else type(value)
+        cls = value.cls if isinstance(value, v.Instance) else type(value)
         if isinstance(value, type) and cls.__name__ in _METACLASSES:
             return UNSET
         raw = member(cls, name)
         if isinstance(raw, types.FunctionType):
-            return Bound(raw, value)
+            return v.Bound(raw, value)
         if raw is None or (raw is not UNSET and not isinstance(raw, (*_BUILT_IN, staticmethod, classmethod))):
             raise Refused(f"{cls.__name__}.{name} is a {type(raw).__name__}")
         return UNSET
 
     def is_own(self, value: Any) -> bool:
         """Return whether a value is an object of a class that is not one of Python's own."""
-        return isinstance(value, Instance) or not (
+        return isinstance(value, v.Instance) or not (
             is_plain(value)
-            or isinstance(value, (*_OF_EVALUATION, Box))
+            or isinstance(value, (*_OF_EVALUATION, v.Box))
             or type(value).__module__ in ("builtins", "functools", "itertools", "operator")
         )
 

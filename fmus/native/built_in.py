@@ -12,37 +12,13 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from . import ir
+from . import values as v
 from .attributes import member
 from .expressions import formatted
 from .loops import UNROLLED, for_each_index
 from .lower import COMPENSATED, complaint
 from .shapes import push
-from .values import (
-    EITHER,
-    UNSET,
-    Array,
-    Bound,
-    Bytes,
-    Closure,
-    Dict,
-    Each,
-    Failure,
-    Instance,
-    List,
-    Picked,
-    Refused,
-    Ring,
-    Span,
-    Text,
-    Union,
-    is_mixed,
-    is_number,
-    is_plain,
-    is_real,
-    joined_text,
-    read,
-    same,
-)
+from .values import EITHER, UNSET, Refused, is_mixed, is_number, is_plain, is_real, joined_text, read, same
 
 if TYPE_CHECKING:
     from .evaluate import Evaluator
@@ -65,22 +41,22 @@ def built_in(e: Evaluator, function: Any, args: list[Any], named: dict[str, Any]
         return e.operators.operate("/", *[built_in(e, function, [x], {}) for x in args])
     if of_math and name not in ("floor", "ceil", "trunc"):
         args = [e.paths.real(x) if is_mixed(x) else x for x in args]
-    if any(isinstance(x, Union) for x in args) and not any(function is f for f in OF_FORMS):
-        k = next(i for i, x in enumerate(args) if isinstance(x, Union))
+    if any(isinstance(x, v.Union) for x in args) and not any(function is f for f in OF_FORMS):
+        k = next(i for i, x in enumerate(args) if isinstance(x, v.Union))
         return e.paths.by_form(
             args[k], lambda x: built_in(e, function, [*args[:k], x, *args[k + 1 :]], named)
         )
     if name == "get" and type(getattr(function, "__self__", None)) is dict:
-        return METHODS[Dict, name](e, Dict(function.__self__), *args)
+        return METHODS[v.Dict, name](e, v.Dict(function.__self__), *args)
     if isinstance(function, _KINDS_OF_FUNCTIONS) and function in FUNCTIONS:
         return FUNCTIONS[function](e, *args, **named)
     if of_math and all(map(is_number, args)):
         return e.lower.function(name, *args)
     if isinstance(function, type) and issubclass(function, BaseException):
-        return Failure(function, text_of(args))
+        return v.Failure(function, text_of(args))
     if getattr(function, "__module__", "") == "_operator" and name.startswith(("i", "set", "del")):
         raise Refused(f"a call of operator.{name}")
-    plain = [tuple(e.items.of(x)) if isinstance(x, List) else x for x in args]
+    plain = [tuple(e.items.of(x)) if isinstance(x, v.List) else x for x in args]
     if _is_pure(function) and all(map(_is_constant, (*plain, *named.values()))):
         try:
             return e.items.imported(function(*plain, **named))
@@ -212,7 +188,7 @@ def _hypot(e: Evaluator, *values: Any) -> Any:
 
 def _dist(e: Evaluator, first: Any, second: Any) -> Any:
     pairs = list(zip(e.items.of(first), e.items.of(second), strict=True))
-    if not any(isinstance(x, (ir.Var, Union)) for pair in pairs for x in pair):
+    if not any(isinstance(x, (ir.Var, v.Union)) for pair in pairs for x in pair):
         return math.dist(*zip(*pairs, strict=True))
     return e.lower.function(
         "dist", *[e.lower.binary("-", e.paths.real(a), e.paths.real(b)) for a, b in pairs]
@@ -240,7 +216,7 @@ def _sum(e: Evaluator, values: Any, start: Any = 0) -> Any:
 
 
 def _compensated(e: Evaluator, numbers: list[Any], k: int) -> Any:
-    mixed = next((i for i in range(k, len(numbers)) if isinstance(numbers[i], Union)), None)
+    mixed = next((i for i in range(k, len(numbers)) if isinstance(numbers[i], v.Union)), None)
     if mixed is not None:
         before, after = numbers[:mixed], numbers[mixed + 1 :]
         return e.paths.by_form(numbers[mixed], lambda x: _compensated(e, [*before, x, *after], mixed))
@@ -275,7 +251,7 @@ def _sorted(e: Evaluator, values: Any, key: Any = None, reverse: Any = False) ->
     if not isinstance(reverse, (bool, int)):
         raise Refused("an order that is only known at run time")
     if key is None and all(map(_is_constant, items)):
-        return List(sorted(items, reverse=bool(reverse)))
+        return v.List(sorted(items, reverse=bool(reverse)))
     rows = _keyed(e, items, key, "sorting values that are not numbers")
     if len(rows) > MOST_SORTED:
         raise Refused(f"sorting more than {MOST_SORTED} numbers that are only known at run time")
@@ -285,7 +261,7 @@ def _sorted(e: Evaluator, values: Any, key: Any = None, reverse: Any = False) ->
         raise Refused("sorting integers of 64 bits")
     places = [e.lower.let(ir.INT, "sorted_item", k, *keys) for k in range(len(keys))] if keys[1:] else [0]
     ordered = [_numbered(e, place, [row[-1] for row in rows]) for place in places]
-    return List(ordered[::-1] if reverse else ordered)
+    return v.List(ordered[::-1] if reverse else ordered)
 
 
 def _numbered(e: Evaluator, number: ir.Operand, items: Sequence[Any]) -> Any:
@@ -311,7 +287,7 @@ def _in_order(e: Evaluator, op: str, a: Any, b: Any) -> ir.Operand:
     return e.lower.compare(op, *(e.paths.real(x) if is_mixed(x) else x for x in (a, b)))
 
 
-def _searched(e: Evaluator, method: Callable[..., int], owner: List, args: Sequence[Any]) -> int:
+def _searched(e: Evaluator, method: Callable[..., int], owner: v.List, args: Sequence[Any]) -> int:
     if not all(map(is_plain, (*read(owner), *args))):
         raise Refused(f"the method {method.__name__} of a list")
     try:
@@ -320,36 +296,36 @@ def _searched(e: Evaluator, method: Callable[..., int], owner: List, args: Seque
         e.lower.end("ValueError", str(error))
 
 
-def _view(owner: Dict, keys: tuple[Any, ...], with_keys: bool) -> Each:
+def _view(owner: v.Dict, keys: tuple[Any, ...], with_keys: bool) -> v.Each:
     def item(k: int) -> Any:
         if tuple(read(owner)) != keys:
             raise Refused("a dictionary whose keys change during iteration")
         value = read(owner)[keys[k]]
         return (keys[k], value) if with_keys else value
 
-    return Each(len(keys), item, once=False)
+    return v.Each(len(keys), item, once=False)
 
 
-def _iter(e: Evaluator, value: Any) -> Each:
+def _iter(e: Evaluator, value: Any) -> v.Each:
     each = e.items.each(value)
-    return each if each.once else Each(each.count, each.item, each.end)
+    return each if each.once else v.Each(each.count, each.item, each.end)
 
 
 def _len(e: Evaluator, value: Any) -> Any:
     own = e.attributes.called(value, "__len__")
     if own is not UNSET:
         return _length(e, e.paths.narrowed(own))
-    if isinstance(value, Ring):
+    if isinstance(value, v.Ring):
         return e.memory.ring_length(value)
-    if isinstance(value, Picked):
+    if isinstance(value, v.Picked):
         if all(isinstance(x, str) or type(x) is tuple for x in value.items):
             return e.memory.by_item(value, len)
         return e.memory.length_of_picked(value)
-    if isinstance(value, Array):
+    if isinstance(value, v.Array):
         return value.memory.length
-    if isinstance(value, Each) and not value.once:
+    if isinstance(value, v.Each) and not value.once:
         return value.count
-    if isinstance(value, (List, Dict)):
+    if isinstance(value, (v.List, v.Dict)):
         return len(read(value))
     if isinstance(value, tuple) or type(value) in (str, bytes, range, list, dict, set, frozenset):
         return len(value)
@@ -364,14 +340,14 @@ def _length(e: Evaluator, count: Any) -> Any:
     return e.lower.binary("+", count, 0)
 
 
-def _array(e: Evaluator, kind: Any, values: Any = ()) -> Array:
+def _array(e: Evaluator, kind: Any, values: Any = ()) -> v.Array:
     each = e.items.each(values)
     if kind != "d" or not each.count:
         raise Refused("an array other than one of real numbers")
     if each.count > MOST_IN_ARRAY:
         raise Refused(f"an array of more than {MOST_IN_ARRAY:,} numbers")
-    made = Array(ir.Array(f"a{e.lower.new(ir.REAL).name}", each.count))
-    if isinstance(values, Array):
+    made = v.Array(ir.Array(f"a{e.lower.new(ir.REAL).name}", each.count))
+    if isinstance(values, v.Array):
         for_each_index(
             e, each.count, lambda k: e.items.set_array_item(made, k, e.memory.array_item(values, k))
         )
@@ -387,13 +363,13 @@ def _array(e: Evaluator, kind: Any, values: Any = ()) -> Array:
 
 def _dict(e: Evaluator, value: Any = (), /, **named: Any) -> Any:
     if type(value) is dict:
-        value = Dict(value)
-    held = read(value) if isinstance(value, Dict) else dict(map(e.items.of, e.items.of(value)))
+        value = v.Dict(value)
+    held = read(value) if isinstance(value, v.Dict) else dict(map(e.items.of, e.items.of(value)))
     held = {e.items.key(k): x for k, x in held.items()}
-    return Dict({**held, **named})
+    return v.Dict({**held, **named})
 
 
-def _decided(e: Evaluator, each: Each, by: bool, k: int = 0) -> Any:
+def _decided(e: Evaluator, each: v.Each, by: bool, k: int = 0) -> Any:
     if k == each.count:
         return not by
     test = e.operators.truth_of(each.item(k))
@@ -403,40 +379,40 @@ def _decided(e: Evaluator, each: Each, by: bool, k: int = 0) -> Any:
 
 def _zip(e: Evaluator, *values: Any, strict: bool = False) -> Any:
     rows = [x if isinstance(x, Repeated) else e.items.each(x) for x in values]
-    counts = {x.count for x in rows if isinstance(x, Each)}
+    counts = {x.count for x in rows if isinstance(x, v.Each)}
     if strict and len(counts) > 1:
         e.lower.end("ValueError", "zip() arguments differ in length")
-    return Each(min(counts), lambda k: tuple(x.item(k) if isinstance(x, Each) else x.value for x in rows))
+    return v.Each(min(counts), lambda k: tuple(x.item(k) if isinstance(x, v.Each) else x.value for x in rows))
 
 
 def _map(e: Evaluator, function: Any, *values: Any) -> Any:
     rows = _zip(e, *values)
-    return Each(rows.count, lambda k: e.call(function, rows.item(k), {}))
+    return v.Each(rows.count, lambda k: e.call(function, rows.item(k), {}))
 
 
 def _enumerate(e: Evaluator, values: Any, start: int = 0) -> Any:
-    if isinstance(values, (Ring, Span)):
+    if isinstance(values, (v.Ring, v.Span)):
         raise Refused("enumerate of a list whose length changes")
     each = e.items.each(values)
-    return Each(each.count, lambda k: (start + k, each.item(k)), each.end)
+    return v.Each(each.count, lambda k: (start + k, each.item(k)), each.end)
 
 
 def _reversed(e: Evaluator, values: Any) -> Any:
-    if e.attributes.special(values, "__reversed__") is not UNSET or isinstance(values, Instance):
+    if e.attributes.special(values, "__reversed__") is not UNSET or isinstance(values, v.Instance):
         raise Refused("reversed of an object")
     each = e.items.each(values)
-    return Each(each.count, lambda k: each.item(each.count - 1 - k))
+    return v.Each(each.count, lambda k: each.item(each.count - 1 - k))
 
 
 def _pairwise(e: Evaluator, values: Any) -> Any:
-    if isinstance(values, Ring):
+    if isinstance(values, v.Ring):
         ring = values
         last = e.lower.binary("-", e.memory.ring_length(ring), 1)
 
         def pair(k: ir.Operand) -> tuple[Any, Any]:
             return e.memory.ring_item(ring, k), e.memory.ring_item(ring, e.lower.binary("+", k, 1))
 
-        return Span(0, last, pair, ring)
+        return v.Span(0, last, pair, ring)
     each = e.items.each(values)
     before: list[Any] = []
 
@@ -445,20 +421,12 @@ def _pairwise(e: Evaluator, values: Any) -> Any:
         before.append(each.item(k + 1))
         return first, before[0]
 
-    return Each(max(each.count - 1, 0), following)
-
-
-def _repeat(e: Evaluator, value: Any, times: int | None = None) -> Any:
-    return Repeated(value) if times is None else (value,) * times
+    return v.Each(max(each.count - 1, 0), following)
 
 
 def _chain(e: Evaluator, *values: Any) -> Any:
     rows = [(each, k) for each in map(e.items.each, values) for k in range(each.count)]
-    return Each(len(rows), lambda i: rows[i][0].item(rows[i][1]))
-
-
-def _chained(e: Evaluator, values: Any) -> Any:
-    return _chain(e, *e.items.of(values))
+    return v.Each(len(rows), lambda i: rows[i][0].item(rows[i][1]))
 
 
 def _range(e: Evaluator, *ends: Any) -> Any:
@@ -468,13 +436,13 @@ def _range(e: Evaluator, *ends: Any) -> Any:
         return range(*ends)
     if len(ends) > 2:
         raise Refused("a range whose step or ends are only known at run time")
-    return Span(ends[0] if len(ends) == 2 else 0, ends[-1], lambda k: k)
+    return v.Span(ends[0] if len(ends) == 2 else 0, ends[-1], lambda k: k)
 
 
 def _bisect_right(e: Evaluator, values: Any, x: Any) -> Any:
     place: ir.Operand = 0
     items = e.items.of(values)
-    if not any(isinstance(v, ir.Var) for v in (*items, x)):
+    if not any(isinstance(y, ir.Var) for y in (*items, x)):
         return bisect.bisect_right(items, x)
     low, high = 0, len(items)
 
@@ -491,7 +459,7 @@ def _bisect_right(e: Evaluator, values: Any, x: Any) -> Any:
 
 def _isinstance(e: Evaluator, value: Any, kinds: Any) -> Any:
     value = e.paths.narrowed(value)
-    if isinstance(value, Union):
+    if isinstance(value, v.Union):
         return e.paths.by_form(value, lambda x: _isinstance(e, x, kinds))
     if isinstance(value, ir.Var):
         of = {ir.REAL: float, ir.BOOL: bool}.get(value.type, int)
@@ -506,40 +474,40 @@ def _isinstance(e: Evaluator, value: Any, kinds: Any) -> Any:
             "enum",
         ):
             raise Refused(f"isinstance of {kind.__name__}, whose class has a metaclass")
-    if isinstance(value, Picked):
+    if isinstance(value, v.Picked):
         value = e.memory.loaded(value)
-    if isinstance(value, (Closure, Bound, Bytes, Span, Each, Failure)):
+    if isinstance(value, (v.Closure, v.Bound, v.Bytes, v.Span, v.Each, v.Failure)):
         raise Refused(f"isinstance of a {type(value).__name__}")
-    if isinstance(value, Text):
+    if isinstance(value, v.Text):
         return issubclass(str, kinds)
-    if isinstance(value, Instance):
+    if isinstance(value, v.Instance):
         return issubclass(value.cls, kinds)
-    if isinstance(value, Array):
+    if isinstance(value, v.Array):
         return issubclass(array.array, kinds)
-    if isinstance(value, (List, Ring, Dict)):
-        return issubclass(dict if isinstance(value, Dict) else list, kinds)
+    if isinstance(value, (v.List, v.Ring, v.Dict)):
+        return issubclass(dict if isinstance(value, v.Dict) else list, kinds)
     return isinstance(value, kinds)
 
 
-def text_of(args: Sequence[Any]) -> Text:
+def text_of(args: Sequence[Any]) -> v.Text:
     if len(args) > 1:
         raise Refused("an exception of several values")
     if not args:
-        return Text(())
-    if isinstance(args[0], Text):
+        return v.Text(())
+    if isinstance(args[0], v.Text):
         return args[0]
     if not is_plain(args[0]):
         raise Refused("an exception of something unknown")
-    return Text((str(args[0]),))
+    return v.Text((str(args[0]),))
 
 
-def _resized(e: Evaluator, owner: List, change: Callable[..., Any], *args: Any) -> None:
+def _resized(e: Evaluator, owner: v.List, change: Callable[..., Any], *args: Any) -> None:
     if owner.path is not None:
         raise Refused(f"{change.__name__} of a list of the state")
     change(e.paths.open(owner), *args)
 
 
-def _append(e: Evaluator, owner: List, item: Any) -> None:
+def _append(e: Evaluator, owner: v.List, item: Any) -> None:
     e.items.promote(owner, item)
     e.paths.open(owner).append(item)
 
@@ -565,7 +533,7 @@ FUNCTIONS: dict[Any, Callable[..., Any]] = {
     itertools.pairwise: _pairwise,
     itertools.repeat: lambda e, value, times=None: Repeated(value) if times is None else (value,) * times,
     len: _len,
-    list: lambda e, values=(): List(e.items.of(values)),
+    list: lambda e, values=(): v.List(e.items.of(values)),
     map: _map,
     math.dist: _dist,
     math.fabs: lambda e, value: e.lower.function("fabs", value),
@@ -596,24 +564,24 @@ time if nothing in the call is only known at run time (see `_is_pure`)."""
 OF_FORMS = (getattr, hasattr, isinstance, bool, zip)
 """Those that take values of several forms; others are called for each form."""
 METHODS: dict[tuple[type, str], Callable[..., Any]] = {
-    (Dict, "copy"): lambda e, owner: Dict(read(owner)),
-    (Dict, "get"): lambda e, owner, key, default=None: read(owner).get(e.items.key(key), default),
-    (Dict, "items"): lambda e, owner: _view(owner, tuple(read(owner)), with_keys=True),
-    (Dict, "keys"): lambda e, owner: tuple(read(owner)),
-    (Dict, "values"): lambda e, owner: _view(owner, tuple(read(owner)), with_keys=False),
-    (List, "append"): _append,
-    (List, "clear"): lambda e, owner: _resized(e, owner, list.clear),
-    (List, "copy"): lambda e, owner: List(read(owner)),
-    (List, "count"): lambda e, owner, *args: _searched(e, list.count, owner, args),
-    (List, "extend"): lambda e, owner, values: _resized(e, owner, list.extend, e.items.of(values)),
-    (List, "index"): lambda e, owner, *args: _searched(e, list.index, owner, args),
-    (List, "insert"): lambda e, owner, *args: _resized(e, owner, list.insert, *args),
-    (List, "pop"): lambda e, owner, index=-1: e.items.remove(owner, index, "pop from empty list"),
-    (List, "reverse"): lambda e, owner: e.paths.open(owner).reverse(),
-    (Ring, "append"): lambda e, ring, item: push(ring, item, read, e.lower),
-    (Ring, "pop"): lambda e, ring, index: e.items.remove(ring, index, "pop from empty list"),
-    (Text, "encode"): lambda e, text, *_, **__: Bytes(text),
+    (v.Dict, "copy"): lambda e, owner: v.Dict(read(owner)),
+    (v.Dict, "get"): lambda e, owner, key, default=None: read(owner).get(e.items.key(key), default),
+    (v.Dict, "items"): lambda e, owner: _view(owner, tuple(read(owner)), with_keys=True),
+    (v.Dict, "keys"): lambda e, owner: tuple(read(owner)),
+    (v.Dict, "values"): lambda e, owner: _view(owner, tuple(read(owner)), with_keys=False),
+    (v.List, "append"): _append,
+    (v.List, "clear"): lambda e, owner: _resized(e, owner, list.clear),
+    (v.List, "copy"): lambda e, owner: v.List(read(owner)),
+    (v.List, "count"): lambda e, owner, *args: _searched(e, list.count, owner, args),
+    (v.List, "extend"): lambda e, owner, values: _resized(e, owner, list.extend, e.items.of(values)),
+    (v.List, "index"): lambda e, owner, *args: _searched(e, list.index, owner, args),
+    (v.List, "insert"): lambda e, owner, *args: _resized(e, owner, list.insert, *args),
+    (v.List, "pop"): lambda e, owner, index=-1: e.items.remove(owner, index, "pop from empty list"),
+    (v.List, "reverse"): lambda e, owner: e.paths.open(owner).reverse(),
+    (v.Ring, "append"): lambda e, ring, item: push(ring, item, read, e.lower),
+    (v.Ring, "pop"): lambda e, ring, index: e.items.remove(ring, index, "pop from empty list"),
+    (v.Text, "encode"): lambda e, text, *_, **__: v.Bytes(text),
 }
 """Methods of values that are understood, with what evaluates a call."""
-KINDS = {List: "list", Ring: "list whose length changes", Dict: "dictionary", Text: "text"}
+KINDS = {v.List: "list", v.Ring: "list whose length changes", v.Dict: "dictionary", v.Text: "text"}
 _KINDS_OF_FUNCTIONS = (type, types.BuiltinFunctionType)

@@ -16,26 +16,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from . import ir
+from . import values as v
 from .attributes import is_generated, member
 from .built_in import built_in, method_of, text_of
 from .read import names_set_by
 from .stack import Call
-from .values import (
-    UNSET,
-    Bound,
-    Box,
-    Closure,
-    Dict,
-    Failure,
-    Frame,
-    Instance,
-    List,
-    Picked,
-    Refused,
-    Union,
-    is_plain,
-    like,
-)
+from .values import UNSET, Refused, is_plain, like
 
 if TYPE_CHECKING:
     from .evaluate import Evaluator
@@ -44,23 +30,23 @@ if TYPE_CHECKING:
 def call(e: Evaluator, function: Any, args: list[Any], named: dict[str, Any]) -> Any:
     """Return the value of a call."""
     function = e.paths.narrowed(function)
-    if isinstance(function, Union):
+    if isinstance(function, v.Union):
         return e.paths.by_form(function, lambda f: e.call(f, args, named))
-    if isinstance(function, Picked):
+    if isinstance(function, v.Picked):
         function = e.memory.loaded(function)
-    if isinstance(function, Closure):
+    if isinstance(function, v.Closure):
         names = _bound(function.node.args, args, named, function.defaults, function.named_defaults)
-        frame = Frame(names, function.frame)
+        frame = v.Frame(names, function.frame)
         call = Call(function.source, frame, base=frame, own=names_set_by(function.node))
         return e.outlining.run(call, function.node)
-    if isinstance(function, Bound):
+    if isinstance(function, v.Bound):
         if isinstance(function.function, str):
             return method_of(e, function.owner, function.function, args, named)
         of = function.function
         if isinstance(of, functools.partialmethod):
             return e.call(of.func, [function.owner, *of.args, *args], of.keywords | named)
         return e.call(of, [function.owner, *args], named)
-    if isinstance(function, Instance):
+    if isinstance(function, v.Instance):
         method = e.attributes.special(function, "__call__")
         if method is UNSET:
             raise Refused(f"a call of a {function.cls.__name__}")
@@ -87,7 +73,7 @@ def call(e: Evaluator, function: Any, args: list[Any], named: dict[str, Any]) ->
         return e.call(function.func, [*function.args, *args], function.keywords | named)
     if function is object.__new__ and isinstance(args[0], type):
         _makes_objects(args[0])
-        return Instance(args[0])
+        return v.Instance(args[0])
     if isinstance(function, type) and not _is_python(function):
         return _made(e, function, args, named)
     method = e.attributes.special(function, "__call__")
@@ -114,7 +100,7 @@ def _inlined(e: Evaluator, function: types.FunctionType, args: list[Any], named:
     source = e.sources.of(function)
     e.stack.entered = f"{source.file}:{source.node.lineno}" if source.file else e.stack.entered
     names = _bound(source.node.args, args, named, function.__defaults__ or (), function.__kwdefaults__ or {})
-    return e.outlining.run(Call(source, Frame(names)), source.node)
+    return e.outlining.run(Call(source, v.Frame(names)), source.node)
 
 
 def _bound(
@@ -141,7 +127,7 @@ def _bound(
     for name, value in (*zip(positional[first:], defaults, strict=True), *named_defaults.items()):
         names.setdefault(name, value)
     if to.kwarg:
-        names[to.kwarg.arg] = Dict(rest)
+        names[to.kwarg.arg] = v.Dict(rest)
     elif rest:
         raise Refused(f"no parameter is called {next(iter(rest))}")
     missing = [n for n in (*positional, *(a.arg for a in to.kwonlyargs)) if n not in names]
@@ -160,7 +146,7 @@ def _made(e: Evaluator, cls: type, args: list[Any], named: dict[str, Any]) -> An
             isinstance(member(cls, name), types.FunctionType) for name in ("__init__", "__new__")
         ):
             raise Refused(f"a {cls.__name__}, which makes its message itself")
-        return Failure(cls, text_of(args))
+        return v.Failure(cls, text_of(args))
     if issubclass(cls, tuple) and hasattr(cls, "_fields"):
         made_by = next(base for base in cls.__mro__ if "__new__" in vars(base))
         if "_fields" not in vars(made_by):
@@ -172,12 +158,12 @@ def _made(e: Evaluator, cls: type, args: list[Any], named: dict[str, Any]) -> An
     if issubclass(cls, (tuple, list, dict, int, float, str)):
         raise Refused(f"making a {cls.__name__}")
     _makes_objects(cls)
-    made = Instance(cls)
+    made = v.Instance(cls)
     _initialized(e, made, args, named)
     return made
 
 
-def _initialized(e: Evaluator, made: Instance, args: list[Any], named: dict[str, Any]) -> None:
+def _initialized(e: Evaluator, made: v.Instance, args: list[Any], named: dict[str, Any]) -> None:
     init = member(made.cls, "__init__")
     if init is object.__init__:
         if args or named:
@@ -192,7 +178,7 @@ def _of_dataclass(e: Evaluator, function: types.FunctionType, args: list[Any], n
     """Return the value of a call of a method that a dataclass has generated."""
     name, me = function.__name__, args[0]
     cls = next((x for x in _class(me).__mro__ if vars(x).get(name) is function), None)
-    if cls is not None and name == "__init__" and isinstance(me, Instance):
+    if cls is not None and name == "__init__" and isinstance(me, v.Instance):
         return _fill(e, me, cls, function, args[1:], named)
     if cls is not None and name == "__eq__" and len(args) == 2 and not named:
         return _equal_fields(e, me, args[1], cls)
@@ -200,8 +186,8 @@ def _of_dataclass(e: Evaluator, function: types.FunctionType, args: list[Any], n
 
 
 def _equal_fields(e: Evaluator, me: Any, other: Any, cls: type) -> Any:
-    if not (isinstance(me, Instance) and isinstance(other, Instance) and me.cls is other.cls):
-        if isinstance(me, Instance) and isinstance(other, Instance):
+    if not (isinstance(me, v.Instance) and isinstance(other, v.Instance) and me.cls is other.cls):
+        if isinstance(me, v.Instance) and isinstance(other, v.Instance):
             return NotImplemented
         if e.attributes.is_own(me) and e.attributes.is_own(other):
             raise Refused("comparing an object of the state with one of the module")
@@ -222,7 +208,7 @@ def _copied(e: Evaluator, value: Any, name: str, copies: dict[int, Any]) -> Any:
     Raises:
         Refused: it contains other values than numbers, texts, functions, lists, objects of own classes.
     """
-    if isinstance(value, (Box, Union, ir.Var, Closure, Bound, Picked)):
+    if isinstance(value, (v.Box, v.Union, ir.Var, v.Closure, v.Bound, v.Picked)):
         if isinstance(value, ir.Var):
             return value
         raise Refused("a copy of what is computed at run time")
@@ -236,21 +222,21 @@ def _copied(e: Evaluator, value: Any, name: str, copies: dict[int, Any]) -> Any:
             return value
         raise Refused(f"{name} of something that may change cannot be copied")
     if isinstance(value, types.MethodType):
-        return Bound(value.__func__, _copied(e, value.__self__, name, copies))
+        return v.Bound(value.__func__, _copied(e, value.__self__, name, copies))
     if type(value) is tuple or hasattr(type(value), "_fields"):
         return like(value, [_copied(e, x, f"{name}[{k}]", copies) for k, x in enumerate(value)])
-    made: Box
+    made: v.Box
     held: dict[Any, Any]
     if type(value) is list:
-        made, held = List([None] * len(value)), dict(enumerate(value))
+        made, held = v.List([None] * len(value)), dict(enumerate(value))
     elif type(value) is dict:
-        made, held = Dict({}), {e.items.key(key): x for key, x in value.items()}
+        made, held = v.Dict({}), {e.items.key(key): x for key, x in value.items()}
     elif _is_its_attributes(value):
-        made, held = Instance(type(value)), vars(value)
+        made, held = v.Instance(type(value)), vars(value)
     else:
         raise Refused(f"{name}, of type {type(value).__name__}, cannot be copied")
     copies[id(value)] = made
-    is_object = isinstance(made, Instance)
+    is_object = isinstance(made, v.Instance)
     for key, x in held.items():
         made.slots[key] = _copied(e, x, f"{name}.{key}" if is_object else f"{name}[{key!r}]", copies)
     return made
@@ -258,7 +244,7 @@ def _copied(e: Evaluator, value: Any, name: str, copies: dict[int, Any]) -> Any:
 
 def _fill(
     e: Evaluator,
-    made: Instance,
+    made: v.Instance,
     cls: type,
     init: types.FunctionType,
     args: list[Any],
@@ -298,7 +284,7 @@ def _fill(
 
 
 def _class(value: Any) -> type:
-    return value.cls if isinstance(value, Instance) else type(value)
+    return value.cls if isinstance(value, v.Instance) else type(value)
 
 
 class _Empty:

@@ -3,17 +3,18 @@
 The library notes which of its branches are reached. Inputs for the others are searched in the library alone,
 which is fast, and what reaches more of them is compared as well (`_search`).
 
-Both run 2,000 steps at each of three step sizes, with inputs in their usual ranges, a hundredth and three
-times these ranges; with every choice of parameters and with changed parameters; with reset, a second start,
-saved, restored and serialized states; with outputs read, and parameters changed, before initialization ends;
-from other start times; with parameters out of range and inputs that are not finite. Values,
-statuses and messages must be the same, except that for huge inputs a native library may refuse to compute an
-integer of 2^53 or more. All NaNs are equal.
+A comparison is a sequence of cases: calls as a host makes them. Both run 2,000 steps at each of three step
+sizes, with inputs in their usual ranges, a hundredth and three times these ranges; then a case for every
+choice of a parameter, changed numbers, parameters out of range and inputs that are not finite, with other
+start times, saved, restored and serialized states, reset, outputs read and inputs changed before
+initialization ends. Values, statuses and messages must be the same, except that for huge inputs a native
+library may refuse to compute an integer of 2^53 or more. All NaNs are equal.
 """
 
 from __future__ import annotations
 
 import ctypes
+import itertools
 import json
 import math
 import os
@@ -36,9 +37,10 @@ FEW, FEWEST, IN_ALL = 100, 2, 3000
 """Steps per other value of a parameter, at most and at least, and approximate number for all values."""
 STARTS = (-1.0, 3600.0)
 """Further start times [s]."""
-MANY = 60
-"""Number of numeric parameters above which each is changed only once."""
-ALL_MOVED = "all parameters moved"
+MOVED, MANY = 20, 60
+"""Number of cases in which all parameters are moved, and of parameters above which each moves only once."""
+EXTREME = (math.nan, math.inf, -math.inf, 1e300, -0.0)
+"""Values of each input that are compared."""
 LIMIT = 240
 """Largest processor time [s] of a comparison, since a wrongly translated loop may never end."""
 SEARCH, EPISODE, LONGEST_EPISODE = 120_000, 150, 50_000
@@ -242,6 +244,31 @@ class Twin:
         return self._answer()
 
 
+@dataclass(frozen=True)
+class Case:
+    """Sequence of calls that a host may make.
+
+    Attributes:
+        label: what distinguishes it, for messages.
+        settings: type, index and value of parameters that are set after a reset.
+        start: start time [s].
+        steps: inputs and step size of each step; the first inputs are set before initialization, too.
+        early: read outputs, and change inputs, before initialization and before it ends.
+        saved: save the state at the end, go on, restore it, and go on again.
+        reset: reset before the state is restored.
+        wild: inputs so large are among them that integers computed from them may be inexact.
+    """
+
+    label: str
+    settings: Sequence[tuple[str, int, Any]]
+    start: float
+    steps: Sequence[tuple[list[float], float]]
+    early: bool = False
+    saved: bool = False
+    reset: bool = False
+    wild: bool = False
+
+
 class _Beside:
     """Both instances, called in the same way."""
 
@@ -251,16 +278,72 @@ class _Beside:
             c: [i for i, v in enumerate(variables) if v.causality == c]
             for c in ("input", "output", "parameter")
         }
-        self.label = ""
-        self.extreme = False  # whether inputs are so large that integers computed from them may be inexact
+        self.label, self.wild = "", False
+
+    def compare(self, case: Case, count: int | None = None) -> None:
+        """Make the calls of a case, with `count` of its steps.
+
+        Raises:
+            Difference: the answers of the two differ.
+        """
+        steps = case.steps[:count]
+        self.label, self.wild = case.label, case.wild
+        self.call("reset")
+        if case.early:
+            self._read_early(steps)
+        for kind, i, value in case.settings:
+            self.call("set", kind, [i], [value])
+        self._set_inputs(steps[0][0])
+        begun = self.call("begin", case.start)
+        if case.early:
+            self._read_early(steps)
+        if begun and self.call("end_initialization") and self._outputs():
+            t = self._run(steps, case.start)
+            if case.saved:
+                self._restored(case, t)
+
+    def _read_early(self, steps: Sequence[tuple[list[float], float]]) -> None:
+        for inputs, _ in steps[:2]:
+            self._set_inputs(inputs)
+            self._outputs()
+
+    def _set_inputs(self, inputs: list[float]) -> None:
+        if inputs:
+            self.call("set", "Real", self.of["input"], inputs)
+
+    def _outputs(self) -> bool:
+        return self.call("get", self.of["output"])
+
+    def _run(self, steps: Sequence[tuple[list[float], float]], t: float) -> float:
+        """Run steps of both until they fail; return the time."""
+        for inputs, h in steps:
+            self._set_inputs(inputs)
+            if not self.call("step", t, h):
+                break
+            t += h
+            self._outputs()
+        return t
+
+    def _restored(self, case: Case, t: float) -> None:
+        kept = self.native.save(), self.twin.save()
+        if not kept[1]:  # Python cannot copy it
+            self.twin.messages.clear()
+            return
+        self._run(case.steps[:FEW], t)
+        if case.reset:
+            self.call("reset")
+        if self.native.restore(kept[0])[0] != self.twin.restore(kept[1])[0]:
+            raise Difference(f"{self.label}: a saved state is not restored")
+        self._outputs()
+        self._run(case.steps[-FEW:], t)
 
     def call(self, what: str, *args: Any) -> bool:
         """Call both and return whether they succeeded."""
         native, python = getattr(self.native, what)(*args), getattr(self.twin, what)(*args)
-        if self.extreme and not native[0] and any(ALONE in text for text in native[1]):
+        if self.wild and not native[0] and any(ALONE in text for text in native[1]):
             return False
         if native[0] != python[0] or native[1] != python[1] or not _same(native[2], python[2]):
-            raise Difference(f"{self.label}{what}{_shown(args)}: {self._apart(native, python)}")
+            raise Difference(f"{self.label}: {what}{_shown(args)}: {self._apart(native, python)}")
         return native[0]  # type: ignore[no-any-return]
 
     def _apart(self, native: Answer, python: Answer) -> str:
@@ -274,48 +357,6 @@ class _Beside:
                 name = self.variables[self.of["output"][i]].name
                 return f"{name} is {a!r} natively, {b!r} in Python"
         return "values differ"
-
-    def start(
-        self,
-        chosen: Callable[[], None],
-        t: float,
-        inputs: Sequence[float],
-        early: Iterator[list[float]] | None = None,
-    ) -> bool:
-        """Reset both, set parameters, and start; with `early` inputs, read outputs while initializing."""
-        self.call("reset")
-        if early:
-            self._read_early(early)
-        chosen()
-        if inputs:
-            self.call("set", "Real", self.of["input"], inputs)
-        begun = self.call("begin", t)
-        if early:
-            self._read_early(early)
-        return begun and self.call("end_initialization") and self.outputs()
-
-    def _read_early(self, inputs: Iterator[list[float]]) -> None:
-        for _ in range(2):
-            if self.of["input"]:
-                self.call("set", "Real", self.of["input"], next(inputs))
-            self.outputs()
-
-    def outputs(self) -> bool:
-        return self.call("get", self.of["output"])
-
-    def steps(self, count: int, h: float, inputs: Iterator[list[float]], t: float) -> float:
-        """Run steps of both until they fail; return the time."""
-        for k in range(count):
-            if self.of["input"]:
-                self.call("set", "Real", self.of["input"], next(inputs))
-            if not self.call("step", t, h):
-                break
-            t += h
-            self.outputs()
-            if k % 50 == 49:  # another step size, as a host uses at an event
-                self.call("step", t, 0.37 * h)
-                t += 0.37 * h
-        return t
 
 
 def _numbers(content: bytes) -> tuple[float, ...]:
@@ -334,189 +375,158 @@ def _shown(args: Sequence[Any]) -> str:
     return f"({text[:80]}...)" if len(text) > 80 else f"({text})"
 
 
-def random_inputs(variables: Sequence[Any], seed: str) -> Iterator[list[float]]:
-    """Yield inputs endlessly: random walks, jumps and constants in usual, smaller and larger ranges."""
+def random_inputs(variables: Sequence[Any], seed: str, near: Sequence[float] = ()) -> Iterator[list[float]]:
+    """Yield inputs endlessly: random walks, jumps and constants in usual, smaller and larger ranges.
+
+    With `near`, also these numbers, those of other inputs, and far larger and smaller ones.
+    """
     chance = random.Random(seed)
     ranges = [usual_range(v.name) for v in variables if v.causality == "input"]
-    now = [0.5 * (low + high) for low, high in ranges]
-    scale, kind = 1.0, "walk"
+    now, half, modes = [0.5 * (low + high) for low, high in ranges], [0.0] * len(ranges), [""] * len(ranges)
+    turn = chance.choice((0.02, 0.1, 0.5)) if near else 0.01
     while True:
-        if chance.random() < 0.01:
-            scale = chance.choice((0.01, 0.3, 1.0, 1.0, 1.0, 3.0))
-            kind = chance.choice(("walk", "walk", "jump", "stay", "rest"))
         for i, (low, high) in enumerate(ranges):
-            middle, half = 0.5 * (low + high), 0.5 * (high - low) * scale
-            if kind == "walk":
-                moved = now[i] + half * chance.gauss(0.0, 0.05)
-                now[i] = min(max(moved, middle - half), middle + half)
-            elif kind == "jump" and chance.random() < 0.3:
-                now[i] = middle + half * chance.uniform(-1.0, 1.0)
-            elif kind == "rest":
-                now[i] = 0.0
+            middle = 0.5 * (low + high)
+            if not modes[i] or chance.random() < turn:
+                modes[i] = chance.choice(
+                    ("walk", "jump", "stay", "rest", *(("near", "same", "wide") if near else ()))
+                )
+                half[i] = 0.5 * (high - low) * chance.choice((0.01, 0.3, 1.0, 1.0, 1.0, 3.0))
+                if modes[i] == "rest":
+                    now[i] = 0.0
+                elif modes[i] == "wide":
+                    now[i] = (high - low) * 10.0 ** chance.uniform(-3.0, 3.0) * chance.choice((-1.0, 1.0))
+                elif modes[i] == "stay":
+                    now[i] = middle + half[i] * chance.uniform(-1.0, 1.0)
+                elif modes[i] in ("near", "same"):
+                    now[i] = chance.choice(near if modes[i] == "near" else now)
+            if modes[i] == "walk":
+                moved = now[i] + half[i] * chance.gauss(0.0, 0.05)
+                now[i] = min(max(moved, middle - half[i]), middle + half[i])
+            elif modes[i] == "jump" and chance.random() < 0.3:
+                now[i] = middle + half[i] * chance.uniform(-1.0, 1.0)
         yield list(now)
 
 
-def compare(
-    library: Path,
-    guid: str,
-    component: type[Any],
-    resources: Path,
-    thresholds: Sequence[float] = (),
-    steps: int = STEPS,
-    usual: Callable[[Branches], None] = lambda branches: None,
-) -> Branches:
-    """Compare a native library with its Python component in all cases, and return its branches.
+class Cases:
+    """Cases of a component, drawn by chance.
 
     Args:
-        library, guid: of the native library.
-        component, resources: of the Python component.
+        component: the Python component.
         thresholds: numbers with which it compares others.
-        steps: number of steps at each step size.
-        usual: called after the comparison with usual inputs, before others are searched.
-
-    Raises:
-        Difference: the first difference.
     """
-    beside = _Beside(Native(library, guid), Twin(component, resources), component.variables)
-    branches = Branches(beside.native.library)
-    branches.forget()
-    _compare_usual(beside, component, steps)
-    branches.keep()
-    if 0 in branches.compared:
-        usual(branches)
-        _search(beside, branches, component, thresholds)
-    return branches
+
+    def __init__(self, component: type[Any], thresholds: Sequence[float]) -> None:
+        self.name, self.variables = component.fmu_name, component.variables
+        self.parameters = [(i, v) for i, v in enumerate(self.variables) if v.causality == "parameter"]
+        self.inputs = sum(v.causality == "input" for v in self.variables)
+        self.near = _near(thresholds)
+        self.counts = sorted({int(x) for x in thresholds if x == int(x) and EPISODE < x <= LONGEST_EPISODE})
+
+    def usual(self) -> Iterator[Case]:
+        """Yield long cases, and one for everything that is compared at least once, else drawn by chance."""
+        inputs = random_inputs(self.variables, self.name)
+
+        def steps(h: float, count: int) -> list[tuple[list[float], float]]:
+            made = []
+            for k in range(count):
+                made.append((next(inputs), h))
+                if k % 50 == 49:  # another step size, as a host uses at an event
+                    made.append((made[-1][0], 0.37 * h))
+            return made
+
+        declared = [float(v.start or 0.0) for v in self.variables if v.causality == "input"]
+        for h in LENGTHS:
+            yield Case(f"steps of {h:g} s", [], 0.0, [(declared, h), *steps(h, STEPS)], saved=True)
+        due = [[setting] for setting in self._settings()] + [[]] * MOVED
+        few = max(FEWEST, min(FEW, IN_ALL // len(due)))
+        for number, settings in enumerate(due):
+            chance = random.Random(f"{self.name}, usual {number}")
+            label = "".join(f"{self.variables[i].name} = {value!r}, " for _, i, value in settings)
+            if not settings:
+                label, settings = f"all parameters moved, {number}, ", self._moved(chance)
+            start, early = chance.choice((0.25, 0.25, 0.25, 0.25, *STARTS)), number % 5 == 0
+            label += f"start at {start:g} s" + ", outputs read before initialization ends" * early
+            made = steps(chance.choice(LENGTHS), few)
+            yield Case(label, settings, start, made, early, saved=number % 4 == 0, reset=number % 8 == 0)
+        for k in range(self.inputs):
+            for value in EXTREME:
+                made = steps(LENGTHS[0], 4)
+                last = [*made[-1][0][:k], value, *made[-1][0][k + 1 :]]
+                made = [*made[:-1], (last, LENGTHS[0]), (last, LENGTHS[0])]
+                yield Case(f"input {k} = {value}", [], 0.0, made, wild=True)
+
+    def _settings(self) -> Iterator[tuple[str, int, Any]]:
+        """Yield values of each parameter: every choice, changed numbers, and what is out of range."""
+        for i, v in self.parameters:
+            values, wrong = _values(v)
+            values = values[:1] if v.type == "Real" and len(self.parameters) > MANY else values
+            yield from ((v.type, i, x) for x in (*values, *wrong))
+
+    def _moved(self, chance: random.Random) -> list[tuple[str, int, Any]]:
+        """Return values of all real parameters near their defaults, and choices of all others."""
+        moved: list[tuple[str, int, Any]] = []
+        for i, v in self.parameters:
+            if v.type == "Real":
+                moved.append(("Real", i, v.start * chance.uniform(0.8, 1.25)))
+            elif v.type != "Integer":
+                moved.append((v.type, i, chance.choice(_values(v)[0])))
+        return moved
+
+    def searched(self) -> Iterator[Case]:
+        """Yield cases with inputs of all kinds, endlessly; every text of a choice is chosen in turn."""
+        for number in itertools.count():
+            chance = random.Random(f"{self.name} {number}")
+            turn, odd = divmod(number, 2)
+            long = self.counts[turn] + AFTER if not odd and turn < len(self.counts) else EPISODE
+            yield self._wild(f"found by searching, {number + 1}", number, chance, long)
+
+    def _wild(self, label: str, number: int, chance: random.Random, count: int) -> Case:
+        moved = chance.sample(self.parameters, min(len(self.parameters), chance.choice((0, 1, 2, 4))))
+        settings = [(v.type, i, self._value(v, chance)) for i, v in moved]
+        settings += [
+            ("String", i, v.choices[number % len(v.choices)])
+            for i, v in self.parameters
+            if v.type == "String"
+        ]
+        if chance.random() < 0.5:  # what is off by default is switched on
+            size = [chance.choice((1.0, -1.0)) * 10.0 ** chance.uniform(-2.0, 4.0) for _ in self.parameters]
+            off = [(i, v, x) for (i, v), x in zip(self.parameters, size, strict=True) if v.type == "Real"]
+            settings += [
+                ("Real", i, _within(v, x)) for i, v, x in off if v.start == 0.0 and chance.random() < 0.6
+            ]
+        h = chance.choice((*LENGTHS, *LENGTHS, 1e-4, 0.1))
+        times = [*self.near, *(float(x) for kind, _, x in settings if kind in ("Real", "Integer"))]
+        start = chance.choice((0.0, 0.0, *STARTS, *[x - 10.3 * h for x in times if 0.0 < x < 1e6]))
+        short = [1e-9, 0.37 * h, *(x for x in self.near if 0.0 < x < 1.0)]  # at events and at the end
+        inputs = random_inputs(self.variables, f"{self.name} {number}", self.near)
+        steps = [(next(inputs), chance.choice(short) if chance.random() < 0.03 else h) for _ in range(count)]
+        return Case(label, settings, start, steps, wild=True)
+
+    def _value(self, v: Any, chance: random.Random) -> Any:
+        """Return a value of a parameter, at its limits or near a threshold."""
+        values, _ = _values(v)
+        if v.type in ("Real", "Integer"):
+            # far less may mean very many samples
+            values = [*values, *(x for x in self.near if abs(x) >= 0.1 * abs(v.start))]
+        value = chance.choice(values)
+        if v.type in ("Real", "Integer") and (_within(v, value) != value or abs(value) > 1e9):
+            value = v.start
+        return int(value) if v.type == "Integer" else value
 
 
-def _compare_usual(beside: _Beside, component: type[Any], steps: int) -> None:
-    variables = beside.variables
-    inputs = random_inputs(variables, component.fmu_name)
-    first = [0.0 if v.start is None else float(v.start) for v in variables if v.causality == "input"]
-
-    def unchanged() -> None:
-        return None
-
-    for h in LENGTHS:
-        beside.label = f"steps of {h:g} s: "
-        if beside.start(unchanged, 0.0, first):
-            t = beside.steps(steps, h, inputs, 0.0)
-            _restored(beside, inputs, h, t, FEW)
-    for start in STARTS:
-        beside.label = f"start at {start:g} s: "
-        if beside.start(unchanged, start, first):
-            beside.steps(FEW, LENGTHS[0], inputs, start)
-    settings = [*_choices(beside, variables), *_all_moved(beside, variables)]
-    few = max(FEWEST, min(FEW, IN_ALL // max(len(settings), 1)))
-    for label, choose in settings:
-        beside.label = f"{label}: "
-        if beside.start(choose, 0.25, next(inputs)):
-            h = random.Random(label).choice(LENGTHS)
-            t = beside.steps(few, h, inputs, 0.25)
-            if label.startswith(ALL_MOVED):
-                _restored(beside, inputs, h, t, few, reset=True)
-    for label, choose in [("", unchanged), *_all_moved(beside, variables)][:2]:
-        beside.label = f"{label and label + ', '}outputs read before initialization ends: "
-        beside.start(choose, 0.25, next(inputs), inputs)
-        beside.steps(few, LENGTHS[0], inputs, 0.25)
-    for i in beside.of["input"]:
-        for value in (math.nan, math.inf, -math.inf, 1e300, -0.0):
-            beside.label = f"{variables[i].name} = {value}: "
-            if beside.start(unchanged, 0.0, first):
-                t = beside.steps(3, 0.001, inputs, 0.0)
-                beside.extreme = True
-                beside.call("set", "Real", [i], [value])
-                if beside.call("step", t, 0.001):
-                    beside.outputs()
-                    beside.call("step", t + 0.001, 0.001)
-                beside.extreme = False
-
-
-def _restored(
-    beside: _Beside, inputs: Iterator[list[float]], h: float, t: float, count: int, *, reset: bool = False
-) -> None:
-    """Save both states, continue, optionally reset, restore and continue from there."""
-    kept = beside.native.save(), beside.twin.save()
-    if not kept[1]:  # Python cannot copy it
-        beside.twin.messages.clear()
-        return
-    beside.steps(count, h, inputs, t)
-    if reset:
-        beside.call("reset")
-    if beside.native.restore(kept[0])[0] != beside.twin.restore(kept[1])[0]:
-        raise Difference("a saved state is not restored")
-    beside.outputs()
-    beside.steps(count, h, inputs, t)
-
-
-def _choices(beside: _Beside, variables: Sequence[Any]) -> Iterator[tuple[str, Callable[[], None]]]:
-    """Yield settings of one parameter: every choice, every number changed, and values out of range."""
-    many = len(beside.of["parameter"]) > MANY
-    for i in beside.of["parameter"]:
-        v = variables[i]
-        if v.type == "String":
-            values: list[Any] = [*v.choices, "none of them"]
-        elif v.type == "Boolean":
-            values = [True, False]
-        elif v.type == "Integer":
-            values = [v.start + 1, max(v.start * 7, 12345), -1]
-        else:
-            values = [v.start * 1.25 + 0.01]
-            if many:
-                values += [v.minimum - 1.0] if v.minimum is not None else []
-            else:
-                values += [v.start * 0.6, 0.0, -1.0]
-                values += [x for x in (v.minimum, v.maximum) if x is not None and abs(x) < 1e30]
-        for value in values:
-            yield f"{v.name} = {value!r}", lambda i=i, k=v.type, x=value: beside.call("set", k, [i], [x])  # type: ignore
-
-
-def _all_moved(beside: _Beside, variables: Sequence[Any]) -> Iterator[tuple[str, Callable[[], None]]]:
-    """Yield settings of all parameters at once, at random near their defaults."""
-    reals = [i for i in beside.of["parameter"] if variables[i].type == "Real"]
-    others = [i for i in beside.of["parameter"] if variables[i].choices or variables[i].type == "Boolean"]
-    for k in range(20):
-
-        def choose(seed: int = k) -> None:
-            own = random.Random(seed)
-            if reals:
-                beside.call(
-                    "set", "Real", reals, [variables[i].start * own.uniform(0.8, 1.25) for i in reals]
-                )
-            for i in others:
-                v = variables[i]
-                beside.call("set", v.type, [i], [own.choice(v.choices or (True, False))])
-
-        yield f"{ALL_MOVED}, {k}", choose
-
-
-@dataclass(frozen=True)
-class _Try:
-    """Sequence of calls: parameters that are set, start time, inputs and step sizes, one per step."""
-
-    settings: list[tuple[str, int, Any]]
-    start: float
-    first: list[float]
-    steps: list[tuple[list[float], float]]
-
-
-def _search(beside: _Beside, branches: Branches, component: type[Any], thresholds: Sequence[float]) -> None:
-    """Search inputs that reach further branches of the native library, and compare them."""
-    left, number, last, found = SEARCH, 0, 0, 0
-    near = _near(thresholds)
-    counts = sorted({int(x) for x in thresholds if x == int(x) and EPISODE < x <= LONGEST_EPISODE})
-    patience = max(PATIENCE, 2 * len(counts))
-    while left > 0 and found < MOST_FOUND and 0 in branches.compared and number - last < patience:
-        chance = random.Random(f"{component.fmu_name} {number}")
-        long = counts[number // 2] if number % 2 == 0 and number // 2 < len(counts) else 0
-        attempt = _attempt(beside, chance, near, long + AFTER if long else EPISODE)
-        number += 1
-        taken, needed = _try_natively(beside, branches, attempt)
-        left -= taken + 20  # the calls before the first step take as long
-        if needed:
-            last, found = number, found + 1
-            beside.label = f"found by searching, {number}: "
-            _compare_try(beside, attempt, needed + AFTER)
-            branches.keep()
+def _values(v: Any) -> tuple[list[Any], list[Any]]:
+    """Return values that a parameter may have, and some that it may not."""
+    limits = [x for x in (v.minimum, v.maximum) if x is not None and abs(x) < 1e30]
+    if v.type == "String":
+        return list(v.choices), ["none of them"]
+    if v.type == "Boolean":
+        return [True, False], []
+    if v.type == "Integer":
+        return [v.start + 1, max(v.start * 7, 12345)], [-1]
+    return [v.start * 1.25 + 0.01, v.start * 0.6, 0.0, *limits], [
+        -1.0 if v.minimum is None else v.minimum - 1.0
+    ]
 
 
 def _near(thresholds: Sequence[float]) -> list[float]:
@@ -529,94 +539,83 @@ def _near(thresholds: Sequence[float]) -> list[float]:
     return list(found)
 
 
-def _attempt(beside: _Beside, chance: random.Random, near: list[float], count: int) -> _Try:
-    variables = beside.variables
-    parameters = beside.of["parameter"]
-    moved = chance.sample(parameters, min(len(parameters), chance.choice((0, 0, 1, 2))))
-    settings = [(variables[i].type, i, _parameter(variables[i], chance, near)) for i in moved]
-    if chance.random() < 0.5:  # what is off by default is switched on
-        off = [i for i in parameters if variables[i].type == "Real" and variables[i].start == 0.0]
-        settings += [
-            ("Real", i, _within(variables[i], chance.choice((1.0, -1.0)) * 10.0 ** chance.uniform(-2.0, 4.0)))
-            for i in off
-            if chance.random() < 0.6
-        ]
-    ranges = [usual_range(variables[i].name) for i in beside.of["input"]]
-    modes, now = [""] * len(ranges), [0.5 * (low + high) for low, high in ranges]
-    h = chance.choice((*LENGTHS, *LENGTHS, 1e-4, 0.1))
-    times = [*near, *(float(x) for kind, _, x in settings if kind in ("Real", "Integer"))]
-    start = chance.choice((0.0, 0.0, *STARTS, *[x - 10.3 * h for x in times if 0.0 < x < 1e6]))
-    short = [1e-9, 0.37 * h, *(x for x in near if 0.0 < x < 1.0)]  # as hosts make at events and at the end
-    steps = []
-    turn = chance.choice((0.02, 0.1, 0.5))
-    for k in range(count):
-        for i, (low, high) in enumerate(ranges):
-            if k == 0 or chance.random() < turn:
-                modes[i] = chance.choice(("near", "usual", "wide", "walk", "rest", "same"))
-                if modes[i] == "near":
-                    now[i] = chance.choice(near)
-                elif modes[i] == "usual":
-                    now[i] = chance.uniform(low, high)
-                elif modes[i] == "wide":
-                    now[i] = (high - low) * 10.0 ** chance.uniform(-3.0, 3.0) * chance.choice((-1.0, 1.0))
-                elif modes[i] == "rest":
-                    now[i] = 0.0
-                elif modes[i] == "same":
-                    now[i] = chance.choice(now)
-            elif modes[i] == "walk":
-                now[i] += 0.05 * (high - low) * chance.uniform(-1.0, 1.0)
-        steps.append((list(now), chance.choice(short) if chance.random() < 0.03 else h))
-    return _Try(settings, start, list(steps[0][0]), steps)
-
-
 def _within(v: Any, value: float) -> float:
-    low, high = (
-        (-math.inf if v.minimum is None else v.minimum),
-        (math.inf if v.maximum is None else v.maximum),
-    )
+    """Return a number moved between the limits of a parameter."""
+    low = -math.inf if v.minimum is None else v.minimum
+    high = math.inf if v.maximum is None else v.maximum
     return float(min(max(abs(value) if low >= 0.0 else value, low), high))
 
 
-def _parameter(v: Any, chance: random.Random, near: list[float]) -> Any:
-    if v.type == "String":
-        return chance.choice(v.choices)
-    if v.type == "Boolean":
-        return chance.random() < 0.5
-    low, high = v.minimum, v.maximum
-    values = [0.0, 0.6 * v.start, 1.25 * v.start, *(x for x in (low, high) if x is not None)]
-    values += [x for x in near if abs(x) >= 0.1 * abs(v.start)]  # far less may mean very many samples
-    value = chance.choice(values)
-    if not (low is None or value >= low) or not (high is None or value <= high) or abs(value) > 1e9:
-        value = v.start
-    return int(value) if v.type == "Integer" else float(value)
+def compare(
+    library: Path,
+    guid: str,
+    component: type[Any],
+    resources: Path,
+    thresholds: Sequence[float] = (),
+    told: Callable[[Branches], None] = lambda branches: None,
+) -> Branches:
+    """Compare a native library with its Python component in all cases, and return its branches.
+
+    Args:
+        library, guid: of the native library.
+        component, resources: of the Python component.
+        thresholds: numbers with which it compares others.
+        told: called before cases are searched, and after each that was found.
+
+    Raises:
+        Difference: the first difference.
+    """
+    beside = _Beside(Native(library, guid), Twin(component, resources), component.variables)
+    branches, cases = Branches(beside.native.library), Cases(component, thresholds)
+    branches.forget()
+    for case in cases.usual():
+        beside.compare(case)
+    branches.keep()
+    if 0 in branches.compared:
+        told(branches)
+        _search(beside, branches, cases, told)
+    return branches
 
 
-def _try_natively(beside: _Beside, branches: Branches, attempt: _Try) -> tuple[int, int]:
-    """Run a try in the native library; return its steps, and those until its last new branch, 0 if none."""
+def _search(beside: _Beside, branches: Branches, cases: Cases, told: Callable[[Branches], None]) -> None:
+    """Search cases that reach further branches of the native library, and compare them."""
+    left, last, found = SEARCH, 0, 0
+    patience = max(PATIENCE, 2 * len(cases.counts))
+    for number, case in enumerate(cases.searched()):
+        if left <= 0 or found >= MOST_FOUND or 0 not in branches.compared or number - last >= patience:
+            return
+        taken, needed = _natively(beside, branches, case)
+        left -= taken + 20  # the calls before the first step take as long
+        if needed:
+            last, found = number + 1, found + 1
+            beside.compare(case, needed + AFTER)
+            branches.keep()
+            told(branches)
+
+
+def _natively(beside: _Beside, branches: Branches, case: Case) -> tuple[int, int]:
+    """Run a case in the native library; return its steps, and those until its last new branch, 0 if none."""
     native, of = beside.native, beside.of
     library, instance = native.library, native.instance
     branches.forget()
     native.reset()
-    for kind, i, value in attempt.settings:
+    for kind, i, value in case.settings:
         native.set(kind, [i], [value])
     n = len(of["input"])
     refs, values, count = (c_uint * n)(*of["input"]), (c_double * n)(), c_size_t(n)
-    values[:] = attempt.first  # type: ignore[assignment]
+    values[:] = case.steps[0][0]  # type: ignore[assignment]
     library.fmi2SetReal(instance, refs, count, values)
-    begun = native.begin(attempt.start)[0] and native.end_initialization()[0]
-    before, needed, taken = branches.compared, 0, 0
-    now = branches.now()
-    if any(a > b for a, b in zip(now, before, strict=True)):
-        needed = 1
-    t, last = attempt.start, now
-    for taken, (inputs, h) in enumerate(attempt.steps if begun else (), start=1):
+    begun = native.begin(case.start)[0] and native.end_initialization()[0]
+    last = branches.now()
+    t, taken, needed = case.start, 0, int(branches.new())
+    for taken, (inputs, h) in enumerate(case.steps if begun else (), start=1):
         values[:] = inputs  # type: ignore[assignment]
         library.fmi2SetReal(instance, refs, count, values)
         failed = library.fmi2DoStep(instance, c_double(t), c_double(h), 1)
         t += h
         now = branches.now()
         if now != last:
-            if any(a > b and not c for a, b, c in zip(now, before, last, strict=True)):
+            if any(a > b and not c for a, b, c in zip(now, branches.compared, last, strict=True)):
                 needed = taken
             last = now
         if failed:
@@ -624,24 +623,6 @@ def _try_natively(beside: _Beside, branches: Branches, attempt: _Try) -> tuple[i
     native.messages.clear()
     branches.forget()
     return taken, needed
-
-
-def _compare_try(beside: _Beside, attempt: _Try, count: int) -> None:
-    def chosen() -> None:
-        for kind, i, value in attempt.settings:
-            beside.call("set", kind, [i], [value])
-
-    beside.extreme = True
-    if beside.start(chosen, attempt.start, attempt.first):
-        t = attempt.start
-        for inputs, h in attempt.steps[:count]:
-            if beside.of["input"]:
-                beside.call("set", "Real", beside.of["input"], inputs)
-            if not beside.call("step", t, h):
-                break
-            t += h
-            beside.outputs()
-    beside.extreme = False
 
 
 def differences(
@@ -673,15 +654,16 @@ def differences(
         def tell(*made: Any) -> None:
             answers.write(json.dumps(made) + "\n")
 
-        def before_search(branches: Branches) -> None:
+        def told(branches: Branches) -> None:
             tell("", branches.compared.hex(), branches.places)
             most = int(sum(os.times()[:2])) + SEARCH_SECONDS
-            resource.setrlimit(resource.RLIMIT_CPU, (min(most, limit), limit + 1))
+            least, _ = resource.getrlimit(resource.RLIMIT_CPU)
+            resource.setrlimit(resource.RLIMIT_CPU, (min(most, least), limit + 1))
 
         try:
             os.close(reading)
             resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 1))
-            branches = compare(library, guid, component, resources, thresholds, usual=before_search)
+            branches = compare(library, guid, component, resources, thresholds, told=told)
             tell("", branches.compared.hex(), branches.places)
         except Difference as difference:
             tell(str(difference)[:4000])
@@ -695,7 +677,7 @@ def differences(
     _, status = os.waitpid(child, 0)
     died = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
     if content and died in (0, signal.SIGXCPU, signal.SIGKILL):
-        # the last line: that before the search, if the search does not end
+        # the last line: that of the last case, if the search does not end
         said, *rest = json.loads(content.splitlines()[-1])
         if said or not rest:
             return Compared(said)

@@ -14,16 +14,15 @@ TYPES = {
     ir.REAL: "double", ir.INT: "double", ir.BOOL: "int", ir.EITHER: "double",
     ir.WORD: "uint64_t", ir.WIDE: "uint64_t",
 }  # fmt: skip
-_INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
+_OF_REALS = {
+    "add": "{} + {}", "sub": "{} - {}", "mul": "{} * {}", "div": "{} / {}", "neg": "-{}", "real": "{}",
+    "mul_int": "{} * {} + 0.0",
+}  # fmt: skip
+_OF_WORDS = {
+    "add_word": "{} + {}", "mul_word": "{} * {}", "and_word": "{} & {}", "or_word": "{} | {}",
+    "xor_word": "{} ^ {}", "word": "{}",
+}  # fmt: skip
 _COMPARED = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
-_WORDS = {
-    "add_word": "+",
-    "mul_word": "*",
-    "and_word": "&",
-    "or_word": "|",
-    "xor_word": "^",
-    "right_word": ">>",
-}
 _INLINE = {"fabs", "copysign", "sqrt"}  # exact in every implementation
 _SIGNATURES = {
     "configure": "const Variables *v, Configured *c",
@@ -140,21 +139,21 @@ class _Function:
         self.tables: list[str] = []
 
     def lines(self, name: str) -> list[str]:
-        body: list[str] = []
-        self._statements(self.function.body, body, 1)
-        stores = [(place, x) for place, x in self.function.stores]
+        body = self._statements(self.function.body, "    ")
+        stores = [(place, self._type_at(place), x) for place, x in self.function.stores]
         made = [
-            f"    const {self._store_type(place, x)} n{i} = {self._stored(place, x)};"
-            for i, (place, x) in enumerate(stores)
+            f"    const {TYPES[type]} n{i} = {self._as(type, x)};" for i, (_, type, x) in enumerate(stores)
         ]
-        made += [f"    {self._place(place)} = n{i};" for i, (place, _) in enumerate(stores)]
+        made += [
+            f"    {f'y[{place[1:]}]' if place[0] == 'y' else place} = n{i};"
+            for i, (place, _, _) in enumerate(stores)
+        ]
         head = f"static int {name}(Problem *problem, {_SIGNATURES[name]})"
-        return self._whole(head, body, made, [x for _, x in stores], ())
+        return self._whole(head, body, made, [x for _, _, x in stores], ())
 
     def of_its_own(self, function: ir.Outlined) -> list[str]:
         """Return the lines of an outlined function, which depends only on numbers."""
-        body: list[str] = []
-        self._statements(function.body, body, 1)
+        body = self._statements(function.body, "    ")
         parameters = "".join(f", {TYPES[x.type]} {x.name}" for x in function.parameters)
         types = dict.fromkeys(TYPES[type] for type in map(ir.type_of, function.results))
         out = "".join(f", {type} *{type}s" for type in types)
@@ -175,8 +174,10 @@ class _Function:
         results: Sequence[ir.Operand],
         parameters: Sequence[ir.Var],
     ) -> list[str]:
-        used = dict.fromkeys(x for x in self._used(self.function.body, results))
-        assigned = list(dict.fromkeys(_targets(self.function.body)))
+        statements = list(ir.every(self.function.body))
+        operands = [x for s in statements if type(s) in _OPERANDS for x in _OPERANDS[type(s)](s)]
+        used = dict.fromkeys(x for x in (*operands, *results) if isinstance(x, ir.Var))
+        assigned = dict.fromkeys(x for s in statements if type(s) in _TARGETS for x in _TARGETS[type(s)](s))
         own = {*assigned, *parameters}
         reads = [
             f"    const {TYPES[x.type]} {x.name} = {self.program.reads[x]};"
@@ -187,17 +188,9 @@ class _Function:
             f"    {TYPES[type]} {', '.join(f'{x.name} = 0' for x in assigned if x.type == type)};"
             for type in dict.fromkeys(x.type for x in assigned)
         ]
-        texts = [
-            f"    char text_{s.count.name}[24];"
-            for s in ir.every(self.function.body)
-            if isinstance(s, ir.Digits)
-        ]
-        arrays = ir.arrays_of(self.function.body)
-        texts += [f"    double {array.name}[{array.length}];" for array in arrays]
+        texts = [f"    char text_{s.count.name}[24];" for s in statements if isinstance(s, ir.Digits)]
+        texts += [f"    double {array.name}[{array.length}];" for array in ir.arrays_of(self.function.body)]
         return [head, "{", *reads, *declared, *texts, *self.tables, *body, *made, "    return 0;", "}", ""]
-
-    def _place(self, place: str) -> str:
-        return f"y[{place[1:]}]" if place.startswith("y") else place
 
     def _type_at(self, place: str) -> str:
         kind, number = place[0], int(place.rpartition(">")[2].lstrip("csy"))
@@ -205,87 +198,47 @@ class _Function:
             return ir.REAL
         return (self.program.configured if kind == "c" else self.program.state)[number]
 
-    def _store_type(self, place: str, value: ir.Operand) -> str:
-        return TYPES[self._type_at(place)]
-
-    def _stored(self, place: str, value: ir.Operand) -> str:
-        return self._as(self._type_at(place), value)
-
-    def _used(self, body: Sequence[ir.Statement], more: Sequence[ir.Operand]) -> Iterator[ir.Var]:
-        for statement in ir.every(body):
-            for x in _operands(statement):
-                if isinstance(x, ir.Var):
-                    yield x
-        for x in more:
-            if isinstance(x, ir.Var):
-                yield x
-
     # ---- statements -------------------------------------------------------------------------
 
-    def _statements(self, body: Sequence[ir.Statement], lines: list[str], depth: int) -> None:
-        pad = "    " * depth
-        for s in body:
-            if isinstance(s, ir.Let):
-                lines.append(f"{pad}{s.target.name} = {self._operation(s)};")
-            elif isinstance(s, ir.If):
-                goes_on = not ir.raises(s.then) and not ir.raises(s.orelse)
-                lines.append(f"{pad}if ({'' if s.then or goes_on else '!'}{s.test.name}) {{")
-                if goes_on:
-                    lines += [self._reached(f"{s.where}:true", depth + 1)]
-                self._statements(s.then if s.then or goes_on else s.orelse, lines, depth + 1)
-                if goes_on or (s.then and s.orelse):
-                    lines.append(f"{pad}}} else {{")
-                    if goes_on:
-                        lines += [self._reached(f"{s.where}:false", depth + 1)]
-                    self._statements(s.orelse, lines, depth + 1)
-                lines.append(f"{pad}}}")
-            elif isinstance(s, ir.Loop):
-                lines.append(f"{pad}for (;;) {{")
-                self._statements(s.body, lines, depth + 1)
-                lines.append(f"{pad}}}")
-            elif isinstance(s, ir.Leave):
-                lines += [f"{pad}if ({self._bool(s.test)}) {{", f"{pad}    break;", f"{pad}}}"]
-            elif isinstance(s, ir.Load):
-                lines.append(
-                    f"{pad}{s.target.name} = {self._table(s, lines, pad)}[(int){self._real(s.index)}];"
-                )
-            elif isinstance(s, ir.Fetch):
-                lines.append(f"{pad}{s.target.name} = {s.array.name}[(int){self._real(s.index)}];")
-            elif isinstance(s, ir.Put):
-                lines.append(f"{pad}{s.array.name}[(int){self._real(s.index)}] = {self._real(s.value)};")
-            elif isinstance(s, ir.Raise):
-                lines += self._raise(s, pad)
-            elif isinstance(s, ir.Push):
-                numbers = self._item(s.items)
-                lines += [
-                    f"{pad}if (!push(&lists[{s.ring}], {numbers})) {{",
-                    f'{pad}    begin_problem(problem, "MemoryError", "");',
-                    f"{pad}    return 1;",
-                    f"{pad}}}",
-                ]
-            elif isinstance(s, ir.Replace):
-                index = self._real(s.index)
-                lines.append(f"{pad}replace(&lists[{s.ring}], {index}, {self._item(s.items)});")
-            elif isinstance(s, ir.Drop):
-                lines.append(f"{pad}drop(&lists[{s.ring}], {int(s.every)});")
-            elif isinstance(s, ir.Invoke):
-                lines += self._invoke(s, pad)
-            elif isinstance(s, ir.Digits):
-                lines.append(
-                    f"{pad}{s.count.name} = write_integer(text_{s.count.name}, {self._real(s.value)});"
-                )
-            elif isinstance(s, ir.Digit):
-                text = f"text_{s.digits.name}[(int){self._real(s.index)}]"
-                lines.append(f"{pad}{s.target.name} = (unsigned char){text};")
+    def _statements(self, body: Sequence[ir.Statement], pad: str) -> list[str]:
+        return [line for s in body for line in _STATEMENTS[type(s)](self, s, pad)]
 
-    def _reached(self, branch: str, depth: int) -> str:
+    def _if(self, s: ir.If, pad: str) -> list[str]:
+        inner = f"{pad}    "
+        if ir.raises(s.then) or ir.raises(s.orelse):
+            lines = [f"{pad}if ({'' if s.then else '!'}{s.test.name}) {{"]
+            lines += self._statements(s.then or s.orelse, inner)
+            if s.then and s.orelse:
+                lines += [f"{pad}}} else {{", *self._statements(s.orelse, inner)]
+            return [*lines, f"{pad}}}"]
+        return [
+            f"{pad}if ({s.test.name}) {{",
+            self._reached(f"{s.where}:true", inner),
+            *self._statements(s.then, inner),
+            f"{pad}}} else {{",
+            self._reached(f"{s.where}:false", inner),
+            *self._statements(s.orelse, inner),
+            f"{pad}}}",
+        ]
+
+    def _reached(self, branch: str, pad: str) -> str:
         """Return the line that notes a branch, or ends the call if it was never compared with Python."""
-        return f"{'    ' * depth}REACHED({self.branches.setdefault(branch, len(self.branches))})"
+        return f"{pad}REACHED({self.branches.setdefault(branch, len(self.branches))})"
 
     def _item(self, numbers: Sequence[ir.Operand]) -> str:
         """Return the width of a list's items, and an item."""
-        numbers = numbers or (0,)  # of items that are always the same, only the number is kept
-        return f"{len(numbers)}, (const double[]){{{', '.join(map(self._real, numbers))}}}"
+        return self._array(numbers or (0,))  # of items that are always the same, only the number is kept
+
+    def _push(self, s: ir.Push, pad: str) -> list[str]:
+        return [
+            f"{pad}if (!push(&lists[{s.ring}], {self._item(s.items)})) {{",
+            f'{pad}    begin_problem(problem, "MemoryError", "");',
+            f"{pad}    return 1;",
+            f"{pad}}}",
+        ]
+
+    def _at(self, index: ir.Operand) -> str:
+        return f"[(int){self._real(index)}]"
 
     def _invoke(self, s: ir.Invoke, pad: str) -> list[str]:
         arguments = "".join(
@@ -299,8 +252,8 @@ class _Function:
         lines += [
             f"{pad}    if ({self.names[s.function]}(problem, v, c{arguments}{out})) {{",
             f"{pad}        return 1;",
+            f"{pad}    }}",
         ]
-        lines.append(f"{pad}    }}")
         counts = dict.fromkeys(used, 0)
         for target, type in zip(s.targets, types, strict=True):
             lines.append(f"{pad}    {target.name} = {type}s[{counts[type]}];")
@@ -325,7 +278,7 @@ class _Function:
                 lines.append(f"{pad}say_real(problem, {self._real(value)}, {digits});")
         return [*lines, f"{pad}return 1;"]
 
-    def _table(self, s: ir.Load, lines: list[str], pad: str) -> str:
+    def _table(self, s: ir.Load) -> str:
         type = TYPES[s.target.type]
         items = ", ".join(self._as(s.target.type, x) for x in s.table)
         if any(isinstance(x, ir.Var) for x in s.table):
@@ -365,55 +318,95 @@ class _Function:
 
     def _operation(self, s: ir.Let) -> str:
         op, args = s.op, s.operands
-        if op == "copy":
-            return self._as(s.target.type, args[0])
-        if op == "not":
-            return f"!{self._bool(args[0])}"
-        if op == "both":
-            return f"{self._bool(args[0])} && {self._bool(args[1])}"
-        if op == "select":
-            type = s.target.type
-            return f"{self._bool(args[0])} ? {self._as(type, args[1])} : {self._as(type, args[2])}"
-        if op in _WORDS:
-            count = str(int(args[1])) if op == "right_word" else self._word(args[1])  # type: ignore[arg-type]
-            return f"{self._word(args[0])} {_WORDS[op]} {count}"
-        if op == "word":
-            return self._word(args[0])
+        if op in _OPERATIONS:
+            return _OPERATIONS[op](self, s, *args)
         if op in _COMPARED:
             words = [ir.type_of(x) for x in args].count(ir.WORD)
             show = self._word if words and ir.REAL not in map(ir.type_of, args) else self._real
             return f"{show(args[0])} {_COMPARED[op]} {show(args[1])}"
-        if op == "ring_length":
-            return f"(double)lists[{args[0]}].count"
-        if op == "ring_item":
-            ring, k, index = args
-            item = f"item(&lists[{ring}], {self.program.rings[int(ring)]}, {self._real(index)})[{k}]"  # type: ignore
-            return item if s.target.type != ir.BOOL else f"{item} != 0.0"
-        reals = [self._real(x) for x in args]
-        if op in _INFIX:
-            return f"{reals[0]} {_INFIX[op]} {reals[1]}"
-        if op == "neg":
-            return f"-{reals[0]}"
-        if op == "real":
-            return reals[0]
-        if op == "mul_int":
-            return f"{reals[0]} * {reals[1]} + 0.0"
-        if op == "compensated_sum":
-            plain = ", ".join(str(int(WHOLE_ARE_PLAIN and ir.type_of(x) != ir.REAL)) for x in args)
-            return f"{op}({len(reals)}, (const double[]){{{', '.join(reals)}}}, (const char[]){{{plain}}})"
-        if op == "sorted_item":
-            keys = ", ".join(reals[1:])
-            return f"{op}({args[0]}, {int(TIES)}, {len(reals) - 1}, (const double[]){{{keys}}})"
-        if op == "norm":
-            return f"{op}({len(reals)}, (const double[]){{{', '.join(reals)}}})"
+        if op in _OF_WORDS:
+            return _OF_WORDS[op].format(*map(self._word, args))
+        reals = list(map(self._real, args))
+        if op in _OF_REALS:
+            return _OF_REALS[op].format(*reals)
         name = f"__builtin_{op}" if op in _INLINE else op.removesuffix("_int")
-        call = f"{name}({', '.join(reals)})"
-        if op == "undefined":
-            name = "undefined_2" if len(reals) == 3 else "undefined_1"
-            return f"{name}({', '.join(reals)})"
-        if op == "overflown":
-            return f"isinf({reals[0]}) && " + " && ".join(f"isfinite({x})" for x in reals[1:])
-        return f"{call} + 0.0" if s.target.type == ir.INT else call
+        return f"{name}({', '.join(reals)})" + " + 0.0" * (s.target.type == ir.INT)
+
+    def _array(self, numbers: Sequence[ir.Operand]) -> str:
+        """Return the number of numbers, and an array of them."""
+        return f"{len(numbers)}, (const double[]){{{', '.join(map(self._real, numbers))}}}"
+
+    def _ring_item(self, s: ir.Let, ring: Any, k: Any, index: ir.Operand) -> str:
+        item = f"item(&lists[{ring}], {self.program.rings[ring]}, {self._real(index)})[{k}]"
+        return item if s.target.type != ir.BOOL else f"{item} != 0.0"
+
+    def _compensated(self, s: ir.Let, *args: ir.Operand) -> str:
+        plain = ", ".join(str(int(WHOLE_ARE_PLAIN and ir.type_of(x) != ir.REAL)) for x in args)
+        return f"compensated_sum({self._array(args)}, (const char[]){{{plain}}})"
+
+    def _undefined(self, s: ir.Let, *args: ir.Operand) -> str:
+        return f"undefined_{len(args) - 1}({', '.join(map(self._real, args))})"
+
+
+_OPERATIONS: dict[str, Callable[..., str]] = {
+    "compensated_sum": _Function._compensated,
+    "copy": lambda f, s, x: f._as(s.target.type, x),
+    "norm": lambda f, s, *args: f"norm({f._array(args)})",
+    "not": lambda f, s, x: f"!{f._bool(x)}",
+    "overflown": lambda f, s, result, *args: (
+        f"isinf({f._real(result)}) && " + " && ".join(f"isfinite({f._real(x)})" for x in args)
+    ),
+    "right_word": lambda f, s, x, count: f"{f._word(x)} >> {int(count)}",
+    "ring_item": _Function._ring_item,
+    "ring_length": lambda f, s, ring: f"(double)lists[{ring}].count",
+    "select": lambda f, s, test, a, b: (
+        f"{f._bool(test)} ? {f._as(s.target.type, a)} : {f._as(s.target.type, b)}"
+    ),
+    "sorted_item": lambda f, s, k, *keys: f"sorted_item({k}, {int(TIES)}, {f._array(keys)})",
+    "undefined": _Function._undefined,
+}
+"""Operations of `Let` that are not functions of C, infix operators or comparisons."""
+_STATEMENTS: dict[type, Callable[[_Function, Any, str], list[str]]] = {
+    ir.Digit: lambda f, s, pad: [
+        f"{pad}{s.target.name} = (unsigned char)text_{s.digits.name}{f._at(s.index)};"
+    ],
+    ir.Digits: lambda f, s, pad: [
+        f"{pad}{s.count.name} = write_integer(text_{s.count.name}, {f._real(s.value)});"
+    ],
+    ir.Drop: lambda f, s, pad: [f"{pad}drop(&lists[{s.ring}], {int(s.every)});"],
+    ir.Fetch: lambda f, s, pad: [f"{pad}{s.target.name} = {s.array.name}{f._at(s.index)};"],
+    ir.If: _Function._if,
+    ir.Invoke: _Function._invoke,
+    ir.Leave: lambda f, s, pad: [f"{pad}if ({f._bool(s.test)}) {{", f"{pad}    break;", f"{pad}}}"],
+    ir.Let: lambda f, s, pad: [f"{pad}{s.target.name} = {f._operation(s)};"],
+    ir.Load: lambda f, s, pad: [f"{pad}{s.target.name} = {f._table(s)}{f._at(s.index)};"],
+    ir.Loop: lambda f, s, pad: [f"{pad}for (;;) {{", *f._statements(s.body, f"{pad}    "), f"{pad}}}"],
+    ir.Push: _Function._push,
+    ir.Put: lambda f, s, pad: [f"{pad}{s.array.name}{f._at(s.index)} = {f._real(s.value)};"],
+    ir.Raise: _Function._raise,
+    ir.Replace: lambda f, s, pad: [
+        f"{pad}replace(&lists[{s.ring}], {f._real(s.index)}, {f._item(s.items)});"
+    ],
+}
+"""Lines of each kind of statement."""
+_TARGETS: dict[type, Callable[[Any], Sequence[ir.Var]]] = {
+    **dict.fromkeys((ir.Let, ir.Load, ir.Fetch, ir.Digit), lambda s: (s.target,)),
+    ir.Invoke: lambda s: s.targets,
+    ir.Digits: lambda s: (s.count,),
+}
+"""Variables that a statement sets."""
+_OPERANDS: dict[type, Callable[[Any], Sequence[ir.Operand]]] = {
+    **dict.fromkeys((ir.Let, ir.Invoke), lambda s: s.operands),
+    **dict.fromkeys((ir.If, ir.Leave), lambda s: (s.test,)),
+    **dict.fromkeys((ir.Fetch, ir.Digit), lambda s: (s.index,)),
+    ir.Load: lambda s: (*s.table, s.index),
+    ir.Put: lambda s: (s.index, s.value),
+    ir.Push: lambda s: s.items,
+    ir.Replace: lambda s: (s.index, *s.items),
+    ir.Digits: lambda s: (s.value,),
+    ir.Raise: lambda s: [part[0] for part in s.message if not isinstance(part, str)],
+}
+"""Operands of a statement, which may be constants."""
 
 
 def _outlined(body: Sequence[ir.Statement]) -> Iterator[ir.Outlined]:
@@ -422,41 +415,3 @@ def _outlined(body: Sequence[ir.Statement]) -> Iterator[ir.Outlined]:
         if isinstance(s, ir.Invoke):
             yield from _outlined(s.function.body)
             yield s.function
-
-
-def _targets(body: Sequence[ir.Statement]) -> Iterator[ir.Var]:
-    for s in ir.every(body):
-        if isinstance(s, (ir.Let, ir.Load, ir.Fetch, ir.Digit)):
-            yield s.target
-        elif isinstance(s, ir.Invoke):
-            yield from s.targets
-        elif isinstance(s, ir.Digits):
-            yield s.count
-
-
-def _operands(s: ir.Statement) -> Sequence[ir.Operand]:
-    if isinstance(s, ir.Let):
-        return s.operands
-    if isinstance(s, ir.Load):
-        return (*s.table, s.index)
-    if isinstance(s, ir.Invoke):
-        return s.operands
-    if isinstance(s, ir.If):
-        return (s.test,)
-    if isinstance(s, ir.Leave):
-        return (s.test,)
-    if isinstance(s, ir.Fetch):
-        return (s.index,)
-    if isinstance(s, ir.Put):
-        return (s.index, s.value)
-    if isinstance(s, ir.Push):
-        return s.items
-    if isinstance(s, ir.Replace):
-        return (s.index, *s.items)
-    if isinstance(s, ir.Digits):
-        return (s.value,)
-    if isinstance(s, ir.Digit):
-        return (s.index,)
-    if isinstance(s, ir.Raise):
-        return [part[0] for part in s.message if not isinstance(part, str)]
-    return ()

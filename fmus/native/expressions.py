@@ -11,25 +11,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from . import ir
+from . import values as v
 from .operators import BINARY
 from .read import kinds_within
 from .stack import Call
 from .statements import assign
-from .values import (
-    EITHER,
-    UNSET,
-    Closure,
-    Dict,
-    Each,
-    Frame,
-    List,
-    Refused,
-    Text,
-    Union,
-    is_plain,
-    joined_text,
-    read,
-)
+from .values import EITHER, UNSET, Refused, is_plain, joined_text, read
 
 if TYPE_CHECKING:
     from .evaluate import Evaluator
@@ -37,7 +24,7 @@ if TYPE_CHECKING:
 
 def _name(e: Evaluator, node: ast.Name) -> Any:
     call = e.stack.call
-    frame: Frame | None = call.frame
+    frame: v.Frame | None = call.frame
     outside = free = False
     while frame is not None:
         value = read(frame).get(node.id, UNSET)
@@ -56,7 +43,7 @@ def _name(e: Evaluator, node: ast.Name) -> Any:
 
 def present(e: Evaluator, value: Any, kind: str, text: str) -> Any:
     """Return a value that is set, or raise an exception where it is not."""
-    if not isinstance(value, Union) or not any(x is UNSET for x in value.alternatives):
+    if not isinstance(value, v.Union) or not any(x is UNSET for x in value.alternatives):
         return value
 
     def use(x: Any) -> Any:
@@ -82,7 +69,7 @@ def _joinedstr(e: Evaluator, node: ast.JoinedStr) -> Any:
 
 
 def formatted(value: Any, spec: str, as_repr: bool) -> list[ir.Part]:
-    if isinstance(value, Text):
+    if isinstance(value, v.Text):
         return list(value.parts)
     if isinstance(value, ir.Var):
         if value.type == ir.EITHER and not spec:
@@ -90,9 +77,9 @@ def formatted(value: Any, spec: str, as_repr: bool) -> list[ir.Part]:
         if spec != "" and not re.fullmatch(r"(\.\d)?g", spec):
             raise Refused(f"the format {spec!r}")
         return [(value, spec or "r")]
-    if (type(value) is tuple or isinstance(value, List)) and not is_plain(value):
-        items = read(value) if isinstance(value, List) else value
-        opening, closing = "[]" if isinstance(value, List) else "()"
+    if (type(value) is tuple or isinstance(value, v.List)) and not is_plain(value):
+        items = read(value) if isinstance(value, v.List) else value
+        opening, closing = "[]" if isinstance(value, v.List) else "()"
         parts: list[ir.Part] = [opening]
         for i, item in enumerate(items):
             parts += [", "] * bool(i) + formatted(item, "", True)
@@ -107,10 +94,10 @@ def _dict(e: Evaluator, node: ast.Dict) -> Any:
     for key, value in zip(node.keys, node.values, strict=True):
         if key is None:
             inner = e.evaluate(value)
-            made |= read(inner) if isinstance(inner, Dict) else inner
+            made |= read(inner) if isinstance(inner, v.Dict) else inner
         else:
             made[e.items.key(e.evaluate(key))] = e.evaluate(value)
-    return Dict(made)
+    return v.Dict(made)
 
 
 def _attribute(e: Evaluator, node: ast.Attribute) -> Any:
@@ -161,7 +148,7 @@ def _comprehended(
 
 def _frames(
     e: Evaluator, generators: list[ast.comprehension], together: bool, inlined: bool = False
-) -> Iterator[Frame]:
+) -> Iterator[v.Frame]:
     """Yield the names of each element of a comprehension.
 
     Args:
@@ -171,22 +158,22 @@ def _frames(
         inlined: see `Frame`.
     """
     call = e.stack.call
-    shared = Frame({}, call.frame, inlined)
+    shared = v.Frame({}, call.frame, inlined)
 
-    def go(k: int, frame: Frame) -> Iterator[Frame]:
+    def go(k: int, frame: v.Frame) -> Iterator[v.Frame]:
         if k == len(generators):
             yield frame
             return
         each = e.items.each(_in_scope(e, call, frame, lambda: e.evaluate(generators[k].iter)))
         for i in range(each.count):
-            inner = shared if together else Frame({}, frame, inlined)
+            inner = shared if together else v.Frame({}, frame, inlined)
             if _in_scope(e, call, inner, lambda: _passes(e, generators[k], each.item(i))):  # noqa: B023
                 yield from go(k + 1, inner)
 
     return go(0, call.frame)
 
 
-def _in_scope(e: Evaluator, call: Call, frame: Frame, evaluated: Callable[[], Any]) -> Any:
+def _in_scope(e: Evaluator, call: Call, frame: v.Frame, evaluated: Callable[[], Any]) -> Any:
     """Evaluate a part of a comprehension in the scope where it was written, even if evaluated later."""
     e.stack.calls.append(replace(call, frame=frame))
     try:
@@ -212,14 +199,14 @@ def _generatorexp(e: Evaluator, node: ast.GeneratorExp) -> Any:
         raise Refused("functions or generators made by a generator expression")
     if len(node.generators) > 1 or generator.ifs:
         frames = list(_frames(e, node.generators, together=False))
-        return Each(len(frames), lambda k: _in_scope(e, call, frames[k], lambda: e.evaluate(node.elt)))
+        return v.Each(len(frames), lambda k: _in_scope(e, call, frames[k], lambda: e.evaluate(node.elt)))
     each = e.items.each(e.evaluate(generator.iter))
 
     def element(k: int) -> Any:
         assign(e, generator.target, each.item(k))
         return e.evaluate(node.elt)
 
-    return Each(each.count, lambda k: _in_scope(e, call, Frame({}, call.frame), lambda: element(k)))
+    return v.Each(each.count, lambda k: _in_scope(e, call, v.Frame({}, call.frame), lambda: element(k)))
 
 
 def _setcomp(e: Evaluator, node: ast.SetComp) -> Any:
@@ -230,7 +217,7 @@ def _dictcomp(e: Evaluator, node: ast.DictComp) -> Any:
     def make() -> tuple[Any, Any]:
         return e.items.key(e.evaluate(node.key)), e.evaluate(node.value)
 
-    return Dict(dict(_comprehended(e, node.generators, make, node.value)))
+    return v.Dict(dict(_comprehended(e, node.generators, make, node.value)))
 
 
 def _binop(e: Evaluator, node: ast.BinOp) -> Any:
@@ -283,7 +270,7 @@ def _namedexpr(e: Evaluator, node: ast.NamedExpr) -> Any:
 
 def _lambda(e: Evaluator, node: ast.Lambda) -> Any:
     call = e.stack.call
-    return Closure(node, call.frame, call.source, tuple(e.values(node.args.defaults)))
+    return v.Closure(node, call.frame, call.source, tuple(e.values(node.args.defaults)))
 
 
 def _compare(e: Evaluator, node: ast.Compare) -> Any:
@@ -315,7 +302,7 @@ def _call(e: Evaluator, node: ast.Call) -> Any:
 
 
 def _named(value: Any) -> dict[str, Any]:
-    held = read(value) if isinstance(value, Dict) else value
+    held = read(value) if isinstance(value, v.Dict) else value
     if type(held) is not dict:
         raise Refused(f"** of a {type(held).__name__}")
     return held
@@ -341,8 +328,8 @@ EXPRESSIONS: dict[type[ast.AST], Callable[[Evaluator, Any], Any]] = {
     ast.IfExp: _ifexp,
     ast.JoinedStr: _joinedstr,
     ast.Lambda: _lambda,
-    ast.List: lambda e, node: List(e.values(node.elts)),
-    ast.ListComp: lambda e, node: List(
+    ast.List: lambda e, node: v.List(e.values(node.elts)),
+    ast.ListComp: lambda e, node: v.List(
         _comprehended(e, node.generators, lambda: e.evaluate(node.elt), node.elt)
     ),
     ast.Name: _name,

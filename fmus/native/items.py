@@ -8,30 +8,11 @@ import types
 from typing import Any
 
 from . import ir
+from . import values as v
 from .attributes import Attributes
 from .memory import beyond, kind_of
 from .shapes import Promote, shape_of
-from .values import (
-    RESIZED,
-    UNSET,
-    Array,
-    Bytes,
-    Dict,
-    Each,
-    Instance,
-    List,
-    Picked,
-    Refused,
-    Ring,
-    Span,
-    Text,
-    Union,
-    is_mixed,
-    is_number,
-    is_plain,
-    is_real,
-    read,
-)
+from .values import RESIZED, UNSET, Refused, is_mixed, is_number, is_plain, is_real, read
 
 _ITERABLE: tuple[type, ...] = (
     list, str, bytes, range, dict, set, frozenset, types.MappingProxyType,
@@ -59,24 +40,24 @@ class Containers:
             raise Refused("a key that is only known at run time")
         return value
 
-    def each(self, value: Any) -> Each:
+    def each(self, value: Any) -> v.Each:
         """Return the items of an iterable, evaluated lazily.
 
         Raises:
             Refused: the number of items is only known at run time.
         """
         value = self._iterated(self.paths.narrowed(value))
-        if isinstance(value, Each):
+        if isinstance(value, v.Each):
             if self.lower.facts.known(read(value)["used"]) is True:
                 raise Refused("an iterator that is used twice")
             if value.once:
                 self.paths.write(value, "used", True)
             return value
-        if isinstance(value, Array):
-            return Each(value.memory.length, lambda k: self.memory.array_item(value, k))
-        if not isinstance(value, List):
+        if isinstance(value, v.Array):
+            return v.Each(value.memory.length, lambda k: self.memory.array_item(value, k))
+        if not isinstance(value, v.List):
             items = self.of(value)
-            return Each(len(items), items.__getitem__)
+            return v.Each(len(items), items.__getitem__)
         count = len(read(value))
 
         def content() -> list[Any]:
@@ -84,7 +65,7 @@ class Containers:
                 raise Refused(RESIZED)
             return read(value)  # type: ignore[no-any-return]
 
-        return Each(count, lambda k: content()[k], content)
+        return v.Each(count, lambda k: content()[k], content)
 
     def _iterated(self, value: Any) -> Any:
         """Return what the __iter__ of a value's class returns, if it is of a component."""
@@ -92,7 +73,7 @@ class Containers:
         if iterator is UNSET:
             return value
         iterator = self.paths.narrowed(iterator)
-        if not isinstance(iterator, Each) or not iterator.once:
+        if not isinstance(iterator, v.Each) or not iterator.once:
             raise Refused("an __iter__ that returns something other than an iterator of known length")
         return iterator
 
@@ -103,14 +84,14 @@ class Containers:
             Refused: the number of items is only known at run time.
         """
         value = self._iterated(self.paths.narrowed(value))
-        if isinstance(value, (Each, Array)):
+        if isinstance(value, (v.Each, v.Array)):
             each = self.each(value)
             return [each.item(k) for k in range(each.count)]
-        if isinstance(value, (List, Dict)):
+        if isinstance(value, (v.List, v.Dict)):
             return list(read(value))
-        if isinstance(value, Picked):
+        if isinstance(value, v.Picked):
             return [self.at(value, k) for k in range(self.memory.length_of_picked(value))]
-        if isinstance(value, (ir.Var, Ring, Span, Union, Bytes, Text, Instance)):
+        if isinstance(value, (ir.Var, v.Ring, v.Span, v.Union, v.Bytes, v.Text, v.Instance)):
             raise Refused("the number of items is only known at run time")
         if isinstance(value, tuple) or type(value) in _ITERABLE:
             return [*value]
@@ -124,38 +105,38 @@ class Containers:
         """Convert the result of a Python function to a value of the evaluation."""
         if isinstance(value, _FINITE):
             items = [*value]
-            return Each(len(items), items.__getitem__)
+            return v.Each(len(items), items.__getitem__)
         if isinstance(value, list):
-            return List([self.imported(x) for x in value])
+            return v.List([self.imported(x) for x in value])
         if type(value) is tuple:
             return tuple(self.imported(x) for x in value)
         if type(value) is dict:
-            return Dict({k: self.imported(x) for k, x in value.items()})
+            return v.Dict({k: self.imported(x) for k, x in value.items()})
         return value
 
     def at(self, owner: Any, index: Any) -> Any:
         """Return owner[index]."""
         if owner is None:
             self.lower.end("TypeError", "'NoneType' object is not subscriptable")
-        if isinstance(owner, Array):
+        if isinstance(owner, v.Array):
             return self.memory.array_item(owner, index)
-        if isinstance(owner, Ring) and not is_real(index):
+        if isinstance(owner, v.Ring) and not is_real(index):
             return self.memory.ring_item(
                 owner, self.memory.ring_index(owner, index, "list index out of range")
             )
-        if isinstance(owner, Dict):
+        if isinstance(owner, v.Dict):
             return read(owner)[self.key(index)]
-        if isinstance(owner, Picked) and not is_real(index):
+        if isinstance(owner, v.Picked) and not is_real(index):
             return self.memory.of_picked(owner, index)
         own = self.attributes.called(owner, "__getitem__", index)
         if own is not UNSET:
             return own
         if isinstance(owner, enum.EnumMeta):
             return owner.__members__[self.key(index)]
-        known_kind = isinstance(owner, (List, tuple)) or type(owner) in _SUBSCRIPTED
-        if not known_kind and not (is_real(index) and isinstance(owner, (Ring, Picked))):
+        known_kind = isinstance(owner, (v.List, tuple)) or type(owner) in _SUBSCRIPTED
+        if not known_kind and not (is_real(index) and isinstance(owner, (v.Ring, v.Picked))):
             raise Refused(f"an item of a {type(owner).__name__}")
-        items = read(owner) if isinstance(owner, List) else owner
+        items = read(owner) if isinstance(owner, v.List) else owner
         if is_real(index):
             self.lower.end("TypeError", f"{kind_of(items)} indices must be integers or slices, not float")
         if isinstance(index, ir.Var):
@@ -172,11 +153,11 @@ class Containers:
         if known and not -len(items) <= index < len(items):
             self.lower.end("IndexError", beyond(items))
         item = items[index]
-        return List(item) if isinstance(owner, List) and isinstance(index, slice) else item
+        return v.List(item) if isinstance(owner, v.List) and isinstance(index, slice) else item
 
     def remove(self, owner: Any, index: Any, text: str) -> Any:
         """Remove an item from a list and return it."""
-        if isinstance(owner, Ring):
+        if isinstance(owner, v.Ring):
             if index != 0 or isinstance(index, (ir.Var, slice)):
                 raise Refused("removing an item other than the first from a list whose length changes")
             item = self.memory.ring_item(owner, self.memory.ring_index(owner, 0, text))
@@ -185,9 +166,9 @@ class Containers:
         own = self.attributes.called(owner, "__delitem__", index)
         if own is not UNSET:
             return own
-        if isinstance(owner, Dict) and not isinstance(index, ir.Var):
+        if isinstance(owner, v.Dict) and not isinstance(index, ir.Var):
             return self.paths.open(owner).pop(self.key(index))
-        if not isinstance(owner, List) or isinstance(index, ir.Var):
+        if not isinstance(owner, v.List) or isinstance(index, ir.Var):
             raise Refused(f"removing an item from a {type(owner).__name__}")
         self.promote(owner)
         held = self.paths.open(owner)
@@ -197,7 +178,7 @@ class Containers:
         del held[index]
         return item
 
-    def promote(self, owner: List, item: Any = UNSET) -> None:
+    def promote(self, owner: v.List, item: Any = UNSET) -> None:
         """Stop tracking the items of a list of the state, because its length changes."""
         if owner.path is not None:
             example = item if item is not UNSET else owner.slots[0] if owner.slots else UNSET
@@ -207,29 +188,29 @@ class Containers:
 
     def set(self, owner: Any, index: Any, value: Any) -> None:
         """Set an item of a list, array or dictionary."""
-        if isinstance(owner, Union):
+        if isinstance(owner, v.Union):
             self.paths.by_form(owner, lambda x: self.set(x, index, value))
             return
         if self.attributes.called(owner, "__setitem__", index, value) is not UNSET:
             return
-        if isinstance(owner, Dict):
+        if isinstance(owner, v.Dict):
             self.paths.write(owner, self.key(index), value)
-        elif isinstance(owner, Array):
+        elif isinstance(owner, v.Array):
             self.set_array_item(owner, index, value)
-        elif isinstance(owner, Ring) and not is_real(index):
+        elif isinstance(owner, v.Ring) and not is_real(index):
             self.memory.set_ring_item(owner, index, value)
-        elif isinstance(owner, List):
+        elif isinstance(owner, v.List):
             self._set_list_item(owner, index, value)
         else:
             raise Refused(f"setting an item of a {type(owner).__name__}")
 
-    def set_array_item(self, array: Array, index: Any, value: Any) -> None:
+    def set_array_item(self, array: v.Array, index: Any, value: Any) -> None:
         """Set an item of an array."""
         if not (is_number(value) or is_mixed(value)):
             raise Refused("an array of something other than real numbers")
         self.memory.put(array, index, self.paths.real(value))
 
-    def _set_list_item(self, owner: List, index: Any, value: Any) -> None:
+    def _set_list_item(self, owner: v.List, index: Any, value: Any) -> None:
         held = read(owner)
         if is_real(index):
             self.lower.end("TypeError", "list indices must be integers or slices, not float")

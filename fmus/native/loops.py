@@ -8,32 +8,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from . import ir
+from . import values as v
 from .read import kinds_within, names_within
 from .shapes import Memo, Shape, Widening, build, numbers_of, shape_of, types_of
 from .stack import CONTINUE, EXIT, ON, OVER, RESULT, RETURN
 from .statements import assign
-from .values import (
-    OF_LOOP,
-    RESIZED,
-    UNSET,
-    Array,
-    Bound,
-    Box,
-    Bytes,
-    Closure,
-    Dict,
-    Each,
-    Frame,
-    List,
-    Refused,
-    Ring,
-    Span,
-    boxes_in,
-    items_of,
-    now,
-    read,
-    same,
-)
+from .values import OF_LOOP, RESIZED, UNSET, Refused, boxes_in, items_of, now, read, same
 
 if TYPE_CHECKING:
     from .evaluate import Evaluator
@@ -51,9 +31,9 @@ class Pass:
 
     out: list[ir.Statement]
     exit: Any
-    starts: dict[tuple[Box, Any], Any]
-    ends: dict[tuple[Box, Any], Any]
-    contents: dict[Box, Any]
+    starts: dict[tuple[v.Box, Any], Any]
+    ends: dict[tuple[v.Box, Any], Any]
+    contents: dict[v.Box, Any]
 
 
 def _while(e: Evaluator, node: ast.While) -> None:
@@ -62,17 +42,17 @@ def _while(e: Evaluator, node: ast.While) -> None:
 
 def _for(e: Evaluator, node: ast.For) -> None:
     over = e.paths.narrowed(e.evaluate(node.iter))
-    if isinstance(over, Ring):
+    if isinstance(over, v.Ring):
         ring = over
-        over = Span(0, e.memory.ring_length(ring), lambda k: e.memory.ring_item(ring, k), ring)
-    if isinstance(over, Array) and over.memory.length > UNROLLED:
+        over = v.Span(0, e.memory.ring_length(ring), lambda k: e.memory.ring_item(ring, k), ring)
+    if isinstance(over, v.Array) and over.memory.length > UNROLLED:
         each = e.items.each(over)
-        over = Span(0, each.count, each.item)
+        over = v.Span(0, each.count, each.item)
     if isinstance(over, range) and len(over) > UNROLLED and over.step == 1:
-        over = Span(over.start, over.stop, lambda k: k)
-    if isinstance(over, Bytes):
+        over = v.Span(over.start, over.stop, lambda k: k)
+    if isinstance(over, v.Bytes):
         _for_bytes(e, node, over)
-    elif isinstance(over, Span):
+    elif isinstance(over, v.Span):
         start = len(e.lower.out)
         _for_span(e, node, over)
         if over.ring and any(
@@ -84,7 +64,7 @@ def _for(e: Evaluator, node: ast.For) -> None:
         _unrolled(e, node, e.items.each(over))
 
 
-def _unrolled(e: Evaluator, node: ast.For, each: Each) -> None:
+def _unrolled(e: Evaluator, node: ast.For, each: v.Each) -> None:
     def go(k: int) -> None:
         if k == each.count:
             each.end()
@@ -129,7 +109,7 @@ def _otherwise(e: Evaluator, statements: Sequence[ast.stmt]) -> None:
     e.block(statements)
 
 
-def _for_bytes(e: Evaluator, node: ast.For, over: Bytes) -> None:
+def _for_bytes(e: Evaluator, node: ast.For, over: v.Bytes) -> None:
     kinds = kinds_within(node)
     if node.orelse or kinds[ast.Break] or kinds[ast.Return]:
         raise Refused("leaving a loop over a text")
@@ -148,11 +128,11 @@ def _for_bytes(e: Evaluator, node: ast.For, over: Bytes) -> None:
             e.lower.out.append(ir.Digit(target, count, k))
             return target
 
-        _for_span(e, node, Span(0, count, digit))
+        _for_span(e, node, v.Span(0, count, digit))
 
 
-def _for_span(e: Evaluator, node: ast.For, over: Span) -> None:
-    counter = List([over.first])
+def _for_span(e: Evaluator, node: ast.For, over: v.Span) -> None:
+    counter = v.List([over.first])
 
     def test() -> ir.Operand:
         return e.lower.compare("<", read(counter)[0], over.end)
@@ -182,7 +162,7 @@ def _loop(
         for name in _stored(node)
         if held.get(name, UNSET) is UNSET and not _is_read_outside(e, node, name)
     }  # names that are local to a pass
-    carried: dict[tuple[Box, Any], Shape] = {}
+    carried: dict[tuple[v.Box, Any], Shape] = {}
     for _ in range(WIDEST):
         heads: list[tuple[ir.Var, ir.Var]] = []
         made = _passed(e, test, body, carried, heads, passing)
@@ -231,11 +211,11 @@ def _passed(
     e: Evaluator,
     test: Callable[[], ir.Operand],
     body: Callable[[], None],
-    carried: dict[tuple[Box, Any], Shape],
+    carried: dict[tuple[v.Box, Any], Shape],
     heads: list[tuple[ir.Var, ir.Var]],
     passing: set[str],
 ) -> Pass:
-    starts: dict[tuple[Box, Any], Any] = {}
+    starts: dict[tuple[v.Box, Any], Any] = {}
 
     def run() -> Any:
         for (box, key), shape in carried.items():
@@ -259,7 +239,7 @@ def _passed(
     path = e.paths.followed(run, e.lower.facts.copy())
     if path.dead:
         raise Refused("a loop whose every pass raises")
-    ends: dict[tuple[Box, Any], Any] = {}
+    ends: dict[tuple[v.Box, Any], Any] = {}
     for box, slots in path.changed.items():
         keys = range(len(slots)) if isinstance(slots, list) else list(slots)
         for key in keys:
@@ -269,7 +249,7 @@ def _passed(
                 ends[box, key] = slots[key]
         if isinstance(slots, list) and len(slots) != len(box.slots) and not path.dead:
             raise Refused("a list whose length changes in a loop")
-        if isinstance(box, Dict) and list(slots) != list(box.slots):
+        if isinstance(box, v.Dict) and list(slots) != list(box.slots):
             raise Refused("a dictionary whose keys change in a loop")
     for key in carried:
         box, name = key
@@ -282,7 +262,7 @@ def _finish_loop(
     e: Evaluator,
     node: ast.For | ast.While,
     made: Pass,
-    carried: dict[tuple[Box, Any], Shape],
+    carried: dict[tuple[v.Box, Any], Shape],
     heads: list[tuple[ir.Var, ir.Var]],
 ) -> None:
     if not isinstance(made.exit, ir.Var):
@@ -295,7 +275,7 @@ def _finish_loop(
         _after_loop(e, node)
         return
     queue = iter(heads)
-    kept: dict[tuple[Box, Any], list[ir.Var]] = {}
+    kept: dict[tuple[v.Box, Any], list[ir.Var]] = {}
     for key, shape in carried.items():
         box, name = key
         leaves = [next(queue)[0] for _ in types_of(shape)]
@@ -305,7 +285,7 @@ def _finish_loop(
         kept[key] = leaves
     outer, e.lower.out = e.lower.out, made.out
 
-    def contents(box: Box) -> Any:
+    def contents(box: v.Box) -> Any:
         return made.contents.get(box, box.slots)
 
     sets = []
@@ -335,25 +315,25 @@ def _replace(before: Any, after: Any) -> None:
         a, b = pairs.pop()
         if isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b):
             pairs += zip(a, b, strict=True)
-        elif isinstance(a, Closure) and isinstance(b, Closure):
+        elif isinstance(a, v.Closure) and isinstance(b, v.Closure):
             pairs.append((a.frame, b.frame))
-        elif isinstance(a, Bound) and isinstance(b, Bound):
+        elif isinstance(a, v.Bound) and isinstance(b, v.Bound):
             pairs.append((a.owner, b.owner))
-        elif isinstance(a, Box) and type(a) is type(b) and a is not b and a.merged is not b:
+        elif isinstance(a, v.Box) and type(a) is type(b) and a is not b and a.merged is not b:
             a.merged = b
             keys = range(len(a.slots)) if isinstance(a.slots, list) else list(a.slots)
             pairs += [(a.slots[k], items_of(b.slots, k)) for k in keys if _has(b, k)]
-            if isinstance(a, Frame) and isinstance(b, Frame):
+            if isinstance(a, v.Frame) and isinstance(b, v.Frame):
                 pairs.append((a.parent, b.parent))
-        elif a is not b and not isinstance(a, Box) and not isinstance(b, Box):
+        elif a is not b and not isinstance(a, v.Box) and not isinstance(b, v.Box):
             for box in boxes_in(a):
                 box.alias = box.alias or OF_LOOP
-        elif isinstance(a, Box):
+        elif isinstance(a, v.Box):
             a.alias = a.alias or OF_LOOP
 
 
-def _has(box: Box, key: Any) -> bool:
-    return key < len(box.slots) if isinstance(box, List) else key in box.slots
+def _has(box: v.Box, key: Any) -> bool:
+    return key < len(box.slots) if isinstance(box, v.List) else key in box.slots
 
 
 def _stored(loop: ast.AST) -> set[str]:

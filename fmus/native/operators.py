@@ -8,33 +8,11 @@ from types import MethodType
 from typing import Any
 
 from . import ir
+from . import values as v
 from .attributes import member
 from .items import Containers
 from .lower import OPERATORS
-from .values import (
-    EITHER,
-    UNSET,
-    Array,
-    Bound,
-    Box,
-    Bytes,
-    Closure,
-    Dict,
-    Each,
-    Instance,
-    List,
-    Picked,
-    Refused,
-    Ring,
-    Span,
-    Text,
-    Union,
-    is_mixed,
-    is_number,
-    is_plain,
-    is_real,
-    read,
-)
+from .values import EITHER, UNSET, Refused, is_mixed, is_number, is_plain, is_real, read
 
 BINARY = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "//", ast.Mod: "%", ast.Pow: "**",
@@ -80,7 +58,7 @@ class Operators:
             if method is UNSET:
                 continue
             result = self.paths.narrowed(self.attributes.call(method, [other], {}))
-            if isinstance(result, Union) and NotImplemented in result.alternatives:
+            if isinstance(result, v.Union) and NotImplemented in result.alternatives:
                 raise Refused(f"{name} that returns NotImplemented on some paths")
             if result is not NotImplemented:
                 return result
@@ -92,11 +70,11 @@ class Operators:
             a = self.paths.real(a)
         elif is_mixed(b) and is_real(a):
             b = self.paths.real(b)
-        if isinstance(a, Union) or isinstance(b, Union):
+        if isinstance(a, v.Union) or isinstance(b, v.Union):
             return self.paths.by_form(
                 a, lambda x: self.paths.by_form(b, lambda y: self.operate(op, x, y, in_place))
             )
-        a, b = (self.memory.loaded(x) if isinstance(x, Picked) else x for x in (a, b))
+        a, b = (self.memory.loaded(x) if isinstance(x, v.Picked) else x for x in (a, b))
         if not (is_number(a) and is_number(b)):
             name = METHODS[op]
             result = self._by_class(a, b, f"__i{name}__", "") if in_place else NotImplemented
@@ -107,11 +85,11 @@ class Operators:
             a, b = _basic(a), _basic(b)
         if is_number(a) and is_number(b):
             return self._exact(op, self.lower.binary(op, a, b), a, b)
-        lists = [isinstance(x, List) or type(x) is list for x in (a, b)]
+        lists = [isinstance(x, v.List) or type(x) is list for x in (a, b)]
         if op == "+" and all(lists):
-            return List([*self.items.of(a), *self.items.of(b)])
-        if isinstance(a, List) and op == "*" and isinstance(b, int):
-            return List(read(a) * b)
+            return v.List([*self.items.of(a), *self.items.of(b)])
+        if isinstance(a, v.List) and op == "*" and isinstance(b, int):
+            return v.List(read(a) * b)
         if isinstance(a, tuple) and isinstance(b, tuple) and op == "+":
             return a + b
         if isinstance(a, tuple) and isinstance(b, int) and op == "*":
@@ -170,20 +148,20 @@ class Operators:
     def truth_of(self, value: Any) -> ir.Operand:
         """Return whether a value counts as true."""
         value = self.paths.real(value) if is_mixed(value) else value
-        if isinstance(value, Union):
+        if isinstance(value, v.Union):
             return self.paths.by_form(value, self.truth_of)  # type: ignore[no-any-return]
         if is_number(value):
             return self.lower.truth(value)
-        if isinstance(value, Ring):
+        if isinstance(value, v.Ring):
             return self.lower.compare("!=", self.memory.ring_length(value), 0)
-        if isinstance(value, Span):
+        if isinstance(value, v.Span):
             return self.lower.compare("<", value.first, value.end)
-        if isinstance(value, Each):
+        if isinstance(value, v.Each):
             return value.once or bool(value.count)
-        if isinstance(value, (List, Dict)):
+        if isinstance(value, (v.List, v.Dict)):
             return bool(read(value))
-        if isinstance(value, Picked):
-            holds = [bool(read(x)) if isinstance(x, List) else self.truth_of(x) for x in value.items]
+        if isinstance(value, v.Picked):
+            holds = [bool(read(x)) if isinstance(x, v.List) else self.truth_of(x) for x in value.items]
             return self.memory.at(tuple(map(self.memory.known_item, holds)), value.index)  # type: ignore[no-any-return]
         for name in ("__bool__", "__len__"):
             result = self.attributes.called(value, name)
@@ -198,7 +176,7 @@ class Operators:
         """Return the result of a comparison."""
         if is_mixed(a) or is_mixed(b):
             a, b = (self.paths.real(x) if is_mixed(x) else x for x in (a, b))
-        if isinstance(a, Union) or isinstance(b, Union):
+        if isinstance(a, v.Union) or isinstance(b, v.Union):
             return self.paths.by_form(a, lambda x: self.paths.by_form(b, lambda y: self.compared(op, x, y)))
         if isinstance(op, (ast.In, ast.NotIn)):
             contained = self.truth_of(self._contained(a, b))
@@ -216,7 +194,7 @@ class Operators:
                 if result is not NotImplemented
                 else self.lower.negation(self.truth_of(self._equal(a, b)))
             )
-        a, b = (self.memory.loaded(x) if isinstance(x, Picked) else x for x in (a, b))
+        a, b = (self.memory.loaded(x) if isinstance(x, v.Picked) else x for x in (a, b))
         result = self._by_class(a, b, *COMPARISONS[COMPARED[type(op)]])
         if result is not NotImplemented:
             return result
@@ -239,11 +217,11 @@ class Operators:
                 return self.lower.compare("==", a, b)
             if ir.BOOL not in types:
                 raise Refused("comparing the identity of two numbers")
-        if isinstance(a, (Picked, Span)) or isinstance(b, (Picked, Span)):
+        if isinstance(a, (v.Picked, v.Span)) or isinstance(b, (v.Picked, v.Span)):
             raise Refused("comparing the identity of an item of a table")
         if a is b or (a is None or b is None):
             return a is b
-        if isinstance(a, Box) and isinstance(b, Box):
+        if isinstance(a, v.Box) and isinstance(b, v.Box):
             if any(x.alias or x.merged for x in (a, b)):
                 raise Refused("comparing the identity of an object with two names")
         elif isinstance(a, _WITHOUT_IDENTITY) and isinstance(b, _WITHOUT_IDENTITY):
@@ -251,13 +229,13 @@ class Operators:
         return False
 
     def _equal(self, a: Any, b: Any) -> Any:
-        if isinstance(a, Union) or isinstance(b, Union):
+        if isinstance(a, v.Union) or isinstance(b, v.Union):
             return self.paths.by_form(a, lambda x: self.paths.by_form(b, lambda y: self._equal(x, y)))
-        if isinstance(a, Picked) or isinstance(b, Picked):
-            picked, other = (a, b) if isinstance(a, Picked) else (b, a)
+        if isinstance(a, v.Picked) or isinstance(b, v.Picked):
+            picked, other = (a, b) if isinstance(a, v.Picked) else (b, a)
             if all(map(is_plain, picked.items)) and is_plain(other):
                 return self.memory.by_item(picked, lambda x: x == other)
-            return self._equal(*(self.memory.loaded(x) if isinstance(x, Picked) else x for x in (a, b)))
+            return self._equal(*(self.memory.loaded(x) if isinstance(x, v.Picked) else x for x in (a, b)))
         if is_number(a) and is_number(b):
             return self.lower.compare("==", a, b)
         result = self._by_class(a, b, *COMPARISONS["=="])
@@ -266,20 +244,20 @@ class Operators:
         a, b = _basic(a), _basic(b)
         if is_number(a) and is_number(b):
             return self.lower.compare("==", a, b)
-        lists = [isinstance(x, List) or type(x) is list for x in (a, b)]
+        lists = [isinstance(x, v.List) or type(x) is list for x in (a, b)]
         if all(lists) or (isinstance(a, tuple) and isinstance(b, tuple)):
             items_a, items_b = self.items.of(a), self.items.of(b)
             return len(items_a) == len(items_b) and self.all_equal(list(zip(items_a, items_b, strict=True)))
-        if isinstance(a, Dict) or isinstance(b, Dict):
+        if isinstance(a, v.Dict) or isinstance(b, v.Dict):
             raise Refused("comparing dictionaries")
-        if isinstance(a, Array) or isinstance(b, Array):
+        if isinstance(a, v.Array) or isinstance(b, v.Array):
             raise Refused("comparing arrays")
         if isinstance(a, _INCOMPARABLE) or isinstance(b, _INCOMPARABLE):
             raise Refused(f"comparing a {type(a).__name__} and a {type(b).__name__}")
-        if isinstance(a, Box) or isinstance(b, Box) or not (is_plain(a) and is_plain(b)):
+        if isinstance(a, v.Box) or isinstance(b, v.Box) or not (is_plain(a) and is_plain(b)):
             if isinstance(a, (dict, list, set)) or isinstance(b, (dict, list, set)):
                 raise Refused(f"comparing a {type(a).__name__} and a {type(b).__name__}")
-            if isinstance(a, (ir.Var, List, Dict)) or isinstance(b, (ir.Var, List, Dict)):
+            if isinstance(a, (ir.Var, v.List, v.Dict)) or isinstance(b, (ir.Var, v.List, v.Dict)):
                 return False  # of different kinds
             return self._same(a, b)
         return bool(a == b)
@@ -316,17 +294,17 @@ class Operators:
 
 
 _SIZED = (str, bytes, tuple, list, dict, set, frozenset, range, int, float)
-_WITHOUT_IDENTITY = (tuple, str, Text, bytes, Bytes, Closure, Bound, MethodType)
-_INCOMPARABLE = (Ring, Span, Each, Text, Bytes, Closure, Bound, set)
+_WITHOUT_IDENTITY = (tuple, str, v.Text, bytes, v.Bytes, v.Closure, v.Bound, MethodType)
+_INCOMPARABLE = (v.Ring, v.Span, v.Each, v.Text, v.Bytes, v.Closure, v.Bound, set)
 
 
 def _class_of(value: Any) -> type:
     """Return the class that a value has in Python, as far as operators depend on it."""
     if isinstance(value, ir.Var):
         return {ir.REAL: float, ir.BOOL: bool}.get(value.type, int)
-    if isinstance(value, Instance):
+    if isinstance(value, v.Instance):
         return value.cls
-    return {List: list, Ring: list, Dict: dict, Text: str}.get(type(value), type(value))
+    return {v.List: list, v.Ring: list, v.Dict: dict, v.Text: str}.get(type(value), type(value))
 
 
 def _type_name(value: Any) -> str:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from . import ir
+from . import values as v
 from .lower import Facts
 from .memory import Memory
 from .stack import EXIT, RESULT, RETURN
@@ -18,17 +19,7 @@ from .values import (
     ANY,
     OF_TABLE,
     TWO_NAMES,
-    Bound,
-    Box,
-    Closure,
-    Dict,
-    Frame,
-    Instance,
-    List,
-    Picked,
     Refused,
-    Ring,
-    Union,
     Unreachable,
     alike,
     boxes_in,
@@ -51,16 +42,16 @@ class Path:
     out: list[ir.Statement]
     facts: Facts
     value: Any
-    changed: dict[Box, Any]
+    changed: dict[v.Box, Any]
     dead: bool
 
-    def slots(self, box: Box) -> Any:
+    def slots(self, box: v.Box) -> Any:
         return self.changed.get(box, box.slots)
 
 
 def forms(value: Any) -> tuple[Any, ...]:
     """Return the alternatives of a value."""
-    return value.alternatives if isinstance(value, Union) else (value,)
+    return value.alternatives if isinstance(value, v.Union) else (value,)
 
 
 class Paths:
@@ -76,13 +67,13 @@ class Paths:
         self.lower, self.memory = memory.lower, memory
         self.choosers: set[ir.Var] = set()
         self.maps: dict[ir.Var, tuple[ir.Var, dict[int, int]]] = {}
-        self.journals: list[tuple[int, dict[Box, Any]]] = []
+        self.journals: list[tuple[int, dict[v.Box, Any]]] = []
 
-    def write(self, box: Box, key: Any, value: Any) -> None:
+    def write(self, box: v.Box, key: Any, value: Any) -> None:
         """Change the content of a box at a key."""
         self.open(box)[key] = value
 
-    def open(self, box: Box) -> Any:
+    def open(self, box: v.Box) -> Any:
         """Return the content of a box for modification."""
         if box.merged is not None or box.pushed:
             raise Refused(TWO_NAMES)
@@ -159,7 +150,7 @@ class Paths:
             slots_a, slots_b = a.slots(box), b.slots(box)
             if isinstance(slots_a, list) and len(slots_a) != len(slots_b):
                 raise Refused("the length of a list changes on one path only")
-            if isinstance(box, Dict) and list(slots_a) != list(slots_b):
+            if isinstance(box, v.Dict) and list(slots_a) != list(slots_b):
                 raise Refused("the keys of a dictionary change on one path only")
             slots_a, slots_b = self._relevant(box, slots_a, slots_b)
             keys = range(len(slots_a)) if isinstance(slots_a, list) else dict.fromkeys((*slots_a, *slots_b))
@@ -170,10 +161,10 @@ class Paths:
             self.lower.out.append(ir.If(test, a.out, b.out, where))
         for box, slots in changes:
             self.open(box)
-            box.slots = slots if isinstance(slots, list) else {k: v for k, v in slots.items()}
+            box.slots = slots
         return value
 
-    def _relevant(self, box: Box, slots_a: Any, slots_b: Any) -> tuple[Any, Any]:
+    def _relevant(self, box: v.Box, slots_a: Any, slots_b: Any) -> tuple[Any, Any]:
         """Return the content of a box on two paths, without names that a path that returns does not use."""
         if (
             box is not self.lower.stack.frame
@@ -190,7 +181,7 @@ class Paths:
 
     def by_form(self, value: Any, use: Callable[[Any], Any]) -> Any:
         """Apply `use` to the active alternative of a value."""
-        if not isinstance(value, Union):
+        if not isinstance(value, v.Union):
             return use(value)
 
         def from_(possible: list[int]) -> Any:
@@ -205,13 +196,13 @@ class Paths:
 
     def narrowed(self, value: Any, facts: Facts | None = None) -> Any:
         """Return the active alternative of a value, if known."""
-        if isinstance(value, Union):
+        if isinstance(value, v.Union):
             left = self._possible(value, facts or self.lower.facts)
             if len(left) == 1:
                 return self.narrowed(value.alternatives[left[0]], facts)
         return value
 
-    def _possible(self, value: Union, facts: Facts) -> list[int]:
+    def _possible(self, value: v.Union, facts: Facts) -> list[int]:
         tag = self.lower.settled(value.tag, facts)
         if not isinstance(tag, ir.Var):
             return [int(tag)]
@@ -242,7 +233,7 @@ class _Join:
 
     def __init__(self, paths: Paths, test: ir.Var, a: Path, b: Path) -> None:
         self.paths, self.lower, self.test, self.a, self.b = paths, paths.lower, test, a, b
-        self.boxes: dict[tuple[Box, Box], Box] = {}
+        self.boxes: dict[tuple[v.Box, v.Box], v.Box] = {}
         self.numbers: dict[tuple[Any, Any], ir.Operand] = {}
 
     def finish(self) -> None:
@@ -259,24 +250,24 @@ class _Join:
             return b
         if is_number(a) and is_number(b) and alike(a, b):
             return self.number(a, b)
-        if isinstance(a, Picked):
+        if isinstance(a, v.Picked):
             a = self._loaded(a, self.a)
-        if isinstance(b, Picked):
+        if isinstance(b, v.Picked):
             b = self._loaded(b, self.b)
         if not alike(a, b):
             return self.union(a, b)
         if isinstance(a, tuple):
             return like(a, [self.of(x, y) for x, y in zip(a, b, strict=True)])
-        if isinstance(a, Box):
+        if isinstance(a, v.Box):
             return self.box(a, b)
-        if isinstance(a, Closure):
+        if isinstance(a, v.Closure):
             frame = self.box(a.frame, b.frame)
-            return Closure(a.node, frame, a.source, a.defaults, a.named_defaults)
-        if isinstance(a, Bound):
-            return Bound(a.function, self.of(a.owner, b.owner))
+            return v.Closure(a.node, frame, a.source, a.defaults, a.named_defaults)
+        if isinstance(a, v.Bound):
+            return v.Bound(a.function, self.of(a.owner, b.owner))
         raise Refused(f"a value that is {type(a).__name__} on both paths")
 
-    def _loaded(self, value: Picked, path: Path) -> Any:
+    def _loaded(self, value: v.Picked, path: Path) -> Any:
         outer, self.lower.out = self.lower.out, path.out
         for box in boxes_in(value):
             box.alias = OF_TABLE
@@ -350,32 +341,32 @@ class _Join:
             else:
                 meanings[target] = ("and", against, b) if a is False else ("or", against, a)
 
-    def box(self, a: Box, b: Box) -> Any:
+    def box(self, a: v.Box, b: v.Box) -> Any:
         if a is b:
             return a
         if (a, b) in self.boxes:
             return self.boxes[a, b]
         slots_a, slots_b = self.a.slots(a), self.b.slots(b)
-        if isinstance(a, Ring) or (isinstance(a, List) and len(slots_a) != len(slots_b)):
+        if isinstance(a, v.Ring) or (isinstance(a, v.List) and len(slots_a) != len(slots_b)):
             raise Refused("the length of a list changes on one path only")
-        made: Box
-        if isinstance(a, Instance):
-            made = Instance(a.cls)
-        elif isinstance(a, List):
-            made = List(slots_a)
-        elif isinstance(a, Frame) and isinstance(b, Frame):
+        made: v.Box
+        if isinstance(a, v.Instance):
+            made = v.Instance(a.cls)
+        elif isinstance(a, v.List):
+            made = v.List(slots_a)
+        elif isinstance(a, v.Frame) and isinstance(b, v.Frame):
             parent = self.box(a.parent, b.parent) if a.parent and b.parent else None
-            made = Frame({}, parent)
+            made = v.Frame({}, parent)
         else:
             made = type(a)({})  # type: ignore[call-arg]
         made.alias = a.alias or b.alias
         self.boxes[a, b] = made
-        keys = keys_of(made) if isinstance(made, List) else dict.fromkeys((*slots_a, *slots_b))
+        keys = keys_of(made) if isinstance(made, v.List) else dict.fromkeys((*slots_a, *slots_b))
         joined = {key: self.of(items_of(slots_a, key), items_of(slots_b, key)) for key in keys}
-        made.slots = list(joined.values()) if isinstance(made, List) else joined
+        made.slots = list(joined.values()) if isinstance(made, v.List) else joined
         return made
 
-    def _by_choice(self, a: Any, b: Any) -> Union | None:
+    def _by_choice(self, a: Any, b: Any) -> v.Union | None:
         """Return a union tagged by the parameter that distinguishes the two paths, if there is one."""
         kind, *of = self.lower.facts.meanings.get(self.test, ("",))
         if kind != "is" or of[0] not in self.paths.choosers:
@@ -384,11 +375,11 @@ class _Join:
         left = self.b.facts.left(source) or frozenset()
         alternatives = [ANY] * (max(number, *left) + 1)
         for k in left:
-            alternatives[k] = b.alternatives[k] if isinstance(b, Union) and b.tag is source else b
+            alternatives[k] = b.alternatives[k] if isinstance(b, v.Union) and b.tag is source else b
         alternatives[number] = a
-        return Union(source, tuple(alternatives))
+        return v.Union(source, tuple(alternatives))
 
-    def union(self, a: Any, b: Any) -> Union:
+    def union(self, a: Any, b: Any) -> v.Union:
         chosen = self._by_choice(a, b)
         if chosen is not None:
             return chosen
@@ -405,9 +396,9 @@ class _Join:
                 places.append(place)
         if len(alternatives) > MOST_FORMS:
             raise Refused(f"a value of more than {MOST_FORMS} forms")
-        tag_a: ir.Operand = a.tag if isinstance(a, Union) else 0
+        tag_a: ir.Operand = a.tag if isinstance(a, v.Union) else 0
         tag_b: ir.Operand = places[0]
-        if isinstance(b, Union):
+        if isinstance(b, v.Union):
             tag_b = b.tag
             if places != list(range(len(places))):
                 tag_b = self.lower.new(ir.INT)
@@ -415,4 +406,4 @@ class _Join:
         tag = self.number(tag_a, tag_b)
         if not isinstance(tag, ir.Var):
             raise Refused("two forms that cannot be distinguished")
-        return Union(tag, tuple(alternatives))
+        return v.Union(tag, tuple(alternatives))

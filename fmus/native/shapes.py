@@ -13,31 +13,9 @@ from types import BuiltinFunctionType, FunctionType
 from typing import Any
 
 from . import ir
+from . import values as v
 from .lower import Lowering
-from .values import (
-    ANY,
-    SHARED,
-    UNSET,
-    Array,
-    Bound,
-    Box,
-    Closure,
-    Dict,
-    Frame,
-    Instance,
-    List,
-    Picked,
-    Refused,
-    Ring,
-    Union,
-    boxes_in,
-    is_number,
-    is_plain,
-    items_of,
-    keys_of,
-    like,
-    same,
-)
+from .values import ANY, SHARED, UNSET, Refused, boxes_in, is_number, is_plain, items_of, keys_of, like, same
 
 
 @dataclass(eq=False)
@@ -72,7 +50,7 @@ class Held(Shape):
     """Box; `blank` creates an empty box of the same kind."""
 
     kind: Any
-    blank: Callable[[], Box]
+    blank: Callable[[], v.Box]
     items: dict[Any, Shape] = field(default_factory=dict)
     parent: Shape | None = None
     path: str = ""
@@ -117,7 +95,7 @@ class Promote(Exception):
         self.path, self.item = path, item
 
 
-Place = Callable[[Box], Any]
+Place = Callable[[v.Box], Any]
 """Returns the content of a box at a given time."""
 
 
@@ -139,21 +117,21 @@ def shape_of(value: Any, slots: Place, path: str = "", memo: Memo | None = None)
     memo = Memo() if memo is None else memo
     if isinstance(value, ir.Var):
         return Known(value) if value in memo.fixed else Leaf(value.type)
-    if isinstance(value, Union):
+    if isinstance(value, v.Union):
         forms = [shape_of(x, slots, f"{path}|{i}", memo) for i, x in enumerate(value.alternatives)]
         return Forms(Known(value.tag) if value.tag in memo.fixed else Leaf(ir.INT), forms)
     if isinstance(value, tuple):
         return Items(value, [shape_of(x, slots, f"{path}.{i}", memo) for i, x in enumerate(value)])
-    if isinstance(value, Ring):
+    if isinstance(value, v.Ring):
         return Growing(value.number, value.item)
-    if isinstance(value, Array):
+    if isinstance(value, v.Array):
         raise Refused("an array that is passed on between steps or passes of a loop; use a list")
-    if isinstance(value, Box):
+    if isinstance(value, v.Box):
         if value.fixed:
             return Known(value)
         if value in memo:
             return memo[value]
-        if path in memo.growing and isinstance(value, List):
+        if path in memo.growing and isinstance(value, v.List):
             return memo.growing[path]
         kind, blank = _kind(value)
         made = Held(kind, blank, path=path, alias=value.alias)
@@ -161,23 +139,23 @@ def shape_of(value: Any, slots: Place, path: str = "", memo: Memo | None = None)
         held = slots(value)
         for key in range(len(held)) if isinstance(held, list) else list(held):
             made.items[key] = shape_of(items_of(held, key), slots, f"{path}.{key}", memo)
-        if isinstance(value, Frame) and value.parent is not None:
+        if isinstance(value, v.Frame) and value.parent is not None:
             made.parent = shape_of(value.parent, slots, f"{path}.", memo)
         return made
-    if isinstance(value, Closure):
+    if isinstance(value, v.Closure):
         of = value.source, value.defaults, value.named_defaults
 
         if not all(map(_never_changes, (*value.defaults, *value.named_defaults.values()))):
             raise Refused("a function whose default arguments are only known at run time")
 
-        def closure(frame: Any, node: Any = value.node) -> Closure:
-            return Closure(node, frame, *of)
+        def closure(frame: Any, node: Any = value.node) -> v.Closure:
+            return v.Closure(node, frame, *of)
 
         return Made(value.node, closure, shape_of(value.frame, slots, path, memo))
-    if isinstance(value, Bound):
+    if isinstance(value, v.Bound):
         owner = shape_of(value.owner, slots, path, memo)
-        return Made(value.function, partial(Bound, value.function), owner)
-    if isinstance(value, Picked):
+        return Made(value.function, partial(v.Bound, value.function), owner)
+    if isinstance(value, v.Picked):
         raise Refused("an item of a table is kept")
     return Known(value)
 
@@ -186,14 +164,14 @@ def _never_changes(value: Any) -> bool:
     return is_plain(value) or isinstance(value, (type, FunctionType, BuiltinFunctionType))
 
 
-def _kind(box: Box) -> tuple[Any, Callable[[], Box]]:
-    if isinstance(box, Instance):
-        return box.cls, partial(Instance, box.cls)
-    if isinstance(box, List):
-        return ("list", len(box.slots)), lambda: List([])
-    if isinstance(box, Dict):
-        return ("dict", tuple(box.slots)), lambda: Dict({})
-    return "frame", lambda: Frame({})
+def _kind(box: v.Box) -> tuple[Any, Callable[[], v.Box]]:
+    if isinstance(box, v.Instance):
+        return box.cls, partial(v.Instance, box.cls)
+    if isinstance(box, v.List):
+        return ("list", len(box.slots)), lambda: v.List([])
+    if isinstance(box, v.Dict):
+        return ("dict", tuple(box.slots)), lambda: v.Dict({})
+    return "frame", lambda: v.Frame({})
 
 
 class Widening:
@@ -350,21 +328,21 @@ def build(shape: Shape, leaves: Iterator[Any], memo: dict[int, Any] | None = Non
     if isinstance(shape, Items):
         return like(shape.sample, [build(item, leaves, memo, alias) for item in shape.items])
     if isinstance(shape, Growing):
-        return Ring(shape.number, shape.item)
+        return v.Ring(shape.number, shape.item)
     if isinstance(shape, Made):
         return shape.make(build(shape.inner, leaves, memo, alias))
     if isinstance(shape, Forms):
         tag = build(shape.tag, leaves, memo, alias)
-        return Union(tag, tuple(build(item, leaves, memo, alias) for item in shape.alternatives))
+        return v.Union(tag, tuple(build(item, leaves, memo, alias) for item in shape.alternatives))
     assert isinstance(shape, Held)
     if id(shape) not in memo:
         made = memo[id(shape)] = shape.blank()
         made.alias = alias or shape.alias
         held = {key: build(item, leaves, memo, alias) for key, item in shape.items.items()}
-        made.slots = list(held.values()) if isinstance(made, List) else held
-        if isinstance(made, List):
+        made.slots = list(held.values()) if isinstance(made, v.List) else held
+        if isinstance(made, v.List):
             made.path = shape.path
-        if shape.parent is not None and isinstance(made, Frame):
+        if shape.parent is not None and isinstance(made, v.Frame):
             made.parent = build(shape.parent, leaves, memo, alias)
     return memo[id(shape)]
 
@@ -376,12 +354,14 @@ def numbers_of(shape: Shape, value: Any, slots: Place, lower: Lowering) -> list[
     return operands
 
 
-def push(ring: Growing | Ring, item: Any, slots: Place, lower: Lowering) -> None:
+def push(ring: Growing | v.Ring, item: Any, slots: Place, lower: Lowering) -> None:
     """Append an item to a list of the state."""
     lower.out.append(ir.Push(ring.number, numbers_of_item(ring, item, slots, lower)))
 
 
-def numbers_of_item(ring: Growing | Ring, item: Any, slots: Place, lower: Lowering) -> tuple[ir.Operand, ...]:
+def numbers_of_item(
+    ring: Growing | v.Ring, item: Any, slots: Place, lower: Lowering
+) -> tuple[ir.Operand, ...]:
     """Return the numbers of an item of a list of the state.
 
     Raises:
@@ -416,22 +396,22 @@ def _collect(
         if shape.parent is not None:
             _collect(shape.parent, value.parent, slots, lower, operands, seen)
     elif isinstance(shape, Growing):
-        if isinstance(value, List):
+        if isinstance(value, v.List):
             lower.out.append(ir.Drop(shape.number, every=True))
             for item in slots(value):
                 push(shape, item, slots, lower)
     elif isinstance(shape, Made):
-        inner = value.frame if isinstance(value, Closure) else value.owner
+        inner = value.frame if isinstance(value, v.Closure) else value.owner
         _collect(shape.inner, inner, slots, lower, operands, seen)
     elif isinstance(shape, Forms):
-        alternatives = list(value.alternatives) if isinstance(value, Union) else [value]
+        alternatives = list(value.alternatives) if isinstance(value, v.Union) else [value]
         memo = Memo()
         places: list[int] = []
         for x in alternatives:
             form = shape_of(x, slots, "", memo)
             places.append(_place(shape.alternatives, form, len(places)))
         tag: ir.Operand = places[0]
-        if isinstance(value, Union):
+        if isinstance(value, v.Union):
             tag = value.tag
             if places != list(range(len(places))):
                 tag = lower.new(ir.INT)

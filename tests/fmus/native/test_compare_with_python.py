@@ -137,7 +137,7 @@ def test_what_does_not_get_through_is_not_packed(tmp_path, monkeypatch):
 @pytest.mark.parametrize("law", LEFT)
 def test_what_a_start_leaves_to_the_next_start_is_found_out(law, compare):
     found = compare(law, differences).difference
-    assert found.startswith("outputs read before")
+    assert "outputs read before" in found
 
 
 @pytest.mark.parametrize("slow", ["by its length", "by its comparison"])
