@@ -460,8 +460,8 @@ class Cases:
         """Yield values of each parameter: every choice, changed numbers, and what is out of range."""
         for i, v in self.parameters:
             values, wrong = _values(v)
-            values = values[:1] if v.type == "Real" and len(self.parameters) > MANY else values
-            yield from ((v.type, i, x) for x in (*values, *wrong))
+            few = v.type == "Real" and len(self.parameters) > MANY
+            yield from ((v.type, i, x) for x in ([*values[:1], *wrong] if few else [*values, *wrong]))
 
     def _moved(self, chance: random.Random) -> list[tuple[str, int, Any]]:
         """Return values of all real parameters near their defaults, and choices of all others."""
@@ -516,7 +516,7 @@ class Cases:
 
 
 def _values(v: Any) -> tuple[list[Any], list[Any]]:
-    """Return values that a parameter may have, and some that it may not."""
+    """Return values of a parameter, which may lie outside its limits, and some that are wrong."""
     limits = [x for x in (v.minimum, v.maximum) if x is not None and abs(x) < 1e30]
     if v.type == "String":
         return list(v.choices), ["none of them"]
@@ -524,9 +524,8 @@ def _values(v: Any) -> tuple[list[Any], list[Any]]:
         return [True, False], []
     if v.type == "Integer":
         return [v.start + 1, max(v.start * 7, 12345)], [-1]
-    return [v.start * 1.25 + 0.01, v.start * 0.6, 0.0, *limits], [
-        -1.0 if v.minimum is None else v.minimum - 1.0
-    ]
+    values = [v.start * 1.25 + 0.01, v.start * 0.6, 0.0, -1.0, *limits]
+    return values, [] if v.minimum is None else [v.minimum - 1.0]
 
 
 def _near(thresholds: Sequence[float]) -> list[float]:
