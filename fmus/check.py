@@ -7,19 +7,15 @@ change its state.
 from __future__ import annotations
 
 import atexit
-import json
 import os
-import signal
-import subprocess
-import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
-from yawbench.foundation.fork_server import die_with_parent, how_it_ended, python
+from yawbench.foundation.processes import ProcessLost, Worker
 
-_checker: subprocess.Popen[str] | None = None
+_checker: Worker | None = None
 
 
 def defects(fmu: Path, *modules: str) -> list[str]:
@@ -27,7 +23,7 @@ def defects(fmu: Path, *modules: str) -> list[str]:
 
     It is validated and loaded once; its parameters must have the values in its model description.
     """
-    answer = _ask("defects", fmu, *modules)
+    answer = _ask(_defects, fmu, *modules)
     return [f"does not load: its process {answer}"] if isinstance(answer, str) else answer
 
 
@@ -36,44 +32,29 @@ def reference_files(fmu: Path, *modules: str) -> dict[str, str]:
 
     The run fails, for instance, without a binary for this platform.
     """
-    answer = _ask("reference_files", fmu, *modules)
+    answer = _ask(_reference_files, fmu, *modules)
     return {} if isinstance(answer, str) else answer
 
 
-def _ask(what: str, *arguments: object) -> Any:
-    """Return the answer to a request, or a text with the exit status if the process died."""
+def _ask(function: Callable[..., Any], *arguments: object) -> Any:
+    """Return what a function returns in the other process, or a text that says how that died."""
     global _checker
-    if _checker is None or _checker.poll() is not None:
-        _checker = subprocess.Popen(
-            python(__name__), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-        atexit.register(_end, _checker)
+    if _checker is None:
+        _checker = Worker(())
+        atexit.register(_checker.close, kill=True)
     try:
-        print(json.dumps([what, *map(str, arguments)]), file=_checker.stdin, flush=True)
-        answer = _checker.stdout.readline()  # type: ignore[union-attr]
-    except BrokenPipeError:
-        answer = ""
-    return json.loads(answer) if answer else how_it_ended(_checker.wait())
-
-
-def _end(checker: subprocess.Popen[str]) -> None:
-    checker.kill()
-    checker.communicate()
-
-
-def main() -> None:
-    """Answer requests until stdin is closed; output of FMUs goes to stderr."""
-    die_with_parent()  # the pipe may not close: other processes may have inherited it
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends this process
-    answers: IO[str] = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)
-    answering = {"defects": _defects, "reference_files": _reference_files}
-    for line in sys.stdin:
-        what, *arguments = json.loads(line)
-        print(json.dumps(answering[what](*arguments)), file=answers, flush=True)
+        _checker.give(function, [*map(str, arguments)])
+        value, error = _checker.answer()
+    except ProcessLost as lost:
+        _checker = None
+        return str(lost)
+    if error is not None:
+        raise error
+    return value
 
 
 def _reference_files(fmu: str, *modules: str) -> dict[str, str]:
+    os.dup2(2, 1)  # output of FMUs goes to stderr
     from .reference_result import reference_result
     from .staging import isolated_modules
 
@@ -85,6 +66,7 @@ def _reference_files(fmu: str, *modules: str) -> dict[str, str]:
 
 
 def _defects(fmu: str, *modules: str) -> list[str]:
+    os.dup2(2, 1)  # output of FMUs goes to stderr
     import fmpy
     from fmpy.validation import validate_fmu
 

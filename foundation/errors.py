@@ -17,6 +17,7 @@ sentence that says where, what, and what is allowed.
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 import signal
@@ -310,6 +311,11 @@ class SimulationError(YawbenchError):
         self.time = time
         self.warnings: tuple[Diagnostic, ...] = ()  # about the run up to that time
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle it: the arguments that it was made with are not those of an exception."""
+        make = functools.partial(type(self), instance=self.instance, time=self.time)
+        return make, self.args, vars(self)
+
 
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C or SIGTERM stopped a run at `time` [s], during a call of `instance` (None: between calls)."""
@@ -337,18 +343,3 @@ class Interrupted(KeyboardInterrupt):
     def of(cls, error: KeyboardInterrupt) -> Interrupted:
         """Convert a KeyboardInterrupt to this type; return the error itself if it is of it already."""
         return error if isinstance(error, cls) else cls()
-
-
-def error_record(error: YawbenchError | Interrupted) -> dict[str, Any]:
-    """Return an error as JSON-ready data, for `rebuilt` in another process."""
-    where = {name: value for name, value in vars(error).items() if name in ("instance", "time", "number")}
-    diagnostics = [diagnostic.record() for diagnostic in error.diagnostics]
-    return {"kind": type(error).__name__, "diagnostics": diagnostics, "where": where}
-
-
-def rebuilt(record: dict[str, Any]) -> YawbenchError | Interrupted:
-    """Return the error of an `error_record` from another process."""
-    kinds = {kind.__name__: kind for kind in (*YawbenchError.__subclasses__(), Interrupted)}
-    kind = kinds.get(record["kind"], YawbenchError)
-    error: YawbenchError | Interrupted = kind(map(Diagnostic.of, record["diagnostics"]), **record["where"])
-    return error

@@ -30,7 +30,7 @@ from yawbench.foundation.interrupts import StopFlag
 from yawbench.interop.second_opinion import MASTERS, installed, second_opinion
 from yawbench.orchestrator.master.compiled_loop import WANTED as LOOP
 from yawbench.orchestrator.master.fmi import open_instance
-from yawbench.orchestrator.master.process_state import Log
+from yawbench.orchestrator.master.log import Log
 from yawbench.orchestrator.master.step_loop import Master
 from yawbench.orchestrator.master.step_program import Operation
 from yawbench.orchestrator.plan import Plan

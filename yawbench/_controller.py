@@ -31,7 +31,7 @@ from yawbench.fmus.fmu import Fmu, Value, ValueRef
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import counted, listed
 from yawbench.orchestrator.master.instance import Buffers, ExperimentSetup, Status, StepCalls, nothing_to_do
-from yawbench.orchestrator.master.process_state import ERROR, OK, Log
+from yawbench.orchestrator.master.log import ERROR, OK, Log
 from yawbench.orchestrator.plan import Instance
 from yawbench.vocabulary.roles import ROLES
 from yawbench.vocabulary.wheels import wheels

@@ -8,7 +8,7 @@ from typing import Any
 
 from yawbench.foundation.errors import YawbenchError
 from yawbench.orchestrator.master.fmi import open_instance
-from yawbench.orchestrator.master.process_state import Log
+from yawbench.orchestrator.master.log import Log
 from yawbench.orchestrator.plan import Instance
 from yawbench.studies.jobs import Job, Outcome, execute
 

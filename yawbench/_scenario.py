@@ -23,7 +23,7 @@ from yawbench.foundation.errors import (
 from yawbench.foundation.messages import hint, short
 from yawbench.metrics.plausibility import PlausibilityWatch
 from yawbench.orchestrator.fault_kinds import FaultList, FaultName
-from yawbench.orchestrator.master.process_state import Log
+from yawbench.orchestrator.master.log import Log
 from yawbench.orchestrator.master.simulate import simulate_in_memory
 from yawbench.orchestrator.plan import Instance, Override, Plan
 from yawbench.orchestrator.scenario import loader

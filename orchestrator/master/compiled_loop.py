@@ -33,8 +33,8 @@ Kind = IntEnum(
     start=0,
 )
 """Kinds of operations; CALL: only Python can do it."""
-Answer = IntEnum("Answer", "FINISHED INTERRUPTED PYTHON STATUS NOT_FINITE COPIED PAUSED", start=0)
-"""Reasons for a walk's return; STATUS: a call's status needs attention; COPIED: a copy made by `fork`."""
+Answer = IntEnum("Answer", "FINISHED INTERRUPTED PYTHON STATUS NOT_FINITE PAUSED", start=0)
+"""Reasons for a walk's return; STATUS: a call's status needs attention."""
 _ANSWERS = tuple(Answer)  # by number: five times as quick as `Answer(number)`, in every step with a fault
 
 
@@ -48,7 +48,7 @@ class OperationData(ctypes.Structure):
         ("n_references", ctypes.c_int64),
         *((name, ctypes.c_void_p) for name in ("values", "first", "second", "factors", "terms")),
         *((name, ctypes.c_void_p) for name in ("time", "size", "answers", "row")),
-        *((name, ctypes.c_int64) for name in ("further", "scale")),
+        *((name, ctypes.c_int64) for name in ("further", "scale", "call")),
     ]
 
     def __init__(self, kind: Kind = Kind.CALL, count: int = 0, **fields: Any) -> None:
@@ -85,7 +85,7 @@ class _Run(ctypes.Structure):
         ("n_recorded", ctypes.c_int64),
         ("rows", ctypes.c_void_p),
         ("stride", ctypes.c_int64),
-        ("reached", ctypes.c_void_p),
+        ("position", ctypes.c_void_p),
         ("stop", ctypes.c_void_p),
         ("pause", ctypes.c_int64),
         ("status", ctypes.c_int64),
@@ -107,7 +107,8 @@ class CompiledLoop:
         clocks: period -> beginning of the step of the instances with that period [s].
         grid: start, step and scale: the k-th communication point is at (start + k step) / scale.
         recorded: indices of the values of a row.
-        reached: kept equal to the last complete communication point.
+        position: a `RunPosition`, kept up to date.
+        call_of: instance and kind of an operation -> number of the call in the position.
         stop: nonzero if the run is to stop.
     """
 
@@ -118,7 +119,8 @@ class CompiledLoop:
         clocks: Mapping[int, ctypes.c_double],
         grid: tuple[int, int, int],
         recorded: np.ndarray,
-        reached: ctypes.c_int64,
+        position: ctypes.Structure,
+        call_of: Mapping[tuple[str, str], int],
         stop: ctypes.c_int32,
     ) -> None:
         library = _library()[0]
@@ -139,14 +141,14 @@ class CompiledLoop:
             time_at=time_at,
             recorded=_address_of(recorded),
             n_recorded=len(recorded),
-            reached=_address_of(reached),
+            position=_address_of(position),
             stop=_address_of(stop),
             pause=PAUSE,
         )
         self._reference = ctypes.byref(self._run)
-        self._kept: list[Any] = [pool, clocks, moving, recorded, reached, stop]
+        self._kept: list[Any] = [pool, clocks, moving, recorded, position, stop]
         self._programs: dict[int, tuple[Sequence[Any], Any]] = {}  # phase -> operations, and as plain data
-        library.begin_process()
+        self._call_of = call_of
 
     @property
     def k(self) -> int:
@@ -205,6 +207,7 @@ class CompiledLoop:
             made = (OperationData * (len(operations) + 1))()
             for i, operation in enumerate(operations):
                 made[i] = operation.data or OperationData(Kind.CALL)
+                made[i].call = self._call_of.get((operation.instance, operation.kind), -1)
             made[len(operations)] = OperationData(Kind.END)
             self._programs[phase] = operations, made
         return _address_of(self._programs[phase][1])

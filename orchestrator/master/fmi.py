@@ -28,9 +28,10 @@ from yawbench.fmus.archive import is_native
 from yawbench.fmus.description import INTEGERS
 
 from ..plan import Instance, Plan
+from .arithmetic import Arithmetic
 from .compiled_loop import Kind, OperationData
 from .instance import BoundCall, CtypesInstance, ExperimentSetup, PlainCall, Status
-from .process_state import DISCARD, OK, WARNING, Log, ProcessState, listen, receive
+from .log import DISCARD, OK, WARNING, Log, listen, receive
 
 
 class Fmi2Instance(CtypesInstance):
@@ -294,11 +295,11 @@ def open_instance(planned: Instance, log: Log, corrupted: set[Path]) -> CtypesIn
     kept = _keeping()
     if kept is not None and (idle := kept.take(planned, log, corrupted)) is not None:
         return idle
-    state = ProcessState()
+    arithmetic = Arithmetic()
     try:
         instance = INSTANCE_TYPES[planned.fmu.fmi](planned, log, corrupted)
     finally:
-        state.restore(planned.name, log)
+        arithmetic.restore(planned.name, log)
     if kept is not None:
         if is_native(planned.fmu.directory):
             instance.keep = functools.partial(kept.keep, planned)

@@ -22,7 +22,7 @@ from yawbench.foundation.messages import listed
 
 from ..plan import Wire
 from .instance import ExperimentSetup, Status
-from .process_state import FATAL, OK, STATUS, WARNING, Log, known
+from .log import FATAL, OK, STATUS, WARNING, Log, known
 from .signal_pool import InstanceSlot, SignalPool, by_type
 from .step_program import getting
 
@@ -59,8 +59,13 @@ class UnsettledWire:
         return f"{self.wire} ({self.old!r}, then {self.new!r})"
 
 
-def initialize(signals: SignalPool, check: StatusCheck, log: Log) -> int:
+def initialize(
+    signals: SignalPool, entered: Callable[[], Iterator[InstanceSlot]], check: StatusCheck, log: Log
+) -> int:
     """Initialize all instances and return the number of passes it took.
+
+    Args:
+        entered: yields the slots of `signals` in turn, and notes whose code runs.
 
     Raises:
         SimulationError: a parameter does not take its value or a loop does not settle; `check` may raise
@@ -68,7 +73,7 @@ def initialize(signals: SignalPool, check: StatusCheck, log: Log) -> int:
     """
     plan = signals.plan
     start, stop = plan.time(0), plan.time(plan.n_steps)
-    for slot in signals.slots:
+    for slot in entered():
         tolerance = slot.instance.tolerance or slot.instance.fmu.tolerance
         experiment = ExperimentSetup(start, stop, tolerance)
         check(slot.name, "initialization", slot.fmu_instance.setup(experiment))
@@ -78,12 +83,12 @@ def initialize(signals: SignalPool, check: StatusCheck, log: Log) -> int:
         _check_parameters(slot, check, log)
         _get(signals, slot, check)
     for number in range(1, PASSES + 1):  # noqa: B007  the number is the result
-        moving = [movement for s in signals.slots for movement in _renew(signals, s, check)]
+        moving = [movement for s in entered() for movement in _renew(signals, s, check)]
         if not moving:
             break
     if any(movement.large for movement in moving):
         raise SimulationError(_unsettled(moving), instance=None, time=start, code="initialization-unsettled")
-    for slot in signals.slots:
+    for slot in entered():
         check(slot.name, "initialization", slot.fmu_instance.exit())
         _get(signals, slot, check)
         _check_constants(slot, check, log)

@@ -13,9 +13,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import mmap
 import os
-import tempfile
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -32,7 +30,7 @@ from yawbench.foundation.messages import listed
 
 from ..plan import Instance
 from .compiled_loop import Kind, OperationData
-from .process_state import ERROR, FATAL, OK, STATUS, WARNING, Log, known, relisten, unlisten
+from .log import ERROR, FATAL, OK, STATUS, WARNING, Log, known, relisten, unlisten
 
 Status = int
 
@@ -68,40 +66,6 @@ class Buffers(NamedTuple):
     output_places: Sequence[ValueRef]
     time: ctypes.c_double  # beginning of the step [s], read at every call
     step: ctypes.c_double  # size of the step [s], read at every call
-
-
-_HEAD = 4  # numbers before the inputs: time, step size, part being done, last answer
-
-
-class SharedBuffer:
-    """Shared memory of an instance: time and step size [s], current part, last answer, inputs, outputs."""
-
-    def __init__(self, descriptor: int, inputs: int, outputs: int) -> None:
-        """Map the file of `shared_memory` for the given numbers of inputs and outputs."""
-        self._map = mmap.mmap(descriptor, size_of(inputs + outputs))
-        self.time = ctypes.c_double.from_buffer(self._map, 0)
-        self.step = ctypes.c_double.from_buffer(self._map, 8)
-        self.part = ctypes.c_int64.from_buffer(self._map, 16)
-        self.answer = ctypes.c_int64.from_buffer(self._map, 24)
-        """Number of the exchange times 256, plus its result."""
-        self.inputs = np.frombuffer(self._map, float, inputs, 8 * _HEAD)
-        self.outputs = np.frombuffer(self._map, float, outputs, 8 * (_HEAD + inputs))
-
-
-def size_of(values: int) -> int:
-    """Return the size of a `SharedBuffer` with `values` inputs and outputs [B]."""
-    return 8 * (_HEAD + values)
-
-
-def shared_memory(values: int) -> int:
-    """Return the descriptor of an anonymous file for a `SharedBuffer` of `values` inputs and outputs."""
-    if hasattr(os, "memfd_create"):
-        descriptor = os.memfd_create("yawbench")
-    else:
-        with tempfile.TemporaryFile() as file:
-            descriptor = os.dup(file.fileno())
-    os.truncate(descriptor, size_of(values))
-    return descriptor
 
 
 class ExperimentSetup(NamedTuple):

@@ -3,252 +3,149 @@
 To the master an isolated instance is an `FmuInstance` like any other. Its numbers are identical to those of
 the same instance in this process, because the process at the other end runs the same `CtypesInstance` on the
 same values. Setting inputs is deferred until the step, and outputs come back with it, so an instance costs
-one exchange per step.
+one exchange per step, most of it the two context switches.
 
-The Real values of a step, its time and its size lie in shared memory; two pipes carry single bytes: which of
-set, step and get to do, and how that ended. Such an exchange costs 7 us on one core and 50 us from core to
-core, most of it the two context switches; a pair of pipes was the fastest of the mechanisms that report the
-death of the other side at once. Everything else, and the messages that the FMU logs meanwhile, is a tagged
-record of a few hundred bytes.
-
-An FMU can write into the pipe to the master. So records from there are checked (see `supervised_process`); a
-stray byte is recognized by comparison with the last answer and its number in shared memory; and waiting for
-a record is limited by the time limit of a call.
-
-`InstanceServer` is the other end: it does with the FMU what the master asks for, and nothing else. Its
-process ends when the master does, and with it everything that the FMU has started (see `stand_guard`).
+The process at the other end is a `Worker`: with its FMU it does what the master asks for (`InstanceServer`).
 """
 
 from __future__ import annotations
 
 import contextlib
-import os
+import ctypes
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
 from yawbench.fmus.fmu import Value, ValueRef
-from yawbench.foundation.errors import SimulationError, YawbenchError, error_record, rebuilt
-from yawbench.foundation.fork_server import start
+from yawbench.foundation import processes
+from yawbench.foundation.errors import SimulationError, YawbenchError
 from yawbench.foundation.interrupts import stop_requested_at
-from yawbench.foundation.supervised_process import (
-    ANSWER,
-    FAILED,
-    LOG,
-    REPLY,
-    REQUEST,
-    PipeChannel,
-    ProcessLost,
-    stand_guard,
-)
+from yawbench.foundation.messages import listed
+from yawbench.foundation.processes import ProcessLost, Worker, die_with_parent, flush_output
 
 from ..plan import Instance, Plan
+from .arithmetic import Arithmetic
 from .fmi import INSTANCE_TYPES, open_instance
-from .instance import (
-    Buffers,
-    CtypesInstance,
-    ExperimentSetup,
-    FmuInstance,
-    SharedBuffer,
-    Status,
-    StepCalls,
-    shared_memory,
-)
-from .process_state import (
-    FATAL,
-    KILLED,
-    OK,
-    PROCESS,
-    WARNING,
-    FmuProcess,
-    Log,
-    LogRelay,
-    ProcessState,
-    flush_output,
-    known,
-)
-from .step_program import copying
+from .instance import Buffers, CtypesInstance, ExperimentSetup, FmuInstance, Status, StepCalls
+from .log import FATAL, KILLED, OK, PROCESS, WARNING, Log, LogRelay, known
 
 T = TypeVar("T")
-
-SET, STEP, GET = 1, 2, 4
-"""Parts of an exchange, in this order; a sum of them asks for several."""
 
 CALL_LIMIT = 10.0
 """Time that a call of an FMU may take [s]; chosen: ten thousand times the length of a step, and still a
 tolerable wait."""
-
 START_LIMIT = 60.0
 """Time that a process may take to start [s]; chosen: enough to load Python from a slow disk."""
 STOP_GRACE = 1.0
 """Time that a call may still take after a stop request [s]; chosen: a tolerable wait for the user."""
 
-_PARTS = {SET: ("set", "Set{}"), STEP: ("step", "DoStep"), GET: ("get", "Get{}")}
-"""Part of an exchange -> kind of the master's operation and template of the FMI function's name."""
 
+class IsolatedInstance(Worker):
+    """An instance of an FMU in a process of its own, which starts at once; `open` makes the instance.
 
-class InstanceProcess(FmuProcess):
-    """The process of one isolated instance."""
+    Args:
+        limit: time that a call of the FMU may take [s].
+    """
 
-    unasked = (LOG, FAILED)
+    longest = 1 << 26  # far longer than any text of an FMU
 
-    def __init__(self, values: int, limit: float) -> None:
-        """Start the process without waiting for it.
-
-        Args:
-            values: number of inputs and outputs to allocate shared memory for.
-            limit: time that an answer may take [s].
-        """
+    def __init__(self, instance: Instance, limit: float) -> None:
+        self.name = instance.name
+        self._log = Log()
+        self._instance = instance
         self._limit = limit
-        self.memory = memory = shared_memory(values)
-        super().__init__(
-            lambda reading, writing: start(__name__, reading, writing, memory, preload=[__name__]), Log()
-        )
+        self._lost = False
+        self._stepping = False
+        self._part = ""
+        kind = INSTANCE_TYPES[instance.fmu.fmi]
+        self._prefix = kind.prefix
+        self._functions = {"set": f"Set{kind.real}", "step": "DoStep", "get": f"Get{kind.real}"}
+        super().__init__([__name__], self._log.relayed)
+        self.give(_serve, ())
 
-    def wait_until_ready(self) -> None:
-        """Wait until the process is ready for requests."""
-        self.answer(START_LIMIT, REPLY)
-
-    def ask(self, request: str, *arguments: Any) -> Any:
-        """Call a method of the process's `InstanceServer` or of its instance; return the result."""
-        with contextlib.suppress(BrokenPipeError):  # the cause is found when the answer is read
-            self._channel.send_object(REQUEST, (request, arguments))
-        return self.answer(self._limit, REPLY)
-
-    def exchange(self, parts: bytes) -> int:
-        """Have it do parts of a step; return the result (see `InstanceServer.exchange`)."""
-        with contextlib.suppress(BrokenPipeError):
-            self._channel.say(parts)
-        result: int = self.answer(self._limit, ANSWER)
-        return result
-
-    def answer(self, limit: float, wanted: int) -> Any:
-        """Return its answer, which may take a time `limit` [s]."""
-        self._deadline = time.monotonic() + limit
-        return self.hear(wanted)
-
-    def take(self, kind: int, content: Any) -> None:
-        if kind == FAILED:
-            self.close()
-            raise ProcessLost(f"failed: {content}")
-        super().take(kind, content)
-
-    def check_time(self) -> None:
-        now, requested = time.monotonic(), stop_requested_at()
-        if requested is not None and now - requested > STOP_GRACE:
-            self.close()
-            raise ProcessLost("did not return when the run was asked to stop", late=True)
-        if now > self._deadline:
-            self.close()
-            limit = f"{self._limit:g} s, the limit of a call (--call-limit)"
-            raise ProcessLost(f"did not return within {limit}", late=True)
-
-    def close(self, *, kill: bool = False) -> int:
-        """End the process by its guardian, which finds the pipe closed and kills everything that is left."""
-        if not self._closed:
-            os.close(self.memory)
-        return super().close()
-
-
-class IsolatedInstance:
-    """An instance of an FMU in a process of its own."""
-
-    def __init__(self, instance: Instance, log: Log, process: InstanceProcess) -> None:
-        """Have the process load the library and instantiate the FMU.
+    def open(self, log: Log) -> IsolatedInstance:
+        """Load the library and instantiate the FMU.
 
         Raises:
             ModelDescriptionError, SimulationError: as for `CtypesInstance`; also if the process dies.
         """
-        self.name = instance.name
+        self._unasked = log.relayed
         self._log = log
-        self._process: InstanceProcess | None = process
-        self._stepping = False
-        self._part = ""
-        self._answered = 0
-        kind = INSTANCE_TYPES[instance.fmu.fmi]
-        self._prefix, self._real = kind.prefix, kind.real
-        process.log = log
+        doing, refused = "its start", ""
         try:
-            process.wait_until_ready()
-        except ProcessLost as lost:
-            raise self._refused(f"{instance.name}: {lost.in_('its start')}") from None
-        try:
+            self._answer(START_LIMIT)
+            doing = f"{self._prefix}Instantiate or before"
+            refused = f"{self._instance.fmu.path} cannot be instantiated: "
             # without the hundreds of variables, which the process does not need
-            failed = process.ask(
-                "open", replace(instance, fmu=replace(instance.fmu, variables={}), series={})
-            )
+            slim = replace(self._instance, fmu=replace(self._instance.fmu, variables={}), series={})
+            self._call("open", slim)
         except ProcessLost as lost:
-            reason = lost.in_(f"{self._prefix}Instantiate or before")
-            raise self._refused(
-                f"{instance.name}: {instance.fmu.path} cannot be instantiated: {reason}"
-            ) from None
-        if failed is not None:
-            process.close()
-            raise rebuilt(failed)
+            sentence = f"{self.name}: {refused}{_lost_in(lost, doing)}"
+            raise SimulationError(sentence, instance=self.name, time=0.0, code="fmu-not-loadable") from None
+        return self
 
-    def _refused(self, sentence: str) -> SimulationError:
-        return SimulationError(sentence, instance=self.name, time=0.0, code="fmu-not-loadable")
+    def _call(self, request: str, *arguments: Any) -> Any:
+        """Call a method of the process's `InstanceServer` or of its instance; return the result."""
+        with contextlib.suppress(BrokenPipeError):  # the cause is found when the answer is read
+            self._channel.send("instance", (request, arguments))
+        return self._answer(self._limit)
+
+    def _answer(self, limit: float) -> Any:
+        """Return the answer, which may take a time `limit` [s]."""
+        self._deadline = time.monotonic() + limit
+        value, error = self.answer()
+        if isinstance(error, YawbenchError):
+            self.close()
+            raise error
+        if error is not None:
+            raise self.lost(f"failed: {type(error).__name__}: {error}")
+        return value
+
+    def check_time(self) -> None:
+        now, requested = time.monotonic(), stop_requested_at()
+        if requested is not None and now - requested > STOP_GRACE:
+            raise self.lost("did not return when the run was asked to stop", late=True)
+        if now > self._deadline:
+            limit = f"{self._limit:g} s, the limit of a call (--call-limit)"
+            raise self.lost(f"did not return within {limit}", late=True)
 
     def connect(self, buffers: Buffers) -> StepCalls:
         inputs, input_places, outputs, output_places, time, step = buffers
-        assert self._process is not None
-        board = SharedBuffer(self._process.memory, len(input_places), len(output_places))
-        self._board = board
-        self._ask("", None, "connect", list(input_places), list(output_places))
-        board.step.value = step.value
-        give = copying(inputs, board.inputs)
-        take = copying(board.outputs, outputs)
-        step_and_get = STEP | GET if len(outputs) else STEP
-        waiting, fresh = 0, False
+        self._ask("", None, "connect", list(input_places), list(output_places), step.value)
+        step_and_get = ("step", "get") if len(outputs) else ("step",)
+        given, values, fresh, failed = b"", b"", False, (FATAL, "", b"")
+
+        def exchange(*parts: str) -> Status:
+            nonlocal given, values
+            status, self._part, values = self._ask(parts, failed, "exchange", parts, time.value, given)
+            given = b""
+            return status
 
         def set_inputs() -> Status:
-            nonlocal waiting
-            give()
-            if self._stepping:
-                waiting = SET
-                return OK
-            return self._exchange(SET)
+            nonlocal given
+            given = inputs.tobytes()
+            return OK if self._stepping else exchange("set")
 
         def take_step() -> Status:
-            nonlocal waiting, fresh
-            board.time.value = time.value
-            parts, waiting = waiting | step_and_get, 0
+            nonlocal fresh
             fresh = True
-            return self._exchange(parts)
+            return exchange(*(("set",) if given else ()), *step_and_get)
 
         def get_outputs() -> Status:
             nonlocal fresh
-            status = OK if fresh else self._exchange(GET)
+            status = OK if fresh else exchange("get")
             fresh = False
-            take()
+            if values:
+                outputs[:] = np.frombuffer(values)
             return status
 
-        def flush() -> Status:
-            nonlocal waiting
-            parts, waiting = waiting, 0
-            return self._exchange(parts) if parts else OK
-
-        self._flush: Callable[[], Status] = flush
+        self._flush: Callable[[], Status] = lambda: exchange("set") if given else OK
         return StepCalls(set_inputs, take_step, get_outputs)
-
-    def _exchange(self, parts: int) -> Status:
-        if self._process is None:
-            return FATAL
-        try:
-            answer = self._process.exchange(_BYTES[parts])
-            self._answered += 256
-            if self._board.answer.value != self._answered + answer:
-                raise self._process.garbled(f"byte {answer}")
-        except ProcessLost as lost:
-            self._part, function = _PARTS.get(self._board.part.value, ("", ""))
-            return self._lose(lost, function and self._prefix + function.format(self._real))
-        if answer == OK:
-            return OK
-        self._part = _PARTS[answer >> 4][0]
-        return answer & 15
 
     def part(self, kind: str) -> str:
         return self._part or kind
@@ -281,40 +178,44 @@ class IsolatedInstance:
     def note(self, status: Status) -> Status:
         return self._ask("", known(status), "note", status)
 
-    def _ask(self, function: str, failed: T, request: str, *arguments: Any) -> T:
-        """Return the answer to a request, or `failed` if the process died."""
-        if self._process is None:
+    def _ask(self, doing: str | Sequence[str], failed: T, request: str, *arguments: Any) -> T:
+        """Return the answer to a request; `failed` if the process is lost, which is logged.
+
+        Args:
+            doing: name of the FMI function that is called, or the parts of a step that are done.
+        """
+        if self._lost:
             return failed
         self._part = ""
         try:
-            answer: T = self._process.ask(request, *arguments)
+            answer: T = self._call(request, *arguments)
             return answer
         except ProcessLost as lost:
-            self._lose(lost, function)
+            self._lost = True
+            errors = self._log.errors(self.name)
+            before = f"; its last message: {' '.join(errors[-1].text.split())}" if errors else ""
+            if not isinstance(doing, str):
+                doing = listed([self._prefix + self._functions[part] for part in doing], last="or")
+            text = _lost_in(lost, doing) + before
+            self._log.add(self.name, FATAL, KILLED if lost.killed else PROCESS, text)
             return failed
 
-    def _lose(self, lost: ProcessLost, function: str) -> Status:
-        """Log how the process was lost."""
-        self._process = None
-        errors = self._log.errors(self.name)
-        before = f"; its last message: {' '.join(errors[-1].text.split())}" if errors else ""
-        self._log.add(self.name, FATAL, KILLED if lost.killed else PROCESS, lost.in_(function) + before)
-        return FATAL
-
     def free(self) -> None:
-        process, self._process = self._process, None
-        if process is None:
+        if self._closed:
             return
         try:
-            process.ask("free")
+            self._call("free")
         except ProcessLost as lost:  # the results are not affected
-            text = lost.in_(f"{self._prefix}Terminate or {self._prefix}FreeInstance")
+            text = _lost_in(lost, f"{self._prefix}Terminate or {self._prefix}FreeInstance")
             self._log.add(self.name, WARNING, PROCESS, text)
-        else:
-            process.close()
+        self.close()
 
 
-_BYTES = [bytes([parts]) for parts in range(SET + STEP + GET + 1)]
+def _lost_in(lost: ProcessLost, function: str) -> str:
+    """Return the message for a loss during a call of an FMI function ("": between two calls)."""
+    if lost.late:
+        return f"{function or 'its process'} {lost}"
+    return f"its process {lost}" + (f" in {function}" if function else " between two calls")
 
 
 class Isolation(contextlib.ExitStack):
@@ -327,107 +228,80 @@ class Isolation(contextlib.ExitStack):
             limit: time that a call of an FMU may take [s].
         """
         super().__init__()
-        self._units = instances
+        self._planned = instances
         self._limit = limit
-        self._processes: dict[str, InstanceProcess] = {}
+        self.instances: dict[str, IsolatedInstance] = {}
 
     def __call__(self, instance: Instance, log: Log, corrupted: set[Path]) -> FmuInstance:
         """Return a new isolated instance. Fatal from one does not affect the others: they share nothing."""
-        if not self._processes:
-            for each in self._units:
-                self._processes[each.name] = process = InstanceProcess(len(each.fmu.variables), self._limit)
-                self.callback(process.close)
-        return IsolatedInstance(instance, log, self._processes[instance.name])
+        if not self.instances:
+            for each in self._planned:
+                self.instances[each.name] = isolated = IsolatedInstance(each, self._limit)
+                self.callback(isolated.close, kill=True)
+        return self.instances[instance.name].open(log)
 
 
-@contextlib.contextmanager
 def opener_of(
     plan: Plan, call_limit: float | None
-) -> Iterator[Callable[[Instance, Log, set[Path]], FmuInstance]]:
-    """Yield a function that opens the instances of a plan: in this process, or isolated if `call_limit` [s].
+) -> contextlib.AbstractContextManager[Callable[[Instance, Log, set[Path]], FmuInstance]]:
+    """Return what opens the instances of a plan: in this process, or isolated if there is a `call_limit` [s].
 
     Raises:
         SimulationError: isolation is not supported on this operating system.
     """
     if call_limit is None:
-        yield open_instance
-        return
+        return contextlib.nullcontext(open_instance)
     if sys.platform == "win32":
         raise SimulationError(
             "--isolate needs Linux or macOS.", instance=None, time=0.0, code="isolation-unavailable"
         )
-    with Isolation(plan.instances, call_limit) as isolation:
-        yield isolation
+    return Isolation(plan.instances, call_limit)
 
 
 class InstanceServer:
-    """Serves the master's requests to one FMU instance."""
+    """In the process of an instance: does with the FMU what the master asks for."""
 
-    def __init__(self, channel: PipeChannel, memory: int) -> None:
-        self._channel = channel
-        self._memory = memory
-        self._log = LogRelay(channel, timed=False)
-        self._process_state: ProcessState | None = ProcessState()  # until stepping begins
+    def __init__(self) -> None:
+        self._log = LogRelay(processes.asking, timed=False)
+        self._arithmetic: Arithmetic | None = Arithmetic()  # until stepping begins
         self._instance: CtypesInstance
 
-    def serve(self) -> None:
-        """Answer requests until the master is gone, or return in a copy forked by the FMU."""
-        hear, say, answers = self._channel.hear, self._channel.say, [bytes([i]) for i in range(256)]
-        process, count = os.getpid(), 0
-        while (byte := hear()) is not None:
-            parts = byte if byte <= SET | STEP | GET else 0
-            if parts:
-                answer, count = self.exchange(parts), count + 256
-            else:
-                name, arguments = self._channel.receive_object()
-                reply = getattr(self if hasattr(self, name) else self._instance, name)(*arguments)
-                if self._process_state is not None:
-                    self._process_state.restore("", self._log)
-            if os.getpid() != process:
-                return
-            if parts:
-                self._answer.value = count + answer
-                say(answers[answer])
-            else:
-                self._channel.send(REPLY, reply)
+    def call(self, request: str, arguments: Sequence[Any]) -> Any:
+        """Call a method of this object or of the instance."""
+        result = getattr(self if hasattr(self, request) else self._instance, request)(*arguments)
+        if self._arithmetic is not None:
+            self._arithmetic.restore("", self._log)
+        return result
 
-    def exchange(self, parts: int) -> int:
-        """Do parts of a step in order; return the worst status plus 16 times the part it belongs to.
+    def open(self, instance: Instance) -> None:
+        self._instance = open_instance(instance, self._log, set())
 
-        Stops after a status worse than Warning.
+    def connect(self, inputs: Sequence[ValueRef], outputs: Sequence[ValueRef], step: float) -> None:
+        self._time = ctypes.c_double()
+        self._inputs, self._outputs = np.zeros(len(inputs)), np.zeros(len(outputs))
+        buffers = self._inputs, inputs, self._outputs, outputs, self._time, ctypes.c_double(step)
+        self._calls = self._instance.connect(Buffers(*buffers))._asdict()
+
+    def exchange(self, parts: Sequence[str], time: float, given: bytes) -> tuple[Status, str, bytes]:
+        """Do parts of a step in order, up to a status worse than Warning.
+
+        Returns:
+            the worst status, the part that it belongs to, and the outputs.
         """
-        answer = OK
-        for part, call in self._calls:
-            if not parts & part:
-                continue
-            self._part.value = part
-            status = known(call())
-            if status > answer % 16:
-                answer = 16 * part + status
+        self._time.value = time
+        if given:
+            self._inputs[:] = np.frombuffer(given)
+        worst, of = OK, ""
+        for part in parts:
+            status = known(self._calls[part]())
+            if status > worst:
+                worst, of = status, part
             if status > WARNING:
                 break
-        self._part.value = 0
-        return answer
+        return worst, of, self._outputs.tobytes()
 
-    def open(self, instance: Instance) -> dict[str, Any] | None:
-        """Instantiate the FMU; return a description of the error if that fails."""
-        try:
-            self._instance = open_instance(instance, self._log, set())
-        except YawbenchError as error:
-            return error_record(error)
-        return None
-
-    def connect(self, input_places: Sequence[ValueRef], output_places: Sequence[ValueRef]) -> None:
-        board = SharedBuffer(self._memory, len(input_places), len(output_places))
-        calls = self._instance.connect(
-            Buffers(board.inputs, input_places, board.outputs, output_places, board.time, board.step)
-        )
-        self._part = board.part
-        self._answer = board.answer
-        self._calls = ((SET, calls.set), (STEP, calls.step), (GET, calls.get))
-
-    def exit(self) -> int:
-        self._process_state = None
+    def exit(self) -> Status:
+        self._arithmetic = None
         return self._instance.exit()
 
     def free(self) -> None:
@@ -437,16 +311,7 @@ class InstanceServer:
         flush_output()
 
 
-def main(*descriptors: str) -> None:
-    """Serve the master: descriptors of the pipes for reading and writing, and of the shared memory."""
-    reading, writing, memory = map(int, descriptors)
-    stand_guard(reading, (writing, memory))
-    channel = PipeChannel(reading, writing)
-    channel.send(REPLY, "ready")
-    try:
-        InstanceServer(channel, memory).serve()
-    except Exception as error:
-        with contextlib.suppress(OSError):
-            channel.send(FAILED, f"{type(error).__name__}: {error}")
-        os._exit(1)
-    os._exit(0)
+def _serve() -> None:
+    """Make the server of this process, which ends with its parent by a signal that no FMU can ignore."""
+    die_with_parent()
+    processes.answering["instance"] = InstanceServer().call

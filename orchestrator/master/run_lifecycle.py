@@ -6,7 +6,6 @@ makes them.
 
 from __future__ import annotations
 
-import ctypes
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,13 +17,12 @@ import numpy as np
 from yawbench.fmus.fmu import Value
 from yawbench.foundation.errors import ResultsError, SimulationError
 from yawbench.foundation.interrupts import StopFlag
-from yawbench.foundation.messages import listed
 
 from ..plan import Instance, Plan
 from ..results.recorder import BLOCK
 from .instance import FmuInstance, Status, StepCalls
-from .process_state import MASTER, WARNING, Copies, Log, suspects
-from .step_loop import EndRequested, Master
+from .log import MASTER, WARNING, Log
+from .step_loop import EndRequested, Master, RunPosition
 
 RunProgress = Callable[[int, int], None]
 """Called a few times a second with the number of communication points completed and their total."""
@@ -52,8 +50,7 @@ class RunLifecycle:
 
     Args:
         rows: buffer for the recorded values, usually the recorder itself.
-        reached: kept equal to the last complete communication point, possibly in shared memory.
-        returned: kept equal to the time of the last call of initialization, likewise (see `Master`).
+        position: kept up to date, possibly in memory shared with another process.
     """
 
     def __init__(
@@ -63,8 +60,7 @@ class RunLifecycle:
         log: Log,
         stop: StopFlag,
         progress: RunProgress | None = None,
-        reached: ctypes.c_int64 | None = None,
-        returned: ctypes.c_double | None = None,
+        position: RunPosition | None = None,
     ) -> None:
         self.plan = plan
         self.passes = 0  # of initialization
@@ -76,11 +72,9 @@ class RunLifecycle:
         self.log = log
         self._stop = stop
         self._progress = progress
-        self._reached = reached
-        self._returned = ctypes.c_double() if returned is None else returned
+        self.position = position or RunPosition().begin()
         self._master: Master | None = None
         self._fmu_instances: dict[str, FmuInstance] = {}
-        self._copies = Copies()
 
     def inputs_of(self, instance: str) -> dict[str, Value]:
         """Return the inputs with which an instance was last stepped."""
@@ -89,14 +83,13 @@ class RunLifecycle:
     def go(self, opener: OpenInstance) -> None:
         """Open the FMUs, initialize them and step to the end."""
         corrupted: set[Path] = set()
-        for instance in self.plan.instances:
+        for number, instance in enumerate(self.plan.instances):
             for violation in instance.fmu.violations:
                 self.log.add(instance.name, WARNING, MASTER, violation.message, self.plan.time(0))
+            self.position.enter(number, "initialization")
             self._fmu_instances[instance.name] = opener(instance, self.log, corrupted)
-            self._copies.end()
-            self._returned.value = time.monotonic()
-        observed = self._reached, self._copies, self._returned
-        self._master = Master(self.plan, self._fmu_instances, self.log, self._stop, *observed)
+            self.position.leave()
+        self._master = Master(self.plan, self._fmu_instances, self.log, self._stop, self.position)
         self.loop = self._master.loop
         with np.errstate(all="ignore"):  # non-finite values are found by `Master`, not by NumPy warnings
             self._master.initialize(self._rows.rows[0], self._rows.others)
@@ -120,10 +113,9 @@ class RunLifecycle:
             try:
                 master.advance(end, self._rows.rows[filled:], self._rows.others)
             except EndRequested:
-                master.check_process_state(since)
+                master.check_arithmetic(since)
                 raise
-            master.check_process_state(since)
-            self._refuse_copies(master.completed)
+            master.check_arithmetic(since)
             now = time.perf_counter()
             if now - reported < REPORT_EVERY:
                 stretch = min(2 * stretch, BLOCK)
@@ -134,24 +126,6 @@ class RunLifecycle:
         self.flush()
         if self._progress is not None:
             self._progress(total, total)
-
-    def _refuse_copies(self, completed: int) -> None:
-        """Check that no FMU has forked this process.
-
-        Raises:
-            SimulationError: an FMU has. It would do so in every step, and each copy stays until the run ends.
-        """
-        if not self._copies.made:
-            return
-        time = self.plan.time(completed)
-        among = suspects(self.plan.instances)
-        raise SimulationError(
-            f"by t = {time:.9g} s an instance ({listed(among, last='or')}) had copied the process of the run "
-            "(fork), and the copy continued it; with --isolate it forks only its own process",
-            instance=among[0] if len(among) == 1 else None,
-            time=time,
-            code="process-copied",
-        )
 
     def flush(self) -> None:
         """Write all complete rows."""
@@ -178,9 +152,10 @@ class RunLifecycle:
 
     def end(self) -> None:
         """Terminate and free the instances."""
-        for instance in reversed(self._fmu_instances.values()):
+        for number, instance in reversed([*enumerate(self._fmu_instances.values())]):
+            self.position.enter(number, "its end")
             instance.free()
-            self._copies.end()
+            self.position.leave()
 
 
 @dataclass

@@ -38,7 +38,7 @@ from ..fault_kinds import KINDS, Disturbance, LinearDisturbance
 from ..plan import Instance, Plan, Wire
 from .compiled_loop import Kind, OperationData
 from .instance import FmuInstance, Status, StepCalls
-from .process_state import OK
+from .log import OK
 
 EXACT = 2.0**53
 """Whole numbers up to this are exact in a Real."""

@@ -33,7 +33,8 @@ from ..results.run_folder import RunStatus
 from ..results.run_record import DiagnosticRecord, EndRecord, ErrorRecord, WarningRecord
 from .child_run import ChildRun, can_be_apart
 from .fmi import keeps, open_instance
-from .process_state import STATUS, Log, Message
+from .isolation import Isolation
+from .log import STATUS, Log, Message
 from .run_lifecycle import OpenInstance, RunLifecycle, RunProgress
 
 WRITTEN = 100
@@ -92,8 +93,9 @@ def simulate(
         opener: creates the instances; tests pass their own.
         watch: looks at the recorded rows; its warnings stand in the record.
         format: of the results, one of `results.file_formats.FILES`.
-        apart: step the instances in a child process where that is possible (see `child_run`): even if it
-            crashes, the run ends with an error message and the results so far.
+        apart: step the instances in a child process where that is possible (see `child_run`), unless each
+            has a process of its own: even if it crashes, the run ends with an error message and the results
+            so far.
 
     Raises:
         ScenarioError: `format` is unknown.
@@ -103,7 +105,8 @@ def simulate(
         ResultsError: `out` is not writable, or the format needs a package that is missing.
     """
     recorder = recorder_of(format)(Path(out), *_columns(plan))
-    run = Simulation(plan, recorder, progress, watch, apart=apart and can_be_apart() and not keeps(plan))
+    apart = apart and can_be_apart() and not keeps(plan) and not isinstance(opener, Isolation)
+    run = Simulation(plan, recorder, progress, watch, apart=apart)
     run.make(opener)
     return RunInfo(
         Path(out),

@@ -4,7 +4,6 @@
    the loop in `master.py` is the reference. Compiled without contraction to fused operations, so that every
    sum has the same bits in both. */
 
-#include <pthread.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -12,12 +11,18 @@
 
 enum kind { END, CALL, COPY, BLEND, CONVERT, SERIES, DISTURB, EXCHANGE_2, EXCHANGE_3, STEP_2, STEP_3 };
 
-enum answer { FINISHED, INTERRUPTED, PYTHON, STATUS, NOT_FINITE, COPIED, PAUSED };
+enum answer { FINISHED, INTERRUPTED, PYTHON, STATUS, NOT_FINITE, PAUSED };
 
 /* What an FMI 3.0 step answers. */
 struct step_answers {
     bool event, ended, early;
     double reached;
+};
+
+/* Where the run is (`RunPosition` in Python): it is read when this process dies. */
+struct position {
+    int64_t completed, call;
+    double returned;
 };
 
 /* A call on behalf of an instance; what is not needed by its kind is zero. */
@@ -33,6 +38,7 @@ struct operation {
     struct step_answers *answers;
     int64_t *row;                   /* of a series: the next one; of faults: the time passed, over `scale` */
     int64_t further, scale;         /* of faults: time of a step, over `scale` */
+    int64_t call;                   /* number of the call in the position */
 };
 
 struct clock {
@@ -56,7 +62,7 @@ struct run {
     int64_t n_recorded;
     double *rows;
     int64_t stride;                 /* from row to row */
-    int64_t *reached;
+    struct position *position;
     const int32_t *stop;
     int64_t pause;                  /* time after which Python gets a turn [ns] */
     int64_t status;
@@ -66,24 +72,6 @@ typedef int exchange_2(void *, const uint32_t *, size_t, double *);
 typedef int exchange_3(void *, const uint32_t *, size_t, double *, size_t);
 typedef int step_2(void *, double, double, int);
 typedef int step_3(void *, double, double, bool, bool *, bool *, bool *, double *);
-
-static volatile int copied;
-
-static void in_copy(void)
-{
-    copied = 1;
-}
-
-__attribute__((constructor)) static void watch_for_copies(void)
-{
-    pthread_atfork(NULL, NULL, in_copy);
-}
-
-/* A process that is forked to make a run is no copy made by an FMU. */
-__attribute__((visibility("default"))) void begin_process(void)
-{
-    copied = 0;
-}
 
 static int64_t now(void)
 {
@@ -182,10 +170,12 @@ static enum answer work(struct run *run)
             continue;
         case EXCHANGE_2:
         case EXCHANGE_3:
+            run->position->call = op->call;
             run->status = exchange(op);
             break;
         case STEP_2:
         case STEP_3:
+            run->position->call = op->call;
             run->status = take_step(op);
             if (op->answers && (op->answers->early || op->answers->ended))
                 return STATUS;
@@ -223,7 +213,7 @@ static void record(struct run *run)
     run->pool[run->time_at] = point(run, run->k);
     for (int64_t i = 0; i < run->n_recorded; i++)
         row[i] = run->pool[run->recorded[i]];
-    *run->reached = run->k;
+    run->position->completed = run->k;
 }
 
 /* Step to `run->end`, or until Python is needed. To go on, Python increments `at` past an operation that it
@@ -241,10 +231,9 @@ __attribute__((visibility("default"))) int walk(struct run *run)
         }
         if (run->at != -2) {
             enum answer answer = work(run);
-            if (copied)
-                return COPIED;
             if (answer != FINISHED)
                 return answer;
+            run->position->call = -1;
             if (!all_finite(run))
                 return NOT_FINITE;
         }

@@ -14,10 +14,9 @@ from __future__ import annotations
 
 import ctypes
 import math
-import os
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import cast
 
 import numpy as np
@@ -28,11 +27,12 @@ from yawbench.foundation.interrupts import StopFlag
 from yawbench.foundation.messages import listed
 
 from ..plan import Plan
+from .arithmetic import Arithmetic
 from .compiled_loop import Answer, CompiledLoop, missing_loop
 from .initialization import initialize
 from .instance import Buffers, FmuInstance, PlainCall, Status
-from .process_state import DISCARD, KILLED, MASTER, OK, WARNING, Copies, Log, ProcessState, describe, suspects
-from .signal_pool import SignalPool
+from .log import DISCARD, KILLED, MASTER, OK, WARNING, Log, describe, suspects
+from .signal_pool import InstanceSlot, SignalPool
 from .step_program import Operation, StepProgram
 
 ALMOST = 1e-6
@@ -48,6 +48,47 @@ class EndRequested(Exception):
         self.time = time
 
 
+WORDS = {"set": "setting inputs", "step": "step", "get": "reading outputs"}
+"""Kind of an operation -> what is said of it."""
+DOING = (*WORDS.values(), "initialization", "its end")
+"""What an instance may be doing."""
+
+
+class RunPosition(ctypes.Structure):
+    """Where a run is, in memory that may be shared with another process.
+
+    `completed` is the last communication point reached, `returned` the time [s], by `time.monotonic`, at
+    which a call of initialization last returned, and `call` the number of the call being made: of the
+    instance in the plan times the length of `DOING`, plus the place of what it does there; -1 between two.
+    """
+
+    _fields_ = [("completed", ctypes.c_int64), ("call", ctypes.c_int64), ("returned", ctypes.c_double)]
+
+    completed: int
+    call: int
+    returned: float
+
+    def begin(self) -> RunPosition:
+        """Set it to the beginning of a run and return it."""
+        self.completed = -1
+        return self.leave()
+
+    def enter(self, instance: int, doing: str) -> None:
+        """Note that a call of an instance begins."""
+        self.call = len(DOING) * instance + DOING.index(doing)
+
+    def leave(self) -> RunPosition:
+        """Note that it has returned."""
+        self.call, self.returned = -1, time.monotonic()
+        return self
+
+    @property
+    def where(self) -> tuple[int, str] | None:
+        """The number of the instance whose code is running, and what it does; None between two calls."""
+        instance, doing = divmod(self.call, len(DOING))
+        return None if instance < 0 else (instance, DOING[doing])
+
+
 class Master:
     """Steps the instances of one run. `completed` is the last communication point with all values."""
 
@@ -57,25 +98,20 @@ class Master:
         fmu_instances: Mapping[str, FmuInstance],
         log: Log,
         stop: StopFlag,
-        reached: ctypes.c_int64 | None = None,
-        copies: Copies | None = None,
-        returned: ctypes.c_double | None = None,
+        position: RunPosition | None = None,
     ) -> None:
-        """Connect the instances.
-
-        Args:
-            reached: kept equal to `completed`, possibly in memory shared with another process.
-            copies: detects forks of this process; created before the FMUs were opened.
-            returned: kept equal to the time of the last call of initialization [s], by `time.monotonic`,
-                possibly in memory shared with another process.
-        """
+        """Connect the instances; `position` is kept up to date."""
         self.plan = plan
         self.log = log
         self.stop = stop
         self.completed = -1
         log.time.value = plan.time(0)
-        self._reached = ctypes.c_int64(-1) if reached is None else reached
-        self._returned = ctypes.c_double() if returned is None else returned
+        self._position = position or RunPosition().begin()
+        first = {one.name: len(DOING) * number for number, one in enumerate(plan.instances)}
+        self._call_of = {
+            (name, kind): first[name] + DOING.index(words) for name in first for kind, words in WORDS.items()
+        }
+        """Instance and kind of an operation -> number of the call, as in `RunPosition`."""
         self.passes = 0
         self.signals = signals = SignalPool(plan, fmu_instances)
         slow = {s.instance.period for s in signals.slots} - {1}
@@ -100,8 +136,7 @@ class Master:
         self._ones = np.ones(signals.n_outputs)
         self._ending: EndRequested | None = None
         self._points: Iterator[int] = iter(())  # communication points still to be reached
-        self._process_state = ProcessState()
-        self._copies = copies or Copies()
+        self._arithmetic = Arithmetic()
         self._compiled: CompiledLoop | None = None
         self.loop = self._choose_loop()
         """Loop that makes the run: "compiled", or "Python: " and the reason."""
@@ -113,8 +148,8 @@ class Master:
         if missing := missing_loop(self._grid, self.plan.n_steps):
             return f"Python: {missing}"
         signals = self.signals
-        parts = signals.pool, signals.time_at, self.clocks, self._grid, self._recorded, self._reached
-        self._compiled = CompiledLoop(*parts, self.stop.flag)
+        parts = signals.pool, signals.time_at, self.clocks, self._grid, self._recorded, self._position
+        self._compiled = CompiledLoop(*parts, self._call_of, self.stop.flag)
         self._compiled.expect(self._expected)
         return "compiled"
 
@@ -124,12 +159,12 @@ class Master:
         Raises:
             SimulationError: an instance fails or logs an error, a wire does not settle or is not finite.
         """
-        self.passes = initialize(self.signals, self._check_initialization, self.log)
+        self.passes = initialize(self.signals, self._entered, self._check_initialization, self.log)
         self._check_finite(0)
         self.signals.pool.take(self._recorded, None, row, "clip")
         if self._recorded_others:
             others.append(self._values_of_others())
-        self.completed = self._reached.value = 0
+        self.completed = self._position.completed = 0
 
     def advance(self, end: int, rows: Sequence[np.ndarray], others: list[list[Value]]) -> None:
         """Step to communication point `end`, filling one of `rows` per point.
@@ -157,11 +192,13 @@ class Master:
     def _loop(self, points: range, rows: Sequence[np.ndarray], others: list[list[Value]]) -> None:
         """Step to the points by the loop in Python, the reference."""
         s, p, q = self._grid
-        stop, reached, cycle = self.stop.flag, self._reached, self.program.cycle
-        calls = {phase: [op.call for op in operations] for phase, operations in self._operations.items()}
+        stop, position, cycle = self.stop.flag, self._position, self.program.cycle
+        calls = {
+            phase: [(op, op.call, self._call_of.get((op.instance, op.kind), -1)) for op in operations]
+            for phase, operations in self._operations.items()
+        }
         clocks = list(self.clocks.items())
         total, ones, finite = self.signals.now.dot, self._ones, math.isfinite
-        getpid, process = os.getpid, self._copies.process
         take, recorded, time = self.signals.pool.take, self._recorded, self.signals.time
         self._points = iter(points)
         for k, row in zip(self._points, rows, strict=False):
@@ -170,28 +207,25 @@ class Master:
             for period, clock in clocks:
                 if k % period == 0:
                     clock.value = (s + (k - period) * p) / q
-            for call in calls[k % cycle]:
+            for operation, call, position.call in calls[k % cycle]:
                 status = call()
                 if status:
-                    self._answer(k, self.operation_of(k, call), status)
+                    self._answer(k, operation, status)
+            position.call = -1
             if not finite(total(ones)):
                 self._check_finite(k)
             time.value = (s + k * p) / q
             take(recorded, None, row, "clip")
             if self._recorded_others:
                 others.append(self._values_of_others())
-            self.completed = reached.value = k
-            if getpid() != process:
-                self._copies.end()
+            self.completed = position.completed = k
 
     def _walk(self, loop: CompiledLoop, end: int, others: list[list[Value]]) -> None:
         """Step to `end` by the compiled loop, with the calls that only Python can make."""
         cycle = self.program.cycle
         while self.completed < end:
             answer = loop.walk(self.completed + 1 if self._recorded_others else end)
-            self.completed, k = self._reached.value, loop.k
-            if answer is not Answer.PYTHON:  # which may be in every step; the next walk notices a copy
-                self._copies.end()
+            self.completed, k = self._position.completed, loop.k
             if answer == Answer.FINISHED:
                 if self._recorded_others:
                     others.append(self._values_of_others())
@@ -207,13 +241,14 @@ class Master:
                 if answer == Answer.STATUS:
                     status: Status | None = cast(PlainCall, call).finish(loop.status)
                 else:
+                    self._position.call = self._call_of.get((operation.instance, operation.kind), -1)
                     status = call()
                 if status:
                     self._answer(k, operation, status)
                     end = end if self._ending is None else k
                 loop.pass_operation()
 
-    def check_process_state(self, since: int) -> None:
+    def check_arithmetic(self, since: int) -> None:
         """Check that no FMU has changed the floating-point environment that all instances share.
 
         Args:
@@ -222,12 +257,12 @@ class Master:
         Raises:
             SimulationError: an FMU has changed it.
         """
-        if not self._process_state.arithmetic_changed():
+        if not self._arithmetic.changed():
             return
         time = self.plan.time(since)
         among = suspects(self.plan.instances)
-        self._process_state.restore("", self.log)
-        self.completed = self._reached.value = since
+        self._arithmetic.restore("", self.log)
+        self.completed = self._position.completed = since
         raise SimulationError(
             f"after t = {time:.9g} s an instance ({listed(among, last='or')}) changed how numbers are "
             "rounded, flushed to zero or trapped, also for all others; --isolate limits it to its process",
@@ -242,26 +277,21 @@ class Master:
         real = {v.name: float(u) for v, u in zip(s.inputs, s.u, strict=True)}
         return real | self.signals.given_others(s)
 
-    def operation_of(self, k: int, call: Callable[[], Status | None]) -> Operation:
-        """Return the operation of the step to `k` that a call belongs to."""
-        return next(op for op in self._operations[k % self.program.cycle] if op.call is call)
-
-    def walked_operation(self) -> Operation | None:
-        """Return the operation that the compiled loop is at, None between two steps."""
-        loop = self._compiled
-        if loop is None or loop.at < 0:
-            return None
-        operations = self._operations[loop.k % self.program.cycle]
-        return operations[loop.at] if loop.at < len(operations) else None
-
     def _values_of_others(self) -> list[Value]:
         return [self.signals.others[key] for key in self._recorded_others]
 
+    def _entered(self) -> Iterator[InstanceSlot]:
+        """Yield the slots in turn; until the next one, the code of their instances runs."""
+        numbers = {one.name: number for number, one in enumerate(self.plan.instances)}
+        for slot in self.signals.slots:
+            self._position.enter(numbers[slot.name], "initialization")
+            yield slot
+        self._position.leave()
+
     def _check_initialization(self, instance: str, what: str, status: Status) -> None:
         """Check a call made during initialization, where a logged error counts whatever the status is."""
-        self._returned.value = time.monotonic()
-        self._copies.end()
-        self._process_state.restore(instance, self.log)
+        self._position.returned = time.monotonic()
+        self._arithmetic.restore(instance, self.log)
         status = self.signals.of[instance].fmu_instance.note(status)
         if status > WARNING or self.log.errors(instance):
             start = self.plan.time(0)
@@ -350,9 +380,6 @@ class Master:
                     instance, WARNING, MASTER, f"{name} is {_spelled(value)}; it is on no wire", time
                 )
                 self._expected = self._expected[self._expected != at]
-
-
-WORDS = {"set": "setting inputs", "step": "step", "get": "reading outputs"}
 
 
 def _spelled(value: float) -> str:

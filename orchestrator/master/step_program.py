@@ -26,7 +26,7 @@ from ..coupling_algorithms import ALGORITHMS, CouplingWeights, WireTiming, delay
 from ..plan import InputSeries, Plan
 from .compiled_loop import Kind, OperationData
 from .instance import PlainCall, Status
-from .process_state import OK
+from .log import OK
 from .signal_pool import FaultInjector, InstanceSlot, SignalPool, by_type
 
 BLOCK = 1024

@@ -10,7 +10,7 @@ from typing import Any
 from yawbench.fmus.fmu import Fmu, ValueRef, Variable
 from yawbench.orchestrator.fault_kinds import FaultySignal
 from yawbench.orchestrator.master.instance import ExperimentSetup, FmuInstance, StepCalls
-from yawbench.orchestrator.master.process_state import ERROR, OK, Log
+from yawbench.orchestrator.master.log import ERROR, OK, Log
 from yawbench.orchestrator.plan import Instance, Plan, Wire
 from yawbench.orchestrator.signal_names import SignalName
 

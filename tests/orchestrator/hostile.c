@@ -7,7 +7,6 @@
 #include <fenv.h>
 #include <fcntl.h>
 #include <limits.h>
-#include <locale.h>
 #include <math.h>
 #include <pthread.h>
 #include <setjmp.h>
@@ -16,7 +15,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
-#include <sys/stat.h>
 #include <unistd.h>
 #if defined(__x86_64__)
 #include <xmmintrin.h>
@@ -66,15 +64,9 @@ static void start(void *(*function)(void *))
     pthread_create(&thread, NULL, function, NULL);
 }
 
-static void start_child(int daemon)
+static void start_child(void)
 {
     if (fork() == 0) {
-        if (daemon) {
-            setsid();
-            if (fork() != 0) {
-                _exit(0);
-            }
-        }
         for (;;) {
             pause();
         }
@@ -142,16 +134,12 @@ static int act(const char *call, const char *name, double t)
         sigfillset(&all), sigprocmask(SIG_SETMASK, &all, NULL);
         for (;;) pause();
     }
-    if (IS("child")) { start_child(0); for (;;) pause(); }
-    if (IS("daemon")) { start_child(1); for (;;) pause(); }
-    if (IS("child_crash")) { start_child(0); raise(SIGSEGV); }
-    if (IS("daemon_exit")) { start_child(1); _exit(0); }
-    if (IS("fork")) fork();
+    if (IS("child")) { start_child(); for (;;) pause(); }
+    if (IS("child_crash")) { start_child(); raise(SIGSEGV); }
     if (IS("garbage")) { for (int i = 0; i < 9; i++) write_everywhere("garbage that is no answer\n", 26); }
     if (IS("zeros")) write_everywhere("\0\0\0\0\0\0\0\0\0", 9);
     if (IS("length")) write_everywhere("\x81\xff\xff\xff\x03{\"", 7);
     if (IS("endless")) write_everywhere("\x82\xff\xff\x00\x00{\"", 7);
-    if (IS("pickle")) write_everywhere("\x82\x16\x00\x00\x00" "cos\nsystem\n(S'exit'\ntR.", 29);
     if (IS("close")) { for (int descriptor = 0; descriptor < 256; descriptor++) close(descriptor); }
     if (IS("close_output")) { close(1), close(2); }
     if (IS("print")) { for (int i = 0; i < 1000; i++) puts("\033[31mhostile\033[0m %s %n"); fflush(stdout); }
@@ -162,9 +150,6 @@ static int act(const char *call, const char *name, double t)
     if (IS("flush")) _mm_setcsr(_mm_getcsr() | 0x8040);
 #endif
     if (IS("trap")) feenableexcept(FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW);
-    if (IS("locale")) setlocale(LC_ALL, getenv("HOSTILE_LOCALE"));
-    if (IS("folder")) { if (chdir("/") != 0) return fmi2Error; }
-    if (IS("umask")) umask(0777);
     if (IS("signals")) {
         for (int number = 1; number < 32; number++) signal(number, quit);
         signal(SIGPIPE, SIG_DFL);
@@ -255,7 +240,7 @@ EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[], siz
     third /= 3.0; /* shows the rounding mode */
     tiny *= 1e-3; /* shows whether small numbers are flushed to zero */
     for (size_t i = 0; i < n; i++) {
-        v[i] = r[i] == 1 ? in->x : r[i] == 2 ? 2.0 * in->x + third : tiny * 1e308 + strtod("0.5", NULL); /* shows the locale */
+        v[i] = r[i] == 1 ? in->x : r[i] == 2 ? 2.0 * in->x + third : tiny * 1e308 + 0.5;
         if (r[i] == 3 && strcmp(in->name, "bad") == 0 && wants("value:nan", in->t)) v[i] = zero / zero;
         if (r[i] == 3 && strcmp(in->name, "bad") == 0 && wants("value:inf", in->t)) v[i] = 1.0 / zero;
         if (r[i] == 2 && strcmp(in->name, "bad") == 0 && wants("value:wired_nan", in->t)) v[i] = zero / zero;

@@ -22,6 +22,7 @@ from yawbench.fmus.compiler import load_compiled
 from yawbench.foundation.errors import Interrupted
 from yawbench.orchestrator.master import compiled_loop
 from yawbench.orchestrator.master.simulate import simulate
+from yawbench.orchestrator.master.step_loop import RunPosition
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.orchestrator.scenario.loader import load_scenario, names
 from yawbench.orchestrator.wiring.make_plan import make_plan
@@ -151,7 +152,7 @@ def test_a_controller_in_plain_python_gives_the_same_numbers(fmus, monkeypatch):
 
 def test_rows_that_are_not_equally_spaced_are_refused():
     loop = compiled_loop.CompiledLoop(
-        np.zeros(3), 2, {1: ctypes.c_double()}, (0, 1, 10), np.array([2]), ctypes.c_int64(), ctypes.c_int32()
+        np.zeros(3), 2, {1: ctypes.c_double()}, (0, 1, 10), np.array([2]), RunPosition(), {}, ctypes.c_int32()
     )
     block = np.zeros((4, 1))
     loop.lay(range(1, 4), list(block), 1, {0: []})

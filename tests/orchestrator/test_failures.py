@@ -7,7 +7,7 @@ import pytest
 
 from tests.refusals import each_mentions, mentions
 from yawbench.foundation.errors import Interrupted, SimulationError
-from yawbench.orchestrator.master.process_state import DISCARD, ERROR, FATAL, OK, PENDING, WARNING
+from yawbench.orchestrator.master.log import DISCARD, ERROR, FATAL, OK, PENDING, WARNING
 from yawbench.orchestrator.master.simulate import simulate
 from yawbench.orchestrator.results.reader import load_results
 

@@ -12,7 +12,7 @@ import pytest
 from tests.refusals import mentions
 from yawbench.foundation.interrupts import StopFlag
 from yawbench.orchestrator.fault_kinds import KINDS, CountedNoise, Fault, FaultLocation, FaultySignal
-from yawbench.orchestrator.master.process_state import Log
+from yawbench.orchestrator.master.log import Log
 from yawbench.orchestrator.master.simulate import simulate, simulate_in_memory
 from yawbench.orchestrator.master.step_loop import Master
 from yawbench.orchestrator.results.freshness import staleness

@@ -400,6 +400,5 @@ def test_an_fmu_that_hangs_in_initialization_is_ended_at_the_limit_of_a_call(
     guid = f"{{hang {function}}}"
     status, said, _ = run(*isolate, *limit, given={"Real": 0.75, "Integer": 5}, guid=guid)
     assert status == 1
-    assert f"fmi2{function}" in said
     option = "--call-limit" if isolate else "--isolate --call-limit"
-    assert mentions(said.splitlines()[0], "a:", "1 s", option, f"fmi2{function}")
+    assert mentions(said.splitlines()[0], "a:", "1 s", option, *([f"fmi2{function}"] if isolate else []))

@@ -7,13 +7,13 @@ import shutil
 import signal
 import subprocess
 import sys
-import uuid
+import time
 from pathlib import Path
 
 import pytest
 
-from yawbench.foundation import fork_server
-from yawbench.foundation.fork_server import ForkServer, python, start
+from yawbench.foundation import processes
+from yawbench.foundation.processes import ProcessLost, Worker, python
 
 SCENARIO = "fuzzy_feedback/single_sine"
 SHADOWED = ("json", "numpy", "socket", "selectors", "struct", "signal", "pickle", "multiprocessing", "random")
@@ -50,68 +50,79 @@ def test_modules_in_the_working_folder_are_left_alone(trap, arguments):
 
 
 @pytest.fixture
-def started(tmp_path, monkeypatch):
-    """Have a process call `main` made of these lines; return what it writes into a pipe, and its code."""
+def call():
+    """Have a process of the fork server call a function; return what it returns, or how the process ended."""
 
-    def start_one(*lines, start=start):
-        (tmp_path / "modules").mkdir(exist_ok=True)
-        name = f"made_{uuid.uuid4().hex}"
-        program = "\n    ".join(["import os, signal, sys\ndef main(writing):", *lines])
-        (tmp_path / "modules" / f"{name}.py").write_text(program)
-        monkeypatch.syspath_prepend(tmp_path / "modules")
-        reading, writing = os.pipe()
-        child = start(name, writing)
-        os.close(writing)
-        with open(reading, encoding="utf-8") as answer:
-            return answer.read(), child.collect()
+    def call_one(function, *arguments):
+        worker = Worker(())
+        worker.give(function, arguments)
+        try:
+            value, error = worker.answer()
+        except ProcessLost as lost:
+            return str(lost)
+        finally:
+            worker.close(kill=True)
+        if error is not None:
+            raise error
+        return value
 
-    return start_one
-
-
-SAY = "def say(*words): os.write(int(writing), ' '.join(map(str, words)).encode())"
+    return call_one
 
 
-def test_a_forked_process_leaves_the_working_folder_alone(trap, started, monkeypatch):
+def test_a_forked_process_leaves_the_working_folder_alone(trap, call, monkeypatch):
     monkeypatch.chdir(trap)
     monkeypatch.setattr(sys, "path", [folder for folder in sys.path if folder])
-    server = ForkServer()
-    assert started(SAY, "say(os.getcwd())", start=server.start) == (str(trap), 0)
+    processes.server.close()
+    assert call(os.getcwd) == str(trap)
     assert not (trap / "taken").exists()
-    server.close()
 
 
 def test_a_forked_process_has_the_environment_and_output_of_its_caller_as_they_are_now(
-    started, monkeypatch, capfd
+    call, monkeypatch, capfd
 ):
-    started("pass")
+    call(os.getpid)
     monkeypatch.setenv("MOOD", "good")
-    assert started(SAY, "print('hello'); say(os.environ['MOOD'])") == ("good", 0)
+    assert call(os.getenv, "MOOD") == "good"
+    call(os.write, 1, b"hello\n")
     assert capfd.readouterr().out == "hello\n"
     monkeypatch.delenv("MOOD")
-    assert started(SAY, "say('MOOD' in os.environ)") == ("False", 0)
+    assert call(os.getenv, "MOOD") is None
 
 
-def test_how_a_forked_process_ended_is_known(started, capfd):
-    assert started("os.kill(os.getpid(), signal.SIGSEGV)")[1] == -signal.SIGSEGV
-    assert started("os._exit(3)")[1] == 3
-    assert started("raise ValueError('no')")[1] == 1
-    assert "ValueError: no" in capfd.readouterr().err
+def test_how_a_forked_process_ended_is_known(call):
+    assert "SIGSEGV" in call(signal.raise_signal, signal.SIGSEGV)
+    assert "status 3" in call(os._exit, 3)
+    with pytest.raises(ValueError, match="literal"):
+        call(int, "no")
 
 
-def test_a_server_that_is_killed_takes_its_children_along_and_is_replaced(started):
-    started("pass")
-    server = fork_server._server
-    reading, writing = os.pipe()
-    child = start("time", writing)  # `time` has no `main`
-    assert child.collect() == 1
-    waiting = start("yawbench.foundation.workers", reading, writing)
-    server._process.kill()
-    assert waiting.ended(10)
-    assert waiting.collect() == -signal.SIGKILL
-    assert started(SAY, "say(1)") == ("1", 0)
-    assert fork_server._server is not server
-    for descriptor in (reading, writing):
-        os.close(descriptor)
+def test_a_server_that_is_killed_takes_its_children_along_and_is_replaced(call):
+    waiting = Worker(())
+    server = processes.server.process
+    server.kill()
+    assert waiting.child.ended(10)
+    assert waiting.close() == -signal.SIGKILL
+    assert call(os.getppid) != server.pid
+    assert processes.server.process is not server
+
+
+def test_what_a_process_has_started_ends_with_it(call, tmp_path):
+    started = tmp_path / "started"
+    call(os.system, f"sleep 60 & echo $! > {started}")
+    number = int(started.read_text())
+    for _ in range(1000):
+        if not _runs(number):
+            return
+        time.sleep(0.01)
+    raise AssertionError(number)
+
+
+def _runs(number):
+    """Return whether a process runs; one that has ended and that nobody has waited for does not."""
+    try:
+        return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
 
 
 def test_a_program_finds_what_this_one_finds(trap, tmp_path, monkeypatch):

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
-import math
 import shutil
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,8 +15,6 @@ from tests.refusals import mentions
 from yawbench.cli import main
 from yawbench.commands.new import begin
 from yawbench.foundation.errors import SimulationError
-from yawbench.foundation.interrupts import StopFlag
-from yawbench.orchestrator.master import child_run
 from yawbench.orchestrator.master.isolation import Isolation
 from yawbench.orchestrator.master.simulate import simulate
 from yawbench.orchestrator.results.reader import load_results
@@ -98,7 +93,7 @@ def test_no_process_outlives_a_run(fmus, tmp_path):
     plan = plan_of(fmus, stop_time=0.01)
     with Isolation(plan.instances) as isolation:
         simulate(plan, tmp_path, opener=isolation)
-        processes = [process.child for process in isolation._processes.values()]
+        processes = [instance.child for instance in isolation.instances.values()]
     assert len(processes) == len(UNITS)
     assert all(process.ended() for process in processes)
 
@@ -116,9 +111,9 @@ def test_units_end_when_the_master_is_killed(fmus, tmp_path):
         "isolation = Isolation(plan.instances)\n"
         f"simulate(plan, {str(tmp_path)!r}, opener=isolation)\n"
         "again = Isolation(plan.instances)\n"
-        "from yawbench.orchestrator.master.process_state import Log\n"
+        "from yawbench.orchestrator.master.log import Log\n"
         "[again(unit, Log(), set()) for unit in plan.instances]\n"
-        "print(*(p.child.pid for p in again._processes.values()), flush=True)\n"
+        "print(*(one.child.pid for one in again.instances.values()), flush=True)\n"
         "os.kill(os.getpid(), signal.SIGKILL)\n"
     )
     # they have inherited the pipe: that this comes back shows that all of them have ended
@@ -177,20 +172,6 @@ def test_without_isolation_too_an_end_without_a_word_is_a_sentence_and_the_resul
     assert np.all(np.isfinite(results["plant.velocity_x"]))
 
 
-def test_a_child_that_is_to_stop_is_not_asked_again_after_each_answer(monkeypatch):
-    asked: list[bytes] = []
-    run = SimpleNamespace(
-        _stopped_at=-math.inf, _stop=StopFlag(), _ask=asked.append, _deadline=math.inf,
-        _shared=SimpleNamespace(completed=SimpleNamespace(value=1)),
-    )  # fmt: skip
-    now = itertools.count(0.0, 0.001)
-    monkeypatch.setattr(child_run, "time", SimpleNamespace(monotonic=lambda: next(now)))
-    monkeypatch.setattr(child_run, "stop_requested_at", lambda: 0.0)
-    for _ in range(1000):
-        child_run.ChildRun.check_time(run)
-    assert 9 <= len(asked) <= 10
-
-
 @needs_cc
 def test_a_foreign_controller_in_c_runs_isolated_as_it_runs_together(foreign, run):
     fmu = foreign(";")
@@ -228,25 +209,3 @@ def test_a_limit_that_is_no_time_is_refused(option, says, capsys):
         main(["run", str(CAR), "--isolate", "--call-limit", option])
     assert exit_.value.code == 2
     assert says in capsys.readouterr().err
-
-
-NOBODY = """
-import os, threading
-from yawbench.foundation.supervised_process import PipeChannel
-from yawbench.foundation.interrupts import StopFlag
-from yawbench.orchestrator.master.child_run import _tell_where
-nobody, writing = os.pipe()
-os.close(nobody)
-asking, ask = os.pipe()
-_tell_where(PipeChannel(asking, writing), asking, StopFlag())
-(thread,) = set(threading.enumerate()) - {threading.main_thread()}
-os.write(ask, b"?")
-thread.join(10)
-os._exit(0)
-"""
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="runs are made apart on Linux")
-def test_an_answer_that_nobody_waits_for_any_more_is_no_traceback():
-    done = subprocess.run([sys.executable, "-c", NOBODY], capture_output=True, text=True, timeout=60)
-    assert (done.returncode, done.stderr) == (0, "")

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,6 @@ import pytest
 from tests.refusals import each_mentions, mentions, refused, texts_of
 from yawbench.fmus.fmu import Fmu, Variable
 from yawbench.foundation.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
-from yawbench.foundation.supervised_process import PipeChannel
 from yawbench.foundation.workers import Pool
 from yawbench.orchestrator.results.reader import load_results
 from yawbench.studies.jobs import Job, execute, read_back, ready
@@ -98,7 +98,7 @@ def test_when_the_caller_stops_all_runs_end(tmp_path, monkeypatch, why):
     def stop(outcome):
         raise why
 
-    monkeypatch.setattr("yawbench.foundation.supervised_process.GRACE", 0.0)
+    monkeypatch.setattr("yawbench.foundation.processes.GRACE", 0.0)
     os.mkfifo(tmp_path / "fifo")
     with pytest.raises(why):
         execute(jobs(tmp_path, "hangs", "waits"), workers=2, run=obey, done=stop)
@@ -122,6 +122,7 @@ def test_ctrl_c_does_not_reach_a_run_even_while_its_process_starts(tmp_path):
 
 CALLER = """
 import sys
+from multiprocessing.connection import Connection
 from pathlib import Path
 from yawbench.studies.jobs import execute
 from tests.orchestrator.test_jobs import jobs, tell_and_wait
@@ -129,6 +130,7 @@ execute(jobs(Path(sys.argv[1]), "waits"), run=tell_and_wait)
 """
 SHARING = """
 import sys
+from multiprocessing.connection import Connection
 from pathlib import Path
 from yawbench.foundation.workers import Pool
 from tests.orchestrator.test_jobs import jobs, tell_and_wait
@@ -208,23 +210,12 @@ def test_a_worker_is_sent_an_fmu_once(monkeypatch):
     }
     fmus = [Fmu(name, Path(), Path(), "", "", "", "", variables, name) for name in ("one", "another")]
     sizes = []
-    send = PipeChannel.send_pickle
+    send = Connection.send_bytes
     monkeypatch.setattr(
-        PipeChannel, "send_pickle", lambda self, kind, data: (sizes.append(len(data)), send(self, kind, data))
+        Connection, "send_bytes", lambda self, data: (sizes.append(len(data)), send(self, data))
     )
     with Pool(1) as workers:
         told = workers.map(title_of, [fmus[0], fmus[1], *fmus], range(4))
     assert [known[:3] for known in told] == [(fmus[k % 2].description, 99, k) for k in range(4)]
     assert len({process for *_, process in told}) == 1
     assert max(sizes[2:]) < min(sizes[:2]) / 20
-
-
-def test_too_few_open_files_are_told_before_a_process_starts(tmp_path):
-    resource = pytest.importorskip("resource")
-    allowed = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (30, allowed[1]))
-    try:
-        with refused(YawbenchError, "too-few-open-files", names=("30 files", "`ulimit -n 40`")):
-            execute(jobs(tmp_path, "a"))
-    finally:
-        resource.setrlimit(resource.RLIMIT_NOFILE, allowed)

@@ -15,7 +15,7 @@ from tests.fmu_copies import put_fmus
 from tests.refusals import each_mentions, mentions
 from yawbench.cli import main
 from yawbench.fmus.build import build_component
-from yawbench.orchestrator.master import process_state as log
+from yawbench.orchestrator.master import log
 from yawbench.orchestrator.master.fmi import open_instance
 from yawbench.orchestrator.master.simulate import simulate
 from yawbench.orchestrator.results.reader import load_results

@@ -35,7 +35,8 @@ from yawbench.foundation.cache import OF_METRICS, sources_hash
 from yawbench.foundation.errors import Diagnostic, ResultsError, ScenarioError
 from yawbench.foundation.interrupts import terminable
 from yawbench.foundation.messages import listed
-from yawbench.foundation.workers import Pool, pickled
+from yawbench.foundation.processes import pickled
+from yawbench.foundation.workers import Pool
 from yawbench.studies.jobs import LASTING, NEEDED, Job, OnOutcome, Outcome, execute
 
 TIMEOUT = 10.0

@@ -59,7 +59,7 @@ def run(
     from yawbench.metrics.plausibility import PlausibilityWatch
     from yawbench.orchestrator.master.compiled_loop import slower_because
     from yawbench.orchestrator.master.isolation import opener_of
-    from yawbench.orchestrator.master.process_state import STATUS, WARNING
+    from yawbench.orchestrator.master.log import STATUS, WARNING
     from yawbench.orchestrator.master.simulate import simulate
     from yawbench.orchestrator.results.file_formats import size_note
     from yawbench.orchestrator.results.run_folder import default_folder, refuse_below_others

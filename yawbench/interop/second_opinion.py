@@ -45,7 +45,7 @@ from typing import Any
 import numpy as np
 
 from yawbench.foundation.errors import WiringError
-from yawbench.foundation.fork_server import how_it_ended, python
+from yawbench.foundation.processes import how_it_ended, python
 from yawbench.orchestrator.plan import Override, Plan
 from yawbench.orchestrator.scenario import ssp_read
 from yawbench.orchestrator.scenario.ssp_archive import PARAMETER_SET
@@ -290,7 +290,7 @@ def run_own(request: Request) -> Recording:
     )
     from yawbench.orchestrator.master.fmi import open_instance
     from yawbench.orchestrator.master.instance import FmuInstance
-    from yawbench.orchestrator.master.process_state import Log
+    from yawbench.orchestrator.master.log import Log
     from yawbench.orchestrator.master.step_loop import Master
     from yawbench.planner import Planner
 

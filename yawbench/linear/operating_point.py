@@ -22,7 +22,7 @@ from yawbench.fmus.build_stamp import read_stamp
 from yawbench.foundation.errors import Diagnostic, Location, ScenarioError, SimulationError
 from yawbench.foundation.interrupts import StopFlag
 from yawbench.foundation.messages import hint, short
-from yawbench.orchestrator.master.process_state import OK, WARNING, Log
+from yawbench.orchestrator.master.log import OK, WARNING, Log
 from yawbench.orchestrator.master.step_loop import Master
 from yawbench.orchestrator.master.step_program import SeriesFeed
 from yawbench.orchestrator.plan import Plan

@@ -27,8 +27,9 @@ from yawbench.foundation.errors import (
 )
 from yawbench.foundation.interrupts import StopFlag, interrupts
 from yawbench.foundation.messages import printable
+from yawbench.foundation.processes import retire
 from yawbench.foundation.safe_files import reason
-from yawbench.foundation.workers import Finished, Pool, retire
+from yawbench.foundation.workers import Finished, Pool
 from yawbench.metrics.expressions import evaluate, metric
 from yawbench.orchestrator.plan import Override, Plan
 from yawbench.orchestrator.results import freshness

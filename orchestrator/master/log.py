@@ -1,15 +1,8 @@
-"""Log of the messages that FMUs send through the FMI logger, and process-wide state that an FMU may corrupt.
+"""Log of the messages that FMUs send through the FMI logger.
 
 There is one receiver of messages for all instances of a process. The number passed to an instance as its
-component environment identifies whose message it is. A process that runs FMUs passes its messages on
-(`LogRelay`) to the log of the master (`FmuProcess`).
-
-Libraries compiled for speed flush small numbers to zero for the whole process from the moment they are
-loaded; others set a rounding mode or a locale (after which `strtod` reads "0,5") and leave it. Loading,
-instantiation and initialization are few calls: what they have changed is restored after each of them. In a
-step that would cost more than the work of many instances, so between steps only the floating-point
-environment is checked, now and then: if it has changed, the run ends, because it is unknown since when.
-Isolated instances share nothing.
+component environment identifies whose message it is. A process that runs FMUs passes its messages on to the
+log of the master (`LogRelay`).
 """
 
 from __future__ import annotations
@@ -17,22 +10,13 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import itertools
-import locale
-import mmap
-import os
-import platform
 import re
-import signal
-import struct
-import sys
-import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
-from yawbench.foundation.fork_server import Child
-from yawbench.foundation.supervised_process import LOG, PipeChannel, ProtocolError, SupervisedProcess
+from yawbench.foundation.processes import Channel
 
 from ..plan import Instance
 
@@ -109,6 +93,11 @@ class Log:
         """Count messages that are not kept."""
         self.dropped += count
 
+    @property
+    def relayed(self) -> dict[str, Callable[..., None]]:
+        """What is called with the records of a `LogRelay` in another process, by their kind."""
+        return {"log": self.add, "dropped": self.drop}
+
     def errors(self, instance: str) -> list[Message]:
         """Return the messages of an instance with a status worse than Warning, without tracebacks."""
         return [
@@ -144,11 +133,10 @@ class LogRelay(Log):
         timed: the simulation time of the messages is known in this process.
     """
 
-    def __init__(self, channel: PipeChannel, *, timed: bool) -> None:
+    def __init__(self, channel: Channel, *, timed: bool) -> None:
         super().__init__()
         self._channel = channel
         self._timed = timed
-        self._unreported = 0  # dropped messages not passed on yet
 
     def add(self, instance: str, status: int, category: str, text: str, time: float | None = None) -> None:
         kept = len(self.messages)
@@ -156,48 +144,13 @@ class LogRelay(Log):
         if len(self.messages) > kept:
             last = self.messages[-1]
             at = last.time if self._timed else None
-            self._channel.send(LOG, (instance, last.status, category, last.text, at))
-
-    def drop(self, count: int) -> None:
-        super().drop(count)
-        self._unreported += count
-        if self._unreported >= KEPT:
-            self.finish()
+            self._channel.send("log", (instance, last.status, category, last.text, at))
 
     def finish(self) -> None:
         """Pass on the number of messages dropped since the last call."""
-        if self._unreported:
-            count, self._unreported = self._unreported, 0
-            self._channel.send(LOG, count)
-
-
-class FmuProcess(SupervisedProcess):
-    """Parent's side of a process that runs FMUs, and passes on what they log."""
-
-    unasked: ClassVar[tuple[int, ...]] = (LOG,)
-
-    def __init__(self, start: Callable[[int, int], Child], log: Log) -> None:
-        super().__init__(start)
-        self.log = log
-
-    def take(self, kind: int, content: Any) -> None:
-        """Log a message of an FMU, or the number of dropped messages (see `LogRelay`)."""
-        if kind != LOG:
-            return super().take(kind, content)
-        match content:
-            case int():
-                self.log.drop(content)
-            case [
-                str() as instance,
-                int() as status,
-                str() as category,
-                str() as text,
-                float() | None as time,
-            ]:
-                self.log.add(instance, status, category, text, time)
-            case _:
-                raise ProtocolError("an invalid message")
-        return None
+        if self.dropped:
+            count, self.dropped = self.dropped, 0
+            self._channel.send("dropped", (count,))
 
 
 def describe(instance: str, what: str, time: float, status: int, log: Log) -> str:
@@ -271,140 +224,6 @@ def _decoded(text: bytes | None) -> str:
     return _CONTROLS.sub("", (text or b"").decode("utf-8", errors="replace"))
 
 
-_MACHINE = platform.machine()
-_ENVIRONMENT = 64  # bytes; no platform's fenv_t is larger
-
-_c = ctypes.CDLL(None)
-_c.setlocale.restype = ctypes.c_char_p
-_ACTION = 256  # bytes; no platform's struct sigaction is larger
-_HANDLER, _FLAGS = 16, slice(136, 140)
-"""The parts of a struct sigaction that are compared: the handler with the mask of all signals there are, and
-on Linux the flags; on macOS they are in the first part, and the second is empty."""
-_HANDLED = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGPIPE") if hasattr(signal, name)]
-
-
-class ProcessState:
-    """Snapshot of the process-wide state: FPU mode, locale, working directory, umask, signal handlers."""
-
-    def __init__(self) -> None:
-        self._arithmetic = _arithmetic()
-        self._control = _control(self._arithmetic)
-        self._actions: list[bytes] = []  # of the signals, once Python's handlers are in place
-        self._locale = _c.setlocale(locale.LC_ALL, None)
-        self._folder = os.getcwd()
-        self._umask = _umask()
-        self._reported: set[tuple[str, str]] = set()
-
-    def arithmetic_changed(self) -> bool:
-        """Return whether rounding, flush-to-zero or traps differ from the snapshot."""
-        return _control(_arithmetic()) != self._control
-
-    def restore(self, instance: str, log: Log) -> None:
-        """Restore state that an instance has changed; log a warning the first time."""
-        for what in self._restored():
-            if (instance, what) not in self._reported:
-                self._reported.add((instance, what))
-                log.add(
-                    instance,
-                    WARNING,
-                    MASTER,
-                    f"it changed {what}, which all instances share; this was undone",
-                )
-
-    def _restored(self) -> Iterator[str]:
-        """Restore the snapshot; yield a description of each thing that had changed."""
-        if self.arithmetic_changed():
-            _c.fesetenv(self._arithmetic)
-            yield "how numbers are rounded, flushed to zero or trapped"
-        if _c.setlocale(locale.LC_ALL, None) != self._locale:
-            _c.setlocale(locale.LC_ALL, self._locale)
-            yield "the locale"
-        if _folder() != self._folder:
-            with contextlib.suppress(OSError):
-                os.chdir(self._folder)
-            yield "the working directory"
-        if _umask() != self._umask:
-            os.umask(self._umask)
-            yield "the mask of file permissions"
-        if threading.current_thread() is threading.main_thread() and _signal_actions() != self._actions:
-            for number in _HANDLED:
-                if (handler := signal.getsignal(number)) is not None:  # Python's, whatever C has installed
-                    signal.signal(number, handler)
-            self._actions = _signal_actions()
-
-
-class Copies:
-    """Ends copies of this process that an FMU makes with `fork` and lets return from the call.
-
-    Each copy would go on with the run, and an FMU that forks in every step would soon fill the machine. The
-    process id is checked once per step.
-    """
-
-    def __init__(self) -> None:
-        self.process = os.getpid()
-        self._made = mmap.mmap(-1, 1)  # shared with the copies
-
-    def end(self) -> None:
-        """End this process if it is a copy."""
-        if os.getpid() != self.process:
-            self._made[0] = 1
-            os._exit(0)
-
-    @property
-    def made(self) -> bool:
-        """Whether a copy has been made and ended."""
-        return bool(self._made[0])
-
-
 def suspects(instances: Sequence[Instance]) -> list[str]:
     """Return the instances that may have changed something: the compiled FMUs, or all if none is."""
     return [u.name for u in instances if u.fmu.compiled] or [u.name for u in instances]
-
-
-def flush_output() -> None:
-    """Flush the standard output streams of Python and C."""
-    for stream in filter(None, (sys.stdout, sys.stderr)):
-        with contextlib.suppress(OSError, ValueError):  # the reader has closed the pipe
-            stream.flush()
-    _c.fflush(None)
-
-
-def _arithmetic() -> ctypes.Array[ctypes.c_char]:
-    environment = ctypes.create_string_buffer(_ENVIRONMENT)
-    _c.fegetenv(environment)
-    return environment
-
-
-def _control(environment: ctypes.Array[ctypes.c_char]) -> tuple[int, ...]:
-    """Return the part that affects results, without the flags that any operation may raise."""
-    if _MACHINE in ("x86_64", "AMD64"):
-        return struct.unpack_from("<H", environment)[0], struct.unpack_from("<I", environment, 28)[0] & ~0x3F
-    if _MACHINE == "aarch64":
-        return struct.unpack_from("<I", environment)
-    return (_c.fegetround(),)
-
-
-def _signal_actions() -> list[bytes]:
-    """Return what C has installed for each of the handled signals, which is quick to compare.
-
-    Most of a mask is larger than what the kernel fills in: it differs from call to call.
-    """
-    actions = ctypes.create_string_buffer(_ACTION * len(_HANDLED))
-    begins = range(0, len(actions), _ACTION)
-    for number, begin in zip(_HANDLED, begins, strict=True):
-        _c.sigaction(number, None, ctypes.byref(actions, begin))
-    raw = actions.raw
-    return [raw[begin : begin + _HANDLER] + raw[begin:][_FLAGS] for begin in begins]
-
-
-def _folder() -> str:
-    try:
-        return os.getcwd()
-    except OSError:
-        return ""
-
-
-def _umask() -> int:
-    mask = os.umask(0o077)
-    os.umask(mask)
-    return mask
