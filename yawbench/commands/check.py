@@ -263,7 +263,7 @@ def _shown(value: Value | None, measure: str | None) -> str:
 
 def _wire_rows(plan: Plan) -> Iterable[tuple[str, str, str, str]]:
     """Yield source, target, the control side's view of the source (truth, measured, estimated), variables."""
-    from yawbench.orchestrator.wiring.suspicious_values import seen_as
+    from yawbench.orchestrator.wiring.control_side import seen_as
 
     instances = {instance.name: instance.fmu.variables for instance in plan.instances}
     for (source, target), wires in _grouped(((w.source, w.target), w) for w in plan.wires).items():
