@@ -37,11 +37,12 @@ from typing import Any
 from yawbench.foundation.cache import STORES, cache_folders, content_of, delete_unused, hold
 from yawbench.foundation.errors import ModelDescriptionError
 from yawbench.foundation.messages import closest, listed, short
-from yawbench.foundation.safe_files import PACKED, ArchiveError, TooLargeError, members, read_bytes, reason
+from yawbench.foundation.safe_files import PACKED, read_bytes, reason
 
 from . import description as fmu_description
 from .description import binary_of, platform
 from .fmu import Fmu, RunsAs
+from .zip_members import ArchiveError, members
 
 FORMAT = 12
 """Format version of cache entries; part of their names, so versions of this program can share a cache."""
@@ -199,8 +200,6 @@ def _files(raw: bytes, path: Path) -> dict[str, bytes]:
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
             contents = {name: archive.read(info) for name, info in members(archive).items()}
     except ArchiveError as error:
-        raise ModelDescriptionError(f"{path}: {error}", code="fmu-damaged") from None
-    except TooLargeError as error:
         raise ModelDescriptionError(f"{path}: cannot read this FMU: {error}", code="fmu-damaged") from None
     except _DAMAGE as error:
         if raw[:2] != b"PK":
