@@ -15,12 +15,11 @@ import select
 import signal
 import time
 import traceback
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import fields
 from typing import Any, NamedTuple
 
-from .errors import RecordWarning, YawbenchError, hide_library_warnings
+from .errors import YawbenchError, hide_library_warnings
 from .fork_server import ServedChild, start
 from .sent_once import SentOnce
 from .supervised_process import LOOK_EVERY, REPLY, REQUEST, PipeChannel, ProcessLost, SupervisedProcess
@@ -252,7 +251,6 @@ def retire() -> None:
 
 def main(reading: str, writing: str) -> None:
     """Execute calls until the pipe is closed."""
-    warnings.filterwarnings("ignore", category=RecordWarning)  # the parent warns
     hide_library_warnings()
     channel = PipeChannel(int(reading), int(writing))
     while channel.hear() is not None:

@@ -20,12 +20,11 @@ from typing import Any, cast
 
 from yawbench.fmus.archive import runs_as
 from yawbench.fmus.fmu import Fmu, Variable
-from yawbench.foundation.cache import OF_RESULTS, checksum, sources_hash
+from yawbench.foundation.cache import OF_RESULTS, sources_hash
 from yawbench.foundation.errors import ResultsError
 
 from ..plan import DEFAULT, InputSeries, Instance, Plan, ValueSource, Wire
 from ..signal_names import SignalName
-from .reader import load_results
 from .run_folder import RUN_FILE, RunStatus, is_dead
 from .run_record import (
     ConnectionRecord,
@@ -262,10 +261,7 @@ _OF_UNIT = {
 
 
 def staleness(plan: Plan, folder: Path) -> str | None:
-    """Return why the results in a folder are not those of the plan; None if their keys are equal.
-
-    Results without checksums, such as those of earlier versions, always count as out of date.
-    """
+    """Return why the results in a folder are not those of the plan; None if their keys are equal."""
     if not (folder / RUN_FILE).is_file():
         return "no results yet"
     try:
@@ -277,27 +273,9 @@ def staleness(plan: Plan, folder: Path) -> str | None:
     results = folder / recorded.results
     if not results.is_file():
         return "the results are missing"
-    if not _whole(results, recorded):
+    if results.stat().st_size != recorded.size:
         return "the results were changed or cut off"
-    if recorded.key != key_of(plan):
-        return _reason(plan, recorded)
-    if recorded.units != units_of(plan):
-        return "the units of its record are not those of the FMUs"
-    return None if recorded.has_checksums else "the record has no checksums"
-
-
-def altered(folder: Path) -> str:
-    """Return a sentence on changes in a folder since its run wrote it, "" if there are none."""
-    if not (folder / RUN_FILE).is_file() or is_dead(folder):
-        return ""
-    try:
-        recorded = load_record(folder)
-        results = folder / recorded.results
-        if results.is_file() and not _whole(results, recorded):
-            return f"{results}: was changed or truncated"
-    except ResultsError as error:
-        return str(error)
-    return "" if recorded.has_checksums else f"{folder / RUN_FILE}: has no checksums"
+    return None if recorded.key == key_of(plan) else _reason(plan, recorded)
 
 
 def _reason(plan: Plan, recorded: RunRecord) -> str:
@@ -318,13 +296,3 @@ def _reason(plan: Plan, recorded: RunRecord) -> str:
         if version != earlier:
             return f"{program} {version} in place of {earlier}"
     return "its record is of an earlier version"
-
-
-def _whole(results: Path, recorded: RunRecord) -> bool:
-    """Return whether a results file is unchanged since its run wrote it."""
-    try:
-        if recorded.checksum:
-            return recorded.checksum == checksum(results)
-        return load_results(results.parent).time.size >= recorded.rows
-    except (OSError, ResultsError):
-        return False

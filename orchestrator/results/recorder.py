@@ -11,17 +11,14 @@ from __future__ import annotations
 import contextlib
 import csv
 import errno
-import hashlib
 import io
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from yawbench.fmus.fmu import Value
-from yawbench.foundation.cache import checksum, shown
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.safe_files import reason, write_whole
 
@@ -125,14 +122,15 @@ class Recorder(RowBlock):
         self._lock = FolderLock(folder)
         try:
             tidy(self._home)
-            self._file = self._path.open("xb", buffering=0)  # "x": does not follow a link of that name
+            # "x" does not follow a link of that name; a file that something truncates stays shorter
+            append = lambda name, flags: os.open(name, flags | os.O_APPEND, 0o666)  # noqa: E731
+            self._file = open(self._path, "xb", buffering=0, opener=append)  # noqa: SIM115
         except OSError as error:
             self._lock.release()
             raise ResultsError(
                 f"{folder}: results cannot be written here: {reason(error)}.", code="results-unwritable"
             ) from None
         self._size = 0
-        self._digest: Any = hashlib.sha256()  # None once rows have been cut off
         try:
             self._begin()
         except ResultsError:
@@ -176,15 +174,12 @@ class Recorder(RowBlock):
                 f"{self.folder / self.file}: cannot be written: {reason(error)}.", code="results-unwritable"
             ) from None
         self._size += len(data)
-        if self._digest is not None:
-            self._digest.update(data)
 
     def _cut_back(self, arrived: bytes) -> None:
         """Keep the whole rows of a block that did not fit on the disk."""
         whole = arrived.rfind(b"\n") + 1
         self.written += arrived[:whole].count(b"\n") if self._size else 0
         self._size += whole
-        self._digest = None
         with contextlib.suppress(OSError):
             self._file.truncate(self._size)
 
@@ -225,13 +220,14 @@ class Recorder(RowBlock):
             raise ResultsError(f"{self.written_to / self.file}: {lost}.", code="results-unwritable")
 
     def _refuse_altered(self) -> None:
-        """Check that the file has the bytes that were written to it, and under its name.
+        """Check that the file is still there with all that was written to it.
 
         Raises:
             ResultsError: something else has removed, replaced or changed it.
         """
         try:
-            whole = self._path.stat().st_size == self._size and self._checksum() == checksum(self._path)
+            there = self._path.stat()
+            whole = os.path.samestat(there, os.fstat(self._file.fileno())) and there.st_size == self._size
         except FileNotFoundError:
             whole = False
         if not whole:
@@ -256,12 +252,9 @@ class Recorder(RowBlock):
     def _complete(self, record: RunRecord) -> None:
         """Write the end of the file, if the format has one."""
 
-    def _checksum(self) -> str:
-        return checksum(self._path) if self._digest is None else shown(self._digest)
-
     def _write_record(self, record: RunRecord) -> None:
         """Complete a run record with what only the recorder knows, and write it."""
-        record.rows, record.checksum = self.written, self._checksum()
+        record.rows, record.size = self.written, self._size
         if record.results != self.file:
             record.results = self.file
         record.smallest, record.largest = self.extremes()
@@ -283,7 +276,6 @@ class Recorder(RowBlock):
         whole = lost.find(b"\n") + 1
         self.written -= lost[whole:].count(b"\n")
         self._size = size + whole
-        self._digest = None
         self._file.truncate(self._size)
         return True
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from yawbench.foundation.cache import KEY, checksum
 from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.safe_files import open_own, reason, write_whole
 
@@ -56,10 +55,10 @@ def salvage(folder: Path) -> tuple[Path, int]:
             ended = {
                 "status": RunStatus.DIED.value,
                 "rows": rows,
-                "checksum": checksum(path),
+                "size": path.stat().st_size,
                 "error": {"message": WHY},
             }
-            known = {name: value for name, value in record.items() if name not in ("results", KEY)}
+            known = {name: value for name, value in record.items() if name != "results"}
             part = folder / f"{RUN_FILE}{PART}"
             write_whole(part, check_record(known | ended, part).to_json())
             return put_in_place(folder), rows

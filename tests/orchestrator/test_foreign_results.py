@@ -554,7 +554,6 @@ def test_a_page_of_foreign_results_loads_nothing_and_runs_no_script_of_theirs(wo
     scenario = {"title": evil, "source": evil, "file": evil, "parameters": {evil: evil}}
     theirs = {**good, "title": evil, "scenario": scenario, "versions": {evil: evil}, "notes": [evil]}
     theirs["fmus"] = {evil: good["fmus"]["plant"], "plant": {**good["fmus"]["plant"], "name": evil}}
-    del theirs["checksums"]
     (work / "theirs" / "run.json").write_text(json.dumps(theirs))
     (work / "study.yaml").write_text(
         "title: Theirs\nruns: [{name: theirs, scenario: no.yaml}, {name: good, scenario: no.yaml}]\n"

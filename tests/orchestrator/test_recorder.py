@@ -267,12 +267,6 @@ def _replaced(file):
     file.write_bytes(content)
 
 
-def _overwritten(file):
-    with file.open("r+b") as stream:
-        stream.seek(20)
-        stream.write(b"7")
-
-
 def _lengthened(file):
     with file.open("ab") as stream:
         stream.write(b"1.0,2.0\n" * 20 * BLOCK)
@@ -280,11 +274,11 @@ def _lengthened(file):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="open files cannot be removed")
 @pytest.mark.parametrize("format", ["csv", "parquet", "mf4"])
-@pytest.mark.parametrize("change", [os.unlink, _truncated, _replaced, _overwritten, _lengthened])
+@pytest.mark.parametrize("change", [os.unlink, _truncated, _replaced, _lengthened])
 def test_a_file_of_results_that_something_else_changes_during_the_run_fails_it(
     format, change, tmp_path, monkeypatch
 ):
-    if format != "csv" and change in (_truncated, _overwritten):
+    if format != "csv" and change is _truncated:
         pytest.skip("the file is empty until the end")
     monkeypatch.setattr(recorder_of("parquet"), "CHUNK", BLOCK)
     file = tmp_path / f"{file_formats.FILES[format]}.part"
@@ -388,4 +382,4 @@ def test_every_key_that_a_run_writes_is_a_field_of_its_record(tmp_path):
     assert foreign(record) == set()
     assert written.keys() <= RunRecord.model_fields.keys()
     assert record.fmus["a"].name
-    assert json.loads(record.to_json()) == written  # its checksums are those of what stands there
+    assert json.loads(record.to_json()) == written
