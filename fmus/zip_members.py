@@ -6,7 +6,7 @@ import zipfile
 from collections.abc import Iterable
 from pathlib import PurePosixPath
 
-from yawbench.foundation.safe_files import size_in_words
+from yawbench.foundation.messages import in_bytes
 
 UNPACKED = 1_000_000_000
 """Bytes of all members of an archive, unpacked. Chosen: larger than all FMUs known to us."""
@@ -25,7 +25,7 @@ def members(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
     """
     size = sum(info.file_size for info in archive.infolist())
     if size > UNPACKED:
-        raise ArchiveError(f"unpacked it has {size_in_words(size)}, more than {size_in_words(UNPACKED)}")
+        raise ArchiveError(f"unpacked it has {in_bytes(size)}, more than {in_bytes(UNPACKED)}")
     files: dict[str, zipfile.ZipInfo] = {}
     for info in archive.infolist():
         name = info.filename.replace("\\", "/")

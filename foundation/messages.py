@@ -100,6 +100,13 @@ def counted(number: int, noun: str, several: str = "") -> str:
     return f"{number} {noun if number == 1 else several or f'{noun}s'}"
 
 
+def in_bytes(size: float) -> str:
+    """Return a number of bytes in words: "1.5 GB", "20 MB", "3 kB"."""
+    if size >= 1e9:
+        return f"{size / 1e9:.1f} GB"
+    return f"{size / 1e6:.0f} MB" if size >= 1e6 else f"{size / 1e3:.0f} kB"
+
+
 RESOLVED, FINEST = 3, 6
 """Digits after the first one of the distance of numbers in a range, and of the smallest of them up to so many
 decimals. Chosen: both read as exact to a thousandth, and no rounding is shown."""

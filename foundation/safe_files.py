@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import BinaryIO, Concatenate, ParamSpec, TypeVar
 
 from .errors import YawbenchError
+from .messages import in_bytes
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -89,13 +90,8 @@ def read_bytes(path: Path, *, largest: int, follow: bool = True) -> bytes:
     with open_regular(path, follow=follow) as stream:
         size = os.fstat(stream.fileno()).st_size
         if size > largest:
-            raise ValueError(f"it is larger than {size_in_words(largest)}")
+            raise ValueError(f"it is larger than {in_bytes(largest)}")
         return stream.read(size)  # allocates that much even for a short file, so not `largest`
-
-
-def size_in_words(size: int) -> str:
-    """Return a number of bytes: "1.5 GB", "20 MB"."""
-    return f"{size / 1e9:.3g} GB" if size >= 1e9 else f"{size / 1e6:.3g} MB"
 
 
 @contextlib.contextmanager

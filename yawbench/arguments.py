@@ -117,9 +117,11 @@ def items(value: Any, name: str, wanted: str, *, ordered: bool = True) -> list[A
         wanted: description of valid arguments, for messages.
         ordered: whether to refuse sets, too, as their order is arbitrary.
     """
-    unordered = (set, frozenset) if ordered else ()
-    is_single = isinstance(value, (str, bytes, Mapping, *unordered)) or np.shape(value) == ()
-    return list(value) if isinstance(value, Iterable) and not is_single else refuse(name, wanted, value)
+    unfit = (str, bytes, bytearray, memoryview, Mapping, *((set, frozenset) if ordered else ()))
+    is_single = isinstance(value, np.ndarray) and value.shape == ()
+    if isinstance(value, unfit) or is_single or not isinstance(value, Iterable):
+        refuse(name, wanted, value)
+    return list(value)
 
 
 def texts(value: Any, name: str, *, ordered: bool = True) -> list[str]:
@@ -172,7 +174,8 @@ def as_scenario_errors(origin: str = "") -> Iterator[None]:
 
 def plain(value: Any) -> Any:
     """Return a NumPy scalar or a 0-d array as plain Python, anything else unchanged."""
-    return value.item() if isinstance(value, (np.generic, np.ndarray)) and value.shape == () else value
+    is_single = isinstance(value, (np.generic, np.ndarray)) and value.shape == ()
+    return value.item() if is_single and value.dtype.kind in "biufU" else value  # no dates
 
 
 def refuse(name: str, wanted: str, value: object) -> NoReturn:

@@ -296,12 +296,12 @@ def load_results(
     return Results(folder, time, dict(zip(columns, values, strict=True)), empty.units, record)
 
 
-def source_of(path: Path, texts: Sequence[str] | None = None) -> ResultsSource:
+def source_of(path: Path, texts: Sequence[str]) -> ResultsSource:
     """Open a results file for reading.
 
     Args:
         path: path of the file; its name determines the format.
-        texts: columns that hold text, for formats that do not record it; None: guess from the first row.
+        texts: columns that hold text, for formats that do not record it.
 
     Raises:
         OSError, ValueError: it is not a file that a run writes.

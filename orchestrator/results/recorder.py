@@ -23,8 +23,9 @@ from yawbench.foundation.errors import ResultsError
 from yawbench.foundation.safe_files import reason, write_whole
 
 from .file_formats import FORMATS, RESULTS_FILE, check_format, load_class, plain, rows_text
+from .folder_lock import FolderLock
 from .reader import Results
-from .run_folder import PART, RUN_FILE, FolderLock, RunStatus, put_in_place, tidy
+from .run_folder import PART, RUN_FILE, RunStatus, put_in_place, tidy
 from .run_record import ErrorRecord, RunRecord
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)

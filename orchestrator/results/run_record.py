@@ -249,7 +249,7 @@ class RunRecord(_Part):
     ended: EndRecord | None = None
     evaluation_order: list[str] = []
     units: dict[str, str | None] = {}  # units of time and of the columns
-    texts: list[str] | None = None  # columns that hold text
+    texts: list[str] = []  # columns that hold text
     fmus: dict[str, FmuRecord] = {}
     sources: list[SourceRecord] = []  # of values of parameters and constants, each once
     changes: list[OverrideRecord] = []

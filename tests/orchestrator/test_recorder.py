@@ -107,7 +107,7 @@ def test_columns_keep_their_order_when_some_are_no_reals(tmp_path):
     writer.rows[0][:] = [0.0, 1.0, 2.0]
     writer.others.append([7, 'say "ä",\nthen stop', True])
     writer.write(1)
-    writer.finish(RunRecord(status="completed", units={}))
+    writer.finish(RunRecord(status="completed", texts=["a.s"], units={}))
     writer.close()
     results = load_results(tmp_path)
     assert {name: column[0] for name, column in results.columns.items()} == {

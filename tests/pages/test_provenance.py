@@ -13,7 +13,8 @@ from tests.fmu_copies import put_fmus
 from tests.orchestrator.recorded import record_text
 from tests.refusals import mentions
 from yawbench.orchestrator.plan import CHOSEN, ERRATUM, LITERATURE, NEUTRAL, PAPER, ValueSource
-from yawbench.orchestrator.results.freshness import key_of, run_record, staleness
+from yawbench.orchestrator.results.freshness import key_of, staleness
+from yawbench.orchestrator.results.record_of_plan import run_record
 from yawbench.orchestrator.results.run_record import RunRecord
 from yawbench.orchestrator.scenario.loader import load_scenario
 from yawbench.orchestrator.wiring.make_plan import make_plan

@@ -71,7 +71,7 @@ def _data_of(plan: Plan) -> dict[str, object]:
     """Return a plan as run.json describes it."""
     from datetime import datetime, timezone
 
-    from yawbench.orchestrator.results.freshness import run_record
+    from yawbench.orchestrator.results.record_of_plan import run_record
     from yawbench.orchestrator.results.run_folder import RunStatus
 
     record = run_record(plan, status=RunStatus.PLANNED, started=datetime.now(timezone.utc)).content()
@@ -289,7 +289,7 @@ def _delayed_rows(plan: Plan) -> Iterable[Sequence[str]]:
 
 
 def _fault_rows(plan: Plan) -> Iterable[Sequence[str]]:
-    from yawbench.orchestrator.results.freshness import faults_of
+    from yawbench.orchestrator.results.record_of_plan import faults_of
 
     for fault in faults_of(plan):
         yield fault.on, fault.fault, ", ".join(fold(fault.at))

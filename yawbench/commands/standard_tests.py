@@ -89,7 +89,7 @@ def drive(
     Without --out, results go to results/<folder of the scenario>/<its name>_series. An interrupted series
     is resumed; finished runs are not repeated.
     """
-    from yawbench.orchestrator.results.run_folder import default_folder
+    from yawbench.orchestrator.results.folder_names import default_folder
     from yawbench.orchestrator.scenario import loader
     from yawbench.studies.scenario_experiments import TestDriver
 
@@ -211,8 +211,8 @@ def evaluate(
     `yawbench drive`, its runs and its A are taken, and its evaluation is kept: this one goes to a folder
     evaluated in it. Exit status 1 if nothing could be judged.
     """
+    from yawbench.orchestrator.results.folder_names import below_results
     from yawbench.orchestrator.results.measurement_results import load_run
-    from yawbench.orchestrator.results.run_folder import below_results
     from yawbench.proving_ground.trace import trace_of
 
     from .results import distinct, folder_of_all

@@ -19,7 +19,7 @@ from yawbench._scenario import fmu_of
 from yawbench.components.fmi.component import Component
 from yawbench.foundation.errors import ScenarioError
 from yawbench.foundation.messages import hint
-from yawbench.orchestrator.results.run_folder import writing
+from yawbench.orchestrator.results.folder_lock import writing
 from yawbench.orchestrator.scenario import loader
 from yawbench.studies.executor import Executor
 from yawbench.studies.jobs import Job, OnOutcome, Outcome, run_job
